@@ -1,5 +1,5 @@
-//! Builds a scene in code, without a scene file: a row of balls on a checkered ground plane, one of them with a texture
-//! image that is also built here. Writes the image with depth and normal layers to an OpenEXR file.
+//! Builds a scene in code, without a scene file: a row of balls on a checkered ground plane. The texture image of one
+//! ball is also built in code. Writes the image with depth and normal layers to an OpenEXR file.
 //!
 //! ```sh
 //! cargo run --release --example build_scene -- balls.exr
@@ -41,7 +41,7 @@ fn main() -> Result<(), Error> {
         .with_shape(SphereDescription::new("striped", [0.0, 0.0, 0.9], 0.9))
         .with_shape(SphereDescription::new("glass", [2.0, -0.5, 0.9], 0.9));
 
-    // A texture image in memory, by the texture's file name.
+    // A texture image in memory; its key is the file name that the texture refers to.
     let colors: Vec<[u8; 3]> = (0..32)
         .map(|i| if i % 4 < 2 { [200, 40, 40] } else { [240, 230, 200] })
         .collect();

@@ -32,11 +32,11 @@ fn main() -> Result<ExitCode, Error> {
         return Ok(ExitCode::FAILURE);
     }
     let Some(difference) = difference(&gpu.pixels(), &cpu.pixels(), 0.0) else {
-        return Ok(ExitCode::FAILURE); // The images have different sizes.
+        return Ok(ExitCode::FAILURE); // the images have different sizes
     };
     let name = &gpu.device().name;
     println!(
-        "{name}: {} pixels differ from the CPU's; largest difference {}",
+        "{name}: pixels that differ from the CPU: {}; largest difference: {}",
         difference.unequal, difference.largest
     );
     Ok(match difference.unequal {

@@ -1,4 +1,4 @@
-//! Writes procedural meshes, which need no download: the knot of `scenes/meshes/`, and large meshes for measurements.
+//! Writes procedural meshes: the knot of `scenes/meshes/`, and large meshes for measurements.
 //!
 //! ```sh
 //! cargo run --release --example make_mesh -- knot scenes/meshes/knot.obj
@@ -16,9 +16,9 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let words: Vec<String> = std::env::args().skip(1).collect();
-    let words: Vec<&str> = words.iter().map(String::as_str).collect();
-    let (name, bytes) = match *words {
+    let args: Vec<String> = std::env::args().skip(1).collect();
+    let args: Vec<&str> = args.iter().map(String::as_str).collect();
+    let (name, bytes) = match *args {
         [] => ("target/knot.obj", knot().into_bytes()),
         ["knot", file] => (file, knot().into_bytes()),
         ["terrain", count, file] => (file, terrain(count.parse()?).to_bytes(file)?),
@@ -30,34 +30,35 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Number of points along the knot (`ALONG`) and around its tube (`AROUND`).
-const ALONG: usize = 216;
-const AROUND: usize = 12;
+/// Number of points along the knot.
+const POINTS_ALONG: usize = 216;
+/// Number of points around the tube.
+const POINTS_AROUND: usize = 12;
 
-/// Returns a tube along the (2, 3) torus knot as the text of an OBJ file: closed, with unit normals and texture
-/// coordinates. It is 0.8 wide and rests on the plane z = 0.
+/// Returns a closed tube along the (2, 3) torus knot as the text of an OBJ file, with unit normals and texture
+/// coordinates. The tube is 0.8 wide and rests on the plane z = 0.
 pub fn knot() -> String {
     const TORUS: f64 = 0.23;
     const RING: f64 = 0.1;
     const TUBE: f64 = 0.065;
     let mut positions = Vec::new();
     let mut normals = Vec::new();
-    for i in 0..ALONG {
-        let t = TAU * i as f64 / ALONG as f64;
+    for i in 0..POINTS_ALONG {
+        let t = TAU * i as f64 / POINTS_ALONG as f64;
         let ((sin_a, cos_a), (sin_b, cos_b)) = ((2.0 * t).sin_cos(), (3.0 * t).sin_cos());
         let radius = TORUS + RING * cos_b;
         let center = [radius * cos_a, radius * sin_a, RING * sin_b];
         // The curve lies on a torus, whose normal is perpendicular to the curve.
-        let out = [cos_b * cos_a, cos_b * sin_a, sin_b];
+        let outward = [cos_b * cos_a, cos_b * sin_a, sin_b];
         let tangent = unit([
             -3.0 * RING * sin_b * cos_a - 2.0 * radius * sin_a,
             -3.0 * RING * sin_b * sin_a + 2.0 * radius * cos_a,
             3.0 * RING * cos_b,
         ]);
-        let side = cross(out, tangent);
-        for j in 0..AROUND {
-            let (sin, cos) = (TAU * j as f64 / AROUND as f64).sin_cos();
-            let normal: [f64; 3] = std::array::from_fn(|k| cos * out[k] + sin * side[k]);
+        let side = cross(outward, tangent);
+        for j in 0..POINTS_AROUND {
+            let (sin, cos) = (TAU * j as f64 / POINTS_AROUND as f64).sin_cos();
+            let normal: [f64; 3] = std::array::from_fn(|k| cos * outward[k] + sin * side[k]);
             let position: [f64; 3] = std::array::from_fn(|k| center[k] + TUBE * normal[k]);
             positions.push(position);
             normals.push(normal);
@@ -69,8 +70,8 @@ pub fn knot() -> String {
     let mut text = String::from(
         "# A tube along the (2, 3) torus knot. Made by: cargo run --release --example make_mesh -- knot FILE\no knot\n",
     );
-    let mut line = |words: std::fmt::Arguments| {
-        text.write_fmt(words).expect("a string takes all text");
+    let mut line = |content: std::fmt::Arguments| {
+        text.write_fmt(content).expect("writing to a string succeeds");
         text.push('\n');
     };
     let rounded = |x: f64| (x * 1e4).round() / 1e4 + 0.0;
@@ -82,18 +83,18 @@ pub fn knot() -> String {
         let [x, y, z] = n.map(|x| (x * 1e3).round() / 1e3 + 0.0);
         line(format_args!("vn {x} {y} {z}"));
     }
-    // One repetition of the texture is about as long as it is wide.
-    for i in 0..=ALONG {
-        for j in 0..=AROUND {
-            let (u, v) = (i as f64 / AROUND as f64, j as f64 / AROUND as f64);
+    // One repetition of the texture is about as long as wide.
+    for i in 0..=POINTS_ALONG {
+        for j in 0..=POINTS_AROUND {
+            let (u, v) = (i as f64 / POINTS_AROUND as f64, j as f64 / POINTS_AROUND as f64);
             line(format_args!("vt {} {}", rounded(u), rounded(v)));
         }
     }
-    for i in 0..ALONG {
-        for j in 0..AROUND {
+    for i in 0..POINTS_ALONG {
+        for j in 0..POINTS_AROUND {
             let corner = |i: usize, j: usize| {
-                let vertex = i % ALONG * AROUND + j % AROUND + 1;
-                format!("{vertex}/{}/{vertex}", i * (AROUND + 1) + j + 1)
+                let vertex = i % POINTS_ALONG * POINTS_AROUND + j % POINTS_AROUND + 1;
+                format!("{vertex}/{}/{vertex}", i * (POINTS_AROUND + 1) + j + 1)
             };
             let [a, b] = [corner(i, j), corner(i + 1, j)];
             let [c, d] = [corner(i + 1, j + 1), corner(i, j + 1)];
@@ -114,7 +115,7 @@ pub struct Triangles {
 impl Triangles {
     /// Returns the bytes of a file with this name, whose extension selects the format.
     pub fn to_bytes(&self, file: &str) -> Result<Vec<u8>, Box<dyn Error>> {
-        match Path::new(file).extension().and_then(|ending| ending.to_str()) {
+        match Path::new(file).extension().and_then(|extension| extension.to_str()) {
             Some("obj") => Ok(self.to_obj()),
             Some("ply") => Ok(self.to_ply()),
             Some("stl") => Ok(self.to_stl()),
@@ -126,10 +127,10 @@ impl Triangles {
     fn to_obj(&self) -> Vec<u8> {
         let mut text = String::new();
         for [x, y, z] in &self.positions {
-            writeln!(text, "v {x} {y} {z}").expect("a string takes all text");
+            writeln!(text, "v {x} {y} {z}").expect("writing to a string succeeds");
         }
         for [a, b, c] in self.triangles.iter().map(|triangle| triangle.map(|vertex| vertex + 1)) {
-            writeln!(text, "f {a} {b} {c}").expect("a string takes all text");
+            writeln!(text, "f {a} {b} {c}").expect("writing to a string succeeds");
         }
         text.into_bytes()
     }
@@ -148,7 +149,7 @@ impl Triangles {
         for vertex in self.triangles.iter().flatten() {
             binary.extend(vertex.to_le_bytes());
         }
-        let (all, at) = (binary.len(), 12 * vertices);
+        let (binary_len, index_offset) = (binary.len(), 12 * vertices);
         let mut json =
             r#"{"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],"#.to_owned();
         json += r#""meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1,"material":0}]}],"#;
@@ -156,20 +157,20 @@ impl Triangles {
         json += &format!(r#""accessors":[{{"bufferView":0,"componentType":5126,"count":{vertices},"type":"VEC3","#);
         json += &format!(r#""min":{low:?},"max":{high:?}}},"#);
         json += &format!(r#"{{"bufferView":1,"componentType":5125,"count":{indices},"type":"SCALAR"}}],"#);
-        json += &format!(r#""bufferViews":[{{"buffer":0,"byteLength":{at}}},"#);
+        json += &format!(r#""bufferViews":[{{"buffer":0,"byteLength":{index_offset}}},"#);
         json += &format!(
-            r#"{{"buffer":0,"byteOffset":{at},"byteLength":{}}}],"buffers":[{{"byteLength":{all}}}]}}"#,
-            all - at
+            r#"{{"buffer":0,"byteOffset":{index_offset},"byteLength":{}}}],"buffers":[{{"byteLength":{binary_len}}}]}}"#,
+            binary_len - index_offset
         );
         json += &" ".repeat(json.len().next_multiple_of(4) - json.len());
         let mut bytes = b"glTF".to_vec();
         let word = |bytes: &mut Vec<u8>, x: usize| bytes.extend((x as u32).to_le_bytes());
         word(&mut bytes, 2);
-        word(&mut bytes, 12 + 8 + json.len() + 8 + all);
+        word(&mut bytes, 12 + 8 + json.len() + 8 + binary_len);
         word(&mut bytes, json.len());
         bytes.extend(b"JSON");
         bytes.extend(json.as_bytes());
-        word(&mut bytes, all);
+        word(&mut bytes, binary_len);
         bytes.extend(b"BIN\0");
         bytes.extend(binary);
         bytes
@@ -232,10 +233,10 @@ pub fn rock(count: usize) -> Triangles {
     let side = ((count as f64 / 12.0).sqrt().round() as usize).max(1);
     let mut positions = Vec::with_capacity(6 * side * side + 2);
     let mut triangles = Vec::with_capacity(12 * side * side);
-    let mut numbers = HashMap::with_capacity(6 * side * side + 2);
+    let mut vertices = HashMap::with_capacity(6 * side * side + 2);
     let mut vertex = |lattice: [usize; 3]| -> u32 {
-        *numbers.entry(lattice).or_insert_with(|| {
-            // Equiangular coordinates: with the tangent, cells have similar sizes on the sphere.
+        *vertices.entry(lattice).or_insert_with(|| {
+            // Equiangular coordinates: the tangent gives the cells similar sizes on the sphere.
             let on_cube = lattice.map(|i| ((2.0 * i as f64 / side as f64 - 1.0) * TAU / 8.0).tan());
             let direction = unit(on_cube);
             let radius = 0.4 + 0.16 * noise(direction.map(|x| 1.3 * x + 7.0), 10);
@@ -244,18 +245,18 @@ pub fn rock(count: usize) -> Triangles {
         })
     };
     for axis in 0..3 {
-        for (end, i, j) in [0, side]
+        for (side_index, i, j) in [0, side]
             .into_iter()
-            .flat_map(|end| (0..side).flat_map(move |i| (0..side).map(move |j| (end, i, j))))
+            .flat_map(|side_index| (0..side).flat_map(move |i| (0..side).map(move |j| (side_index, i, j))))
         {
             let mut corner = |i: usize, j: usize| {
-                let mut lattice = [end; 3];
+                let mut lattice = [side_index; 3];
                 (lattice[(axis + 1) % 3], lattice[(axis + 2) % 3]) = (i, j);
                 vertex(lattice)
             };
             let [a, b] = [corner(i, j), corner(i + 1, j)];
             let [c, d] = [corner(i + 1, j + 1), corner(i, j + 1)];
-            triangles.extend(match end {
+            triangles.extend(match side_index {
                 0 => [[a, c, b], [a, d, c]],
                 _ => [[a, b, c], [a, c, d]],
             });
@@ -268,7 +269,7 @@ pub fn rock(count: usize) -> Triangles {
 /// al., "Texturing and Modeling: A Procedural Approach", chapters 2 and 16.
 fn noise(mut point: [f64; 3], octaves: u32) -> f64 {
     let mut sum = 0.0;
-    let mut height = 0.5;
+    let mut amplitude = 0.5;
     for octave in 0..octaves {
         let cell = point.map(f64::floor);
         // Smoothstep: 3 t^2 - 2 t^3.
@@ -277,13 +278,13 @@ fn noise(mut point: [f64; 3], octaves: u32) -> f64 {
             t * t * (3.0 - 2.0 * t)
         });
         let cell = cell.map(|x| x as i64);
-        let at = |corner: [i64; 3]| value(std::array::from_fn(|k| cell[k] + corner[k]), octave);
+        let value_at = |corner: [i64; 3]| value(std::array::from_fn(|k| cell[k] + corner[k]), octave);
         let mix = |a: f64, b: f64, t: f64| a + (b - a) * t;
-        let edge = |y: i64, z: i64| mix(at([0, y, z]), at([1, y, z]), weight[0]);
+        let edge = |y: i64, z: i64| mix(value_at([0, y, z]), value_at([1, y, z]), weight[0]);
         let face = |z: i64| mix(edge(0, z), edge(1, z), weight[1]);
-        sum += height * mix(face(0), face(1), weight[2]);
-        height *= 0.5;
-        // The offset keeps lattices from coinciding.
+        sum += amplitude * mix(face(0), face(1), weight[2]);
+        amplitude *= 0.5;
+        // The offset prevents the lattices of the octaves from coinciding.
         point = point.map(|x| 2.0 * x + 0.37);
     }
     2.0 * sum

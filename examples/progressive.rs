@@ -1,4 +1,4 @@
-//! Shows an image in the terminal while it is rendered progressively. Needs a terminal with 24-bit colours.
+//! Renders an image progressively and shows it in the terminal. Needs a terminal with 24-bit colors.
 //!
 //! ```sh
 //! cargo run --release --example progressive -- scenes/cornell.toml
@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 
 use wgray::{Error, Options, Overrides, Picture, Scene};
 
-/// A character shows two pixels, one above the other.
+/// The size of the image in pixels. A character shows two pixels, one above the other.
 const SIZE: (u32, u32) = (64, 48);
 
 fn main() -> Result<(), Error> {
@@ -26,7 +26,7 @@ fn main() -> Result<(), Error> {
     let mut last_draw = Instant::now();
     let picture = wgray::render_progressive(&scene, &Options::default(), &mut |progress| {
         if last_draw.elapsed() > Duration::from_millis(100) {
-            // Moves the cursor up: the next image overwrites this one.
+            // Moves the cursor up, so that the next image overwrites this image.
             let lines = draw(&progress.picture()?);
             print!("{:3.0} %\x1b[{lines}A\r", progress.share() * 100.0);
             last_draw = Instant::now();

@@ -19,7 +19,7 @@ fn mean_of(sum: vec4f) -> vec3f {
     return select(vec3f(0.0), sum.rgb / sum.w, abs(sum.w) > 0.0);
 }
 
-// Assumes independent samples.
+// Returns the variance of the mean of independent samples.
 fn variance_of_mean(sum: vec4f, moments: vec4f) -> vec3f {
     let n = moments.w;
     let scale = n / ((n - 1.0) * sum.w * sum.w);
@@ -43,8 +43,8 @@ fn display_slope_squared(value: f32) -> f32 {
     return slope * slope;
 }
 
-// Adds a sample to the pilot statistics: y sums squared deviations over samples and channels, z the squares of each
-// sample's sum.
+// Adds a sample to the pilot statistics. The squared deviations of a sample's channels are added; y is the sum over all
+// samples, z the sum of the squares.
 fn pilot_add(pilot: vec4f, sum: vec4f, sample: vec4f) -> vec4f {
     let deviation = squared_deviation(sum, sample);
     let total = deviation.x + deviation.y + deviation.z;
@@ -56,22 +56,22 @@ fn pilot_finish(pilot: vec4f, sum: vec4f, moments: vec4f) -> vec4f {
     return vec4f(display_variance(sum, moments), pilot.y, pilot.z, 1.0);
 }
 
-// Returns a sample count from neighbors' pilot statistics over `first` samples each. Doubles the count until the mean
-// squared error is small enough, as long as the variance is reliable. The effective sample size of the variance, y^2 /
-// z, is 1 if a single sample deviates, and the full count if half of the samples do.
-fn samples_wanted(pilot_sum: vec4f, first: u32, squared_error: f32, most: u32) -> u32 {
+// Returns the sample count that the neighbors' pilot statistics require, from `pilot_samples` samples each. Doubles the
+// count until the mean squared error is small enough, as long as the variance is reliable. The effective sample size of
+// the variance, y^2 / z, is 1 if a single sample deviates, and the full count if half of the samples deviate.
+fn samples_wanted(pilot_sum: vec4f, pilot_samples: u32, squared_error: f32, max_samples: u32) -> u32 {
     if !(pilot_sum.w > 0.0) | !(squared_error > 0.0) {
-        return most;
+        return max_samples;
     }
-    let variance = pilot_sum.x / pilot_sum.w * f32(first);
-    var count = first;
-    while count < most {
-        let enough = variance <= squared_error * f32(count);
-        let evident = pilot_sum.y * pilot_sum.y >= pilot_sum.z * (EFFECTIVE_SAMPLES_PER_DOUBLING * (f32(2u * count / first) - 1.0));
-        if enough | !evident {
+    let variance = pilot_sum.x / pilot_sum.w * f32(pilot_samples);
+    var count = pilot_samples;
+    while count < max_samples {
+        let is_enough = variance <= squared_error * f32(count);
+        let is_reliable = pilot_sum.y * pilot_sum.y >= pilot_sum.z * (EFFECTIVE_SAMPLES_PER_DOUBLING * (f32(2u * count / pilot_samples) - 1.0));
+        if is_enough | !is_reliable {
             break;
         }
         count *= 2u;
     }
-    return select(count, most, count > most);
+    return select(count, max_samples, count > max_samples);
 }

@@ -1,6 +1,7 @@
-// Surfaces with alpha. Acceptance depends on pixel, sample, bounce and hit, not on traversal order.
+// Surfaces with alpha. Whether a surface accepts a ray depends on pixel, sample, bounce and hit, not on traversal
+// order.
 
-// Purposes of rays. Rays of different purposes make separate decisions at a surface.
+// Purposes of rays. The random decisions at a surface are independent for rays of different purposes.
 const RAY_BSDF: u32 = 0u;
 const RAY_SHADOW: u32 = 1u;
 
@@ -9,11 +10,12 @@ fn alpha_accepts(material: Material, pixel: vec2u, sample: u32, bounce: u32, pur
     let key = hash4(vec4u(pixel.x, pixel.y, camera.seed, sample));
     let face = select(0u, 1u, side > 0.0);
     let bits = hash4(vec4u(key.x, key.y + 2u * bounce + purpose, hit.instance, 2u * hit.primitive + face));
-    let shown = unit_float(bits.x) < material.opacity;
-    let whole = select(shown, material.opacity >= material.cutoff, material.alpha_mode == MASK);
-    return whole | (material.alpha_mode == OPAQUE);
+    let is_visible = unit_float(bits.x) < material.opacity;
+    let accepted = select(is_visible, material.opacity >= material.cutoff, material.alpha_mode == MASK);
+    return accepted | (material.alpha_mode == OPAQUE);
 }
 
+// Returns the material with textured and vertex-colored opacity.
 fn with_opacity_at(before: Material, prim: HitPrimitive, hit: Hit, uv: vec2f) -> Material {
     var material = before;
     for (var i = 0u; i < LOOKUPS; i++) {
@@ -32,21 +34,22 @@ fn with_opacity_at(before: Material, prim: HitPrimitive, hit: Hit, uv: vec2f) ->
     return material;
 }
 
+// Returns the fraction of rays that the surface accepts.
 fn opacity_at(before: Material, prim: HitPrimitive, hit: Hit, uv: vec2f) -> f32 {
     let material = with_opacity_at(before, prim, hit, uv);
-    let whole = select(0.0, 1.0, material.opacity >= material.cutoff);
-    let share = select(min(material.opacity, 1.0), whole, material.alpha_mode == MASK);
-    return select(share, 1.0, material.alpha_mode == OPAQUE);
+    let masked = select(0.0, 1.0, material.opacity >= material.cutoff);
+    let opacity = select(min(material.opacity, 1.0), masked, material.alpha_mode == MASK);
+    return select(opacity, 1.0, material.alpha_mode == OPAQUE);
 }
 
-// Variant of `is_occluded` with alpha; true after more than MAX_ALPHA_SKIPS skipped surfaces.
-fn is_occluded_alpha(before: bool, surface: Surface, to: vec3f, t_max: f32, target_prim: u32, pixel: vec2u, sample: u32,
+// Variant of `is_occluded` with alpha. Returns true if the ray skips more than MAX_ALPHA_SKIPS surfaces.
+fn is_occluded_alpha(already_occluded: bool, surface: Surface, to_light: vec3f, t_max: f32, target_prim: u32, pixel: vec2u, sample: u32,
              bounce: u32) -> bool {
-    if before {
+    if already_occluded {
         return true;
     }
-    let distance = sqrt(dot(to, to));
-    var ray = Ray(surface.ray_origin, to * (1.0 / distance));
+    let distance = sqrt(dot(to_light, to_light));
+    var ray = Ray(surface.ray_origin, to_light * (1.0 / distance));
     var origin_prim = surface.exclude_front;
     var inside_prim = surface.exclude_back;
     var remaining = distance * t_max;
@@ -83,8 +86,8 @@ fn skip_transparent(ray: Ray, first: Hit) -> Hit {
         let prim = fetch_hit_primitive(hit);
         let surface = surface_of(prim, hit, continued);
         let material = with_opacity_at(material_of(prim), prim, hit, surface.uv);
-        let least = select(0.5, material.cutoff, material.alpha_mode == MASK);
-        if (material.alpha_mode == OPAQUE) | (material.opacity >= least) {
+        let min_opacity = select(0.5, material.cutoff, material.alpha_mode == MASK);
+        if (material.alpha_mode == OPAQUE) | (material.opacity >= min_opacity) {
             break;
         }
         distance += hit.t;

@@ -19,12 +19,13 @@ fn closest_of(kind: u32, before: Hit, ray: Ray, origin_prim: u32, inside_prim: u
     return hit;
 }
 
-// Returns true if `before` is true, or if a primitive except `target_prim` occludes the segment to `t_max * to`.
-fn is_occluded_by(kind: u32, before: bool, surface: Surface, to: vec3f, t_max: f32, target_prim: u32) -> bool {
+// Returns true if `already_occluded` is true, or if a primitive of the kind, except `target_prim`, occludes the segment
+// from the surface along `t_max * to_light`.
+fn is_occluded_by(kind: u32, already_occluded: bool, surface: Surface, to_light: vec3f, t_max: f32, target_prim: u32) -> bool {
     let range = counts.primitives[kind];
-    var occluded = before;
+    var occluded = already_occluded;
     for (var i = range.x; i < range.y && !occluded; i++) {
-        occluded = is_occluded_by_primitive(kind, primitives[i], i, surface, to, t_max, target_prim);
+        occluded = is_occluded_by_primitive(kind, primitives[i], i, surface, to_light, t_max, target_prim);
     }
     return occluded;
 }
@@ -33,7 +34,8 @@ fn emitter_count() -> u32 {
     return counts.emitters.y;
 }
 
-// Returns a mask of up to 32 primitives in `first..end` that may occlude a light: bit i is `first + i`.
+// Returns a mask of the primitives that may occlude a light, for up to 32 primitives in `first..end`: bit i stands for
+// primitive `first + i`.
 fn shadow_candidates(first: u32, end: u32, frustum: ShadowFrustum) -> u32 {
     var candidates = 0u;
     for (var i = 0u; i < 32u && first + i < end; i++) {

@@ -8,7 +8,7 @@ struct Completion {
 }
 
 // Reports the end of a pixel, after all loops of a kernel. `index` is the index of the pixel in its workgroup. The
-// first invocation reports for the whole workgroup, since an atomic addition per pixel takes 3 % of a render on
+// first invocation reports for the whole workgroup, since an atomic addition per pixel takes 3 % of the render time on
 // lavapipe.
 fn report_completion(index: u32) {
     var rounds = 0u;

@@ -12,7 +12,7 @@ fn cylinder_levels(q: Primitive, from_anchor: vec3f) -> vec2f {
 
 // Returns the interval of s, from x to y, where o + s d is inside; empty unless x < y. `levels` are the levels of o.
 fn cylinder_interval(o: vec3f, d: vec3f, levels: vec2f) -> vec2f {
-    // Side, with `ellipsoid_discriminant` in two dimensions.
+    // Side: as `ellipsoid_discriminant`, in two dimensions.
     let a = d.x * d.x + d.y * d.y;
     let b = o.x * d.x + o.y * d.y;
     let moment = o.x * d.y - o.y * d.x;
@@ -21,12 +21,12 @@ fn cylinder_interval(o: vec3f, d: vec3f, levels: vec2f) -> vec2f {
     let sum = select(-b - root, root - b, b < 0.0);
     let s0 = levels.x / sum;
     let s1 = sum / a;
-    let parallel = a == 0.0;
-    // Written so that NaN misses.
-    let misses = select(!(discriminant >= 0.0), !((levels.x <= 0.0) & (b == 0.0)), parallel);
-    let near_side = select(min(s0, s1), -INFINITE_T, parallel);
-    let far_side = select(max(s0, s1), INFINITE_T, parallel);
-    // Caps. Between them, z - 1 and -z - 1 are negative.
+    let is_parallel = a == 0.0;
+    // Negated comparisons, so that NaN is a miss.
+    let misses = select(!(discriminant >= 0.0), !((levels.x <= 0.0) & (b == 0.0)), is_parallel);
+    let near_side = select(min(s0, s1), -INFINITE_T, is_parallel);
+    let far_side = select(max(s0, s1), INFINITE_T, is_parallel);
+    // Caps: between the caps, z - 1 and -z - 1 are negative.
     let above = o.z > 0.0;
     let upper = select(-2.0 - levels.y, levels.y, above);
     let lower = select(levels.y, -2.0 - levels.y, above);
@@ -38,27 +38,27 @@ fn cylinder_interval(o: vec3f, d: vec3f, levels: vec2f) -> vec2f {
     return vec2f(select(near, INFINITE_T, misses), select(far, -INFINITE_T, misses));
 }
 
-// Returns the distance of the nearest hit in (0, limit), else `limit`. With `from_inside` the ray goes inside from the
-// surface.
+// Returns the t of the nearest hit in (0, limit), else `limit`. With `from_inside`, the ray starts on the surface and
+// goes inwards.
 fn intersect_cylinder(q: Primitive, from_inside: bool, ray: Ray, limit: f32) -> f32 {
     let from_anchor = vector_to_local(q, ray.origin - q.anchor);
     let d = vector_to_local(q, ray.direction);
-    let free = cylinder_levels(q, from_anchor);
-    let levels = select(free, levels_on_surface(free, 0.0), from_inside);
+    let raw_levels = cylinder_levels(q, from_anchor);
+    let levels = select(raw_levels, levels_on_surface(raw_levels, 0.0), from_inside);
     return nearest_end(cylinder_interval(from_anchor - q.middle, d, levels), limit);
 }
 
-// Returns true if the surface cuts the local segment o + s d, s in (0, t_max).
+// Returns true if the surface occludes the local segment o + s d, s in (0, t_max).
 fn cylinder_occludes(o: vec3f, d: vec3f, levels: vec2f, t_max: f32) -> bool {
     return interval_occludes(cylinder_interval(o, d, levels), t_max);
 }
 
-// Returns false on the side.
+// Returns true on the caps, false on the side.
 fn is_on_cap(local: vec3f) -> bool {
     return local.z * local.z > local.x * local.x + local.y * local.y;
 }
 
-// Returns 1 at the end, -1 at the start.
+// Returns 1 on the end cap, -1 on the start cap.
 fn cap_side(local: vec3f) -> f32 {
     return select(-1.0, 1.0, local.z > 0.0);
 }
@@ -68,19 +68,19 @@ fn cylinder_gradient(local: vec3f) -> vec3f {
     return select(vec3f(local.x, local.y, 0.0), vec3f(0.0, 0.0, cap_side(local)), is_on_cap(local));
 }
 
-// Returns the gradient's change for the offset d.
+// Returns the change of `cylinder_gradient` for the offset d.
 fn cylinder_gradient_derivative(local: vec3f, d: vec3f) -> vec3f {
     return select(vec3f(d.x, d.y, 0.0), vec3f(0.0), is_on_cap(local));
 }
 
-// Returns the function whose gradient is `cylinder_gradient`.
+// Returns the value of the function whose gradient is `cylinder_gradient`.
 fn cylinder_height(q: Primitive, from_anchor: vec3f) -> f32 {
     let levels = cylinder_levels(q, from_anchor);
     return select(0.5 * levels.x, levels.y, is_on_cap(from_anchor - q.middle));
 }
 
-// Returns the texture coordinates. Side: longitude, and 0 to 1 from start to end. Caps: as on a disk; mirrored on the
-// start cap, seen from the other side.
+// Returns the texture coordinates. Side: the longitude, and 0 to 1 from start to end. Caps: as on a disk, mirrored on
+// the start cap, which faces the other way.
 fn cylinder_uv(local: vec3f) -> vec2f {
     let cap = vec2f(0.5 * local.x + 0.5, 0.5 * (local.y * cap_side(local)) + 0.5);
     return select(vec2f(longitude(local), 0.5 * local.z + 0.5), cap, is_on_cap(local));
@@ -93,12 +93,12 @@ fn cylinder_uv_derivative(local: vec3f, d: vec3f) -> vec2f {
     return select(vec2f(du * 0.15915494309189535, 0.5 * d.z), cap, is_on_cap(local));
 }
 
-// Returns the derivative by u.
+// Returns the derivative of the local position by u.
 fn cylinder_tangent(local: vec3f) -> vec3f {
     return select(vec3f(-local.y, local.x, 0.0) * 6.283185307179586, vec3f(2.0, 0.0, 0.0), is_on_cap(local));
 }
 
-// Returns the derivative by v.
+// Returns the derivative of the local position by v.
 fn cylinder_bitangent(local: vec3f) -> vec3f {
     return select(vec3f(0.0, 0.0, 2.0), vec3f(0.0, 2.0 * cap_side(local), 0.0), is_on_cap(local));
 }

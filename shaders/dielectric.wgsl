@@ -11,8 +11,8 @@ fn eta_of(surface: Surface, material: Material) -> f32 {
     return select(material.ior, 1.0 / material.ior, surface.side > 0.0);
 }
 
-// Returns true if refraction leads through the surface, or on total internal reflection. Mapped and interpolated
-// normals can bend the refracted ray back to the viewer's side, where the path would count as inside.
+// Returns true if the refracted ray passes through the surface, or on total internal reflection. Mapped and
+// interpolated normals can bend the refracted ray back to the viewer's side, although the path would count as inside.
 fn refracts_inwards(surface: Surface, material: Material, normal: vec3f) -> bool {
     let eta = eta_of(surface, material);
     let cosine_i = max(dot(surface.wo, normal), 1e-6);
@@ -23,19 +23,19 @@ fn refracts_inwards(surface: Surface, material: Material, normal: vec3f) -> bool
 
 struct DielectricSample {
     path: Path,
-    passes: bool,          // transmitted
-    eta: f32,              // index ratio, before to behind, if transmitted, else 1
+    is_transmitted: bool,
+    eta: f32,              // ratio of the indices before and behind the surface if transmitted, else 1
 }
 
 // Samples reflection or refraction. Radiance scales with the squared index: Veach, "Robust Monte Carlo Methods for
 // Light Transport Simulation", thesis, 1997, section 5.2.
-fn dielectric_sample(path: Path, surface: Surface, at: HitDifferential, material: Material, random: f32) -> DielectricSample {
+fn dielectric_sample(path: Path, surface: Surface, hit_diff: HitDifferential, material: Material, random: f32) -> DielectricSample {
     let eta = eta_of(surface, material);
     let cosine_i = max(dot(surface.wo, surface.shading_normal), 1e-6);
     let cosine_t = refracted_cosine(cosine_i, eta);
     if random < fresnel(cosine_i, cosine_t, eta) {
-        return DielectricSample(reflected_path(path, surface, at, path.throughput), false, 1.0);
+        return DielectricSample(reflected_path(path, surface, hit_diff, path.throughput), false, 1.0);
     }
     let throughput = path.throughput * material.tint * (eta * eta);
-    return DielectricSample(refracted_path(path, surface, at, throughput, eta, cosine_i, cosine_t), true, eta);
+    return DielectricSample(refracted_path(path, surface, hit_diff, throughput, eta, cosine_i, cosine_t), true, eta);
 }

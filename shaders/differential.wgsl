@@ -1,7 +1,7 @@
 // Ray differentials: derivatives by image coordinates. Igehy, "Tracing Ray Differentials", SIGGRAPH 1999; section
 // numbers refer to that paper.
 
-// Derivative by one image coordinate, times the sample spacing.
+// The derivative of a ray by one image coordinate, times the sample spacing.
 struct Derivative {
     position: vec3f,
     direction: vec3f,
@@ -12,17 +12,16 @@ struct Differential {
     y: Derivative,
 }
 
-// Transfers a derivative to t (section 3.1).
+// Transfers the derivative of a ray to the hit at t (section 3.1).
 fn transferred(derivative: Derivative, ray: Ray, t: f32, normal: vec3f) -> Derivative {
     let moved = derivative.position + derivative.direction * t;
     let dt = dot(moved, normal) / dot(ray.direction, normal);
     return Derivative(moved - ray.direction * dt, derivative.direction);
 }
 
-// Returns the derivative of the outward unit normal, given the derivative of the position, `dp` (section 3.2). The
-// gradient of |M (P
-// - c)|^2 / 2 is g = M^T M (P - c), on a cylinder's side without the third row of M; with N = g / |g|, dN = (dg - N (N
-// . dg)) / |g|.
+// Returns the derivative of the outward unit normal for the derivative `dp` of the position (section 3.2). The gradient
+// of |M (P - c)|^2 / 2 is g = M^T M (P - c), on a cylinder's side without the third row of M. With N = g / |g|, dN =
+// (dg - N (N . dg)) / |g|.
 fn normal_derivative(q: Primitive, local: vec3f, dp: vec3f) -> vec3f {
     let dl = vector_to_local(q, dp);
     let s = solid_gradient(q.kind, local);
@@ -56,7 +55,7 @@ struct HitDifferential {
     normal_y: vec3f,
 }
 
-fn arrival(q: Primitive, differential: Differential, ray: Ray, t: f32, surface: Surface) -> HitDifferential {
+fn primitive_hit_differential(q: Primitive, differential: Differential, ray: Ray, t: f32, surface: Surface) -> HitDifferential {
     let local = point_to_local(q, surface.position);
     let x = transferred(differential.x, ray, t, surface.normal);
     let y = transferred(differential.y, ray, t, surface.normal);
@@ -65,11 +64,11 @@ fn arrival(q: Primitive, differential: Differential, ray: Ray, t: f32, surface: 
     return HitDifferential(x, y, normal_x, normal_y);
 }
 
-fn reflected_differential(at: HitDifferential, d: vec3f, n: vec3f) -> Differential {
-    return Differential(reflected_derivative(at.x, d, n, at.normal_x), reflected_derivative(at.y, d, n, at.normal_y));
+fn reflected_differential(hit_diff: HitDifferential, d: vec3f, n: vec3f) -> Differential {
+    return Differential(reflected_derivative(hit_diff.x, d, n, hit_diff.normal_x), reflected_derivative(hit_diff.y, d, n, hit_diff.normal_y));
 }
 
-fn refracted_differential(at: HitDifferential, d: vec3f, n: vec3f, eta: f32, cosine: f32) -> Differential {
-    return Differential(refracted_derivative(at.x, d, n, at.normal_x, eta, cosine),
-                        refracted_derivative(at.y, d, n, at.normal_y, eta, cosine));
+fn refracted_differential(hit_diff: HitDifferential, d: vec3f, n: vec3f, eta: f32, cosine: f32) -> Differential {
+    return Differential(refracted_derivative(hit_diff.x, d, n, hit_diff.normal_x, eta, cosine),
+                        refracted_derivative(hit_diff.y, d, n, hit_diff.normal_y, eta, cosine));
 }

@@ -3,9 +3,9 @@
 // Light that may arrive at a point.
 struct LightSample {
     to: vec3f,             // vector to the sampled point; direction to distant light
-    radiance: vec3f,       // of a delta light: its contribution for a pdf of 1
-    pdf: f32,              // per solid angle, including the selection; for a delta light the selection alone
-    is_delta: bool,        // cannot be hit by other rays
+    radiance: vec3f,       // for a delta light, the contribution at a pdf of 1
+    pdf: f32,              // per solid angle, including the selection; for a delta light, only the selection probability
+    is_delta: bool,        // BSDF samples cannot hit the light
     t_max: f32,            // end of shadow rays, as a multiple of `to`
     primitive: u32,        // the emitter, which does not occlude itself, or NO_INDEX
 }
@@ -17,17 +17,17 @@ fn select_emitter(bits: vec2u) -> Emitter {
     if EMITTERS == 1u {
         return load_emitter(0u);
     }
-    let first = whole_below(bits.x, count);
+    let first = uniform_below(bits.x, count);
     let emitter = load_emitter(first);
     return load_emitter(select(emitter.alias_index, first, unit_float(bits.y) < emitter.threshold));
 }
 
-// Samples the light that arrives at p. `normal` is the surface's, or 0 if light may arrive from both sides.
-fn sample_emitter(chosen: EmitterSelection, p: vec3f, normal: vec3f, u: vec2f) -> LightSample {
-    let emitter = chosen.emitter;
+// Samples the light that arrives at p. `normal` is the surface normal, or 0 if light may arrive from both sides.
+fn sample_emitter(selection: EmitterSelection, p: vec3f, normal: vec3f, u: vec2f) -> LightSample {
+    let emitter = selection.emitter;
     if (EMITTER_KINDS & (1u << INSTANCE)) != 0u {
         if emitter.instance != 0u {
-            return sample_face(chosen, p, u);
+            return sample_face(selection, p, u);
         }
     }
     var light = load_light(emitter.index);
@@ -37,56 +37,56 @@ fn sample_emitter(chosen: EmitterSelection, p: vec3f, normal: vec3f, u: vec2f) -
         }
     }
     if LIGHT_TREE != 0u {
-        light.density = select(light.density, chosen.density, chosen.density > 0.0);
+        light.density = select(light.density, selection.density, selection.density > 0.0);
     }
     return sample_light(light, p, u);
 }
 
 fn sample_light(light: Light, p: vec3f, u: vec2f) -> LightSample {
-    var at = vec2f(0.0);
+    var position = vec2f(0.0);
     if (EMITTER_KINDS & (1u << RECTANGLE)) != 0u {
-        at = select(at, u * 2.0 - 1.0, light.kind == RECTANGLE);
+        position = select(position, u * 2.0 - 1.0, light.kind == RECTANGLE);
     }
     if (EMITTER_KINDS & (1u << DISK)) != 0u {
-        at = select(at, disk_sample(u), light.kind == DISK);
+        position = select(position, disk_sample(u), light.kind == DISK);
     }
     if (EMITTER_KINDS & (1u << TRIANGLE)) != 0u {
-        at = select(at, triangle_sample(u), light.kind == TRIANGLE);
+        position = select(position, triangle_sample(u), light.kind == TRIANGLE);
     }
-    var to = (light.center - p * light.finite) + light.u * at.x + light.v * at.y;
+    var to_light = (light.center - p * light.finite) + light.u * position.x + light.v * position.y;
     var pdf = light.density;
     var radiance = light.color;
     let is_delta = light.kind >= POINT;
     var behind = false;
     if (EMITTER_KINDS & (1u << POINT)) != 0u {
-        radiance = select(radiance, light.color / dot(to, to), light.kind == POINT);
+        radiance = select(radiance, light.color / dot(to_light, to_light), light.kind == POINT);
     }
     if (EMITTER_KINDS & (1u << SPOT)) != 0u {
-        radiance = select(radiance, light.color * (spot_falloff(light, to) / dot(to, to)), light.kind == SPOT);
+        radiance = select(radiance, light.color * (spot_falloff(light, to_light) / dot(to_light, to_light)), light.kind == SPOT);
     }
     if (EMITTER_KINDS & ((1u << RECTANGLE) | (1u << DISK) | (1u << TRIANGLE))) != 0u {
-        pdf = select(solid_angle_pdf(pdf, to, light.normal), pdf, is_delta);
-        behind = (light.sides == 1u) & (dot(light.normal, to) >= 0.0);
+        pdf = select(solid_angle_pdf(pdf, to_light, light.normal), pdf, is_delta);
+        behind = (light.sides == 1u) & (dot(light.normal, to_light) >= 0.0);
     }
     if (EMITTER_KINDS & (1u << ELLIPSOID)) != 0u {
         if light.kind == ELLIPSOID {
             let q = load_primitive(light.primitive);
-            to = ellipsoid_sample(q, p, u);
-            pdf = light.density * ellipsoid_area(q) * ellipsoid_pdf(q, p, normalize(to));
+            to_light = ellipsoid_sample(q, p, u);
+            pdf = light.density * ellipsoid_area(q) * ellipsoid_pdf(q, p, normalize(to_light));
         }
     }
     if (EMITTER_KINDS & (1u << CYLINDER)) != 0u {
         if light.kind == CYLINDER {
             let q = load_primitive(light.primitive);
             let point = cylinder_sample(q, p, u);
-            to = point.to;
-            pdf = solid_angle_pdf(light.density * cylinder_share(q, p), to, point.normal);
+            to_light = point.to;
+            pdf = solid_angle_pdf(light.density * cylinder_share(q, p), to_light, point.normal);
         }
     }
     if EMISSION_TEXTURES != 0u {
         if !is_delta {
             let q = load_primitive(light.primitive);
-            let uv = primitive_uv(q, point_to_local(q, p + to));
+            let uv = primitive_uv(q, point_to_local(q, p + to_light));
             let hit = hit_on_primitive(light.primitive);
             radiance = emission_at(load_material(q.material), standalone_hit_primitive(q), hit, uv);
         }
@@ -95,24 +95,24 @@ fn sample_light(light: Light, p: vec3f, u: vec2f) -> LightSample {
         if !is_delta {
             let q = load_primitive(light.primitive);
             let hit = hit_on_primitive(light.primitive);
-            radiance *= opacity_at(load_material(q.material), standalone_hit_primitive(q), hit, primitive_uv(q, point_to_local(q, p + to)));
+            radiance *= opacity_at(load_material(q.material), standalone_hit_primitive(q), hit, primitive_uv(q, point_to_local(q, p + to_light)));
         }
     }
     radiance = select(radiance, vec3f(0.0), behind);
-    return LightSample(to, radiance, pdf, is_delta, light.t_max, light.primitive);
+    return LightSample(to_light, radiance, pdf, is_delta, light.t_max, light.primitive);
 }
 
 fn hit_on_primitive(primitive: u32) -> Hit {
     return Hit(0.0, 0u, primitive, 0u, vec2f(0.0));
 }
 
-fn sample_face(chosen: EmitterSelection, p: vec3f, u: vec2f) -> LightSample {
-    let emitter = chosen.emitter;
+fn sample_face(selection: EmitterSelection, p: vec3f, u: vec2f) -> LightSample {
+    let emitter = selection.emitter;
     let b = triangle_sample(u);
     let hit = Hit(0.0, emitter.instance, 0u, emitter.index, b);
     let face = face_of(load_instance(emitter.instance - 1u), hit);
     let material = material_of(face);
-    let to = face.primitive.anchor + (face.edge_1 * b.x + face.edge_2 * b.y) - p;
+    let to_light = face.primitive.anchor + (face.edge_1 * b.x + face.edge_2 * b.y) - p;
     var radiance = material.emission;
     if EMISSION_TEXTURES != 0u {
         radiance = emission_at(material, face, hit, face_uv(face, b));
@@ -127,10 +127,10 @@ fn sample_face(chosen: EmitterSelection, p: vec3f, u: vec2f) -> LightSample {
     }
     var density = material.density;
     if LIGHT_TREE != 0u {
-        density = chosen.density;
+        density = selection.density;
     }
-    let pdf = solid_angle_pdf(density, to, face.primitive.z);
-    return LightSample(to, radiance, pdf, false, environment.t_max, NO_INDEX);
+    let pdf = solid_angle_pdf(density, to_light, face.primitive.z);
+    return LightSample(to_light, radiance, pdf, false, environment.t_max, NO_INDEX);
 }
 
 // Returns the textured emission, without vertex colors.

@@ -1,7 +1,7 @@
 // Equirectangular mapping of the environment map, and its cells. The center is +x, left and right edges are -x, the
 // upper edge is +z. A cell lies between the centers of four texels, or of two texels and a pole.
 
-// A point in a cell. Rows have `width` cells; there is one row more than in the image.
+// A point in a cell. Rows have `width` cells. There is one more row of cells than of texels.
 struct EnvironmentCell {
     column: u32,
     row: u32,
@@ -14,16 +14,16 @@ fn cell_towards(d: vec3f, width: u32, height: u32) -> EnvironmentCell {
     let v = atan2(sqrt(d.x * d.x + d.y * d.y), d.z) * 0.31830987 * f32(height) + 0.5;
     let column = floor(u);
     let row = min(floor(v), f32(height));
-    // First and last row have half the height: `at` is 1/2 to 1 in the first, 0 to 1/2 in the last.
-    let at = v - row;
-    let first = row == 0.0;
-    let last = row == f32(height);
-    let y = select(select(at, 2.0 * at, last), 2.0 * at - 1.0, first);
-    let inside = min(max(y, 0.0), 1.0);
-    return EnvironmentCell(u32(select(f32(width) - 1.0, column, column >= 0.0)), u32(row), u - column, inside);
+    // The first and the last row have half the height: `fraction` is 1/2 to 1 in the first row, 0 to 1/2 in the last.
+    let fraction = v - row;
+    let is_first = row == 0.0;
+    let is_last = row == f32(height);
+    let y = select(select(fraction, 2.0 * fraction, is_last), 2.0 * fraction - 1.0, is_first);
+    let clamped_y = min(max(y, 0.0), 1.0);
+    return EnvironmentCell(u32(select(f32(width) - 1.0, column, column >= 0.0)), u32(row), u - column, clamped_y);
 }
 
-// Wraps around the edge.
+// Returns the next column, wrapped around the edge.
 fn column_after(column: u32, width: u32) -> u32 {
     return select(column + 1u, 0u, column + 1u == width);
 }
@@ -35,8 +35,9 @@ fn cap_above(row: u32, height: u32) -> f32 {
     return 2.0 * s * s;
 }
 
-// Returns a normal's bin: the nearest point of a grid on the octahedral map, which includes the axes. Cigolle et al.,
-// "A Survey of Efficient Representations for Independent Unit Vectors", JCGT 3(2), 2014. The last bin is for 0.
+// Returns a normal's bin: the nearest point of a grid on the octahedral map; the grid includes the axes. Cigolle et
+// al., "A Survey of Efficient Representations for Independent Unit Vectors", JCGT 3(2), 2014. The last bin is for the
+// normal 0.
 fn normal_bin(normal: vec3f) -> u32 {
     let sum = abs(normal.x) + abs(normal.y) + abs(normal.z);
     let x = normal.x / sum;
@@ -50,15 +51,15 @@ fn normal_bin(normal: vec3f) -> u32 {
     return select(NORMAL_BINS * NORMAL_BINS, bin, sum > 0.0);
 }
 
-// Returns the direction to the point u of a cell, uniform over the solid angle for uniform u. Its length is 1 within 1
-// / 10^6.
+// Returns the direction to the point u of a cell, uniform over the solid angle for uniform u. The length is 1 within
+// 1e-6.
 fn direction_in_cell(column: u32, row: u32, u: vec2f, width: u32, height: u32) -> vec3f {
     let turn = 1.0 - 2.0 * ((f32(column) + 0.5 + u.x) / f32(width));
-    let below = row > height / 2u;
-    let from_pole = select(row, height - row, below);
+    let is_lower_half = row > height / 2u;
+    let from_pole = select(row, height - row, is_lower_half);
     let inner = cap_above(from_pole, height);
     let cap = inner + (cap_above(from_pole + 1u, height) - inner) * u.y;
     let radius = sqrt(max(cap * (2.0 - cap), 0.0));
     let z = 1.0 - cap;
-    return vec3f(radius * sine(turn + 0.5), radius * sine(turn), select(z, -z, below));
+    return vec3f(radius * sine(turn + 0.5), radius * sine(turn), select(z, -z, is_lower_half));
 }

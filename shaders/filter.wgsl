@@ -1,8 +1,8 @@
 // Reconstruction filters by importance sampling: samples follow the filter's magnitude and are weighted by its sign, so
-// that a pixel needs no samples of its neighbors. Ernst, Stamminger and Greiner, "Filter Importance Sampling", IEEE
-// Symposium on Interactive Ray Tracing, 2006. `crates/render/src/pack/filter.rs` builds the bins.
+// that a pixel needs no samples of neighboring pixels. Ernst, Stamminger and Greiner, "Filter Importance Sampling",
+// IEEE Symposium on Interactive Ray Tracing, 2006. `crates/render/src/pack/filter.rs` builds the bins.
 
-// Returns a uniform number's bin. Bins run symmetrically outwards from the center.
+// Returns the bin of a uniform number. Bins run symmetrically outwards from the center.
 fn filter_bin(u: f32, bins: u32) -> u32 {
     let bin = u32(max(abs(2.0 * u - 1.0) * f32(bins), 0.0)); // NaN: 0
     return select(bins - 1u, bin, bin < bins);

@@ -20,8 +20,8 @@ fn wrap_v(t: Texture) -> u32 {
     return t.wrap >> 2u;
 }
 
-// Transforms a footprint to texture coordinates. It has no extent across a clamped edge, so that coarse levels do not
-// mix in distant texels.
+// Transforms a footprint from surface to texture coordinates. Beyond a clamped edge, the footprint has no extent across
+// the edge, so that coarse levels do not mix in distant texels.
 fn texture_footprint(t: Texture, f: Footprint) -> Footprint {
     let dx = vec2f(t.u.x * f.dx.x + t.u.y * f.dx.y, t.v.x * f.dx.x + t.v.y * f.dx.y);
     let dy = vec2f(t.u.x * f.dy.x + t.u.y * f.dy.y, t.v.x * f.dy.x + t.v.y * f.dy.y);
@@ -39,8 +39,8 @@ struct Ellipse {
     minor: f32,
 }
 
-// Returns the ellipse with conjugate semi-axes dx and dy. Its minor semi-axis is at least 1 / `anisotropy` of the major
-// semi-axis. The eigenvalues of J J^T for J = (dx, dy) are the squared semi-axes.
+// Returns the ellipse with conjugate semi-axes dx and dy. The minor semi-axis is enlarged to at least 1 / `anisotropy`
+// of the major semi-axis. The eigenvalues of J J^T for J = (dx, dy) are the squared semi-axes.
 fn footprint_ellipse(dx: vec2f, dy: vec2f, anisotropy: f32) -> Ellipse {
     let p = dx.x * dx.x + dy.x * dy.x;
     let q = dx.x * dx.y + dy.x * dy.y;
@@ -49,8 +49,8 @@ fn footprint_ellipse(dx: vec2f, dy: vec2f, anisotropy: f32) -> Ellipse {
     let root = sqrt(half * half + q * q);
     let large = 0.5 * (p + r) + root;
     let area = dx.x * dy.y - dx.y * dy.x;
-    let least = large / (anisotropy * anisotropy);
-    let small = min(max(area * area / max(large, 1e-30), least), large);
+    let lower_bound = large / (anisotropy * anisotropy);
+    let small = min(max(area * area / max(large, 1e-30), lower_bound), large);
     // M = small I + (large - small) e e^T, e the unit vector of the major axis.
     let wide = half >= 0.0;
     let e = vec2f(select(q, half + root, wide), select(root - half, q, wide));

@@ -1,7 +1,7 @@
 // Ray queries of integrators. A few primitives are tested one by one, from buffers (`buffers.wgsl`) or as constants;
 // BVHs hold all others (`bvh.wgsl`).
 
-// Returns the closest hit except on `origin_prim`. The ray goes inside from the solid `inside_prim`.
+// Returns the closest hit except on `origin_prim`. The ray starts on the solid `inside_prim` and goes inwards.
 fn closest_hit(ray: Ray, origin_prim: vec2u, inside_prim: vec2u) -> Hit {
     if TLAS_KINDS == 0u {
         return closest_primitive(ray, origin_prim.y, inside_prim.y);
@@ -9,8 +9,9 @@ fn closest_hit(ray: Ray, origin_prim: vec2u, inside_prim: vec2u) -> Hit {
     return closest_in_bvh(closest_primitive(ray, standalone_prim(origin_prim), standalone_prim(inside_prim)), ray, origin_prim, inside_prim);
 }
 
-// Returns the mask of occluded samples. The surface's own primitive does not occlude samples above it, unless it is a
-// solid seen from inside. Samples in `unlit` are not tested against the BVH; the bits of these samples have no meaning.
+// Returns the mask of occluded samples. The surface's own primitive does not occlude samples above the surface, unless
+// the primitive is a solid seen from inside. Samples in the mask `unlit` are not tested against the BVH, and their bits
+// have no meaning.
 fn occluded_samples(surface: Surface, light: Light, block: SampleBlock, unlit: u32) -> u32 {
     let bits = occluded_by_primitives(surface, light, block);
     if TLAS_KINDS == 0u {
@@ -19,14 +20,14 @@ fn occluded_samples(surface: Surface, light: Light, block: SampleBlock, unlit: u
     return occluded_by_bvh(bits | unlit, surface, light, block);
 }
 
-// Returns true if `before` is true, or if a primitive except `target_prim` occludes the segment to `t_max * to`. The
-// surface's own primitive counts as in `occluded_samples`.
-fn is_occluded(before: bool, surface: Surface, to: vec3f, t_max: f32, target_prim: u32) -> bool {
-    let occluded = is_occluded_by_primitives(before, surface, to, t_max, target_prim);
+// Returns true if `already_occluded` is true, or if a primitive except `target_prim` occludes the segment from the
+// surface along `t_max * to_light`. The surface's own primitive counts as in `occluded_samples`.
+fn is_occluded(already_occluded: bool, surface: Surface, to_light: vec3f, t_max: f32, target_prim: u32) -> bool {
+    let occluded = is_occluded_by_primitives(already_occluded, surface, to_light, t_max, target_prim);
     if TLAS_KINDS == 0u {
         return occluded;
     }
-    return is_occluded_by_bvh(occluded, surface, to, t_max, target_prim);
+    return is_occluded_by_bvh(occluded, surface, to_light, t_max, target_prim);
 }
 
 fn is_on_mesh(hit: Hit) -> bool {
@@ -67,15 +68,15 @@ fn hit_differential(prim: HitPrimitive, hit: Hit, surface: Surface, ray: Ray, di
     if is_on_mesh(hit) {
         return face_hit_differential(prim, hit.barycentric, differential, ray, hit.t, surface);
     }
-    return arrival(prim.primitive, differential, ray, hit.t, surface);
+    return primitive_hit_differential(prim.primitive, differential, ray, hit.t, surface);
 }
 
 // Returns the footprint in texture coordinates.
-fn footprint_of(prim: HitPrimitive, hit: Hit, surface: Surface, at: HitDifferential) -> Footprint {
+fn footprint_of(prim: HitPrimitive, hit: Hit, surface: Surface, hit_diff: HitDifferential) -> Footprint {
     if is_on_mesh(hit) {
-        return face_footprint(prim, surface, at.x.position, at.y.position);
+        return face_footprint(prim, surface, hit_diff.x.position, hit_diff.y.position);
     }
-    return surface_footprint(prim.primitive, surface, at.x.position, at.y.position);
+    return surface_footprint(prim.primitive, surface, hit_diff.x.position, hit_diff.y.position);
 }
 
 // Returns the camera ray through an image point and the lens center.
@@ -86,7 +87,7 @@ fn view_ray(raster: vec2f) -> Ray {
     return camera_ray(camera, raster);
 }
 
-// Moves a path behind the first surfaces that are invisible to the camera.
+// Continues a camera path behind the surfaces at its start that are invisible to the camera.
 fn skip_camera_invisible(start: Path) -> Path {
     var path = start;
     for (var i = 0u; i < MAX_CAMERA_SKIPS; i++) {

@@ -11,7 +11,7 @@ fn ggx_d(alpha: vec2f, m: vec3f) -> f32 {
     return select(0.0, 0.31830988618379067 / (alpha.x * alpha.y * s * s), m.z > 0.0);
 }
 
-// Returns the length of w in the hemispherical configuration.
+// Returns the length of w, stretched to the hemispherical configuration.
 fn ggx_length(alpha: vec2f, w: vec3f) -> f32 {
     let x = w.x * alpha.x;
     let y = w.y * alpha.y;
@@ -53,32 +53,32 @@ fn ggx_albedo(alpha: f32, mu: f32) -> vec2f {
     return ggx_albedo_fit(alpha, mu / length, length);
 }
 
-// Approximates the albedo for two different alphas: masking uses the alpha along w, shadowing the root mean square.
-// Within 7 % where one is 1 and the other small, else within 2 %.
+// Approximates the albedo for two different alphas: masking uses the alpha along w, shadowing the root mean square. The
+// error is within 7 % if one alpha is 1 and the other is small, else within 2 %.
 fn ggx_albedo_along(alpha: vec2f, w: vec3f) -> vec2f {
     let square = 0.5 * (alpha.x * alpha.x + alpha.y * alpha.y);
     let length = sqrt(square * (1.0 - w.z * w.z) + w.z * w.z);
     return ggx_albedo_fit(sqrt(square), abs(w.z) / ggx_length(alpha, w), length);
 }
 
-// Evaluates the fits of `scripts/fit-albedo`, where l is `ggx_length` and t the cosine divided by it. y is within
-// 0.004, x + y within 0.5 % (relative).
+// Evaluates the fits of `scripts/fit-albedo`, where l is `ggx_length` and t the cosine divided by l. y is within 0.004,
+// and x + y within 0.5 % (relative).
 fn ggx_albedo_fit(alpha: f32, t: f32, l: f32) -> vec2f {
     let a = alpha;
     let lost_0 = 0.00548034 + t * (0.0632291 + t * (1.18311 - t * 1.24938));
     let lost_1 = -0.0095148 + t * (0.365153 - t * (0.350613 + t * 0.129283));
     let lost_2 = 0.00812975 + t * (1.56884 + t * (1.18546 - t * 1.09209));
-    let over_0 = 1.0 + t * (3.34908 - t * (1.5592 + t * 1.9202));
-    let over_1 = t * (t * 1.2091 - 0.391082) - 1.12089;
-    let over_2 = 0.644689 + t * 1.02691;
-    let lost = (lost_0 + a * (lost_1 + a * lost_2)) / (over_0 + a * (over_1 + a * over_2));
+    let divisor_0 = 1.0 + t * (3.34908 - t * (1.5592 + t * 1.9202));
+    let divisor_1 = t * (t * 1.2091 - 0.391082) - 1.12089;
+    let divisor_2 = 0.644689 + t * 1.02691;
+    let lost = (lost_0 + a * (lost_1 + a * lost_2)) / (divisor_0 + a * (divisor_1 + a * divisor_2));
     let edge_0 = 0.966613 + l * (2.47501 - l * (12.6147 - l * (22.9802 - l * (18.2852 - l * 5.3897))));
     let edge_1 = -0.386341 - l * (7.14816 - l * (8.05595 - l * (7.34351 - l * 1.95036)));
     let edge_2 = -0.489888 + l * (9.38023 - l * (2.59002 - l * 2.93296));
     let edge_3 = 0.498131 - l * (5.66461 + l * 1.88525);
     let edge_4 = -0.553876 + l * 2.07251;
     let edge = edge_0 + t * (edge_1 + t * (edge_2 + t * (edge_3 + t * (edge_4 + t * 0.267055))));
-    let wide = 1.0 + l * (17.865 + l * 1.84166) - t * (0.237295 + l * 15.3236 + t * 0.459621);
-    let y = max(edge / wide, 0.0);
+    let edge_divisor = 1.0 + l * (17.865 + l * 1.84166) - t * (0.237295 + l * 15.3236 + t * 0.459621);
+    let y = max(edge / edge_divisor, 0.0);
     return vec2f(max(1.0 - lost - y, 0.0), y);
 }

@@ -1,15 +1,15 @@
 // Thin lens cameras: depth of field by aperture shape (Kolb, Mitchell and Hanrahan, "A Realistic Camera Model for
 // Computer Graphics", SIGGRAPH 1995, section 3.1).
 
-// Returns the ray of image point `at` from the lens point p, in the unit disk. The point in focus does not depend on p.
-// Lengths are divided by the focus distance, so that squares neither overflow nor vanish.
-fn lens_ray(camera: Camera, at: vec2f, p: vec2f) -> Ray {
+// Returns the ray of the image point `raster` from the lens point p, in the unit disk. All lens points p have the same
+// point in focus. Lengths are divided by the focus distance, so that squares neither overflow nor vanish.
+fn lens_ray(camera: Camera, raster: vec2f, p: vec2f) -> Ray {
     let start = camera.lens_u * p.x + camera.lens_v * p.y;
-    let through_middle = camera.forward + image_plane_offset(camera, at);
+    let through_middle = camera.forward + image_plane_offset(camera, raster);
     return Ray(camera.position + start, normalize(through_middle - start * camera.inverse_focus));
 }
 
-// Samples the aperture uniformly: the unit disk, or a polygon of blades in it.
+// Samples the aperture uniformly: the unit disk, or a polygon of `blades` sides in the unit disk.
 fn lens_sample(blades: u32, u: vec2f) -> vec2f {
     if blades == 0u {
         return disk_sample(u);
@@ -26,7 +26,7 @@ fn polygon_sample(corners: u32, u: vec2f) -> vec2f {
     return circle_point(side * step) * b.x + circle_point((side + 1.0) * step) * b.y;
 }
 
-// Takes the angle in units of pi.
+// Returns the point of the unit circle at an angle in units of pi.
 fn circle_point(angle: f32) -> vec2f {
     return vec2f(sine(angle + 0.5), sine(angle));
 }

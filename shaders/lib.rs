@@ -1,6 +1,7 @@
-//! The WGSL shaders of wgray as text, and their hash, part of the identity of a render on every device.
+//! The WGSL shaders of wgray as text, and the hash of all shaders, which is part of the identity of a render on every
+//! device.
 
-/// A shader file: name and text at build time.
+/// Name and text of a shader file at build time.
 pub type File = (&'static str, &'static str);
 
 macro_rules! files {
@@ -57,9 +58,10 @@ pub static SHARED: &[File] = files![
     "bvh_node.wgsl",
     "mesh.wgsl",
 ];
-/// Correctly rounded quotients and square roots: first, since naga requires functions before their calls.
+/// Correctly rounded quotients and square roots. This file comes first, since naga requires a function before calls of
+/// it.
 pub static ROUNDING_FILE: &[File] = files!["rounding.wgsl"];
-/// Buffers and scene traversal, in every kernel besides [`SHARED`].
+/// Buffers and scene traversal. Every kernel contains these files and [`SHARED`].
 pub static KERNEL: &[File] = files![
     "bindings.wgsl",
     "completion.wgsl",
@@ -84,16 +86,15 @@ pub static PATH: &[File] = files![
     "scattering.wgsl",
     "integrators/path.wgsl"
 ];
-/// Loops that read the scene from buffers. Kernels with the scene compiled in have functions with constant records
-/// instead.
+/// Loops that read the scene from buffers. Baked kernels have functions with constant records instead.
 pub static FROM_BUFFERS: &[File] = files!["buffers.wgsl"];
 /// Texels in a single buffer.
 pub static TEXELS: &[File] = files!["texels.wgsl"];
-/// Accumulates samples.
+/// The kernel that accumulates samples.
 pub static RENDER_FILE: &[File] = files!["film.wgsl", "kernels/render.wgsl"];
-/// Accumulates samples with adaptive sampling.
+/// The kernel that accumulates samples with adaptive sampling.
 pub static ADAPTIVE_FILE: &[File] = files!["film.wgsl", "kernels/adaptive.wgsl"];
-/// Writes first hits.
+/// The kernel that writes first hits.
 pub static FIRST_HITS_FILE: &[File] = files!["kernels/first_hits.wgsl"];
 
 /// Returns every file, in the order of [`hash`].
@@ -150,9 +151,15 @@ mod tests {
     #[test]
     fn the_table_lists_every_shader() {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR"));
-        let files = ["", "kernels", "integrators"].into_iter().flat_map(|below| {
-            let entries = std::fs::read_dir(folder.join(below)).unwrap().map(Result::unwrap);
-            entries.map(move |entry| Path::new(below).join(entry.file_name()).to_str().unwrap().to_owned())
+        let files = ["", "kernels", "integrators"].into_iter().flat_map(|subfolder| {
+            let entries = std::fs::read_dir(folder.join(subfolder)).unwrap().map(Result::unwrap);
+            entries.map(move |entry| {
+                Path::new(subfolder)
+                    .join(entry.file_name())
+                    .to_str()
+                    .unwrap()
+                    .to_owned()
+            })
         });
         let shaders: BTreeSet<String> = files.filter(|name| name.ends_with(".wgsl")).collect();
         let table: BTreeSet<String> = built_in().map(|(name, _)| name.to_owned()).collect();

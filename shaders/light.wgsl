@@ -11,20 +11,20 @@ fn segments_to_light(light: Light, p: vec3f) -> LightSegments {
     return LightSegments(light.center - p * light.finite, light.u, light.v);
 }
 
-fn segments_to_local(q: Primitive, to: LightSegments) -> LightSegments {
-    return LightSegments(vector_to_local(q, to.towards), vector_to_local(q, to.u), vector_to_local(q, to.v));
+fn segments_to_local(q: Primitive, segments: LightSegments) -> LightSegments {
+    return LightSegments(vector_to_local(q, segments.towards), vector_to_local(q, segments.u), vector_to_local(q, segments.v));
 }
 
-// Returns the vector to `at` in the unit square.
-fn segment(to: LightSegments, at: vec2f) -> vec3f {
-    return to.towards + to.u * (2.0 * at.x - 1.0) + to.v * (2.0 * at.y - 1.0);
+// Returns the vector to the sample `at` in the unit square.
+fn segment(segments: LightSegments, at: vec2f) -> vec3f {
+    return segments.towards + segments.u * (2.0 * at.x - 1.0) + segments.v * (2.0 * at.y - 1.0);
 }
 
-// Returns a spot light's relative intensity: a squared ramp in the cosine, as in glTF's KHR_lights_punctual. `to` is
-// the vector to the light. The difference of unit vectors gives 1 - cosine with the digits of small angles.
-fn spot_falloff(light: Light, to: vec3f) -> f32 {
-    let away = normalize(to) + light.normal;
-    let ramp = (light.cone - 0.5 * dot(away, away)) * light.falloff;
+// Returns a spot light's relative intensity: a squared ramp in the cosine, as in glTF's KHR_lights_punctual. 1 - cosine
+// is computed from the difference of unit vectors, which is precise for small angles.
+fn spot_falloff(light: Light, to_light: vec3f) -> f32 {
+    let difference = normalize(to_light) + light.normal;
+    let ramp = (light.cone - 0.5 * dot(difference, difference)) * light.falloff;
     let bounded = min(max(ramp, 0.0), 1.0);
     return bounded * bounded;
 }

@@ -3,17 +3,17 @@
 // A sampled direction, in the frame of the lobe.
 struct LobeSample {
     wi: vec3f,             // z < 0: transmitted
-    weight: vec3f,         // BSDF times cosine over PDF; 0 if the path ends
+    weight: vec3f,         // BSDF times cosine over pdf; 0 if the path ends
     pdf: f32,              // per solid angle
     eta: f32,              // ratio of the indices before and behind the surface if transmitted, else 1
 }
 
-// Returns alpha along both axes: Burley, "Physically Based Shading at Disney", 2012, section 5.4, with the anisotropy
-// of KHR_materials_anisotropy (glTF).
+// Returns alpha along the two axes of the lobe: Burley, "Physically Based Shading at Disney", 2012, section 5.4, with
+// the anisotropy of KHR_materials_anisotropy (glTF).
 fn plain_alpha(material: Material) -> vec2f {
-    let across = material.roughness * material.roughness;
-    let along = across + (1.0 - across) * (material.anisotropy * material.anisotropy);
-    return vec2f(along, across);
+    let alpha_v = material.roughness * material.roughness;
+    let alpha_u = alpha_v + (1.0 - alpha_v) * (material.anisotropy * material.anisotropy);
+    return vec2f(alpha_u, alpha_v);
 }
 
 fn is_polished(material: Material) -> bool {
@@ -27,16 +27,16 @@ fn facet_alpha(material: Material) -> vec2f {
 }
 
 // Returns the axes of a lobe around the shading normal: the direction of texture u, rotated towards v by `rotation`
-// half turns; arbitrary without usable texture coordinates.
+// half turns; arbitrary axes without usable texture coordinates.
 fn lobe_frame(surface: Surface, rotation: f32) -> Tangents {
     let n = surface.shading_normal;
-    let along = surface.du - n * dot(n, surface.du);
-    let length2 = dot(along, along);
-    let usable = (length2 > 1e-12 * dot(surface.du, surface.du)) & (length2 < 1e30);
-    let other = frame_around(n);
-    let first = select(other.u, along * (1.0 / sqrt(max(length2, 1e-30))), usable);
-    let across = cross(n, first);
-    let second = across * select(-1.0, 1.0, dot(across, surface.dv) >= 0.0);
+    let tangent = surface.du - n * dot(n, surface.du);
+    let length2 = dot(tangent, tangent);
+    let is_usable = (length2 > 1e-12 * dot(surface.du, surface.du)) & (length2 < 1e30);
+    let fallback = frame_around(n);
+    let first = select(fallback.u, tangent * (1.0 / sqrt(max(length2, 1e-30))), is_usable);
+    let perpendicular = cross(n, first);
+    let second = perpendicular * select(-1.0, 1.0, dot(perpendicular, surface.dv) >= 0.0);
     let u = normalize(first * sine(rotation + 0.5) + second * sine(rotation));
     return Tangents(u, cross(n, u));
 }
@@ -55,14 +55,14 @@ fn vector_from_lobe(frame: Tangents, n: vec3f, w: vec3f) -> vec3f {
     return frame.u * w.x + frame.v * w.y + n * w.z;
 }
 
-// Returns the microfacet normal; the surface normal for opposite directions.
+// Returns the microfacet normal of a reflection; for opposite directions, the surface normal.
 fn half_vector(wo: vec3f, wi: vec3f) -> vec3f {
     let sum = wo + wi;
     let length2 = dot(sum, sum);
     return select(vec3f(0.0, 0.0, 1.0), sum * (1.0 / sqrt(length2)), length2 > 1e-20);
 }
 
-// Returns the BRDF for F = 1 times the cosine of wi: D G2 / (4 cos).
+// Returns the BRDF with F = 1, times the cosine of wi: D G2 / (4 cos).
 fn facet_eval(alpha: vec2f, wo: vec3f, wi: vec3f) -> f32 {
     let o = abs(wo.z);
     let i = abs(wi.z);
@@ -70,7 +70,7 @@ fn facet_eval(alpha: vec2f, wo: vec3f, wi: vec3f) -> f32 {
     return ggx_d(alpha, half_vector(wo, wi)) * masking;
 }
 
-// Returns the PDF of reflection by visible normals, per solid angle.
+// Returns the pdf of reflection by visible normals, per solid angle.
 fn facet_pdf(alpha: vec2f, wo: vec3f, wi: vec3f) -> f32 {
     return ggx_d(alpha, half_vector(wo, wi)) * 0.5 / max(wo.z + ggx_length(alpha, wo), 1e-30);
 }
@@ -81,8 +81,8 @@ fn facet_weight(alpha: vec2f, wo: vec3f, wi: vec3f) -> f32 {
     return wi.z * (wo.z + length) / max(wo.z * ggx_length(alpha, wi) + wi.z * length, 1e-30);
 }
 
-// Returns the position of w in an anisotropic albedo table, 0 to 1. x: the roughness in the azimuth of w, from alpha.y
-// to alpha.x, finer near alpha.y. y: the cosine, finer near 0 at low roughness.
+// Returns the position of w in an anisotropic albedo table, 0 to 1. x is for the roughness in the azimuth of w, from
+// alpha.y to alpha.x, with steps finer near alpha.y. y is for the cosine, with steps finer near 0 at low roughness.
 fn aniso_table_position(alpha: vec2f, w: vec3f) -> vec2f {
     let x = alpha.x * w.x;
     let y = alpha.y * w.y;
@@ -94,8 +94,8 @@ fn aniso_table_position(alpha: vec2f, w: vec3f) -> vec2f {
     return vec2f(line, 0.5 * (cosine + cosine * (1.0 + half_way) / (cosine + half_way)));
 }
 
-// Returns the energy lost by single scattering, as a multiple of its albedo, reduced by the error of the fit so that
-// compensation creates no energy.
+// Returns the energy that single scattering loses, as a multiple of the single-scattering albedo, reduced by the error
+// of the fit so that compensation creates no energy.
 fn facet_loss(alpha: vec2f, wo: vec3f) -> f32 {
     let albedo = ggx_albedo_along(alpha, wo);
     return max(1.0 / (albedo.x + albedo.y) - 1.005, 0.0);

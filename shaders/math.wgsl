@@ -1,5 +1,5 @@
-// Arithmetic with the same bits wherever rounding follows IEEE 754. WGSL's built-in functions are avoided, as no
-// decoration protects them from contraction. Tests check each error bound.
+// Arithmetic that gives the same bits wherever rounding follows IEEE 754. WGSL's built-in functions are avoided, since
+// no decoration protects them from contraction. Tests check each error bound.
 
 fn dot(a: vec3f, b: vec3f) -> f32 {
     return a.x * b.x + a.y * b.y + a.z * b.z;
@@ -34,12 +34,12 @@ fn positive_zero(x: f32) -> f32 {
 }
 
 fn floor(x: f32) -> f32 {
-    let small = abs(x) < 8388608.0; // larger ones are whole
-    let whole = f32(i32(select(0.0, x, small)));
-    return select(x, select(whole, whole - 1.0, whole > x), small);
+    let small = abs(x) < 8388608.0; // larger numbers are integers
+    let integer = f32(i32(select(0.0, x, small)));
+    return select(x, select(integer, integer - 1.0, integer > x), small);
 }
 
-// Returns x^n by squaring, n below 2^bits: within n x 2^-24 relative for x from 0 to 1.
+// Returns x^n by squaring, n below 2^bits. The relative error is within n x 2^-24 for x from 0 to 1.
 fn power_whole(x: f32, n: u32, bits: u32) -> f32 {
     var result = 1.0;
     var square = x;
@@ -50,15 +50,15 @@ fn power_whole(x: f32, n: u32, bits: u32) -> f32 {
     return result;
 }
 
-// Returns x^y as 2^(y log2 x), for x from 0 to 1 and y > 0, within 1.7 x 2^-23 (1 + |y log2 x|) relative; 0 for
-// subnormal x.
+// Returns x^y as 2^(y log2 x), for x from 0 to 1 and y > 0; 0 for subnormal x. The relative error is within 1.7 x 2^-23
+// (1 + |y log2 x|).
 fn power(x: f32, y: f32) -> f32 {
     return select(0.0, exp2(y * log2(x)), x >= 1.1754943508222875e-38);
 }
 
 // Returns log2 of a normal x > 0: the exponent, and the series of 2 artanh((m - 1) / (m + 1)) for a mantissa m from
-// sqrt(1/2) to sqrt(2) (Abramowitz and Stegun, "Handbook of Mathematical Functions", 4.1.27). Within 4.5 units in the
-// last place.
+// sqrt(1/2) to sqrt(2) (Abramowitz and Stegun, "Handbook of Mathematical Functions", 4.1.27). The error is within 4.5
+// units in the last place.
 fn log2(x: f32) -> f32 {
     let bits = bitcast<i32>(x);
     let exponent = (bits - 0x3f3504f3) >> 23u;
@@ -70,18 +70,18 @@ fn log2(x: f32) -> f32 {
 }
 
 // Returns 2^x; 0 below the normal numbers, infinite from 127.5 on. Splits off the nearest integer, for the series of
-// the exponential (Abramowitz and Stegun, 4.2.1). Within 1.5 units in the last place.
+// the exponential (Abramowitz and Stegun, 4.2.1). The error is within 1.5 units in the last place.
 fn exp2(x: f32) -> f32 {
     let p = min(max(x, -126.5), 128.0);
-    let whole = i32(p + select(0.5, -0.5, p < 0.0));
-    let f = (p - f32(whole)) * 0.6931471805599453;
+    let integer = i32(p + select(0.5, -0.5, p < 0.0));
+    let f = (p - f32(integer)) * 0.6931471805599453;
     let high = 0.008333334 + f * (0.0013888889 + f * 0.0001984127);
     let series = 1.0 + f * (1.0 + f * (0.5 + f * (0.16666667 + f * (0.041666668 + f * high))));
-    return select(0.0, series * bitcast<f32>((whole + 127) << 23u), x > -126.5);
+    return select(0.0, series * bitcast<f32>((integer + 127) << 23u), x > -126.5);
 }
 
 // Returns the angle of (x, y) in (-pi, pi], 0 if both are 0: the series of the arctangent (Abramowitz and Stegun,
-// 4.4.42), for arguments reduced below tan(pi / 8). Within 3.5 units in the last place.
+// 4.4.42), for arguments reduced below tan(pi / 8). The error is within 3.5 units in the last place.
 fn atan2(y: f32, x: f32) -> f32 {
     let large = max(abs(x), abs(y));
     let small = min(abs(x), abs(y));
@@ -96,12 +96,12 @@ fn atan2(y: f32, x: f32) -> f32 {
     return select(0.0, select(half, -half, y < 0.0), large > 0.0);
 }
 
-// Returns sin(pi x), within 3 / 10^7 for |x| below 1000: the Taylor series from -pi / 2 to pi / 2.
+// Returns sin(pi x): the Taylor series from -pi / 2 to pi / 2. The error is within 3e-7 for |x| below 1000.
 fn sine(x: f32) -> f32 {
-    let whole = floor(x + 0.5);
-    let r = x - whole;
+    let integer = floor(x + 0.5);
+    let r = x - integer;
     let r2 = r * r;
     let tail = 0.5992645 - r2 * (0.08214589 - r2 * 0.007370431);
     let series = r * (3.1415927 - r2 * (5.1677127 - r2 * (2.550164 - r2 * tail)));
-    return select(series, -series, whole - 2.0 * floor(0.5 * whole) > 0.0);
+    return select(series, -series, integer - 2.0 * floor(0.5 * integer) > 0.0);
 }

@@ -1,7 +1,7 @@
 // Mesh triangles: intersection and surface properties. Object-space directions keep their length, so that t is the
 // world-space distance.
 
-// The shear that maps a ray to the z axis; `axis` is the largest component of its direction.
+// The shear that maps a ray to the z axis; `axis` is the axis of the direction's largest component.
 struct Shear {
     axis: u32,
     slope: vec2f,
@@ -32,8 +32,8 @@ struct Crossing {
 }
 
 // Intersects a triangle: Woop, Benthin and Wald, "Watertight Ray/Triangle Intersection", JCGT 2(1), 2013; edges are
-// inside. The ray must hit the triangle's box too, and t is clamped to that interval, so that a BVH misses no hit
-// (docs/decisions/trees.md).
+// inside. The ray must also hit the triangle's box, and t is clamped to the interval inside the box, so that a BVH
+// misses no hit (docs/decisions/trees.md).
 fn triangle_crossing(v0: vec3f, v1: vec3f, v2: vec3f, origin: vec3f, shear: Shear, s: Slabs) -> Crossing {
     let a = sheared(v0 - origin, shear);
     let b = sheared(v1 - origin, shear);
@@ -76,7 +76,7 @@ fn normal_from_mesh(i: Instance, n: vec3f) -> vec3f {
     return scaled / sqrt(max(dot(scaled, scaled), 0.5));
 }
 
-// Returns the object-space margin of boxes for the rounding of a ray.
+// Returns the object-space padding of boxes for the rounding of a ray.
 fn mesh_pad(i: Instance, origin: vec3f) -> f32 {
     return BOX_PAD * (largest(origin) + i.size);
 }
@@ -105,15 +105,15 @@ fn standalone_hit_primitive(q: Primitive) -> HitPrimitive {
     return HitPrimitive(q, zero, zero, zero.xy, zero.xy, zero.xy, zero, zero, zero, none, none, none, zero, 0.0);
 }
 
-// Returns a triangle as a primitive with the barycentric coordinates of its second and third vertex as local x and y.
+// Returns a triangle as a primitive, with the barycentric coordinates of the second and third vertex as local x and y.
 // Edges are in world space, `v0` is in object space.
 fn face_primitive(i: Instance, v0: vec3f, edge_1: vec3f, edge_2: vec3f, material: u32) -> Primitive {
-    let least = 1.1754943508222875e-38;
-    let across = cross(edge_1 / max(largest(edge_1), least), edge_2 / max(largest(edge_2), least));
+    let min_positive = 1.1754943508222875e-38;
+    let scaled_normal = cross(edge_1 / max(largest(edge_1), min_positive), edge_2 / max(largest(edge_2), min_positive));
     // A triangle too thin for 32 bits has the normal z.
-    let normal = select(vec3f(0.0, 0.0, 1.0), normalize(across), dot(across, across) > 1e-30) * i.side;
+    let normal = select(vec3f(0.0, 0.0, 1.0), normalize(scaled_normal), dot(scaled_normal, scaled_normal) > 1e-30) * i.side;
     let area = dot(cross(edge_1, edge_2), normal);
-    let determinant = select(least, area, abs(area) > least);
+    let determinant = select(min_positive, area, abs(area) > min_positive);
     let anchor = i.anchor + vector_from_mesh(i, v0);
     return Primitive(anchor, material, cross(edge_2, normal) / determinant, i.shape, cross(normal, edge_1) / determinant,
                      TRIANGLE, normal, 1.0 / determinant, vec3f(0.0), 0.0);
@@ -127,12 +127,12 @@ fn face_surface(face: HitPrimitive, prim_id: vec2u, b: vec2f, d: vec3f, epsilon:
     let normal = q.z * side;
     let edge = max(max(largest(face.edge_1), largest(face.edge_2)), largest(face.edge_2 - face.edge_1));
     let size = max(max(largest(position), largest(position - face.anchor)), 0.25 * edge) * max(1.0, 0.125 * face.condition_number);
-    // The component towards the viewer moves the origin of a hit on an edge in front of the other faces at that edge,
-    // too.
-    let start = position + (normal - d) * (epsilon * size);
+    // The component towards the viewer moves the ray origin of a hit on an edge also in front of the other faces at the
+    // edge.
+    let ray_origin = position + (normal - d) * (epsilon * size);
     let tangents = face_frame(face, b);
     let smooth_normal = face_normal(face, b) * side;
-    return Surface(position, normal, smooth_normal, smooth_normal, -d, start, face_terminator_offset(face, b, side), side, prim_id, prim_id,
+    return Surface(position, normal, smooth_normal, smooth_normal, -d, ray_origin, face_terminator_offset(face, b, side), side, prim_id, prim_id,
                    face_uv(face, b), tangents.u, tangents.v);
 }
 
@@ -159,8 +159,8 @@ fn flipped_to(v: vec3f, side: vec3f) -> vec3f {
     return v * select(1.0, -1.0, dot(v, side) < 0.0);
 }
 
-// Returns the offset up to the smooth surface that the vertex normals imply, so that a coarse mesh does not shadow
-// itself in grazing light: Hanika, "Hacking the Shadow Terminator", Ray Tracing Gems II, 2021, chapter 4.
+// Returns the offset from the triangle to the smooth surface that the vertex normals imply, so that a coarse mesh does
+// not shadow itself in grazing light: Hanika, "Hacking the Shadow Terminator", Ray Tracing Gems II, 2021, chapter 4.
 fn face_terminator_offset(face: HitPrimitive, b: vec2f, side: f32) -> vec3f {
     let p = face.edge_1 * b.x + face.edge_2 * b.y;
     let up = face.primitive.z * side;
@@ -170,19 +170,19 @@ fn face_terminator_offset(face: HitPrimitive, b: vec2f, side: f32) -> vec3f {
     return lift_0 * (1.0 - b.x - b.y) + lift_1 * b.x + lift_2 * b.y;
 }
 
-// Returns the offset from a point up to a vertex's tangent plane; 0 above it. `from_vertex` is the vector to the point.
-// A normal more than 37 degrees off the triangle normal `up` implies no surface nearby, as at the corner of a cube:
-// objects on it would lose their contact shadows.
+// Returns the offset from a point up to a vertex's tangent plane; 0 for a point above the plane. `from_vertex` is the
+// vector from the vertex to the point. A vertex normal more than 37 degrees off the triangle normal `up` implies no
+// smooth surface, as at the corner of a cube: with an offset, objects on the cube would lose their contact shadows.
 fn lift(n: vec3f, from_vertex: vec3f, up: vec3f) -> vec3f {
     return n * select(0.0, max(-dot(n, from_vertex), 0.0), dot(n, up) > 0.8);
 }
 
-// Returns false if the triangle itself occludes light from `to` at the origin of shadow rays. Light from behind may
-// pass the triangle's edges, up to the terminator offset.
-fn face_direction_allowed(face: HitPrimitive, surface: Surface, to: vec3f) -> bool {
-    let fall = -dot(surface.normal, to);
+// Returns false if the triangle itself occludes light from `direction` at the origin of shadow rays. Since the origin
+// is above the triangle by the terminator offset, light from behind the triangle may pass beside it.
+fn face_direction_allowed(face: HitPrimitive, surface: Surface, direction: vec3f) -> bool {
+    let fall = -dot(surface.normal, direction);
     let height = dot(surface.normal, surface.terminator_offset);
-    let crossing = surface.position + surface.terminator_offset + to * (height / max(fall, 1e-30));
+    let crossing = surface.position + surface.terminator_offset + direction * (height / max(fall, 1e-30));
     let b = point_to_local(face.primitive, crossing);
     return (fall <= 0.0) | (b.x < 0.0) | (b.y < 0.0) | (b.x + b.y > 1.0);
 }
@@ -193,11 +193,11 @@ fn face_tangents(face: HitPrimitive) -> Tangents {
     let a = face.uv_1 - face.uv_0;
     let b = face.uv_2 - face.uv_0;
     let area = a.x * b.y - a.y * b.x;
-    let whole = abs(area) > 1e-30;
-    let scale = 1.0 / select(1.0, area, whole);
+    let is_valid = abs(area) > 1e-30;
+    let scale = 1.0 / select(1.0, area, is_valid);
     let u = (face.edge_1 * b.y - face.edge_2 * a.y) * scale;
     let v = (face.edge_2 * a.x - face.edge_1 * b.x) * scale;
-    return Tangents(select(face.edge_1, u, whole), select(cross(face.primitive.z, face.edge_1), v, whole));
+    return Tangents(select(face.edge_1, u, is_valid), select(cross(face.primitive.z, face.edge_1), v, is_valid));
 }
 
 // Returns the interpolated vertex tangents, continuous across edges; `face_tangents` if the mesh has no vertex
@@ -206,12 +206,12 @@ fn face_frame(face: HitPrimitive, b: vec2f) -> Tangents {
     let a = 1.0 - b.x - b.y;
     let u = face.tangents_0.u * a + face.tangents_1.u * b.x + face.tangents_2.u * b.y;
     let v = face.tangents_0.v * a + face.tangents_1.v * b.x + face.tangents_2.v * b.y;
-    let own = face_tangents(face);
-    let between = (largest(u) > 1e-12) & (largest(v) > 1e-12);
-    return Tangents(select(own.u, u, between), select(own.v, v, between));
+    let fallback = face_tangents(face);
+    let has_tangents = (largest(u) > 1e-12) & (largest(v) > 1e-12);
+    return Tangents(select(fallback.u, u, has_tangents), select(fallback.v, v, has_tangents));
 }
 
-// Returns the change of `face_uv` for the offset d.
+// Returns the change of the texture coordinates for the offset d.
 fn face_uv_derivative(face: HitPrimitive, d: vec3f) -> vec2f {
     let b = vector_to_local(face.primitive, d);
     return (face.uv_1 - face.uv_0) * b.x + (face.uv_2 - face.uv_0) * b.y;
@@ -224,8 +224,8 @@ fn face_normal_derivative(face: HitPrimitive, b: vec2f, d: vec3f) -> vec3f {
     let length2 = dot(n, n);
     let scale = 1.0 / sqrt(max(length2, 1e-12));
     let unit = n * scale;
-    let along = (dn - unit * dot(unit, dn)) * scale;
-    let outward = along * select(1.0, -1.0, dot(unit, face.primitive.z) < 0.0);
+    let tangential = (dn - unit * dot(unit, dn)) * scale;
+    let outward = tangential * select(1.0, -1.0, dot(unit, face.primitive.z) < 0.0);
     return select(vec3f(0.0), outward, length2 > 1e-12);
 }
 

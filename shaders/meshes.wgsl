@@ -1,4 +1,4 @@
-// Mesh buffers: BVH nodes, items, instances and group words in `nodes`, triangles and vertices in `meshes`.
+// Access to mesh buffers: `nodes` holds BVH nodes, items, instances and group words, `meshes` triangles and vertices.
 
 fn load_position(i: Instance, vertex: u32) -> vec3f {
     return bitcast<vec3f>(meshes[i.vertices + vertex].xyz);
@@ -15,7 +15,7 @@ fn word_of(row: vec4u, i: u32) -> u32 {
     return select(select(row.x, row.y, i == 1u), select(row.z, row.w, i == 3u), i >= 2u);
 }
 
-// Returns a triangle's group word: material and NO_SHADOW.
+// Returns the word of a triangle's group: the material, and the bit NO_SHADOW.
 fn group_word(i: Instance, slot: u32) -> u32 {
     var group = i.materials;
     if i.groups != NO_INDEX {

@@ -7,14 +7,14 @@ fn conductor_fresnel(eta: f32, k: f32, cosine: f32) -> f32 {
     let c2 = cosine * cosine;
     let s2 = 1.0 - c2;
     let real = eta * eta - k * k - s2;
-    let whole = sqrt(real * real + 4.0 * (eta * eta) * (k * k));
-    let a = 2.0 * cosine * sqrt(max(0.5 * (whole + real), 0.0));
-    let s = (whole + c2 - a) / (whole + c2 + a);
-    let p = s * ((c2 * whole + s2 * s2 - a * s2) / (c2 * whole + s2 * s2 + a * s2));
+    let magnitude = sqrt(real * real + 4.0 * (eta * eta) * (k * k));
+    let a = 2.0 * cosine * sqrt(max(0.5 * (magnitude + real), 0.0));
+    let s = (magnitude + c2 - a) / (magnitude + c2 + a);
+    let p = s * ((c2 * magnitude + s2 * s2 - a * s2) / (c2 * magnitude + s2 * s2 + a * s2));
     return max(0.5 * (s + p), 0.0);
 }
 
-// Returns the tint, times Fresnel if there is an index.
+// Returns the tint, times the Fresnel reflectance if the material has an index of refraction.
 fn metal_fresnel(material: Material, cosine: f32) -> vec3f {
     let eta = material.eta;
     let k = material.k;

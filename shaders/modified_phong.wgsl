@@ -1,7 +1,7 @@
 // The material `phong` with the integrator `path`: the modified model of Lafortune and Willems, "Using the Modified
 // Phong Reflectance Model for Physically Based Rendering", report CW 197, Leuven, 1994.
 
-// Reflectances, scaled down to a sum of at most 1.
+// Reflectances, scaled down to a sum of at most 1 per channel.
 struct PhongFactors {
     diffuse: vec3f,
     specular: vec3f,
@@ -9,9 +9,9 @@ struct PhongFactors {
 }
 
 fn phong_factors(material: Material) -> PhongFactors {
-    let most = largest(material.diffuse + material.specular);
-    let diffuse = select(material.diffuse, material.diffuse / most, most > 1.0);
-    let specular = select(material.specular, material.specular / most, most > 1.0);
+    let max_sum = largest(material.diffuse + material.specular);
+    let diffuse = select(material.diffuse, material.diffuse / max_sum, max_sum > 1.0);
+    let specular = select(material.specular, material.specular / max_sum, max_sum > 1.0);
     let d = diffuse.x + diffuse.y + diffuse.z;
     let s = specular.x + specular.y + specular.z;
     return PhongFactors(diffuse, specular, select(1.0, d / (d + s), s > 0.0));
@@ -45,7 +45,7 @@ fn modified_phong_sample(material: Material, normal: vec3f, wo: vec3f, u: vec2f,
     let p = disk_sample(u);
     let r2 = p.x * p.x + p.y * p.y;
     let cosine = power(max(1.0 - r2, 0.0), 1.0 / (material.shininess + 1.0));
-    let across = sqrt(max(1.0 - cosine * cosine, 0.0));
-    let around = p * (across / sqrt(max(r2, 1e-20)));
-    return normalize(vector_around(normalize(normal * (2.0 * dot(normal, wo)) - wo), vec3f(around, cosine)));
+    let sine = sqrt(max(1.0 - cosine * cosine, 0.0));
+    let offset = p * (sine / sqrt(max(r2, 1e-20)));
+    return normalize(vector_around(normalize(normal * (2.0 * dot(normal, wo)) - wo), vec3f(offset, cosine)));
 }

@@ -10,7 +10,7 @@ fn mapped_normal(surface: Surface, t: Texture, n: vec3f) -> vec3f {
     let along_v = (surface.dv * t.u.x - surface.du * t.u.y) * sign;
     let outward = surface.shading_normal * surface.side;
     let tangent = normalize(along_u - outward * dot(outward, along_u));
-    let across = cross(outward, tangent);
-    let bitangent = across * select(-1.0, 1.0, dot(across, along_v) > 0.0);
+    let perpendicular = cross(outward, tangent);
+    let bitangent = perpendicular * select(-1.0, 1.0, dot(perpendicular, along_v) > 0.0);
     return normalize(tangent * n.x + bitangent * n.y + outward * max(n.z, 0.001)) * surface.side;
 }

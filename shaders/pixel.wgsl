@@ -12,16 +12,16 @@ fn camera_sample(pixel: vec2u, sample: u32) -> CameraSample {
     let round = sample / PIXEL_SAMPLES;
     let index = sample % PIXEL_SAMPLES;
     let u = sample_square(PIXEL_PATTERN, PIXEL_SIDE, index, round, sample_key(pixel, camera.seed, 0u));
-    let at = filtered(u);
-    let raster = vec2f(pixel) + at.xy;
+    let position = filtered(u);
+    let raster = vec2f(pixel) + position.xy;
     var ray = view_ray(raster);
     if LENS != 0u {
         ray = lens_ray(camera, raster, lens_point(pixel, sample));
     }
-    return CameraSample(ray, differential_at(raster), at.z);
+    return CameraSample(ray, differential_at(raster), position.z);
 }
 
-// Returns a sample's lens position, from a separate point set over the pixel's samples.
+// Returns a sample's point on the lens, from a separate point set over the pixel's samples.
 fn lens_point(pixel: vec2u, sample: u32) -> vec2f {
     let key = hash4(vec4u(pixel.x, pixel.y, camera.seed, 0u)).zw;
     var u = sobol_sample(sample, key);
@@ -52,7 +52,7 @@ fn differential_at(raster: vec2f) -> Differential {
     return camera_differential(camera, raster, spacing);
 }
 
-// Warps a uniform position to the filter, relative to the pixel corner; z is the weight.
+// Warps a uniform position in the pixel to the filter. x and y are relative to the pixel corner; z is the weight.
 fn filtered(u: vec2f) -> vec3f {
     if FILTER_BINS == 0u {
         return vec3f(u, 1.0);

@@ -1,7 +1,7 @@
 // Dispatch by the kind of a primitive, which may be a compile-time constant.
 
-// Returns the t of the nearest hit in (0, limit), else `limit`. With `from_inside` the ray goes inside from the
-// primitive.
+// Returns the t of the nearest hit in (0, limit), else `limit`. With `from_inside`, the ray starts on the primitive and
+// goes inwards.
 fn intersect(kind: u32, q: Primitive, from_inside: bool, ray: Ray, limit: f32) -> f32 {
     if kind == RECTANGLE {
         return intersect_rectangle(q, ray, limit);
@@ -51,7 +51,7 @@ fn is_centered(kind: u32) -> bool {
     return (kind == RECTANGLE) | (kind == DISK);
 }
 
-// Returns the levels of a local point for `occludes`, negative inside; y is for cylinders only. With `from_inside` a
+// Returns the levels of a local point for `occludes`, negative inside; y is for cylinders only. With `from_inside`, a
 // point on the surface counts as barely inside: segments inwards are occluded if they end outside.
 fn solid_levels(kind: u32, q: Primitive, from_anchor: vec3f, from_inside: bool) -> vec2f {
     if kind == CYLINDER {
@@ -78,11 +78,11 @@ fn solid_gradient_derivative(kind: u32, local: vec3f, d: vec3f) -> vec3f {
     return select(d, cylinder_gradient_derivative(local, d), kind == CYLINDER);
 }
 
-// Returns the function whose gradient is `primitive_gradient`.
+// Returns the value of the function whose gradient is `primitive_gradient`.
 fn primitive_height(q: Primitive, from_anchor: vec3f) -> f32 {
-    let round = 0.5 * ellipsoid_level(q, from_anchor);
-    let solid = select(round, cylinder_height(q, from_anchor), q.kind == CYLINDER);
-    return select(from_anchor.z, solid, is_solid(q.kind));
+    let ellipsoid_height = 0.5 * ellipsoid_level(q, from_anchor);
+    let solid_height = select(ellipsoid_height, cylinder_height(q, from_anchor), q.kind == CYLINDER);
+    return select(from_anchor.z, solid_height, is_solid(q.kind));
 }
 
 fn primitive_normal(q: Primitive, local: vec3f) -> vec3f {

@@ -1,8 +1,8 @@
 // The material `principled`: the metallic-roughness model of glTF 2.0 with extensions (Khronos, "glTF 2.0
 // Specification", 2021, appendix B; KHR_materials_anisotropy, _clearcoat, _ior, _sheen, _specular, _transmission,
 // _volume). Clearcoat lies over sheen, and sheen over metal or a dielectric, diffuse or transmissive. Metal and the
-// diffuse base are two-sided. A layer attenuates those below by its albedo towards the viewer, which conserves energy.
-// Transmission works as in `dielectric`. In the local frame, z is the shading normal on the viewer's side, x the
+// diffuse base are two-sided. A layer's albedo towards the viewer attenuates the layers below, which conserves energy.
+// Transmission works as in `dielectric`. In the local frame, z is the shading normal on the viewer's side, and x the
 // tangent.
 
 // The lobes as seen from one direction.
@@ -24,7 +24,7 @@ struct PrincipledLobes {
     coat_normal: vec3f,
     sheen: vec3f,          // weight of the sheen lobe
     sheen_alpha: f32,
-    lobe_probs: vec4f,     // probabilities of diffuse, specular, glass and coat; sheen has the rest
+    lobe_probs: vec4f,     // probabilities of diffuse, specular, glass and coat; sheen has the remaining probability
 }
 
 // Returns the lobes seen from wo. Lobes without a bit in `lobes` are omitted. `energy` holds tabulated albedos: x and y
@@ -41,12 +41,12 @@ fn principled_mixture(material: Material, wo: vec3f, outside: bool, coat_normal:
     m.eta = select(1.0, select(material.ior, 1.0 / material.ior, outside), volume);
     var layer_throughput = 1.0;
     m.coat_normal = coat_normal;
-    let over = outside | !volume;
+    let has_layers = outside | !volume;
     var coat_share = 0.0;
     if (lobes & LOBE_COAT) != 0u {
         let cosine = dot(wo, coat_normal);
         m.coat_alpha = max(material.clearcoat_roughness * material.clearcoat_roughness, SMALLEST_ALPHA);
-        m.coat = select(0.0, material.clearcoat, over & (cosine > 0.0));
+        m.coat = select(0.0, material.clearcoat, has_layers & (cosine > 0.0));
         let reflected = ggx_albedo(m.coat_alpha, max(cosine, 0.0));
         coat_share = min(m.coat * (COAT_F0 * reflected.x + reflected.y), 1.0);
         layer_throughput = 1.0 - coat_share;
@@ -56,10 +56,10 @@ fn principled_mixture(material: Material, wo: vec3f, outside: bool, coat_normal:
         let roughness = max(material.sheen_roughness, MIN_SHEEN_ROUGHNESS);
         m.sheen_alpha = roughness * roughness;
         let albedo = sheen_albedo(roughness, wo.z);
-        m.sheen = material.sheen * (select(0.0, layer_throughput, over) / max(albedo, 1.0));
+        m.sheen = material.sheen * (select(0.0, layer_throughput, has_layers) / max(albedo, 1.0));
         let bounded = min(albedo, 1.0);
         sheen_share = luminance(m.sheen) * albedo;
-        layer_throughput *= select(1.0, max(1.0 - largest(material.sheen) * bounded, 0.0), over);
+        layer_throughput *= select(1.0, max(1.0 - largest(material.sheen) * bounded, 0.0), has_layers);
     }
     let base = material.diffuse;
     let dielectric = 1.0 - material.metallic;
@@ -67,29 +67,29 @@ fn principled_mixture(material: Material, wo: vec3f, outside: bool, coat_normal:
     let ratio = (material.ior - 1.0) / (material.ior + 1.0);
     var reflected = vec3f(0.0);
     var inner = vec3f(0.0);
-    var share = vec2f(0.0);
+    var albedo_factors = vec2f(0.0);
     var compensation = 0.0;
     if (lobes & (LOBE_SPECULAR | LOBE_TRANSMISSION)) != 0u {
-        share = ggx_albedo(m.alpha.y, wo.z);
-        var lower_bound = 1.005; // beyond the error of the fit
+        albedo_factors = ggx_albedo(m.alpha.y, wo.z);
+        var lower_bound = 1.005; // the fit may be too low by up to 0.5 %
         if (lobes & LOBE_ANISOTROPY) != 0u {
             if material.aniso_table != 0u {
-                share = energy.xy;
+                albedo_factors = energy.xy;
                 lower_bound = 1.0;
             }
         }
         // Turquin, "Practical multiple scattering compensation for microfacet models", 2019.
-        compensation = max(1.0 / max(share.x + share.y, 1e-3) - lower_bound, 0.0);
+        compensation = max(1.0 / max(albedo_factors.x + albedo_factors.y, 1e-3) - lower_bound, 0.0);
         let inner_f0 = bounded_color(material.specular * (ratio * ratio)) * material.specular_weight;
-        // With the index of air nothing reflects: Lagarde and de Rousiers, "Moving Frostbite to Physically Based
+        // At the index of air, nothing is reflected: Lagarde and de Rousiers, "Moving Frostbite to Physically Based
         // Rendering", SIGGRAPH 2014 course, section 3.
         let inner_f90 = material.specular_weight * min(50.0 * (ratio * ratio), 1.0);
         let inner_gain = vec3f(1.0) + inner_f0 * compensation;
         let metal_gain = (vec3f(1.0) + base * compensation) * (material.metallic * layer_throughput);
         m.f0 = inner_f0 * inner_gain * (diffuse_weight * layer_throughput) + base * metal_gain;
         m.f90 = inner_gain * (inner_f90 * (diffuse_weight * layer_throughput)) + metal_gain;
-        reflected = m.f0 * share.x + m.f90 * share.y;
-        inner = (inner_f0 * share.x + vec3f(inner_f90 * share.y)) * inner_gain;
+        reflected = m.f0 * albedo_factors.x + m.f90 * albedo_factors.y;
+        inner = (inner_f0 * albedo_factors.x + vec3f(inner_f90 * albedo_factors.y)) * inner_gain;
     }
     m.diffuse = base * (diffuse_weight * layer_throughput * max(1.0 - largest(inner), 0.0));
     var glass_weight = 0.0;
@@ -104,7 +104,7 @@ fn principled_mixture(material: Material, wo: vec3f, outside: bool, coat_normal:
         let glass = dielectric * material.transmission * layer_throughput;
         m.glass = glass * gain;
         m.transmission_tint = base * m.glass;
-        let mirrored = min(luminance(m.glass_f0 * share.x + vec3f(m.glass_f90 * share.y)), 1.0);
+        let mirrored = min(luminance(m.glass_f0 * albedo_factors.x + vec3f(m.glass_f90 * albedo_factors.y)), 1.0);
         glass_weight = glass * (luminance(base) * (1.0 - mirrored) + mirrored);
     }
     let weights = vec4f(luminance(m.diffuse), luminance(reflected), glass_weight, coat_share);
@@ -136,12 +136,12 @@ fn schlick(f0: vec3f, f90: vec3f, cosine: f32) -> vec3f {
 // Returns the reflectance of glass, or of both sides of a thin sheet, scaled to `glass_f0` and `glass_f90`.
 fn glass_fresnel(m: PrincipledLobes, cosine: f32) -> vec3f {
     let c = min(max(cosine, 1e-6), 1.0);
-    let behind = refracted_cosine(c, m.ratio);
-    let once = fresnel(c, behind, m.ratio);
-    let exact = select(once, 2.0 * once / (1.0 + once), m.thin);
+    let cosine_t = refracted_cosine(c, m.ratio);
+    let one_side = fresnel(c, cosine_t, m.ratio);
+    let exact = select(one_side, 2.0 * one_side / (1.0 + one_side), m.thin);
     let x = (exact - m.f0_ior) / max(1.0 - m.f0_ior, 1e-6);
     let f = m.glass_f0 + (vec3f(m.glass_f90) - m.glass_f0) * x;
-    return select(bounded_color(vec3f(max(f.x, 0.0), max(f.y, 0.0), max(f.z, 0.0))), vec3f(1.0), behind == 0.0);
+    return select(bounded_color(vec3f(max(f.x, 0.0), max(f.y, 0.0), max(f.z, 0.0))), vec3f(1.0), cosine_t == 0.0);
 }
 
 fn glass_probability(m: PrincipledLobes, cosine: f32) -> f32 {
@@ -157,7 +157,7 @@ fn is_flat(alpha: vec2f) -> bool {
     return max(alpha.x, alpha.y) <= SMALLEST_ALPHA;
 }
 
-// Returns the specular lobe for F = 1 times the cosine of wi.
+// Returns the specular BRDF with F = 1, times the cosine of wi.
 fn facets_eval(alpha: vec2f, wo: vec3f, wi: vec3f, half: vec3f) -> f32 {
     return ggx_d(alpha, half) * ggx_g2(alpha, wo, wi) / (4.0 * max(wo.z, 1e-6));
 }
@@ -175,8 +175,8 @@ fn refracting_half(wo: vec3f, wi: vec3f, eta: f32) -> vec3f {
     return select(-unit, unit, unit.z > 0.0);
 }
 
-// Returns the Jacobian from transmitted directions to normals, equation 17 of that paper; 0 if no normal refracts wi to
-// wo.
+// Returns the Jacobian from transmitted directions to normals, equation 17 of the same paper; 0 if no normal refracts
+// wi to wo.
 fn refracting_density(wo: vec3f, wi: vec3f, half: vec3f, eta: f32) -> f32 {
     let o = dot(wo, half);
     let i = dot(wi, half);
@@ -212,7 +212,7 @@ fn principled_eval(m: PrincipledLobes, wo: vec3f, wi: vec3f, lobes: u32) -> vec3
     return value;
 }
 
-// Evaluates glass as in `rough_dielectric.wgsl` and `thin.wgsl`.
+// Evaluates the glass lobe as in `rough_dielectric.wgsl` and `thin.wgsl`.
 fn glass_eval(m: PrincipledLobes, wo: vec3f, wi: vec3f) -> vec3f {
     let above = wi.z > 0.0;
     if above | m.thin {
@@ -224,8 +224,8 @@ fn glass_eval(m: PrincipledLobes, wo: vec3f, wi: vec3f) -> vec3f {
     }
     let half = refracting_half(wo, wi, m.eta);
     let reflected = glass_fresnel(m, dot(wo, half));
-    let seen = ggx_pdf(m.alpha, wo, half) * ggx_g1(m.alpha, wi);
-    let density = seen * refracting_density(wo, wi, half, m.eta) * (m.eta * m.eta);
+    let visible = ggx_pdf(m.alpha, wo, half) * ggx_g1(m.alpha, wi);
+    let density = visible * refracting_density(wo, wi, half, m.eta) * (m.eta * m.eta);
     return m.transmission_tint * (vec3f(1.0) - reflected) * density;
 }
 
@@ -284,7 +284,7 @@ fn principled_pdf(m: PrincipledLobes, wo: vec3f, wi: vec3f, lobes: u32) -> f32 {
     return pdf;
 }
 
-// Returns the PDF of a reflected direction, given the PDF of its normal.
+// Returns the pdf of a reflected direction, from the pdf of the microfacet normal.
 fn mirrored_pdf(alpha: vec2f, wo: vec3f, half: vec3f) -> f32 {
     let cosine = dot(wo, half);
     return select(0.0, ggx_pdf(alpha, wo, half) / (4.0 * max(cosine, 1e-6)), cosine > 0.0);
@@ -301,9 +301,9 @@ fn principled_sample(m: PrincipledLobes, wo: vec3f, u: vec2f, random: f32, lobes
     var is_delta = false;
     var weight = vec3f(0.0); // of a delta lobe
     var eta = 1.0;
-    var rest = random - m.lobe_probs.x;
+    var remaining = random - m.lobe_probs.x;
     if (lobes & LOBE_SPECULAR) != 0u {
-        if (rest >= 0.0) & (rest < m.lobe_probs.y) {
+        if (remaining >= 0.0) & (remaining < m.lobe_probs.y) {
             is_delta = is_flat(m.alpha);
             let half = select(ggx_sample(m.alpha, wo, u), vec3f(0.0, 0.0, 1.0), is_delta);
             wi = half * (2.0 * dot(wo, half)) - wo;
@@ -312,33 +312,33 @@ fn principled_sample(m: PrincipledLobes, wo: vec3f, u: vec2f, random: f32, lobes
                 return no_sample();
             }
         }
-        rest -= m.lobe_probs.y;
+        remaining -= m.lobe_probs.y;
     }
     if (lobes & LOBE_TRANSMISSION) != 0u {
-        if (rest >= 0.0) & (rest < m.lobe_probs.z) {
+        if (remaining >= 0.0) & (remaining < m.lobe_probs.z) {
             is_delta = transmits_straight(m);
             let half = select(ggx_sample(m.alpha, wo, u), vec3f(0.0, 0.0, 1.0), is_delta);
             let cosine = max(dot(wo, half), 1e-6);
             let reflected = glass_fresnel(m, cosine);
             let chance = glass_probability(m, cosine);
-            let mirrors = rest < m.lobe_probs.z * chance;
+            let reflects = remaining < m.lobe_probs.z * chance;
             let mirrored = half * (2.0 * cosine) - wo;
-            let behind = refracted_cosine(cosine, m.eta);
-            let bent = refracted_direction(-wo, half, m.eta, cosine, behind);
-            let through = select(bent, vec3f(mirrored.x, mirrored.y, -mirrored.z), m.thin);
-            wi = normalize(select(through, mirrored, mirrors));
-            eta = select(m.eta, 1.0, mirrors);
-            let passing = m.transmission_tint * (vec3f(1.0) - reflected) * (m.eta * m.eta);
-            let share = max(m.lobe_probs.z * select(1.0 - chance, chance, mirrors), 1e-30);
-            weight = select(passing, reflected * m.glass, mirrors) * (1.0 / share);
-            if wi.z * select(-1.0, 1.0, mirrors) <= 0.0 {
+            let cosine_t = refracted_cosine(cosine, m.eta);
+            let refracted = refracted_direction(-wo, half, m.eta, cosine, cosine_t);
+            let transmitted = select(refracted, vec3f(mirrored.x, mirrored.y, -mirrored.z), m.thin);
+            wi = normalize(select(transmitted, mirrored, reflects));
+            eta = select(m.eta, 1.0, reflects);
+            let transmitted_weight = m.transmission_tint * (vec3f(1.0) - reflected) * (m.eta * m.eta);
+            let probability = max(m.lobe_probs.z * select(1.0 - chance, chance, reflects), 1e-30);
+            weight = select(transmitted_weight, reflected * m.glass, reflects) * (1.0 / probability);
+            if wi.z * select(-1.0, 1.0, reflects) <= 0.0 {
                 return no_sample();
             }
         }
-        rest -= m.lobe_probs.z;
+        remaining -= m.lobe_probs.z;
     }
     if (lobes & LOBE_COAT) != 0u {
-        if (rest >= 0.0) & (rest < m.lobe_probs.w) {
+        if (remaining >= 0.0) & (remaining < m.lobe_probs.w) {
             let alpha = vec2f(m.coat_alpha);
             is_delta = is_flat(alpha);
             let o = to_frame_around(m.coat_normal, wo);
@@ -347,10 +347,10 @@ fn principled_sample(m: PrincipledLobes, wo: vec3f, u: vec2f, random: f32, lobes
             let reflected = schlick(vec3f(COAT_F0), vec3f(1.0), o.z) * (m.coat / m.lobe_probs.w);
             weight = select(vec3f(0.0), reflected, wi.z > 0.0);
         }
-        rest -= m.lobe_probs.w;
+        remaining -= m.lobe_probs.w;
     }
     if (lobes & LOBE_SHEEN) != 0u {
-        if rest >= 0.0 {
+        if remaining >= 0.0 {
             // Uniform over the hemisphere.
             let height = 1.0 - p.x * p.x - p.y * p.y;
             wi = vec3f(p * sqrt(max(1.0 + height, 0.0)), max(height, 0.0));
@@ -377,7 +377,7 @@ fn sheen_lobe(alpha: f32, wo: vec3f, wi: vec3f) -> f32 {
 }
 
 // Returns the directional albedo of sheen, which is above 1 at grazing angles for low roughness. Fits its logarithm as
-// a function of the square root of the cosine; at most 2 % above the value by numerical quadrature.
+// a function of the square root of the cosine; at most 2 % above the result of numerical quadrature.
 fn sheen_albedo(roughness: f32, cosine: f32) -> f32 {
     let r = roughness;
     let q = 1.0 / r;

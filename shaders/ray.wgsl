@@ -6,7 +6,7 @@ struct Ray {
     direction: vec3f,      // unit length
 }
 
-// The nearest hit; INFINITE_T and NO_INDEX for a miss.
+// The nearest hit. For a miss, t is INFINITE_T and `primitive` is NO_INDEX.
 struct Hit {
     t: f32,
     instance: u32,         // 0 for a standalone primitive, else 1 + index of the mesh instance
@@ -39,7 +39,7 @@ fn vector_to_world(q: Primitive, v: vec3f) -> vec3f {
     return sum / q.determinant;
 }
 
-// Returns the t of the plane z = 0; not finite for parallel rays.
+// Returns the t at which a ray crosses the plane z = 0; not finite for parallel rays.
 fn plane_distance(q: Primitive, ray: Ray) -> f32 {
     return dot(q.z, q.anchor - ray.origin) / dot(q.z, ray.direction);
 }
@@ -49,21 +49,21 @@ fn crosses_plane(o: vec3f, d: vec3f, t_max: f32) -> bool {
     return (o.z * d.z < 0.0) & (abs(o.z) < t_max * abs(d.z));
 }
 
-// Returns the crossing as (x |d.z|, y |d.z|), without a division.
+// Returns the crossing with the plane z = 0 as (x |d.z|, y |d.z|), without a division.
 fn scaled_crossing(o: vec3f, d: vec3f) -> vec2f {
     let a = abs(d.z);
     let s = abs(o.z);
     return vec2f(o.x * a + s * d.x, o.y * a + s * d.y);
 }
 
-// Returns the nearer of `hit` and the hit at t on primitive i, unless i is `origin_prim`.
+// Returns the nearer of `hit` and a hit at t on primitive i. Ignores primitive `origin_prim`.
 fn closer(hit: Hit, t: f32, i: u32, origin_prim: u32) -> Hit {
     let nearer = (t < hit.t) & (i != origin_prim);
     return Hit(select(hit.t, t, nearer), hit.instance, select(hit.primitive, i, nearer), hit.slot, hit.barycentric);
 }
 
-// Returns the nearer hit; at equal distance the hit with the lower instance, then the lower primitive. If b.t is
-// INFINITE_T, b is a miss.
+// Returns the nearer hit; at equal distance, the hit with the lower instance, then the lower primitive. b is a miss if
+// b.t is INFINITE_T.
 fn nearer_hit(a: Hit, b: Hit) -> Hit {
     let lower = (b.instance < a.instance) | ((b.instance == a.instance) & (b.primitive < a.primitive));
     let nearer = (b.t < INFINITE_T) & ((b.t < a.t) | ((b.t == a.t) & lower));

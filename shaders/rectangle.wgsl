@@ -8,7 +8,7 @@ fn intersect_rectangle(q: Primitive, ray: Ray, limit: f32) -> f32 {
     return select(limit, t, (t > 0.0) & (t < limit) & inside);
 }
 
-// Returns true if it occludes the local segment o + s d, s in (0, t_max).
+// Returns true if the rectangle occludes the local segment o + s d, s in (0, t_max).
 fn rectangle_occludes(o: vec3f, d: vec3f, t_max: f32) -> bool {
     let p = scaled_crossing(o, d);
     return crosses_plane(o, d, t_max) & (abs(p.x) <= abs(d.z)) & (abs(p.y) <= abs(d.z));

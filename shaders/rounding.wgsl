@@ -1,7 +1,7 @@
-// Correctly rounded quotients and square roots (IEEE 754-2019, 4.3.1: to nearest, ties to even), for devices whose own
+// Correctly rounded quotients and square roots (IEEE 754-2019, 4.3.1: to nearest, ties to even), for devices whose
 // operations may be inexact: WGSL allows 2.5 units in the last place. The device's result is corrected by its
-// remainder, exact in integers modulo 2^32. `crates/render/src/gpu/rounding.rs` replaces the operations of a kernel by
-// these.
+// remainder, which is computed exactly in integers modulo 2^32. `crates/render/src/gpu/rounding.rs` replaces the
+// operations of a kernel by these functions.
 
 const INFINITE = 0x7f800000u;
 
@@ -18,16 +18,16 @@ fn digits_of(bits: u32) -> Digits {
     return Digits(mantissa, select(1 - i32(shift), i32(bits >> 23u), is_normal));
 }
 
-// Returns the rounded bits of 2^(exponent - 127) x (digits / 2^24), digits from 2^24 to 2^25; of a slightly larger
-// number if `more` is true.
+// Returns the rounded bits of 2^(exponent - 127) x (digits / 2^24), with digits from 2^24 to 2^25. If `more` is true,
+// the exact number is slightly larger.
 fn rounded(exponent: i32, digits: u32, more: bool) -> u32 {
     let dropped = u32(clamp(2 - exponent, 1, 26));
     let kept = digits >> dropped;
     let rest = digits & ((1u << dropped) - 1u);
     let half = 1u << (dropped - 1u);
-    let up = (rest > half) | ((rest == half) & (more | ((kept & 1u) == 1u)));
-    let below = u32(clamp(exponent - 1, 0, 254)) << 23u; // the mantissa's first bit adds the last 1
-    return select(below + kept + select(0u, 1u, up), INFINITE, exponent >= 255);
+    let rounds_up = (rest > half) | ((rest == half) & (more | ((kept & 1u) == 1u)));
+    let exponent_bits = u32(clamp(exponent - 1, 0, 254)) << 23u; // the mantissa's leading bit adds 1 to the exponent
+    return select(exponent_bits + kept + select(0u, 1u, rounds_up), INFINITE, exponent >= 255);
 }
 
 fn quotient(a: f32, b: f32) -> f32 {
@@ -36,9 +36,9 @@ fn quotient(a: f32, b: f32) -> f32 {
     let y = bitcast<u32>(b) & 0x7fffffffu;
     let over = digits_of(x);
     let under = digits_of(y);
-    let less = over.mantissa < under.mantissa;
-    let numerator = over.mantissa << select(0u, 1u, less); // so that the quotient is from 1 to 2
-    let exponent = over.exponent - under.exponent + select(127, 126, less);
+    let is_less = over.mantissa < under.mantissa;
+    let numerator = over.mantissa << select(0u, 1u, is_less); // so that the quotient is from 1 to 2
+    let exponent = over.exponent - under.exponent + select(127, 126, is_less);
     let guess = i32(f32(numerator) / f32(under.mantissa) * 16777216.0);
     let denominator = i32(under.mantissa);
     var rest = i32(numerator << 24u) - guess * denominator;
@@ -72,9 +72,9 @@ fn quotient4(a: vec4f, b: vec4f) -> vec4f {
 fn square_root(x: f32) -> f32 {
     let bits = bitcast<u32>(x);
     let number = digits_of(bits & 0x7fffffffu);
-    let even = (number.exponent & 1) == 0;
-    let mantissa = number.mantissa << select(0u, 1u, even);
-    let exponent = (number.exponent - select(0, 1, even) + 127) / 2;
+    let is_even = (number.exponent & 1) == 0;
+    let mantissa = number.mantissa << select(0u, 1u, is_even);
+    let exponent = (number.exponent - select(0, 1, is_even) + 127) / 2;
     var digits = i32(sqrt(f32(mantissa) * 33554432.0)); // from 2^24 to 2^25
     var rest = i32(mantissa << 25u) - digits * digits;
     digits += i32(f32(rest) / f32(2 * digits)) - select(0, 1, rest < 0);

@@ -5,7 +5,7 @@ struct Reflection {
     pdf: f32,              // per solid angle
 }
 
-// Evaluates materials without a local frame.
+// Evaluates materials that need no local frame.
 fn plain_reflection(surface: Surface, material: Material, wi: vec3f) -> Reflection {
     let angles = angles_at(surface.shading_normal, surface.wo, wi);
     var result = Reflection(vec3f(0.0), 0.0);
@@ -45,35 +45,35 @@ fn reflection(prim: HitPrimitive, surface: Surface, material: Material, mixture:
     return result;
 }
 
-// Clamps textured or vertex-colored materials so that they create no energy.
-fn bounded(found: Material) -> Material {
-    var material = found;
+// Clamps the parameters of textured or vertex-colored materials, so that the materials create no energy.
+fn bounded(original: Material) -> Material {
+    var material = original;
     if (LOOKUPS != 0u) | (VERTEX_COLORS != 0u) {
         let one = vec3f(1.0);
-        let above = (found.diffuse > one) & vec3<bool>((found.kind == DIFFUSE) | (found.kind == PRINCIPLED));
-        material.diffuse = select(found.diffuse, one, above);
-        material.tint = select(found.tint, one, found.tint > one);
-        material.roughness = min(found.roughness, 1.0);
+        let exceeds = (original.diffuse > one) & vec3<bool>((original.kind == DIFFUSE) | (original.kind == PRINCIPLED));
+        material.diffuse = select(original.diffuse, one, exceeds);
+        material.tint = select(original.tint, one, original.tint > one);
+        material.roughness = min(original.roughness, 1.0);
         if (MATERIALS & (1u << PRINCIPLED)) != 0u {
-            material.sheen = select(found.sheen, one, found.sheen > one);
-            material.sheen_roughness = min(found.sheen_roughness, 1.0);
-            material.anisotropy = min(found.anisotropy, 1.0);
-            material.metallic = min(found.metallic, 1.0);
-            material.transmission = min(found.transmission, 1.0);
-            material.clearcoat = min(found.clearcoat, 1.0);
-            material.clearcoat_roughness = min(found.clearcoat_roughness, 1.0);
-            material.specular_weight = min(found.specular_weight, 1.0);
+            material.sheen = select(original.sheen, one, original.sheen > one);
+            material.sheen_roughness = min(original.sheen_roughness, 1.0);
+            material.anisotropy = min(original.anisotropy, 1.0);
+            material.metallic = min(original.metallic, 1.0);
+            material.transmission = min(original.transmission, 1.0);
+            material.clearcoat = min(original.clearcoat, 1.0);
+            material.clearcoat_roughness = min(original.clearcoat_roughness, 1.0);
+            material.specular_weight = min(original.specular_weight, 1.0);
         }
     }
     return material;
 }
 
-// Returns `normal`, which is from a normal map, if the material can use it, else a different normal.
+// Returns `normal`, from a normal map, if the material can use this normal, else a usable normal.
 fn shaded_normal(surface: Surface, material: Material, normal: vec3f) -> vec3f {
     if is_delta(material) {
         let usable = usable_normal(surface, normal);
-        let bends = (material.kind == GLASS) | (material.kind == ROUGH_GLASS);
-        return select(usable, surface.normal, bends & !refracts_inwards(surface, material, usable));
+        let refracts = (material.kind == GLASS) | (material.kind == ROUGH_GLASS);
+        return select(usable, surface.normal, refracts & !refracts_inwards(surface, material, usable));
     }
     if (MATERIALS & (MICROFACET_KINDS | (1u << PRINCIPLED))) != 0u {
         if has_facets(material) | (material.kind == PRINCIPLED) {
@@ -102,7 +102,7 @@ fn has_inside(material: Material) -> bool {
     return (material.kind == GLASS) | (material.kind == ROUGH_GLASS) | is_volume;
 }
 
-// Returns true if scattering here is only specular.
+// Returns true if the material scatters only specularly.
 fn is_delta(material: Material) -> bool {
     if (DELTA_KINDS & MICROFACET_KINDS) != 0u {
         return is_specular(material) | (has_facets(material) & is_polished(material));
@@ -122,14 +122,14 @@ fn facet_frame(surface: Surface, material: Material) -> Tangents {
     return frame_around(surface.shading_normal);
 }
 
-// Returns a microfacet material as seen by the viewer, in the frame of du and dv: the relative index behind the
-// surface, and the loss by multiple scattering.
-fn facets_of(surface: Surface, found: Material) -> Material {
-    var material = found;
+// Returns a microfacet material with the values for the viewer's direction: the relative index behind the surface, and
+// the energy that single scattering loses. du and dv are the frame.
+fn facets_of(surface: Surface, original: Material) -> Material {
+    var material = original;
     let wo = vector_to_lobe(Tangents(surface.du, surface.dv), surface.shading_normal, surface.wo);
     if (MATERIALS & (1u << ROUGH_GLASS)) != 0u {
         if material.kind == ROUGH_GLASS {
-            material.ior = 1.0 / eta_of(surface, found);
+            material.ior = 1.0 / eta_of(surface, original);
         }
     }
     if material.energy != NO_INDEX {
@@ -148,7 +148,7 @@ fn facets_of(surface: Surface, found: Material) -> Material {
     return material;
 }
 
-// Evaluates microfacets in their frame.
+// Evaluates a microfacet material in its frame.
 fn facet_reflection(material: Material, wo: vec3f, wi: vec3f) -> Reflection {
     var result = Reflection(vec3f(0.0), 0.0);
     if (MATERIALS & (1u << METAL)) != 0u {
@@ -169,7 +169,7 @@ fn facet_reflection(material: Material, wo: vec3f, wi: vec3f) -> Reflection {
     return result;
 }
 
-// Samples microfacets in their frame.
+// Samples a microfacet material in its frame.
 fn facet_sample(material: Material, wo: vec3f, u: vec2f, random: f32) -> LobeSample {
     var result = LobeSample(vec3f(0.0, 0.0, 1.0), vec3f(0.0), 0.0, 1.0);
     if (MATERIALS & (1u << METAL)) != 0u {
@@ -190,7 +190,7 @@ fn facet_sample(material: Material, wo: vec3f, u: vec2f, random: f32) -> LobeSam
     return result;
 }
 
-// Returns wo in the lobe's frame, never below the surface.
+// Returns wo in the frame of du and dv, above the surface.
 fn local_wo(surface: Surface) -> vec3f {
     let wo = vector_to_lobe(Tangents(surface.du, surface.dv), surface.shading_normal, surface.wo);
     return vec3f(wo.x, wo.y, max(wo.z, 1e-6));
@@ -219,13 +219,13 @@ fn direction_allowed(prim: HitPrimitive, surface: Surface, material: Material, w
     return lit;
 }
 
-// Returns true for transmission other than by a delta.
+// Returns true if the material transmits light other than by a delta BSDF.
 fn is_transmissive(material: Material) -> bool {
-    var passes = ((TRANSMISSIVE_KINDS >> material.kind) & 1u) != 0u;
+    var transmits = ((TRANSMISSIVE_KINDS >> material.kind) & 1u) != 0u;
     if (LOBES & LOBE_TRANSMISSION) != 0u {
-        passes |= (material.kind == PRINCIPLED) & (material.transmission > 0.0);
+        transmits |= (material.kind == PRINCIPLED) & (material.transmission > 0.0);
     }
-    return passes;
+    return transmits;
 }
 
 // Returns the shading normal, or 0 if light may arrive from both sides.
@@ -233,7 +233,7 @@ fn lit_normal(surface: Surface, material: Material) -> vec3f {
     return select(surface.shading_normal, vec3f(0.0), is_transmissive(material));
 }
 
-// Returns the surface for rays that leave it on the other side.
+// Returns the surface for rays that leave on the other side.
 fn flipped(surface: Surface) -> Surface {
     var result = surface;
     result.ray_origin = surface.position - (surface.ray_origin - surface.position);

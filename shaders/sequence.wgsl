@@ -1,7 +1,7 @@
 // Low-discrepancy sequences on the unit square, randomized by integer hashing.
 
 // Returns point `index` of the Sobol' (0,2)-sequence, Owen-scrambled by hashing: Burley, "Practical Hash-based Owen
-// Scrambling", JCGT 9(4), 2020. As the order is scrambled too, keys are independent.
+// Scrambling", JCGT 9(4), 2020. Since the order is scrambled too, sequences of different keys are independent.
 fn sobol_sample(index: u32, key: vec2u) -> vec2f {
     let bits = sobol_bits(index, key);
     return vec2f(unit_float(bits.x), unit_float(bits.y));
@@ -13,9 +13,9 @@ fn sobol_bits(index: u32, key: vec2u) -> vec2u {
     return vec2u(reverseBits(scramble(i, key.x)), reverseBits(scramble(sobol_reversed(i), key.y)));
 }
 
-// Returns the second coordinate of Sobol' point i as 32 bits, the first digit lowest; the first coordinate is i. Digit
-// j is the sum of the bits k of i with C(k, j) odd: Pascal's triangle modulo 2 in five factors (Ahmed, "An
-// Implementation Algorithm of 2D Sobol Sequence Fast, Elegant, and Compact", EGSR 2024).
+// Returns the second coordinate of Sobol' point i as 32 digits, with the first digit in the lowest bit. The first
+// coordinate in this form is i. Digit j is the sum of the bits k of i with C(k, j) odd: Pascal's triangle modulo 2 in
+// five factors (Ahmed, "An Implementation Algorithm of 2D Sobol Sequence Fast, Elegant, and Compact", EGSR 2024).
 fn sobol_reversed(i: u32) -> u32 {
     var x = i;
     x ^= (x >> 1u) & 0x55555555u;
@@ -25,8 +25,8 @@ fn sobol_reversed(i: u32) -> u32 {
     return x ^ (x >> 16u);
 }
 
-// Changes every bit by the lower ones, which Owen-scrambles reversed digits: the permutation of Laine and Karras,
-// "Stratified Sampling for Stochastic Transparency", EGSR 2011, with the constants of Burley 2020, listing 2.
+// Changes every bit depending on the lower bits, which Owen-scrambles reversed digits: the permutation of Laine and
+// Karras, "Stratified Sampling for Stochastic Transparency", EGSR 2011, with the constants of Burley 2020, listing 2.
 fn scramble(digits: u32, seed: u32) -> u32 {
     var x = digits + seed;
     x ^= x * 0x6c50b47cu;
@@ -52,11 +52,11 @@ fn halton_sample(index: u32, key: vec2u) -> vec2f {
 
 // Returns the lowest 15 base-3 digits of i, reversed, below 3^15.
 fn radical_inverse_3(i: u32) -> u32 {
-    var rest = i;
+    var remaining = i;
     var reversed = 0u;
     for (var k = 0u; k < 15u; k++) {
-        reversed = reversed * 3u + rest % 3u;
-        rest /= 3u;
+        reversed = reversed * 3u + remaining % 3u;
+        remaining /= 3u;
     }
     return reversed;
 }

@@ -10,26 +10,26 @@ struct SampleBlock {
     key: vec2u,
 }
 
-// Returns the mask of samples that the primitive occludes from p. `kind` is a compile-time constant. With `from_inside`
-// p is on a solid seen from inside (`solid_levels`).
+// Returns the mask of samples that the primitive occludes from p. `kind` is a compile-time constant. With
+// `from_inside`, p is on a solid seen from inside (`solid_levels`).
 fn occlusion_mask(kind: u32, q: Primitive, p: vec3f, from_inside: bool, light: Light, block: SampleBlock) -> u32 {
     let from_anchor = vector_to_local(q, p - q.anchor);
     let o = from_anchor - q.middle;
     let levels = solid_levels(kind, q, from_anchor, from_inside);
-    let to = segments_to_local(q, segments_to_light(light, p));
+    let segments = segments_to_local(q, segments_to_light(light, p));
     var bits = 0u;
     for (var i = 0u; i < block.count; i++) {
-        let d = segment(to, block_sample(block, i));
+        let d = segment(segments, block_sample(block, i));
         bits |= select(0u, 1u << i, occludes(kind, o, d, levels, light.t_max));
     }
     return bits;
 }
 
-// Returns true if the primitive occludes p + s to, s in (0, t_max).
-fn occludes_segment(kind: u32, q: Primitive, p: vec3f, from_inside: bool, to: vec3f, t_max: f32) -> bool {
+// Returns true if the primitive occludes the segment p + s `to_light`, s in (0, t_max).
+fn occludes_segment(kind: u32, q: Primitive, p: vec3f, from_inside: bool, to_light: vec3f, t_max: f32) -> bool {
     let from_anchor = vector_to_local(q, p - q.anchor);
     let levels = solid_levels(kind, q, from_anchor, from_inside);
-    return occludes(kind, from_anchor - q.middle, vector_to_local(q, to), levels, t_max);
+    return occludes(kind, from_anchor - q.middle, vector_to_local(q, to_light), levels, t_max);
 }
 
 fn block_sample(block: SampleBlock, i: u32) -> vec2f {
@@ -39,27 +39,27 @@ fn block_sample(block: SampleBlock, i: u32) -> vec2f {
 // The shadow rays from p to a light: s (towards + u a + v b) for s >= 0 and a, b in -1..=1.
 struct ShadowFrustum {
     apex: vec3f,
-    to: LightSegments,
+    segments: LightSegments,
     length2: f32,          // |towards|^2
     inverse_depth: f32,    // 1 / (the minimum of dot(towards, ray)); negative if the minimum is not positive
 }
 
 fn light_frustum(light: Light, p: vec3f) -> ShadowFrustum {
-    let to = segments_to_light(light, p);
-    let length2 = dot(to.towards, to.towards);
-    let depth = length2 - abs(dot(to.towards, to.u)) - abs(dot(to.towards, to.v));
-    return ShadowFrustum(p, to, length2, select(-1.0, 1.0 / depth, depth > 0.0));
+    let segments = segments_to_light(light, p);
+    let length2 = dot(segments.towards, segments.towards);
+    let depth = length2 - abs(dot(segments.towards, segments.u)) - abs(dot(segments.towards, segments.v));
+    return ShadowFrustum(p, segments, length2, select(-1.0, 1.0 / depth, depth > 0.0));
 }
 
-// Returns false if a plane through the apex separates the sphere from the frustum. Its normal is n = m - towards slope,
-// where m is the part of the vector to the sphere's center perpendicular to `towards`, and `slope` is the smallest
-// slope that keeps all rays below the plane.
+// Returns false if a plane through the apex separates the sphere from the frustum. The plane's normal is n = m -
+// towards slope, where m is the part of the vector to the sphere's center that is perpendicular to `towards`, and
+// `slope` is the smallest slope with which all rays stay below the plane.
 fn may_block(sphere: Sphere, frustum: ShadowFrustum) -> bool {
     let w = sphere.center - frustum.apex;
-    let along = dot(w, frustum.to.towards);
-    let m = w - frustum.to.towards * (along / frustum.length2);
+    let along = dot(w, frustum.segments.towards);
+    let m = w - frustum.segments.towards * (along / frustum.length2);
     let m2 = dot(m, m);
-    let slope = (abs(dot(m, frustum.to.u)) + abs(dot(m, frustum.to.v))) * frustum.inverse_depth;
+    let slope = (abs(dot(m, frustum.segments.u)) + abs(dot(m, frustum.segments.v))) * frustum.inverse_depth;
     let height = m2 - slope * along;
     let radius2 = sphere.radius * sphere.radius;
     return (slope < 0.0) | (height <= 0.0)

@@ -2,9 +2,9 @@
 // SIGGRAPH 1986. Boxes are enlarged by `pad`.
 //
 // Every step is monotone in 32-bit floats: of two nested boxes, the outer one is entered no later and left no earlier.
-// A BVH thus misses nothing whose box a ray hits (docs/decisions/trees.md).
+// A traversal thus misses no item whose box a ray hits (docs/decisions/trees.md).
 
-// A ray's terms for box tests, with origins for lower and upper sides.
+// Precomputed terms of a ray for box tests: origins for lower and upper sides, offset by the padding.
 struct Slabs {
     low_origin: vec3f,
     high_origin: vec3f,
@@ -18,11 +18,11 @@ fn slabs(origin: vec3f, direction: vec3f, pad: f32) -> Slabs {
 
 // Returns 1 / x, finite: |x| is at least 2^-100.
 fn inverse_of(x: f32) -> f32 {
-    let least = select(7.888609e-31, -7.888609e-31, x < 0.0);
-    return 1.0 / select(least, x, abs(x) >= 7.888609e-31);
+    let smallest = select(7.888609e-31, -7.888609e-31, x < 0.0);
+    return 1.0 / select(smallest, x, abs(x) >= 7.888609e-31);
 }
 
-// Returns the t of entry, x, and exit, y; a miss if x > y.
+// Returns the t of entry, x, and of exit, y; a miss if x > y.
 fn box_interval(low: vec3f, high: vec3f, s: Slabs) -> vec2f {
     let a = (low - s.low_origin) * s.inverse;
     let b = (high - s.high_origin) * s.inverse;
@@ -36,7 +36,8 @@ fn interval_hits(interval: vec2f, limit: f32) -> bool {
     return (interval.x <= interval.y) & (interval.y >= 0.0) & (interval.x <= limit);
 }
 
-// All rays from a point with directions in a box. A box test reports a hit if any of these rays hits.
+// Precomputed terms of all rays from a point with directions in a box. A box test reports a hit if any of these rays
+// hits.
 struct RayInterval {
     low_origin: vec3f,
     high_origin: vec3f,
@@ -46,24 +47,24 @@ struct RayInterval {
     far_high: vec3f,
 }
 
-fn ray_interval(origin: vec3f, least: vec3f, most: vec3f, pad: f32) -> RayInterval {
-    let up = least >= vec3f(0.0);
-    let down = most < vec3f(0.0);
-    let of_least = vec3f(inverse_of(least.x), inverse_of(least.y), inverse_of(least.z));
-    let of_most = vec3f(inverse_of(most.x), inverse_of(most.y), inverse_of(most.z));
+fn ray_interval(origin: vec3f, min_direction: vec3f, max_direction: vec3f, pad: f32) -> RayInterval {
+    let is_positive = min_direction >= vec3f(0.0);
+    let is_negative = max_direction < vec3f(0.0);
+    let inverse_min = vec3f(inverse_of(min_direction.x), inverse_of(min_direction.y), inverse_of(min_direction.z));
+    let inverse_max = vec3f(inverse_of(max_direction.x), inverse_of(max_direction.y), inverse_of(max_direction.z));
     let zero = vec3f(0.0);
-    return RayInterval(origin + pad, origin - pad, select(of_most, zero, down), select(of_least, zero, up),
-               select(zero, of_most, down), select(zero, of_least, up));
+    return RayInterval(origin + pad, origin - pad, select(inverse_max, zero, is_negative), select(inverse_min, zero, is_positive),
+               select(zero, inverse_max, is_negative), select(zero, inverse_min, is_positive));
 }
 
-// Returns the earliest t at which any ray may enter, x, and the latest t at which any ray may leave, y.
-fn ray_interval_box(low: vec3f, high: vec3f, f: RayInterval) -> vec2f {
-    let a = low - f.low_origin;
-    let b = high - f.high_origin;
-    let by_low = a * f.near_low;
-    let by_high = b * f.near_high;
-    let near = max(max(max(by_low.x, by_high.x), max(by_low.y, by_high.y)), max(by_low.z, by_high.z));
-    let none = (f.far_low == vec3f(0.0)) & (f.far_high == vec3f(0.0));
-    let far = select(a * f.far_low + b * f.far_high, vec3f(INFINITE_T), none);
+// Returns the earliest t at which any ray may enter a box, x, and the latest t at which any ray may leave, y.
+fn ray_interval_box(low: vec3f, high: vec3f, rays: RayInterval) -> vec2f {
+    let a = low - rays.low_origin;
+    let b = high - rays.high_origin;
+    let t_low = a * rays.near_low;
+    let t_high = b * rays.near_high;
+    let near = max(max(max(t_low.x, t_high.x), max(t_low.y, t_high.y)), max(t_low.z, t_high.z));
+    let is_unbounded = (rays.far_low == vec3f(0.0)) & (rays.far_high == vec3f(0.0));
+    let far = select(a * rays.far_low + b * rays.far_high, vec3f(INFINITE_T), is_unbounded);
     return vec2f(near, min(min(far.x, far.y), far.z));
 }

@@ -1,18 +1,19 @@
 // Specular reflection and refraction.
 
-// Reflects direction d, towards the surface, at n.
+// Reflects the direction d, which points to the surface, at the normal n.
 fn reflected_direction(d: vec3f, n: vec3f) -> vec3f {
     return d - n * (2.0 * dot(d, n));
 }
 
-// Refracts direction d at the normal n, which is on the side that d comes from. `eta` is the index of refraction on
-// that side, relative to the index on the other; `cosine_i` and `cosine_t` are the cosines of the incident and the
+// Refracts direction d at the normal n, which is on the side of the incident ray. `eta` is the index of refraction on
+// that side, relative to the index on the other side; `cosine_i` and `cosine_t` are the cosines of the incident and the
 // refracted direction.
 fn refracted_direction(d: vec3f, n: vec3f, eta: f32, cosine_i: f32, cosine_t: f32) -> vec3f {
     return d * eta + n * (eta * cosine_i - cosine_t);
 }
 
-// Returns the refracted cosine by Snell's law; 0 on total internal reflection. Exactly `cosine_i` if eta is 1.
+// Returns the cosine of the refracted direction by Snell's law; 0 on total internal reflection, exactly `cosine_i` if
+// eta is 1.
 fn refracted_cosine(cosine_i: f32, eta: f32) -> f32 {
     return sqrt(max((1.0 - eta * eta) + eta * eta * (cosine_i * cosine_i), 0.0));
 }

@@ -16,13 +16,14 @@ struct Surface {
     dv: vec3f,
 }
 
+// Returns the largest absolute component.
 fn largest(v: vec3f) -> f32 {
     return max(max(abs(v.x), abs(v.y)), abs(v.z));
 }
 
-// Returns the surface where a ray hits primitive i, q, without texture coordinates. A Newton step moves the point back
-// onto the primitive, up to the rounding of its coordinates and of its offset from the anchor. Rays start above the
-// surface by `epsilon` times the largest of these coordinates.
+// Returns the surface where a ray hits the primitive q with index i, without texture coordinates. A Newton step moves
+// the point back onto the primitive, up to the rounding of the point's coordinates and of the offset from the anchor.
+// Rays start above the surface by `epsilon` times the largest of these coordinates.
 fn surface_at(q: Primitive, i: u32, ray: Ray, t: f32, epsilon: f32) -> Surface {
     let point = ray.origin + ray.direction * t;
     let offset = point - q.anchor;
@@ -37,14 +38,14 @@ fn surface_at(q: Primitive, i: u32, ray: Ray, t: f32, epsilon: f32) -> Surface {
     let side = select(1.0, -1.0, inside);
     let normal = outward * side;
     let size = max(largest(position), largest(offset));
-    let start = position + normal * (epsilon * size);
-    let above = vec2u(0u, select(i, NO_INDEX, solid & inside));
-    let below = vec2u(0u, select(i, NO_INDEX, solid & !inside));
-    return Surface(position, normal, normal, normal, -ray.direction, start, vec3f(0.0), side, above, below, vec2f(0.0),
+    let ray_origin = position + normal * (epsilon * size);
+    let exclude_front = vec2u(0u, select(i, NO_INDEX, solid & inside));
+    let exclude_back = vec2u(0u, select(i, NO_INDEX, solid & !inside));
+    return Surface(position, normal, normal, normal, -ray.direction, ray_origin, vec3f(0.0), side, exclude_front, exclude_back, vec2f(0.0),
                    vec3f(0.0), vec3f(0.0));
 }
 
-// Adds texture coordinates and tangents on q.
+// Adds texture coordinates and tangents.
 fn with_coordinates(surface: Surface, q: Primitive) -> Surface {
     let local = point_to_local(q, surface.position);
     let tangents = local_tangents(q, local);
@@ -59,6 +60,7 @@ fn with_positive_zeros(v: vec3f) -> vec3f {
     return vec3f(positive_zero(v.x), positive_zero(v.y), positive_zero(v.z));
 }
 
+// Returns the record of a first hit on a standalone primitive.
 fn first_hit(q: Primitive, ray: Ray, t: f32) -> FirstHit {
     let local = point_to_local(q, ray.origin + ray.direction * t);
     let n = primitive_normal(q, local);

@@ -2,31 +2,31 @@
 
 fn texture_color(t: Texture, surface: Footprint) -> vec3f {
     let f = texture_footprint(t, surface);
-    var x = vec3f(0.0);
+    var factor = vec3f(0.0);
     if (TEXTURE_KINDS & 3u) != 0u {
         if t.kind <= LINES {
-            x = vec3f(procedural_share(t.kind, t.parameter, f));
+            factor = vec3f(procedural_share(t.kind, t.parameter, f));
         }
     }
     if (TEXTURE_KINDS & 4u) != 0u {
         if t.kind == NEAREST {
-            x = nearest_color(t, f.uv);
+            factor = nearest_color(t, f.uv);
         }
     }
     if (TEXTURE_KINDS & 24u) != 0u {
         if (t.kind == BILINEAR) | (t.kind == TRILINEAR) {
-            x = linear_color(t, f);
+            factor = linear_color(t, f);
         }
     }
     if (TEXTURE_KINDS & 32u) != 0u {
         if t.kind == EWA {
-            x = ewa_color(t, f);
+            factor = ewa_color(t, f);
         }
     }
-    return t.first + (t.second - t.first) * x;
+    return t.first + (t.second - t.first) * factor;
 }
 
-// An image pyramid's level.
+// A level of an image pyramid.
 struct Level {
     start: u32,            // of its texels
     width: u32,
@@ -42,8 +42,8 @@ fn load_texel(t: Texture, level: Level, x: i32, y: i32) -> vec3f {
     var color = vec3f(0.0);
     if (TEXEL_FORMATS & 4u) != 0u {
         if t.format == FLOAT {
-            let at = level.start + 3u * i;
-            color = vec3f(bitcast<f32>(texel_word(at)), bitcast<f32>(texel_word(at + 1u)), bitcast<f32>(texel_word(at + 2u)));
+            let texel = level.start + 3u * i;
+            color = vec3f(bitcast<f32>(texel_word(texel)), bitcast<f32>(texel_word(texel + 1u)), bitcast<f32>(texel_word(texel + 2u)));
         }
     }
     if (TEXEL_FORMATS & 3u) != 0u {
@@ -61,15 +61,15 @@ fn nearest_color(t: Texture, uv: vec2f) -> vec3f {
     return load_texel(t, level, i32(x), i32(y));
 }
 
-// Returns the level, with a fraction, at which `length`, given in texels of the finest level, is 1 to 2 texels.
+// Returns the fractional level at which `length`, in texels of the finest level, is 1 to 2 texels.
 fn level_of_length(t: Texture, length: f32) -> f32 {
     let coarsest = f32(t.levels - 1u);
     let level = max(log2(max(length, 1.0)), 0.0);
     return select(coarsest, level, (length < 1e9) & (level < coarsest));
 }
 
-// Interpolates the finest level bilinearly; TRILINEAR: the two levels whose texels match the footprint's longer edge:
-// Williams, "Pyramidal Parametrics", SIGGRAPH 1983.
+// Interpolates the finest level bilinearly. TRILINEAR blends the two levels whose texels match the footprint's longer
+// edge: Williams, "Pyramidal Parametrics", SIGGRAPH 1983.
 fn linear_color(t: Texture, f: Footprint) -> vec3f {
     let size = vec2f(f32(t.width), f32(t.height));
     let dx = f.dx * size;
@@ -77,11 +77,11 @@ fn linear_color(t: Texture, f: Footprint) -> vec3f {
     let longest = sqrt(max(dx.x * dx.x + dx.y * dx.y, dy.x * dy.x + dy.y * dy.y));
     let lod = select(0.0, level_of_length(t, longest), t.kind == TRILINEAR);
     let finer = floor(lod);
-    let between = lod - finer;
+    let blend = lod - finer;
     var color = vec3f(0.0);
-    for (var i = 0u; i < select(1u, 2u, between > 0.0); i++) {
+    for (var i = 0u; i < select(1u, 2u, blend > 0.0); i++) {
         let sampled = bilinear_color(t, level_of(t, u32(i32(finer)) + i), f.uv);
-        color = select(color + (sampled - color) * between, sampled, i == 0u);
+        color = select(color + (sampled - color) * blend, sampled, i == 0u);
     }
     return color;
 }
@@ -102,58 +102,58 @@ fn bilinear_color(t: Texture, level: Level, uv: vec2f) -> vec3f {
 
 // Returns the elliptical weighted average: Greene and Heckbert, "Creating Raster Omnimax Images from Multiple
 // Perspective Views Using the Elliptical Weighted Average Filter", IEEE CG&A 6(6), 1986; over a pyramid as in Pharr,
-// Jakob and Humphreys, "Physically Based Rendering", 3rd edition, 10.4.5, but on finer levels: half the minor axis is
+// Jakob and Humphreys, "Physically Based Rendering", 3rd edition, 10.4.5, but on finer levels: the minor semi-axis is
 // 2.2 to 4.4 texels. Levels blend over the last quarter.
 fn ewa_color(t: Texture, f: Footprint) -> vec3f {
     let size = vec2f(f32(t.width), f32(t.height));
     let minor = footprint_ellipse(f.dx * size, f.dy * size, t.parameter).minor;
     let lod = level_of_length(t, 0.45 * minor);
     let finer = floor(lod);
-    let between = max(4.0 * (lod - finer) - 3.0, 0.0);
-    let coarsest = lod >= f32(t.levels - 1u); // one texel: needs no footprint, which may be unbounded
+    let blend = max(4.0 * (lod - finer) - 3.0, 0.0);
+    let coarsest = lod >= f32(t.levels - 1u); // a single texel needs no footprint, which may be unbounded
     let dx = select(f.dx, vec2f(0.0), coarsest);
     let dy = select(f.dy, vec2f(0.0), coarsest);
     var color = vec3f(0.0);
-    for (var i = 0u; i < select(1u, 2u, between > 0.0); i++) {
+    for (var i = 0u; i < select(1u, 2u, blend > 0.0); i++) {
         let sampled = ewa_level_color(t, level_of(t, u32(i32(finer)) + i), f.uv, dx, dy);
-        color = select(color + (sampled - color) * between, sampled, i == 0u);
+        color = select(color + (sampled - color) * blend, sampled, i == 0u);
     }
     return color;
 }
 
-// Returns the mean of a level over the ellipse, resized so that the whole filter has the variance that it has on the
-// finest level: M + I, where a half axis r has the variance r^2 and I is the reconstruction filter. Texels are means
-// over a box of variance 1/3, less the variance of the finest texels: (1 - q) / 3, where q is the squared size of a
-// finest texel; I becomes q I. Half axes stay above 1, so that every ellipse contains a texel. Differences to one texel
-// are averaged, to keep constants exact.
+// Returns the mean of a level over the ellipse. The ellipse is resized so that the full filter has the same variance as
+// on the finest level, M + I, where a semi-axis r has the variance r^2 and I is the reconstruction filter. On a coarser
+// level, texels are means over a box and add the variance (1 - q) / 3, where q is the squared size of a finest texel,
+// and I becomes q I. Semi-axes stay above 1, so that every ellipse contains a texel. Differences from one texel are
+// averaged, so that constant colors stay exact.
 fn ewa_level_color(t: Texture, level: Level, uv: vec2f, dx: vec2f, dy: vec2f) -> vec3f {
     let size = vec2f(f32(level.width), f32(level.height));
     let q = size / vec2f(f32(t.width), f32(t.height));
     let edges = vec2f(select(size.x, 0.0, level.width == 1u), select(size.y, 0.0, level.height == 1u));
     let ellipse = footprint_ellipse(dx * edges, dy * edges, t.parameter);
     let m = ellipse.m;
-    let least = 1.0 - ellipse.minor * ellipse.minor;
-    let xx = m.x + max((4.0 * (q.x * q.x) - 1.0) / 3.0, least);
-    let yy = m.z + max((4.0 * (q.y * q.y) - 1.0) / 3.0, least);
+    let min_increase = 1.0 - ellipse.minor * ellipse.minor;
+    let xx = m.x + max((4.0 * (q.x * q.x) - 1.0) / 3.0, min_increase);
+    let yy = m.z + max((4.0 * (q.y * q.y) - 1.0) / 3.0, min_increase);
     let slope = m.y / yy;
-    let across = xx - m.y * slope; // squared half width of the row through the center
+    let half_width2 = xx - m.y * slope; // of the row through the center
     let x = near_coordinate(uv.x, wrap_u(t)) * size.x - 0.5;
     let y = near_coordinate(uv.y, wrap_v(t)) * size.y - 0.5;
-    let t_max = sqrt(yy);
-    let first_row = -i32(floor(t_max - y));
-    let last_row = i32(floor(y + t_max));
+    let half_height = sqrt(yy);
+    let first_row = -i32(floor(half_height - y));
+    let last_row = i32(floor(y + half_height));
     var base = vec3f(0.0);
     var sum = vec3f(0.0);
     var total = 0.0;
     for (var row = first_row; row <= last_row; row++) {
         let h = f32(row) - y;
-        let along = h * h / yy;
+        let row_r2 = h * h / yy;
         let middle = x + h * slope;
-        let half = sqrt(across * max(1.0 - along, 0.0));
+        let half = sqrt(half_width2 * max(1.0 - row_r2, 0.0));
         let last = i32(floor(middle + half));
         for (var column = -i32(floor(half - middle)); column <= last; column++) {
             let w = f32(column) - middle;
-            let weight = max(gaussian_weight(along + w * w / across), 0.0);
+            let weight = max(gaussian_weight(row_r2 + w * w / half_width2), 0.0);
             let color = load_texel(t, level, column, row);
             base = select(base, color, total == 0.0);
             sum += (color - base) * weight;
@@ -169,7 +169,7 @@ fn channel_of(color: vec3f, lookup: Lookup, slot: u32) -> f32 {
     return select(select(color.x, color.y, channel == 1u), color.z, channel == 2u);
 }
 
-// Sets the parameters of principled materials only.
+// Sets the parameters that only principled materials have.
 fn with_principled(before: Material, color: vec3f, lookup: Lookup) -> Material {
     var m = before;
     let purposes = lookup.purposes;
@@ -190,7 +190,7 @@ fn with_principled(before: Material, color: vec3f, lookup: Lookup) -> Material {
     return m;
 }
 
-// A textured material and its shading normals.
+// A textured material and the shading normals.
 struct EvaluatedMaterial {
     material: Material,
     normal: vec3f,
@@ -198,17 +198,17 @@ struct EvaluatedMaterial {
 }
 
 // Applies at most `lookups` textures.
-fn evaluate_material(prim: HitPrimitive, hit: Hit, material: Material, surface: Surface, at: HitDifferential, lookups: u32) -> EvaluatedMaterial {
+fn evaluate_material(prim: HitPrimitive, hit: Hit, material: Material, surface: Surface, hit_diff: HitDifferential, lookups: u32) -> EvaluatedMaterial {
     var shading = EvaluatedMaterial(material, surface.shading_normal, surface.shading_normal);
     if lookups == 0u {
         return shading;
     }
-    let footprint = footprint_of(prim, hit, surface, at);
+    let footprint = footprint_of(prim, hit, surface, hit_diff);
     for (var i = 0u; i < lookups; i++) {
         if i < material.lookups.y {
             let lookup = load_lookup(material.lookups.x + i);
             let t = load_texture(lookup.texture);
-            let color = texture_color(t, footprint_in_set(footprint, prim, hit, at, lookup.uv_set));
+            let color = texture_color(t, footprint_in_set(footprint, prim, hit, hit_diff, lookup.uv_set));
             let purposes = lookup.purposes;
             shading.material.ambient = select(shading.material.ambient, color, (purposes & FOR_AMBIENT) != 0u);
             shading.material.diffuse = select(shading.material.diffuse, color, (purposes & FOR_DIFFUSE) != 0u);

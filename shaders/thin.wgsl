@@ -1,12 +1,13 @@
-// The material `dielectric` as a thin sheet, which does not change the direction of transmitted light. Interreflection
-// between its sides adds up to the reflectance 2 R / (1 + R): see the series in Stam, "An Illumination Model for a Skin
-// Layer Bounded by Rough Surfaces", EGRW 2001. Roughness spreads transmitted light like reflected light.
+// The material `dielectric` as a thin sheet, which does not change the direction of transmitted light. With
+// interreflection between the sides of the sheet, the reflectance is 2 R / (1 + R): see the series in Stam, "An
+// Illumination Model for a Skin Layer Bounded by Rough Surfaces", EGRW 2001. Roughness spreads transmitted light like
+// reflected light.
 
 fn thin_reflectance(ior: f32, cosine: f32) -> f32 {
     let c = min(max(cosine, 1e-6), 1.0);
     let eta = 1.0 / ior;
-    let once = fresnel(c, refracted_cosine(c, eta), eta);
-    return 2.0 * once / (1.0 + once);
+    let one_side = fresnel(c, refracted_cosine(c, eta), eta);
+    return 2.0 * one_side / (1.0 + one_side);
 }
 
 // Mirrors a direction behind the sheet to the viewer's side.
@@ -31,18 +32,18 @@ fn thin_pdf(material: Material, wo: vec3f, wi: vec3f) -> f32 {
     return select(0.0, share * facet_pdf(facet_alpha(material), wo, up), (wo.z > 0.0) & (up.z > 0.0));
 }
 
-// Samples reflection or transmission, by `random` in [0, 1).
+// Samples reflection or transmission, as `random` in [0, 1) selects.
 fn thin_sample(material: Material, wo: vec3f, u: vec2f, random: f32) -> LobeSample {
     let alpha = facet_alpha(material);
     let m = ggx_sample(alpha, wo, u);
     let cosine = dot(wo, m);
     let reflected = thin_reflectance(material.ior, cosine);
-    let mirrors = random < reflected;
+    let reflects = random < reflected;
     let up = m * (2.0 * cosine) - wo;
     let lit = (wo.z > 0.0) & (up.z > 0.0) & (cosine > 0.0);
-    let weight = select(material.tint, vec3f(1.0), mirrors) * (facet_weight(alpha, wo, up) * dielectric_gain(material));
-    let share = select(1.0 - reflected, reflected, mirrors);
+    let weight = select(material.tint, vec3f(1.0), reflects) * (facet_weight(alpha, wo, up) * dielectric_gain(material));
+    let share = select(1.0 - reflected, reflected, reflects);
     let pdf = share * ggx_d(alpha, m) * 0.5 / max(wo.z + ggx_length(alpha, wo), 1e-30);
-    let wi = vec3f(up.x, up.y, select(-up.z, up.z, mirrors));
+    let wi = vec3f(up.x, up.y, select(-up.z, up.z, reflects));
     return LobeSample(wi, select(vec3f(0.0), weight, lit), select(0.0, pdf, lit), 1.0);
 }

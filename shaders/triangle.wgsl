@@ -11,7 +11,7 @@ fn intersect_triangle(q: Primitive, ray: Ray, limit: f32) -> f32 {
     return select(limit, t, (t > 0.0) & (t < limit) & inside);
 }
 
-// Returns true if it occludes o + s d, s in (0, t_max).
+// Returns true if the triangle occludes the local segment o + s d, s in (0, t_max).
 fn triangle_occludes(o: vec3f, d: vec3f, t_max: f32) -> bool {
     let p = scaled_crossing(o, d);
     return crosses_plane(o, d, t_max) & (p.x >= 0.0) & (p.y >= 0.0) & (p.x + p.y <= abs(d.z));

@@ -28,14 +28,15 @@ fn with_vertex_colors(before: Material, hit: Hit) -> Material {
     return material;
 }
 
-// Loads a vertex's further texture coordinates, which must exist.
+// Loads a vertex's texture coordinates of a further set, which must exist.
 fn load_further_uv(i: Instance, vertex: u32, uv_set: u32) -> vec2f {
     let rows = (i.uv_sets + 1u) / 2u;
     let row = bitcast<vec4f>(meshes[i.more_uvs + rows * vertex + (uv_set - 1u) / 2u]);
     return select(row.zw, row.xy, (uv_set & 1u) == 1u);
 }
 
-// Returns the hit primitive with a set of texture coordinates in place of the first; 0 if missing.
+// Returns the hit primitive with the texture coordinates of a further set instead of set 0; 0 if the mesh lacks the
+// set.
 fn hit_primitive_in_uv_set(prim: HitPrimitive, hit: Hit, uv_set: u32) -> HitPrimitive {
     var face = prim;
     if is_on_mesh(hit) {
@@ -53,7 +54,7 @@ fn hit_primitive_in_uv_set(prim: HitPrimitive, hit: Hit, uv_set: u32) -> HitPrim
     return face;
 }
 
-// Returns texture coordinates in a set; `first` is set 0.
+// Returns the texture coordinates in a set; `first` are those of set 0.
 fn uv_in_set(first: vec2f, prim: HitPrimitive, hit: Hit, uv_set: u32) -> vec2f {
     if UV_SETS == 0u {
         return first;
@@ -64,7 +65,7 @@ fn uv_in_set(first: vec2f, prim: HitPrimitive, hit: Hit, uv_set: u32) -> vec2f {
     return face_uv(hit_primitive_in_uv_set(prim, hit, uv_set), hit.barycentric);
 }
 
-fn footprint_in_set(first: Footprint, prim: HitPrimitive, hit: Hit, at: HitDifferential, uv_set: u32) -> Footprint {
+fn footprint_in_set(first: Footprint, prim: HitPrimitive, hit: Hit, hit_diff: HitDifferential, uv_set: u32) -> Footprint {
     if UV_SETS == 0u {
         return first;
     }
@@ -73,5 +74,5 @@ fn footprint_in_set(first: Footprint, prim: HitPrimitive, hit: Hit, at: HitDiffe
     }
     let face = hit_primitive_in_uv_set(prim, hit, uv_set);
     let uv = face_uv(face, hit.barycentric);
-    return Footprint(uv, face_uv_derivative(face, at.x.position), face_uv_derivative(face, at.y.position));
+    return Footprint(uv, face_uv_derivative(face, hit_diff.x.position), face_uv_derivative(face, hit_diff.y.position));
 }

@@ -1,7 +1,7 @@
 // Mappings from the unit square to points and directions.
 
 // Samples the unit disk uniformly: Shirley and Chiu, "A Low Distortion Map between Disk and Square", Journal of
-// Graphics Tools 2(3), 1997. Taylor series of angles up to pi / 4, within 3 / 10^8.
+// Graphics Tools 2(3), 1997. Sine and cosine of angles up to pi / 4 are Taylor series, within 3e-8.
 fn disk_sample(u: vec2f) -> vec2f {
     let a = 2.0 * u.x - 1.0;
     let b = 2.0 * u.y - 1.0;
@@ -34,22 +34,22 @@ fn frame_around(n: vec3f) -> Tangents {
     return Tangents(vec3f(1.0 + sign * n.x * n.x * a, sign * b, -sign * n.x), vec3f(b, sign + n.y * n.y * a, -n.y));
 }
 
-// Rotates a vector from a frame with the z axis n.
+// Rotates a vector from a local frame to a frame with the z axis n.
 fn vector_around(n: vec3f, v: vec3f) -> vec3f {
     let frame = frame_around(n);
     return frame.u * v.x + frame.v * v.y + n * v.z;
 }
 
 // Samples a unit vector on the side of n proportionally to the cosine: disk points are projected to the hemisphere
-// (Malley's method). Its length is 1 within 3 / 10^7.
+// (Malley's method). The length is 1 within 3e-7.
 fn hemisphere_sample(n: vec3f, u: vec2f) -> vec3f {
     let p = disk_sample(u);
     return vector_around(n, vec3f(p, sqrt(max(1.0 - p.x * p.x - p.y * p.y, 0.0))));
 }
 
-// Maps the unit disk to the spherical cap of height `most` around z, preserving relative areas. The length is 1 up to
-// rounding.
-fn cap_sample(p: vec2f, most: f32) -> vec3f {
-    let h = (p.x * p.x + p.y * p.y) * most;
-    return vec3f(p * sqrt(max(most * (2.0 - h), 0.0)), 1.0 - h);
+// Maps the unit disk to the spherical cap of height `cap_height` around z, preserving relative areas. The vector's
+// length is 1 up to rounding.
+fn cap_sample(p: vec2f, cap_height: f32) -> vec3f {
+    let h = (p.x * p.x + p.y * p.y) * cap_height;
+    return vec3f(p * sqrt(max(cap_height * (2.0 - h), 0.0)), 1.0 - h);
 }

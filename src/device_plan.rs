@@ -4,13 +4,14 @@
 use wgray_render::gpu;
 use wgray_render::records::Packed;
 
+use crate::context::Context;
 use crate::device::{Device, DeviceInfo};
 use crate::error::RenderError;
 #[cfg(feature = "gpu")]
 use crate::open::choice_of;
 use crate::open::faster_on_cpu;
 #[cfg(not(feature = "gpu"))]
-use crate::{error::Error, open::adapter};
+use crate::open::gpu_missing;
 
 /// The device of a render, and why it was chosen.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -41,7 +42,7 @@ pub fn plan_device(scene: &Packed, device: &Device) -> Result<DevicePlan, Render
             return Ok(on_cpu("this build has no GPU support (feature \"gpu\")".to_owned()));
         }
         Device::Auto => {
-            if let Some(why) = faster_on_cpu(scene) {
+            if let Some(why) = faster_on_cpu(&Context::new(), scene) {
                 return Ok(on_cpu(why));
             }
         }
@@ -74,9 +75,6 @@ fn preferred(scene: &Packed, device: &Device) -> Result<DevicePlan, RenderError>
 }
 
 #[cfg(not(feature = "gpu"))]
-fn preferred(scene: &Packed, device: &Device) -> Result<DevicePlan, RenderError> {
-    match adapter(scene, device, false, &|_, _| true) {
-        Err(Error::Render(error)) => Err(error),
-        _ => Err(RenderError::NoDevice("only the CPU is available".to_owned())),
-    }
+fn preferred(_: &Packed, device: &Device) -> Result<DevicePlan, RenderError> {
+    Err(gpu_missing(device))
 }

@@ -21,6 +21,8 @@
 //!   [`Scene::load_with`] replaces the size, number of samples or seed of the file.
 //! - [`render_progressive`] shows the image while it renders, and can be cancelled.
 //! - [`Picture`] provides the linear pixels and layers, and writes PNG, OpenEXR, JPEG and WebP files.
+//! - [`Session`] renders a scene several times, from other cameras for example, with one device and without packing the
+//!   scene again.
 //! - [`Description::new`] builds a scene in code, without a file:
 //!
 //! ```
@@ -63,6 +65,7 @@ struct Readme;
 
 #[cfg(feature = "cli")]
 pub mod cli;
+mod context;
 mod device;
 #[cfg(feature = "cli")]
 mod device_plan;
@@ -73,7 +76,9 @@ mod options;
 mod picture;
 mod render;
 mod renderer;
+mod session;
 
+pub use context::Context;
 pub use device::{Device, DeviceInfo};
 pub use error::Error;
 pub use glam::DVec3;
@@ -81,7 +86,8 @@ pub use image::{Aov, AovSource, Pixels};
 pub use options::Options;
 pub use picture::{Channel, Picture};
 pub use render::{Progressive, render, render_progressive};
-pub use scene::{Description, Overrides, Scene};
+pub use scene::{Camera, Description, Overrides, Scene};
+pub use session::Session;
 pub use wgray_image::Region;
 pub use wgray_render::film;
 #[cfg(feature = "gpu")]

@@ -1,5 +1,7 @@
 //! Opens the requested device for a scene: the CPU or an adapter.
 
+use std::sync::Arc;
+
 use wgray_render::backend::Backend;
 use wgray_render::cpu::Cpu;
 #[cfg(feature = "gpu")]
@@ -8,30 +10,78 @@ use wgray_render::records::Packed;
 #[cfg(feature = "gpu")]
 use wgray_scene::Problem;
 
+use crate::context::Context;
 use crate::device::{Device, DeviceInfo};
 use crate::error::{Error, RenderError};
 
-pub(crate) type Ready<'a> = (Box<dyn Backend + 'a>, DeviceInfo);
+/// A scene on the CPU or on an adapter.
+pub(crate) enum Engine {
+    Cpu(Cpu<Arc<Packed>>),
+    #[cfg(feature = "gpu")]
+    Gpu(Box<Gpu>, Arc<Packed>),
+}
 
-pub(crate) fn cpu(scene: &Packed) -> Ready<'_> {
-    (Box::new(Cpu::new(scene)), DeviceInfo::cpu())
+impl Engine {
+    pub(crate) fn cpu(scene: Arc<Packed>) -> Engine {
+        Engine::Cpu(Cpu::new(scene))
+    }
+
+    pub(crate) fn backend(&mut self) -> &mut dyn Backend {
+        match self {
+            Engine::Cpu(cpu) => cpu,
+            #[cfg(feature = "gpu")]
+            Engine::Gpu(gpu, _) => &mut **gpu,
+        }
+    }
+
+    pub(crate) fn scene(&self) -> &Arc<Packed> {
+        match self {
+            Engine::Cpu(cpu) => cpu.scene(),
+            #[cfg(feature = "gpu")]
+            Engine::Gpu(_, scene) => scene,
+        }
+    }
+
+    pub(crate) fn into_scene(self) -> Arc<Packed> {
+        match self {
+            Engine::Cpu(cpu) => cpu.into_scene(),
+            #[cfg(feature = "gpu")]
+            Engine::Gpu(_, scene) => scene,
+        }
+    }
+
+    /// Edits the camera and discards the film. The kernel must stay the same.
+    pub(crate) fn edit_camera(&mut self, edit: impl FnOnce(&mut Packed)) -> Result<(), RenderError> {
+        match self {
+            Engine::Cpu(cpu) => {
+                cpu.edit_scene(|scene| edit(Arc::make_mut(scene)));
+                Ok(())
+            }
+            #[cfg(feature = "gpu")]
+            Engine::Gpu(gpu, scene) => {
+                let scene = Arc::make_mut(scene);
+                edit(scene);
+                gpu.set_camera(&scene.camera)
+            }
+        }
+    }
 }
 
 /// Returns the reason if the CPU is faster than any adapter for this scene; `docs/performance.md` has the measurements.
 #[cfg(feature = "gpu")]
-pub(crate) fn faster_on_cpu(scene: &Packed) -> Option<String> {
+pub(crate) fn faster_on_cpu(context: &Context, scene: &Packed) -> Option<String> {
     if scene.specialization.tlas_kinds == 0 {
         return None;
     }
-    let adapter = gpu::adapters().into_iter().next()?;
+    let adapter = context.devices.best()?;
     adapter.is_software().then(|| {
-        let name = adapter.name;
+        let name = &adapter.name;
         format!("no GPU found, and the CPU traverses the BVH faster than {name}; use --device gpu to override")
     })
 }
 
 #[cfg(not(feature = "gpu"))]
-pub(crate) fn faster_on_cpu(_: &Packed) -> Option<String> {
+pub(crate) fn faster_on_cpu(_: &Context, _: &Packed) -> Option<String> {
     None
 }
 
@@ -44,22 +94,34 @@ pub(crate) fn choice_of(device: &Device) -> gpu::AdapterChoice {
     }
 }
 
-/// Opens the first matching adapter that `wanted` accepts. `wanted` gets the name, and whether the adapter is software.
+/// Puts a scene on the first matching adapter that `wanted` accepts, which gets the name, and whether the adapter is
+/// software. Without `wanted`, a device that the context has opened for the same request is used again.
 #[cfg(feature = "gpu")]
-pub(crate) fn adapter<'a>(
-    scene: &'a Packed,
+pub(crate) fn adapter(
+    context: &Context,
+    scene: &Arc<Packed>,
     device: &Device,
     exact_rounding: bool,
-    wanted: &dyn Fn(&str, bool) -> bool,
-) -> Result<Ready<'a>, Error> {
-    let choice = choice_of(device);
-    let wanted = |info: &gpu::GpuInfo| wanted(&info.name, info.is_software());
-    let opened = gpu::choose_among(&choice, &wanted).map_err(|error| match device {
-        Device::Auto => RenderError::NoDevice(error.to_string()),
-        _ => error,
-    })?;
+    wanted: Option<&dyn Fn(&str, bool) -> bool>,
+) -> Result<(Engine, DeviceInfo), Error> {
+    let opened = match wanted {
+        None => context.devices.get(device),
+        Some(_) => None,
+    };
+    let opened = match opened {
+        Some(opened) => opened,
+        None => {
+            let wanted = |info: &gpu::GpuInfo| wanted.is_none_or(|wanted| wanted(&info.name, info.is_software()));
+            let opened = gpu::choose_among(&choice_of(device), &wanted).map_err(|error| match device {
+                Device::Auto => RenderError::NoDevice(error.to_string()),
+                _ => error,
+            })?;
+            context.devices.add(device, &opened);
+            tracing::info!(device = opened.info.name, driver = opened.info.driver, "device open");
+            opened
+        }
+    };
     let info = DeviceInfo::from(&opened.info);
-    tracing::info!(device = info.name, driver = info.driver, "device open");
     let mut options = gpu::Options::best(&opened);
     if exact_rounding {
         if !opened.info.exact {
@@ -69,21 +131,27 @@ pub(crate) fn adapter<'a>(
         options.exact = Some(Rounding::Software);
     }
     let gpu = Gpu::new(&opened, scene, &Shaders::built_in(), options)?;
-    Ok((Box::new(gpu), info))
+    Ok((Engine::Gpu(Box::new(gpu), Arc::clone(scene)), info))
 }
 
 #[cfg(not(feature = "gpu"))]
-pub(crate) fn adapter<'a>(
-    _: &'a Packed,
+pub(crate) fn adapter(
+    _: &Context,
+    _: &Arc<Packed>,
     device: &Device,
     _: bool,
-    _: &dyn Fn(&str, bool) -> bool,
-) -> Result<Ready<'a>, Error> {
-    let asked = match device {
+    _: Option<&dyn Fn(&str, bool) -> bool>,
+) -> Result<(Engine, DeviceInfo), Error> {
+    Err(Error::Render(gpu_missing(device)))
+}
+
+#[cfg(not(feature = "gpu"))]
+pub(crate) fn gpu_missing(device: &Device) -> RenderError {
+    let requested = match device {
         Device::Named(name) => format!("'{name}'"),
         _ => "a GPU".to_string(),
     };
-    Err(Error::Render(RenderError::NoDevice(format!(
-        "{asked}: only the CPU is available, because the crate was built without the feature \"gpu\""
-    ))))
+    RenderError::NoDevice(format!(
+        "{requested}: only the CPU is available, because the crate was built without the feature \"gpu\""
+    ))
 }

@@ -50,12 +50,16 @@ impl Options {
         Err(Problem::of("crop", format!("{x0},{y0},{x1},{y1} {rule}")))
     }
 
+    /// Returns true if the film must have layers: for alpha, or for requested layers that are means over samples.
+    pub(crate) fn needs_layers(&self, scene: &Scene) -> bool {
+        let integrator = scene.render.integrator;
+        let is_mean = |aov: &Aov| aov.source(integrator) == AovSource::Samples;
+        integrator.has_layers() && (scene.render.alpha || self.aovs.iter().any(is_mean))
+    }
+
     pub(crate) fn pack(&self, scene: &Scene) -> Packed {
-        let plain = pack(scene);
-        let of_samples = |aov: &Aov| aov.source(plain.integrator) == AovSource::Samples;
-        match self.aovs.iter().any(of_samples) {
-            true => plain.with_layers(),
-            false => plain,
-        }
+        let mut packed = pack(scene);
+        packed.specialization.layers = self.needs_layers(scene).into();
+        packed
     }
 }

@@ -1,15 +1,15 @@
 //! Rendering of a scene to an image in memory.
 
 use std::ops::ControlFlow;
+use std::sync::Arc;
 
-use tracing::warn;
-
+use crate::context::Context;
 use crate::device::DeviceInfo;
 use crate::error::{Error, RenderError};
 use crate::image::{Aov, AovSource, Layout};
 use crate::options::Options;
 use crate::picture::Picture;
-use crate::renderer::{FaultHandler, Recovery, Renderer};
+use crate::renderer::{OpenScene, Renderer, warnings};
 use wgray_image::Region;
 use wgray_render::backend::Backend;
 use wgray_render::film::{Film, FilmLayout};
@@ -33,8 +33,20 @@ use wgray_scene::Scene;
 ///
 /// The options do not fit the scene, the device does not exist, or its driver reports an error.
 pub fn render(scene: &Scene, options: &Options) -> Result<Picture, Error> {
-    let packed = options.pack(scene);
-    let mut prepared = RenderSetup::new(scene, &packed, options)?;
+    let mut open = open(scene, options)?;
+    render_with(Renderer::new(&mut open, warnings()), scene, options)
+}
+
+/// Opens a device for a single render.
+fn open(scene: &Scene, options: &Options) -> Result<OpenScene, Error> {
+    options.region(scene).map_err(Error::Option)?;
+    let packed = Arc::new(options.pack(scene));
+    OpenScene::new(&Context::new(), packed, options, &mut warnings())
+}
+
+pub(crate) fn render_with(renderer: Renderer, scene: &Scene, options: &Options) -> Result<Picture, Error> {
+    let packed = Arc::clone(renderer.scene());
+    let mut prepared = RenderSetup::new(scene, &packed, renderer, options)?;
     let region = prepared.layout.region;
     let mut film = empty(region, packed.film_layout())?;
     let (split, most) = (WorkSplit::of(packed.film_layout()), prepared.renderer.largest_film());
@@ -72,8 +84,18 @@ pub fn render_progressive(
     options: &Options,
     watch: &mut dyn FnMut(&mut Progressive) -> Result<ControlFlow<()>, Error>,
 ) -> Result<Picture, Error> {
-    let packed = options.pack(scene);
-    let mut prepared = RenderSetup::new(scene, &packed, options)?;
+    let mut open = open(scene, options)?;
+    render_progressive_with(Renderer::new(&mut open, warnings()), scene, options, watch)
+}
+
+pub(crate) fn render_progressive_with(
+    renderer: Renderer,
+    scene: &Scene,
+    options: &Options,
+    watch: &mut dyn FnMut(&mut Progressive) -> Result<ControlFlow<()>, Error>,
+) -> Result<Picture, Error> {
+    let packed = Arc::clone(renderer.scene());
+    let mut prepared = RenderSetup::new(scene, &packed, renderer, options)?;
     let RenderSetup { renderer, hits, layout } = &mut prepared;
     let (split, order) = (WorkSplit::of(packed.film_layout()), Order::Pixels);
     let most = renderer.largest_film();
@@ -173,16 +195,13 @@ struct RenderSetup<'a> {
 }
 
 impl<'a> RenderSetup<'a> {
-    fn new(scene: &Scene, packed: &'a Packed, options: &Options) -> Result<RenderSetup<'a>, Error> {
+    fn new(
+        scene: &Scene,
+        packed: &Packed,
+        mut renderer: Renderer<'a>,
+        options: &Options,
+    ) -> Result<RenderSetup<'a>, Error> {
         let region = options.region(scene).map_err(Error::Option)?;
-        let on_fault = FaultHandler {
-            tell: Box::new(|why, remedy| match remedy {
-                Recovery::Reopen => warn!("{why}; re-opening it"),
-                Recovery::Cpu => warn!("rendering on the CPU: {why}"),
-            }),
-            stopped: Box::new(|| false), // the pauses are short
-        };
-        let mut renderer = Renderer::new(packed, options, on_fault)?;
         let hits = match needs_first_hits(packed, &options.aovs) {
             true => renderer.work(|backend, _| job::first_hits(backend, region))?,
             false => Vec::new(),

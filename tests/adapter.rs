@@ -5,10 +5,10 @@ use std::sync::OnceLock;
 
 use wgray_render::gpu::{AdapterChoice, Device, choose};
 
-/// Part of the name, driver or type of the adapter.
+/// Environment variable: part of the name, driver or type of the adapter under test.
 const ADAPTER: &str = "WGRAY_TEST_ADAPTER";
-/// Set to 1 to run only the tests that need no adapter.
-const WITHOUT: &str = "WGRAY_TEST_WITHOUT_GPU";
+/// Environment variable: 1 runs only the tests that need no adapter.
+const WITHOUT_GPU: &str = "WGRAY_TEST_WITHOUT_GPU";
 
 /// Returns the adapter under test, or `None` if `WGRAY_TEST_WITHOUT_GPU` is 1. Panics if no adapter is found.
 pub fn device() -> Option<&'static Device> {
@@ -17,8 +17,8 @@ pub fn device() -> Option<&'static Device> {
 }
 
 fn open() -> Option<Device> {
-    if std::env::var_os(WITHOUT).is_some_and(|value| value == "1") {
-        print_line("adapter: none, as WGRAY_TEST_WITHOUT_GPU=1 asks; GPU and CPU are not compared");
+    if std::env::var_os(WITHOUT_GPU).is_some_and(|value| value == "1") {
+        print_line("adapter: none, because WGRAY_TEST_WITHOUT_GPU is 1; GPU and CPU are not compared");
         return None;
     }
     let choice = std::env::var(ADAPTER).map_or(AdapterChoice::Auto, AdapterChoice::Named);
@@ -31,7 +31,7 @@ fn open() -> Option<Device> {
             ));
             Some(device)
         }
-        Err(error) => panic!("{error}. To run only the tests that need no adapter, set {WITHOUT}=1."),
+        Err(error) => panic!("{error}. To run only the tests that need no adapter, set {WITHOUT_GPU}=1."),
     }
 }
 
@@ -50,8 +50,8 @@ pub fn bit_exact(device: &Device) -> bool {
 pub struct KnownDifference {
     /// Part of the adapter's name or driver.
     pub adapter: &'static str,
-    /// The affected check: the name of a shared function, `denormal numbers` for all functions, `picture` or `first hits`.
-    pub what: &'static str,
+    /// The name of a shared function, `denormal numbers` for all functions, `picture` or `first hits`.
+    pub check: &'static str,
     pub reason: &'static str,
     /// Maximum fraction of results that may differ.
     pub share: f64,
@@ -66,38 +66,43 @@ pub const KNOWN_DIFFERENCES: &[KnownDifference] = &[
     swiftshader("filter_offset", ROUNDED_TWICE, 0.0102),
 ];
 
-/// The driver converts such integers to floats in two rounding steps. Indices in scenes are below 2^31.
+/// The driver rounds twice when it converts these integers to floats. Indices in scenes are below 2^31.
 pub const ROUNDED_TWICE: &str = "unsigned integers of 2^31 or more are rounded twice";
 
-const fn swiftshader(what: &'static str, reason: &'static str, share: f64) -> KnownDifference {
+const fn swiftshader(check: &'static str, reason: &'static str, share: f64) -> KnownDifference {
     KnownDifference {
         adapter: "SwiftShader",
-        what,
+        check,
         reason,
         share,
     }
 }
 
-/// Returns the deviation listed for a check on this device.
-pub fn allowed<'a>(known: &'a [KnownDifference], name: &str, driver: &str, what: &str) -> Option<&'a KnownDifference> {
-    known
+/// Returns the table entry for a check on a device.
+pub fn allowed<'a>(
+    entries: &'a [KnownDifference],
+    name: &str,
+    driver: &str,
+    check: &str,
+) -> Option<&'a KnownDifference> {
+    entries
         .iter()
-        .find(|k| k.what == what && (name.contains(k.adapter) || driver.contains(k.adapter)))
+        .find(|entry| entry.check == check && (name.contains(entry.adapter) || driver.contains(entry.adapter)))
 }
 
-/// Checks the fraction of differing results against the table entry. Without an entry no result may differ. An entry
+/// Checks the fraction of differing results against the table entry. Without an entry, no result may differ. An entry
 /// whose deviation no longer occurs is an error.
-pub fn judge(known: Option<&KnownDifference>, what: &str, share: f64) -> Result<(), String> {
-    match known {
+pub fn judge(entry: Option<&KnownDifference>, check: &str, share: f64) -> Result<(), String> {
+    match entry {
         None if share == 0.0 => Ok(()),
-        None => Err(format!("{what}: {:.4} % of the results differ", share * 100.0)),
-        Some(k) if share == 0.0 => Err(format!(
-            "{what}: no result differs any more; remove the entry: {}",
-            k.reason
+        None => Err(format!("{check}: {:.4} % of the results differ", share * 100.0)),
+        Some(entry) if share == 0.0 => Err(format!(
+            "{check}: no result differs any more; remove the entry: {}",
+            entry.reason
         )),
-        Some(k) if share > k.share => Err(format!(
-            "{what}: {share} of the results differ, more than explained by: {}",
-            k.reason
+        Some(entry) if share > entry.share => Err(format!(
+            "{check}: {share} of the results differ, more than this entry allows: {}",
+            entry.reason
         )),
         Some(_) => Ok(()),
     }
@@ -105,13 +110,13 @@ pub fn judge(known: Option<&KnownDifference>, what: &str, share: f64) -> Result<
 
 #[test]
 fn outdated_or_exceeded_known_differences_fail() {
-    let known = [KnownDifference {
+    let entries = [KnownDifference {
         adapter: "Some GPU",
-        what: "dot",
+        check: "dot",
         reason: "division by an approximation",
         share: 0.1,
     }];
-    let entry = allowed(&known, "Some GPU 9000", "driver 1", "dot");
+    let entry = allowed(&entries, "Some GPU 9000", "driver 1", "dot");
     assert!(entry.is_some());
     assert!(judge(entry, "dot", 0.05).is_ok());
     assert!(judge(entry, "dot", 0.0).is_err(), "an outdated entry is accepted");
@@ -119,17 +124,17 @@ fn outdated_or_exceeded_known_differences_fail() {
         judge(entry, "dot", 0.2).is_err(),
         "more differences than listed are accepted"
     );
-    for (name, driver, what) in [("Some GPU", "driver 1", "cross"), ("Other", "driver 1", "dot")] {
-        let entry = allowed(&known, name, driver, what);
+    for (name, driver, check) in [("Some GPU", "driver 1", "cross"), ("Other", "driver 1", "dot")] {
+        let entry = allowed(&entries, name, driver, check);
         assert!(entry.is_none());
-        assert!(judge(entry, what, 1e-6).is_err(), "an unlisted difference is accepted");
-        assert!(judge(entry, what, 0.0).is_ok());
+        assert!(judge(entry, check, 1e-6).is_err(), "an unlisted difference is accepted");
+        assert!(judge(entry, check, 0.0).is_ok());
     }
 }
 
-/// If the query of the driver properties failed, the properties would look unsupported.
+/// If the query of the driver properties failed, float controls would look unsupported.
 #[test]
-fn software_vulkan_can_be_asked_for_float_controls() {
+fn float_controls_of_software_vulkan_are_queried() {
     let Some(device) = device().filter(|device| bit_exact(device)) else {
         return;
     };

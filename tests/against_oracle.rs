@@ -4,49 +4,49 @@ use glam::{DVec2, DVec3};
 use wgray::scene::{Description, Pattern, SamplesDescription};
 use wgray_render::records::{FirstHit, NO_INDEX};
 
-use crate::oracle::{Flaw, Meeting, Oracle};
+use crate::oracle::{Flaw, Intersection, Oracle};
 use crate::pictures::{both, first_hits, means, render};
 use crate::scenes;
 
-/// Tolerance of a value `v`, relative to `1 + v`. Rounding errors of f32 reach this size after a specular exponent of 50.
+/// Tolerance of a value `v`, relative to `1 + v`: the size of f32 rounding errors after a specular exponent of 50.
 const TOLERANCE: f64 = 1e-5;
 
 /// Maximum fraction of differing pixels. At an edge, rounding can move a sample to the other side.
-const EDGES: f64 = 0.0005;
+const MAX_EDGE_SHARE: f64 = 0.0005;
 
-/// Scenes with more edges: name, maximum fraction of differing pixels, reason.
-const MORE_EDGES: &[(&str, f64, &str)] = &[
+/// Scenes with more edges: name, maximum fraction of differing pixels, and reason.
+const EDGE_SHARES_BY_SCENE: &[(&str, f64, &str)] = &[
     (
         "balls-checker.toml",
         0.003,
-        "a checker without filter up to the horizon",
+        "an unfiltered checkerboard extends to the horizon",
     ),
     (
         "twisted-tube.toml",
         0.003,
-        "shadows on meshes end at edges of thousands of triangles, and a mirror shows them again",
+        "edges of thousands of triangles bound the shadows on meshes, and a mirror reflects the shadows",
     ),
 ];
 
-fn edges(scene: &str) -> f64 {
-    MORE_EDGES
+fn max_edge_share(scene: &str) -> f64 {
+    EDGE_SHARES_BY_SCENE
         .iter()
         .find(|(name, ..)| *name == scene)
-        .map_or(EDGES, |(_, share, _)| *share)
+        .map_or(MAX_EDGE_SHARE, |(_, share, _)| *share)
 }
 
-/// Scenes with features that the oracle lacks: name, features.
-const BEYOND: &[(&str, &str)] = &[
+/// Scenes that the oracle does not support: name and unsupported features.
+const UNSUPPORTED: &[(&str, &str)] = &[
     ("textures.toml", "images and normal maps"),
     ("ground-grid.toml", "an image"),
-    ("cornell-path.toml", "light from surface to surface"),
-    ("pillars.toml", "light from surface to surface"),
-    ("lens.toml", "the same, and a lens"),
-    ("panorama.toml", "the same, and another camera"),
-    ("materials.toml", "the same, and all its materials"),
+    ("cornell-path.toml", "indirect light"),
+    ("pillars.toml", "indirect light"),
+    ("lens.toml", "indirect light, and a lens"),
+    ("panorama.toml", "indirect light, and another camera"),
+    ("materials.toml", "indirect light, and all materials"),
 ];
 
-fn small(description: &Description) -> Description {
+fn reduced(description: &Description) -> Description {
     let mut d = description.clone();
     let scale = f64::from(d.image.width) / 96.0;
     d.image.width = 96;
@@ -65,7 +65,7 @@ fn small(description: &Description) -> Description {
     d
 }
 
-/// Cylinders with each material of the oracle, one in a mirror, seen from outside and inside.
+/// Cylinders with each material that the oracle supports. The camera is inside one of them.
 const CYLINDERS: &str = r#"
 image = { width = 96, height = 72 }
 camera = { position = [0.3, -6, 3], look_at = [0, 0, 0.7], fov = 40 }
@@ -103,7 +103,7 @@ material = "glass"
 start = [1.4, -0.6, 1.2]
 end = [1.4, -0.6, 0.001]
 radius = 0.5
-# Around the camera and all else.
+# Encloses the camera and all other shapes.
 [[shapes]]
 type = "cylinder"
 material = "checks"
@@ -112,14 +112,14 @@ end = [0, 0, 20]
 radius = 30
 "#;
 
-fn known() -> impl Iterator<Item = (String, Description)> {
+fn supported_scenes() -> impl Iterator<Item = (String, Description)> {
     let cylinders = Description::parse(CYLINDERS, "cylinders").expect("a scene");
     let scenes = scenes::descriptions()
         .into_iter()
         .chain([("cylinders".to_owned(), cylinders)]);
     scenes
-        .filter(|(name, _)| !BEYOND.iter().any(|(beyond, _)| beyond == name))
-        .map(|(name, d)| (name, small(&d)))
+        .filter(|(name, _)| !UNSUPPORTED.iter().any(|(unsupported, _)| unsupported == name))
+        .map(|(name, d)| (name, reduced(&d)))
 }
 
 fn differing(a: &[[f64; 3]], b: &[[f64; 3]]) -> f64 {
@@ -135,41 +135,44 @@ fn differing(a: &[[f64; 3]], b: &[[f64; 3]]) -> f64 {
 
 #[test]
 fn images_match_the_oracle() {
-    for (name, description) in known() {
+    for (name, description) in supported_scenes() {
         let truth = Oracle::new(&description, Flaw::None).picture();
-        for way in both() {
-            let picture = means(&render(&scenes::packed(&description), way));
+        for mode in both() {
+            let picture = means(&render(&scenes::packed(&description), mode));
             let share = differing(&picture, &truth);
-            let worst = picture
+            let errors = picture
                 .iter()
                 .flatten()
                 .zip(truth.iter().flatten())
                 .map(|(a, b)| (a - b).abs());
             let mean = |p: &[[f64; 3]]| p.iter().flatten().sum::<f64>() / p.len() as f64;
             println!(
-                "{name} {way:?}: {} of {} pixels differ by more than {TOLERANCE}, worst {:.1e}, mean by {:.1e}",
+                "{name} {mode:?}: {} of {} pixels differ by more than {TOLERANCE}, the largest error is {:.1e}, the mean differs by {:.1e}",
                 (share * truth.len() as f64).round(),
                 truth.len(),
-                worst.fold(0.0, f64::max),
+                errors.fold(0.0, f64::max),
                 mean(&picture) / mean(&truth) - 1.0
             );
-            assert!(share <= edges(&name), "{name}, {way:?}: {share} of the pixels differ");
+            assert!(
+                share <= max_edge_share(&name),
+                "{name}, {mode:?}: {share} of the pixels differ"
+            );
             let drift = (mean(&picture) / mean(&truth) - 1.0).abs();
             assert!(
-                drift < 0.2 * edges(&name),
-                "{name}, {way:?}: the mean differs by {drift}"
+                drift < 0.2 * max_edge_share(&name),
+                "{name}, {mode:?}: the mean differs by {drift}"
             );
         }
     }
 }
 
-/// Every flaw is detected in some scene; a flaw that affects all scenes is detected in each of them.
+/// Some scene detects each flaw. Every scene detects the flaws that affect all scenes.
 #[test]
 fn a_flawed_oracle_is_found() {
-    let way = *both().last().expect("the CPU at least");
+    let mode = *both().last().expect("the CPU at least");
     let mut found = Vec::new();
-    for (name, description) in known() {
-        let picture = means(&render(&scenes::packed(&description), way));
+    for (name, description) in supported_scenes() {
+        let picture = means(&render(&scenes::packed(&description), mode));
         for flaw in [
             Flaw::MissingCosine,
             Flaw::SwappedAxes,
@@ -179,20 +182,20 @@ fn a_flawed_oracle_is_found() {
             Flaw::Exponent,
             Flaw::InvertedIndex,
             Flaw::TransposedTexture,
-            Flaw::Facets,
+            Flaw::FlatShading,
             Flaw::StretchedNormals,
         ] {
-            let everywhere = matches!(flaw, Flaw::MissingCosine | Flaw::ShiftedPixel | Flaw::CornerSamples);
-            if !everywhere && found.contains(&flaw) {
+            let affects_all_scenes = matches!(flaw, Flaw::MissingCosine | Flaw::ShiftedPixel | Flaw::CornerSamples);
+            if !affects_all_scenes && found.contains(&flaw) {
                 continue;
             }
             let share = differing(&picture, &Oracle::new(&description, flaw).picture());
-            if share > 10.0 * EDGES {
+            if share > 10.0 * MAX_EDGE_SHARE {
                 found.push(flaw);
             }
             assert!(
-                !everywhere || share > 10.0 * EDGES,
-                "{name}: {flaw:?} differs in {share} of the pixels only"
+                !affects_all_scenes || share > 10.0 * MAX_EDGE_SHARE,
+                "{name}: {flaw:?} changes only {share} of the pixels"
             );
         }
     }
@@ -202,51 +205,51 @@ fn a_flawed_oracle_is_found() {
         Flaw::Exponent,
         Flaw::InvertedIndex,
         Flaw::TransposedTexture,
-        Flaw::Facets,
+        Flaw::FlatShading,
         Flaw::StretchedNormals,
     ] {
-        assert!(found.contains(&flaw), "{flaw:?} is found in no scene");
+        assert!(found.contains(&flaw), "no scene detects {flaw:?}");
     }
 }
 
-fn same_first_hit(hit: &FirstHit, meeting: &Option<Meeting>) -> bool {
-    let Some(meeting) = meeting else {
+fn same_first_hit(hit: &FirstHit, intersection: &Option<Intersection>) -> bool {
+    let Some(intersection) = intersection else {
         return hit.shape == NO_INDEX && hit.depth == 0.0;
     };
     let close = |a: f64, b: f64| (a - b).abs() <= 2e-5 * (1.0 + b.abs());
     let (normal, uv): (DVec3, DVec2) = (hit.normal.as_dvec3(), hit.uv.as_dvec2());
     // The angle u wraps around from 1 to 0, and is undefined at the poles.
-    let around = |a: f64, b: f64| close(a, b) || close((a - b).abs(), 1.0);
-    let pole = (meeting.uv.y - 0.5).abs() > 0.49;
-    hit.shape as usize == meeting.shape
-        && close(f64::from(hit.depth), meeting.t)
-        && (normal - meeting.normal).length() < 1e-4
-        && (hit.shading_normal.as_dvec3() - meeting.shading).length() < 1e-4
-        && (pole || around(uv.x, meeting.uv.x))
-        && close(uv.y, meeting.uv.y)
+    let close_modulo_1 = |a: f64, b: f64| close(a, b) || close((a - b).abs(), 1.0);
+    let is_pole = (intersection.uv.y - 0.5).abs() > 0.49;
+    hit.shape as usize == intersection.shape
+        && close(f64::from(hit.depth), intersection.t)
+        && (normal - intersection.normal).length() < 1e-4
+        && (hit.shading_normal.as_dvec3() - intersection.shading_normal).length() < 1e-4
+        && (is_pole || close_modulo_1(uv.x, intersection.uv.x))
+        && close(uv.y, intersection.uv.y)
 }
 
 #[test]
 fn first_hits_match_the_oracle() {
-    for (name, description) in known() {
-        let truth = Oracle::new(&description, Flaw::None).meetings();
-        let shifted = Oracle::new(&description, Flaw::ShiftedPixel).meetings();
-        for way in both() {
-            let hits = first_hits(&scenes::packed(&description), way);
-            let differing = |truth: &[Option<Meeting>]| {
+    for (name, description) in supported_scenes() {
+        let truth = Oracle::new(&description, Flaw::None).intersections();
+        let shifted = Oracle::new(&description, Flaw::ShiftedPixel).intersections();
+        for mode in both() {
+            let hits = first_hits(&scenes::packed(&description), mode);
+            let differing = |truth: &[Option<Intersection>]| {
                 assert_eq!(hits.len(), truth.len());
                 let differ = hits
                     .iter()
                     .zip(truth)
-                    .filter(|(hit, meeting)| !same_first_hit(hit, meeting))
+                    .filter(|(hit, intersection)| !same_first_hit(hit, intersection))
                     .count();
                 differ as f64 / hits.len() as f64
             };
             let share = differing(&truth);
-            println!("{name} {way:?}: the first hits of {share} of the pixels differ");
+            println!("{name} {mode:?}: the first hits of {share} of the pixels differ");
             assert!(
-                share <= EDGES,
-                "{name}, {way:?}: the first hits of {share} of the pixels differ"
+                share <= MAX_EDGE_SHARE,
+                "{name}, {mode:?}: the first hits of {share} of the pixels differ"
             );
             assert!(differing(&shifted) > 0.1, "{name}: a shifted pixel is not found");
         }

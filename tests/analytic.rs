@@ -23,7 +23,7 @@ fn grid(count: u32) -> SamplesDescription {
     }
 }
 
-fn empty(from: DVec3, to: DVec3, up: DVec3, height: f64) -> Description {
+fn empty_scene(from: DVec3, to: DVec3, up: DVec3, height: f64) -> Description {
     let camera = OrthographicDescription {
         position: from,
         look_at: to,
@@ -49,9 +49,9 @@ fn empty(from: DVec3, to: DVec3, up: DVec3, height: f64) -> Description {
     }
 }
 
-/// Returns the plane z = 0, seen from above.
-fn floor(from: DVec3, height: f64, [ambient, diffuse, specular]: [f64; 3], shininess: f64) -> Description {
-    let mut scene = empty(from, DVec3::new(from.x, from.y, 0.0), DVec3::Y, height);
+/// Returns a scene with the plane z = 0 and a camera above it.
+fn floor_scene(from: DVec3, height: f64, [ambient, diffuse, specular]: [f64; 3], shininess: f64) -> Description {
+    let mut scene = empty_scene(from, DVec3::new(from.x, from.y, 0.0), DVec3::Y, height);
     let factor = |x| Some(ColorDescription::Plain(DVec3::splat(x)));
     let phong = PhongDescription {
         color: None,
@@ -73,7 +73,7 @@ fn floor(from: DVec3, height: f64, [ambient, diffuse, specular]: [f64; 3], shini
     scene
 }
 
-fn on_floor(from: DVec3, height: f64, pixel: u32) -> DVec2 {
+fn floor_point(from: DVec3, height: f64, pixel: u32) -> DVec2 {
     let step = height / f64::from(SIDE);
     let (column, row) = (f64::from(pixel % SIDE) + 0.5, f64::from(pixel / SIDE) + 0.5);
     DVec2::new(
@@ -83,7 +83,7 @@ fn on_floor(from: DVec3, height: f64, pixel: u32) -> DVec2 {
 }
 
 /// Returns the maximum absolute error of the green channel.
-fn worst(scene: &Description, mode: RenderMode, expected: impl Fn(u32) -> f64) -> f64 {
+fn max_error(scene: &Description, mode: RenderMode, expected: impl Fn(u32) -> f64) -> f64 {
     let picture = means(&render(&packed(scene), mode));
     let difference = |(i, mean): (u32, &[f64; 3])| (mean[1] - expected(i)).abs();
     (0..)
@@ -93,42 +93,43 @@ fn worst(scene: &Description, mode: RenderMode, expected: impl Fn(u32) -> f64) -
 }
 
 /// Returns an antiderivative of 1 / sqrt(x^2 + y^2 + h^2) over x and y.
-fn corner(x: f64, y: f64, h: f64) -> f64 {
+fn antiderivative(x: f64, y: f64, h: f64) -> f64 {
     let r = (x * x + y * y + h * h).sqrt();
     x * (y / (x * x + h * h).sqrt()).asinh() + y * (x / (y * y + h * h).sqrt()).asinh() - h * (x * y / (h * r)).atan()
 }
 
-/// Returns the mean of h / r from a point to a parallel rectangle at height h: the mean cosine at the plane. `at` is
+/// Returns the mean of h / r from a point to a parallel rectangle at height h: the mean cosine at the plane. `point` is
 /// relative to the rectangle's center.
-fn mean_cosine([width, height]: [f64; 2], h: f64, at: DVec2) -> f64 {
-    let (x0, x1) = (-width / 2.0 - at.x, width / 2.0 - at.x);
-    let (y0, y1) = (-height / 2.0 - at.y, height / 2.0 - at.y);
-    let integral = corner(x1, y1, h) - corner(x0, y1, h) - corner(x1, y0, h) + corner(x0, y0, h);
+fn mean_cosine([width, height]: [f64; 2], h: f64, point: DVec2) -> f64 {
+    let (x0, x1) = (-width / 2.0 - point.x, width / 2.0 - point.x);
+    let (y0, y1) = (-height / 2.0 - point.y, height / 2.0 - point.y);
+    let integral =
+        antiderivative(x1, y1, h) - antiderivative(x0, y1, h) - antiderivative(x1, y0, h) + antiderivative(x0, y0, h);
     h * integral / (width * height)
 }
 
 #[test]
-fn the_closed_form_of_the_mean_cosine_is_right() {
+fn the_closed_form_of_the_mean_cosine_is_correct() {
     let (size, h) = ([1.5, 0.5], 0.8);
-    for at in [DVec2::ZERO, DVec2::new(0.3, -0.2), DVec2::new(2.0, 1.0)] {
+    for point in [DVec2::ZERO, DVec2::new(0.3, -0.2), DVec2::new(2.0, 1.0)] {
         let n = 1000;
         let mut sum = 0.0;
         for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
-            let place = |k: i32, size: f64| ((f64::from(k) + 0.5) / f64::from(n) - 0.5) * size;
-            let to = DVec3::new(place(i, size[0]) - at.x, place(j, size[1]) - at.y, h);
-            sum += h / to.length();
+            let coordinate = |k: i32, size: f64| ((f64::from(k) + 0.5) / f64::from(n) - 0.5) * size;
+            let offset = DVec3::new(coordinate(i, size[0]) - point.x, coordinate(j, size[1]) - point.y, h);
+            sum += h / offset.length();
         }
         let mean = sum / f64::from(n * n);
-        assert!((mean - mean_cosine(size, h, at)).abs() < 1e-6, "{at}: {mean}");
+        assert!((mean - mean_cosine(size, h, point)).abs() < 1e-6, "{point}: {mean}");
     }
 }
 
-/// Pixels equal the mean cosine, up to the error of the sample grid, which is a midpoint rule.
+/// Pixels equal the mean cosine up to the error of the sample grid, which is a midpoint rule.
 #[test]
 fn light_of_a_rectangle_on_a_plane() {
     let (from, height) = (DVec3::new(0.3, 0.2, 0.5), 4.0);
     let (size, h) = ([1.5, 0.5], 0.8);
-    let mut scene = floor(from, height, [0.0, 0.7, 0.0], 1.0);
+    let mut scene = floor_scene(from, height, [0.0, 0.7, 0.0], 1.0);
     scene.render.light_samples = grid(1024);
     scene
         .lights
@@ -142,19 +143,22 @@ fn light_of_a_rectangle_on_a_plane() {
         }));
     let swapped = [size[1], size[0]];
     for mode in both() {
-        let worst = |expected: &dyn Fn(DVec2) -> f64| {
-            worst(&scene, mode, |pixel| {
-                0.9 * 0.7 * expected(on_floor(from, height, pixel))
+        let error_against = |expected: &dyn Fn(DVec2) -> f64| {
+            max_error(&scene, mode, |pixel| {
+                0.9 * 0.7 * expected(floor_point(from, height, pixel))
             })
         };
-        let error = worst(&|at| mean_cosine(size, h, at));
+        let error = error_against(&|point| mean_cosine(size, h, point));
         println!("{mode:?}: light of a rectangle within {error:.1e}");
         assert!(error < 1e-4, "{mode:?}: {error}");
-        assert!(!(worst(&|_| 1.0) < 1e-2), "a missing cosine passes");
-        assert!(!(worst(&|at| mean_cosine(swapped, h, at)) < 1e-2), "swapped axes pass");
+        assert!(!(error_against(&|_| 1.0) < 1e-2), "a missing cosine passes");
+        assert!(
+            !(error_against(&|point| mean_cosine(swapped, h, point)) < 1e-2),
+            "swapped axes pass"
+        );
         let pixel = height / f64::from(SIDE);
         assert!(
-            !(worst(&|at| mean_cosine(size, h, at + DVec2::X * pixel)) < 1e-2),
+            !(error_against(&|point| mean_cosine(size, h, point + DVec2::X * pixel)) < 1e-2),
             "a shifted pixel passes"
         );
     }
@@ -165,7 +169,7 @@ fn light_of_a_rectangle_on_a_plane() {
 fn shadow_of_a_sphere() {
     let (from, height) = (DVec3::new(1.6, 0.0, 1.0), 2.4);
     let (center, radius, light) = (DVec3::new(0.0, 0.0, 2.0), 0.5, DVec3::new(-3.0, 0.0, 6.0));
-    let mut scene = floor(from, height, [0.0, 1.0, 0.0], 1.0);
+    let mut scene = floor_scene(from, height, [0.0, 1.0, 0.0], 1.0);
     scene.materials.insert("s".into(), scene.materials["m"].clone());
     scene.shapes.push(ShapeDescription::Sphere(SphereDescription {
         material: "s".into(),
@@ -180,34 +184,43 @@ fn shadow_of_a_sphere() {
     let axis = center - light;
     let half_angle = (radius / axis.length()).asin();
     // Signed angle to the surface of the shadow cone, positive inside.
-    let inside = |at: DVec2| half_angle - (at.extend(0.0) - light).angle_between(axis);
+    let inside = |position: DVec2| half_angle - (position.extend(0.0) - light).angle_between(axis);
     for mode in both() {
         let picture = means(&render(&packed(&scene), mode));
         let lit = |pixel: u32| picture[pixel as usize][1] > 0.0;
-        let wrong = |shift: DVec2, margin: f64| {
-            let pixels = (0..SIDE * SIDE).filter(|pixel| inside(on_floor(from, height, *pixel)).abs() > margin);
+        let wrong_pixels = |shift: DVec2, margin: f64| {
+            let pixels = (0..SIDE * SIDE).filter(|pixel| inside(floor_point(from, height, *pixel)).abs() > margin);
             pixels
-                .filter(|pixel| lit(*pixel) == (inside(on_floor(from, height, *pixel) + shift) > 0.0))
+                .filter(|pixel| lit(*pixel) == (inside(floor_point(from, height, *pixel) + shift) > 0.0))
                 .count()
         };
-        assert_eq!(wrong(DVec2::ZERO, 1e-5), 0, "{mode:?}");
+        assert_eq!(wrong_pixels(DVec2::ZERO, 1e-5), 0, "{mode:?}");
         let pixel = height / f64::from(SIDE);
-        assert!(wrong(DVec2::X * pixel, 1e-5) > 20, "a shifted pixel passes");
-        assert!(wrong(DVec2::Y * pixel, 1e-5) > 20, "a shifted pixel passes");
+        assert!(wrong_pixels(DVec2::X * pixel, 1e-5) > 20, "a shifted pixel passes");
+        assert!(wrong_pixels(DVec2::Y * pixel, 1e-5) > 20, "a shifted pixel passes");
         // Semi-axes of the ellipse; `lean` is the angle between the cone's axis and the vertical.
         let lean = (axis.x / axis.z).abs().atan();
-        let long = light.z * ((lean + half_angle).tan() - (lean - half_angle).tan()) / 2.0;
-        let short = long * (1.0 - (lean.sin() / half_angle.cos()).powi(2)).sqrt();
-        let dark = (0..SIDE * SIDE).filter(|pixel| !lit(*pixel)).count() as f64 * pixel * pixel;
-        println!("{mode:?}: the shadow's area is {dark:.4}, of {:.4}", PI * long * short);
-        assert!((dark / (PI * long * short) - 1.0).abs() < 0.01, "{mode:?}: {dark}");
-        assert!(!((dark / (PI * long * long) - 1.0).abs() < 0.05), "a circle passes");
-        // Outside the shadow only the cosine remains: a point light has no falloff.
-        let worst = (0..SIDE * SIDE).filter(|pixel| lit(*pixel)).map(|pixel| {
-            let to = light - on_floor(from, height, pixel).extend(0.0);
-            (picture[pixel as usize][1] - to.z / to.length()).abs()
+        let major_axis = light.z * ((lean + half_angle).tan() - (lean - half_angle).tan()) / 2.0;
+        let minor_axis = major_axis * (1.0 - (lean.sin() / half_angle.cos()).powi(2)).sqrt();
+        let shadow_area = (0..SIDE * SIDE).filter(|pixel| !lit(*pixel)).count() as f64 * pixel * pixel;
+        println!(
+            "{mode:?}: the area of the shadow is {shadow_area:.4}, expected {:.4}",
+            PI * major_axis * minor_axis
+        );
+        assert!(
+            (shadow_area / (PI * major_axis * minor_axis) - 1.0).abs() < 0.01,
+            "{mode:?}: {shadow_area}"
+        );
+        assert!(
+            !((shadow_area / (PI * major_axis * major_axis) - 1.0).abs() < 0.05),
+            "a circle passes"
+        );
+        // Outside the shadow, only the cosine remains, because a point light has no falloff.
+        let errors = (0..SIDE * SIDE).filter(|pixel| lit(*pixel)).map(|pixel| {
+            let to_light = light - floor_point(from, height, pixel).extend(0.0);
+            (picture[pixel as usize][1] - to_light.z / to_light.length()).abs()
         });
-        assert!(worst.fold(0.0, f64::max) < 1e-5);
+        assert!(errors.fold(0.0, f64::max) < 1e-5);
     }
 }
 
@@ -236,8 +249,8 @@ fn outlines_of_ellipsoids() {
     ];
     for ((center, [a, b, c]), view) in ellipsoids.into_iter().flat_map(|e| views.map(|view| (e, view))) {
         let height = 4.0;
-        let mut scene = floor(DVec3::Z, 1.0, [1.0, 0.0, 0.0], 1.0);
-        scene.camera = empty(view, DVec3::ZERO, DVec3::Z, height).camera;
+        let mut scene = floor_scene(DVec3::Z, 1.0, [1.0, 0.0, 0.0], 1.0);
+        scene.camera = empty_scene(view, DVec3::ZERO, DVec3::Z, height).camera;
         (scene.image.width, scene.image.height) = (256, 256);
         scene.shapes = vec![ShapeDescription::Ellipsoid(EllipsoidDescription {
             material: "m".into(),
@@ -249,15 +262,15 @@ fn outlines_of_ellipsoids() {
         let forward = -view.normalize();
         let right = forward.cross(DVec3::Z).normalize();
         let up = right.cross(forward);
-        let shadow = DVec3::new(
+        let projection = DVec3::new(
             a.cross(b).dot(forward),
             b.cross(c).dot(forward),
             c.cross(a).dot(forward),
         );
-        let area = PI * shadow.length();
+        let area = PI * projection.length();
         let pixel = height / 256.0;
         // Offset from the image center in pixels, to the right and down.
-        let middle = DVec2::new(center.dot(right), -center.dot(up)) / pixel;
+        let expected_center = DVec2::new(center.dot(right), -center.dot(up)) / pixel;
         for mode in both() {
             let hits = first_hits(&packed(&scene), mode);
             let covered: Vec<DVec2> = (0u32..)
@@ -265,28 +278,28 @@ fn outlines_of_ellipsoids() {
                 .filter(|(_, hit)| hit.shape == 0)
                 .map(|(i, _)| DVec2::new(f64::from(i % 256) - 127.5, f64::from(i / 256) - 127.5))
                 .collect();
-            let seen = covered.len() as f64 * pixel * pixel;
+            let covered_area = covered.len() as f64 * pixel * pixel;
             let centroid = covered.iter().sum::<DVec2>() / covered.len() as f64;
             assert!(
-                (seen / area - 1.0).abs() < 0.005,
-                "{mode:?} {center} from {view}: {seen} of {area}"
+                (covered_area / area - 1.0).abs() < 0.005,
+                "{mode:?} {center} from {view}: the area is {covered_area}, expected {area}"
             );
             assert!(
-                (centroid - middle).length() < 0.1,
-                "{mode:?} {center} from {view}: {centroid} for {middle}"
+                (centroid - expected_center).length() < 0.1,
+                "{mode:?} {center} from {view}: the center is {centroid}, expected {expected_center}"
             );
             assert!(
-                !((centroid + DVec2::X - middle).length() < 0.1),
+                !((centroid + DVec2::X - expected_center).length() < 0.1),
                 "a shifted pixel passes"
             );
             // Depth of the center minus the half-extent along the view direction.
-            let half = [a, b, c]
+            let half_extent = [a, b, c]
                 .map(|axis| axis.dot(forward))
                 .map(|h| h * h)
                 .iter()
                 .sum::<f64>()
                 .sqrt();
-            let expected = (center - view).dot(forward) - half;
+            let expected = (center - view).dot(forward) - half_extent;
             let nearest = hits
                 .iter()
                 .filter(|hit| hit.shape == 0)
@@ -294,17 +307,17 @@ fn outlines_of_ellipsoids() {
                 .fold(1e9, f64::min);
             assert!(
                 (0.0..1e-3).contains(&(nearest - expected + 1e-6)),
-                "{mode:?}: {nearest} for {expected}"
+                "{mode:?}: the depth is {nearest}, expected {expected}"
             );
         }
     }
 }
 
-/// Seen along the normal, the radiance is constant: kd n.l + ks (r.v)^s.
+/// The radiance along the normal is constant: kd n.l + ks (r.v)^s.
 #[test]
 fn directional_light_on_a_plane() {
-    for (exponent, other) in [(16.0, 15.0), (2.5, 2.4), (0.5, 0.6), (1.0, 1.5)] {
-        let mut scene = floor(DVec3::new(5.0, -3.0, 2.0), 1.0, [0.0, 0.4, 0.6], exponent);
+    for (exponent, wrong_exponent) in [(16.0, 15.0), (2.5, 2.4), (0.5, 0.6), (1.0, 1.5)] {
+        let mut scene = floor_scene(DVec3::new(5.0, -3.0, 2.0), 1.0, [0.0, 0.4, 0.6], exponent);
         let direction = DVec3::new(0.3, -0.2, -1.0);
         scene
             .lights
@@ -316,17 +329,17 @@ fn directional_light_on_a_plane() {
         // The view direction v is the normal, hence r.v equals n.l.
         let expected = |exponent: f64| 0.4 * cosine + 0.6 * cosine.powf(exponent);
         for mode in both() {
-            let error = worst(&scene, mode, |_| expected(exponent));
+            let error = max_error(&scene, mode, |_| expected(exponent));
             assert!(error < 1e-6, "{mode:?}, shininess {exponent}: {error}");
             assert!(
-                !(worst(&scene, mode, |_| expected(other)) < 1e-4),
+                !(max_error(&scene, mode, |_| expected(wrong_exponent)) < 1e-4),
                 "a wrong shininess passes"
             );
         }
         // Seen from below, the plane is black: the normal faces the viewer, so the light is behind the surface.
-        scene.camera = empty(-DVec3::Z, DVec3::ZERO, DVec3::Y, 1.0).camera;
+        scene.camera = empty_scene(-DVec3::Z, DVec3::ZERO, DVec3::Y, 1.0).camera;
         for mode in both() {
-            assert_eq!(worst(&scene, mode, |_| 0.0), 0.0, "{mode:?}");
+            assert_eq!(max_error(&scene, mode, |_| 0.0), 0.0, "{mode:?}");
         }
     }
 }

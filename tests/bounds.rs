@@ -10,7 +10,7 @@ struct Bound {
     function: &'static str,
     unit: &'static str,
     /// The bound documented at the WGSL function and in `docs/agreement.md`.
-    bound: f64,
+    max_error: f64,
     arguments: fn(&Random) -> Vec<f32>,
     /// Returns the error of a result in `unit`.
     error: fn(&[f32], f64) -> f64,
@@ -29,7 +29,7 @@ const BOUNDS: &[Bound] = &[
     Bound {
         function: "log2",
         unit: "units in the last place, x a normal number",
-        bound: 4.5,
+        max_error: 4.5,
         arguments: |random| {
             let (any, near_one) = (random.magnitude(-37.9, 38.5), random.between(0.9, 1.1));
             vec![random.pick(&[any, near_one]) as f32]
@@ -39,14 +39,14 @@ const BOUNDS: &[Bound] = &[
     Bound {
         function: "exp2",
         unit: "units in the last place, x from -126 to 127.4",
-        bound: 1.5,
+        max_error: 1.5,
         arguments: |random| vec![random.between(-126.0, 127.4) as f32],
         error: |x, result| ulps(result, f64::from(x[0]).exp2()),
     },
     Bound {
         function: "power",
         unit: "2^-23 (1 + |y log2 x|) relative, where the power is a normal number",
-        bound: 1.7,
+        max_error: 1.7,
         arguments: |random| loop {
             let x = if random.once_in(2) {
                 random.unit()
@@ -67,7 +67,7 @@ const BOUNDS: &[Bound] = &[
     Bound {
         function: "power_whole",
         unit: "2^-24 n relative, n below 4096, where the power is a normal number",
-        bound: 1.0,
+        max_error: 1.0,
         arguments: |random| loop {
             let n = random.magnitude(0.0, 3.6) as u32;
             let x = 1.0 - random.magnitude(-6.0, -0.01);
@@ -83,10 +83,10 @@ const BOUNDS: &[Bound] = &[
     Bound {
         function: "atan2",
         unit: "units in the last place of pi",
-        bound: 1.25,
+        max_error: 1.25,
         arguments: |random| {
-            let one = || (random.pick(&[1.0, -1.0]) * random.magnitude(-3.0, 3.0)) as f32;
-            vec![one(), one()]
+            let coordinate = || (random.pick(&[1.0, -1.0]) * random.magnitude(-3.0, 3.0)) as f32;
+            vec![coordinate(), coordinate()]
         },
         error: |x, result| {
             let truth = f64::from(x[0]).atan2(f64::from(x[1]));
@@ -96,17 +96,17 @@ const BOUNDS: &[Bound] = &[
     Bound {
         function: "atan2",
         unit: "units in the last place",
-        bound: 3.5,
+        max_error: 3.5,
         arguments: |random| {
-            let one = || (random.pick(&[1.0, -1.0]) * random.magnitude(-3.0, 3.0)) as f32;
-            vec![one(), one()]
+            let coordinate = || (random.pick(&[1.0, -1.0]) * random.magnitude(-3.0, 3.0)) as f32;
+            vec![coordinate(), coordinate()]
         },
         error: |x, result| ulps(result, f64::from(x[0]).atan2(f64::from(x[1]))),
     },
     Bound {
         function: "sine",
         unit: "10^-7, |x| below 1000",
-        bound: 3.0,
+        max_error: 3.0,
         arguments: |random| {
             let size = random.pick(&[0.6, 3.0, 1000.0]);
             vec![random.between(-size, size) as f32]
@@ -118,8 +118,8 @@ const BOUNDS: &[Bound] = &[
     },
     Bound {
         function: "normalize",
-        unit: "2^-24, largest component's error",
-        bound: 3.0,
+        unit: "2^-24, first component",
+        max_error: 3.0,
         arguments: |random| {
             let size = random.magnitude(-9.0, 9.0);
             (0..3).map(|_| (random.between(-1.0, 1.0) * size) as f32).collect()
@@ -132,14 +132,14 @@ const BOUNDS: &[Bound] = &[
     },
 ];
 
-/// Returns the maximum error over [`CALLS`] arguments. Only the first word of each result is compared.
-fn largest(bound: &Bound, evaluate: &dyn Fn(&[u32]) -> Vec<u32>) -> f64 {
-    let random = Random::new(bound.bound.to_bits());
+/// Returns the maximum error over [`CALLS`] random arguments. Only the first word of each result is compared.
+fn largest_error(bound: &Bound, evaluate: &dyn Fn(&[u32]) -> Vec<u32>) -> f64 {
+    let random = Random::new(bound.max_error.to_bits());
     let arguments: Vec<Vec<f32>> = (0..CALLS).map(|_| (bound.arguments)(&random)).collect();
     let words: Vec<u32> = arguments.iter().flatten().map(|x| x.to_bits()).collect();
     let results = evaluate(&words);
-    let per = results.len() / CALLS;
-    let errors = arguments.iter().zip(results.chunks_exact(per));
+    let words_per_result = results.len() / CALLS;
+    let errors = arguments.iter().zip(results.chunks_exact(words_per_result));
     // A NaN error must propagate, but `f64::max` would drop it.
     errors
         .map(|(x, r)| (bound.error)(x, f64::from(f32::from_bits(r[0]))))
@@ -158,20 +158,20 @@ fn functions_keep_their_documented_error_bounds() {
             .find(|(_, f)| f.name() == bound.function)
             .expect("the function");
         let words_out = function.words_out().len();
-        let mut figures = vec![(
+        let mut errors = vec![(
             "CPU",
-            largest(bound, &|words| twin(bound.function).results(words, words_out)),
+            largest_error(bound, &|words| twin(bound.function).results(words, words_out)),
         )];
         if let Some(device) = adapter::device() {
-            figures.push(("GPU", largest(bound, &|words| function.run(device, words))));
+            errors.push(("GPU", largest_error(bound, &|words| function.run(device, words))));
         }
-        for (path, error) in figures {
+        for (processor, error) in errors {
             let line = format!(
-                "{path} {}: {error:.3} {}; promised {}",
-                bound.function, bound.unit, bound.bound
+                "{processor} {}: {error:.3} {}; documented bound {}",
+                bound.function, bound.unit, bound.max_error
             );
             println!("{line}");
-            if !(error <= bound.bound) {
+            if !(error <= bound.max_error) {
                 problems.push(line);
             }
         }
@@ -214,7 +214,7 @@ fn functions_are_exact_at_special_values() {
         ("atan2", &[-2.0, -2.0], -3.0 * std::f32::consts::FRAC_PI_4),
         ("min", &[1.0, 2.0], 1.0),
         ("max", &[1.0, 2.0], 2.0),
-        ("min", &[0.0, -0.0], -0.0), // neither is less: the second argument
+        ("min", &[0.0, -0.0], -0.0), // equal arguments: the second
         ("max", &[f32::NAN, 0.0], 0.0),
         ("positive_zero", &[-0.0], 0.0),
         ("positive_zero", &[-1.5], -1.5),
@@ -256,16 +256,16 @@ fn the_hash_is_pcg4d() {
 #[test]
 fn a_function_beyond_its_error_bound_is_found() {
     let Some(device) = adapter::device() else { return };
-    for (bound, from, to) in [
+    for (index, from, to) in [
         (0, "s2 * (0.2 +", "s2 * (0.201 +"),
         (1, "f * 0.0001984127", "f * 0.00001984127"),
         (2, "2.8853900817779268", "2.8854"),
         (4, "0.05882353", "0.5882353"),
         (6, "0.007370431", "0.07370431"),
     ] {
-        let bound = &BOUNDS[bound];
+        let bound = &BOUNDS[index];
         let text = shared_source().text;
-        assert!(text.contains(from), "'{from}' is not there to be changed");
+        assert!(text.contains(from), "the source does not contain '{from}'");
         let mut source = wgray_render::gpu::compose::Source::default();
         source.append("changed", &text.replacen(from, to, 1));
         let module = parse(&source);
@@ -274,7 +274,7 @@ fn a_function_beyond_its_error_bound_is_found() {
             .iter()
             .find(|(_, f)| f.name() == bound.function)
             .expect("the function");
-        let error = largest(bound, &|words| function.run_in(device, &source, words));
-        assert!(!(error <= bound.bound), "{}: {error} with '{to}'", bound.function);
+        let error = largest_error(bound, &|words| function.run_in(device, &source, words));
+        assert!(!(error <= bound.max_error), "{}: {error} with '{to}'", bound.function);
     }
 }

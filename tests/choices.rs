@@ -10,10 +10,10 @@ use crate::{adapter, sources};
 fn scene(overrides: Overrides) -> Scene {
     let size = overrides.size.or(Some((40, 30)));
     let overrides = Overrides { size, ..overrides };
-    Scene::load_with(sources::path("scenes/mirror-glass.toml"), &overrides).expect("a sound scene")
+    Scene::load_with(sources::path("scenes/mirror-glass.toml"), &overrides).expect("a valid scene")
 }
 
-fn on(device: Device) -> Options {
+fn options_for(device: Device) -> Options {
     Options {
         device,
         aovs: vec![Aov::Depth, Aov::Normal],
@@ -26,13 +26,13 @@ fn every_device_choice_gives_the_same_image_and_reports_the_device() {
     let Some(device) = adapter::device() else { return };
     let name = device.info.name.clone();
     let scene = scene(Overrides::default());
-    let cpu = wgray::render(&scene, &on(Device::Cpu)).unwrap();
+    let cpu = wgray::render(&scene, &options_for(Device::Cpu)).unwrap();
     assert_eq!(cpu.device().name, "cpu");
     let exact = Options {
         exact_rounding: device.info.exact,
-        ..on(Device::Named(name.clone()))
+        ..options_for(Device::Named(name.clone()))
     };
-    for options in [on(Device::Named(name.clone())), exact] {
+    for options in [options_for(Device::Named(name.clone())), exact] {
         let picture = wgray::render(&scene, &options).unwrap();
         assert_eq!(picture.device().name, name);
         if adapter::bit_exact(device) {
@@ -42,10 +42,10 @@ fn every_device_choice_gives_the_same_image_and_reports_the_device() {
     }
     let first = wgray::adapters()[0].name.clone();
     for choice in [Device::Auto, Device::Gpu, Device::Named("1".to_string())] {
-        let picture = wgray::render(&scene, &on(choice)).unwrap();
+        let picture = wgray::render(&scene, &options_for(choice)).unwrap();
         assert_eq!(picture.device().name, first);
     }
-    let error = wgray::render(&scene, &on(Device::from("abacus"))).unwrap_err();
+    let error = wgray::render(&scene, &options_for(Device::from("abacus"))).unwrap_err();
     assert!(matches!(error, Error::Render(RenderError::NoDevice(_))), "{error:?}");
 }
 
@@ -56,20 +56,20 @@ fn the_final_progressive_image_equals_the_rendered_image() {
         size: Some((130, 131)),
         ..Overrides::default()
     });
-    let options = on(Device::Named(device.info.name.clone()));
+    let options = options_for(Device::Named(device.info.name.clone()));
     let rendered = wgray::render(&scene, &options).unwrap();
-    let mut seen = Vec::new();
-    let grown = wgray::render_progressive(&scene, &options, &mut |progress| {
-        seen.push(progress.picture()?);
+    let mut images = Vec::new();
+    let result = wgray::render_progressive(&scene, &options, &mut |progress| {
+        images.push(progress.picture()?);
         Ok(ControlFlow::Continue(()))
     });
-    assert!(grown.unwrap() == rendered);
-    assert!(seen.len() > 1 && seen[0] != rendered && seen.last() == Some(&rendered));
+    assert!(result.unwrap() == rendered);
+    assert!(images.len() > 1 && images[0] != rendered && images.last() == Some(&rendered));
     let cancelled = wgray::render_progressive(&scene, &options, &mut |_| Ok(ControlFlow::Break(())));
     assert!(matches!(cancelled, Err(Error::Render(RenderError::Cancelled))));
 }
 
-/// Applies if the driver truncates loops and one sample exceeds the limit. The image names the CPU as its device.
+/// On drivers that truncate loops, one sample of this scene exceeds the limit. The image then names the CPU as device.
 #[test]
 fn a_sample_too_long_for_the_driver_is_rendered_by_the_cpu() {
     let Some(device) = adapter::device() else { return };
@@ -79,12 +79,12 @@ fn a_sample_too_long_for_the_driver_is_rendered_by_the_cpu() {
         light_samples: Some(65_536),
         ..Overrides::default()
     });
-    let options = on(Device::Named(device.info.name.clone()));
-    let cpu = wgray::render(&scene, &on(Device::Cpu)).unwrap();
-    let watched = wgray::render_progressive(&scene, &options, &mut |progress| {
+    let options = options_for(Device::Named(device.info.name.clone()));
+    let cpu = wgray::render(&scene, &options_for(Device::Cpu)).unwrap();
+    let progressive = wgray::render_progressive(&scene, &options, &mut |progress| {
         progress.picture().map(|_| ControlFlow::Continue(()))
     });
-    for picture in [wgray::render(&scene, &options).unwrap(), watched.unwrap()] {
+    for picture in [wgray::render(&scene, &options).unwrap(), progressive.unwrap()] {
         let name = &picture.device().name;
         assert!(name == "cpu" || *name == device.info.name, "{name}");
         if adapter::bit_exact(device) {

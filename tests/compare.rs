@@ -56,8 +56,11 @@ fn flip(a: &Picture, b: &Picture) -> f64 {
     compare::flip(a, b, PIXELS_PER_DEGREE, None).unwrap().mean
 }
 
-fn is_near(found: f64, expected: f64, bound: f64) {
-    assert!((found - expected).abs() <= bound, "{found} is not {expected}");
+fn assert_near(found: f64, expected: f64, tolerance: f64) {
+    assert!(
+        (found - expected).abs() <= tolerance,
+        "found {found}, expected {expected}"
+    );
 }
 
 #[test]
@@ -81,10 +84,10 @@ fn metrics_match_the_reference_implementations() {
         let found = color(&a, &b);
         let ssim = compare::ssim(&a, &b).unwrap();
         for (found, expected) in [found.rmse, found.rel_mse, found.psnr, ssim].into_iter().zip(expected) {
-            is_near(found, expected, 1e-12 * expected.abs());
+            assert_near(found, expected, 1e-12 * expected.abs());
         }
         // both implementations use f32
-        is_near(flip(&a, &b), expected[4], 2e-6);
+        assert_near(flip(&a, &b), expected[4], 2e-6);
     }
 }
 
@@ -98,7 +101,7 @@ fn an_image_equals_itself_and_the_second_image_is_the_reference() {
             (0, None, 0, None)
         );
         assert_eq!((found.rmse, found.rel_mse, found.psnr), (0.0, 0.0, f64::INFINITY));
-        is_near(compare::ssim(&a, &a).unwrap(), 1.0, 1e-12);
+        assert_near(compare::ssim(&a, &a).unwrap(), 1.0, 1e-12);
         assert_eq!(flip(&a, &a), 0.0);
         let (forward, backward) = (color(&a, &b), color(&b, &a));
         assert_eq!(forward.rmse, backward.rmse);
@@ -114,11 +117,11 @@ fn extremes_have_closed_forms() {
         let (black, white) = (flat(0.0, 0.0, 0.0, size), flat(255.0, 255.0, 255.0, size));
         let found = color(&black, &white);
         assert_eq!((found.rmse, found.psnr), (1.0, 0.0));
-        is_near(found.rel_mse, 1.0 / 1.01, 1e-12);
+        assert_near(found.rel_mse, 1.0 / 1.01, 1e-12);
         // zero variance and means of 0 and 1: (0 + C1) (0 + C2) / ((1 + C1) (0 + C2))
-        is_near(compare::ssim(&black, &white).unwrap(), 1e-4 / (1.0 + 1e-4), 1e-12);
+        assert_near(compare::ssim(&black, &white).unwrap(), 1e-4 / (1.0 + 1e-4), 1e-12);
         // green and blue have the maximum distance by definition
-        is_near(
+        assert_near(
             flip(&flat(0.0, 255.0, 0.0, size), &flat(0.0, 0.0, 255.0, size)),
             1.0,
             1e-6,
@@ -131,43 +134,48 @@ fn windows_wider_than_the_image_are_clipped_and_renormalized() {
     // the definition in one dimension: (2 ma mb + C1) (2 cov + C2) / ((ma² + mb² + C1) (va + vb + C2))
     let (a, b) = ([0.0, 51.0, 255.0, 102.0], [10.0, 51.0, 200.0, 0.0]);
     let mut sum = 0.0;
-    for middle in 0..4 {
-        let weight = |x: usize| (-(x as f64 - middle as f64).powi(2) / 4.5).exp();
-        let whole: f64 = (0..4).map(weight).sum();
-        let mean = |value: &dyn Fn(usize) -> f64| (0..4).map(|x| weight(x) * value(x)).sum::<f64>() / whole;
-        let (of_a, of_b) = (|x: usize| a[x] / 255.0, |x: usize| b[x] / 255.0);
-        let (ma, mb) = (mean(&of_a), mean(&of_b));
-        let va = mean(&|x| (of_a(x) - ma).powi(2));
-        let vb = mean(&|x| (of_b(x) - mb).powi(2));
-        let cov = mean(&|x| (of_a(x) - ma) * (of_b(x) - mb));
+    for center in 0..4 {
+        let weight = |x: usize| (-(x as f64 - center as f64).powi(2) / 4.5).exp();
+        let total_weight: f64 = (0..4).map(weight).sum();
+        let mean = |value: &dyn Fn(usize) -> f64| (0..4).map(|x| weight(x) * value(x)).sum::<f64>() / total_weight;
+        let (value_a, value_b) = (|x: usize| a[x] / 255.0, |x: usize| b[x] / 255.0);
+        let (ma, mb) = (mean(&value_a), mean(&value_b));
+        let va = mean(&|x| (value_a(x) - ma).powi(2));
+        let vb = mean(&|x| (value_b(x) - mb).powi(2));
+        let cov = mean(&|x| (value_a(x) - ma) * (value_b(x) - mb));
         sum += (2.0 * ma * mb + 1e-4) * (2.0 * cov + 9e-4) / ((ma * ma + mb * mb + 1e-4) * (va + vb + 9e-4));
     }
     let wide = |values: [f64; 4]| picture(4, 1, BYTES, move |x, _, _| values[x as usize] as f32);
     let tall = |values: [f64; 4]| picture(1, 4, BYTES, move |_, y, _| values[y as usize] as f32);
-    is_near(compare::ssim(&wide(a), &wide(b)).unwrap(), sum / 4.0, 1e-12);
-    is_near(compare::ssim(&tall(a), &tall(b)).unwrap(), sum / 4.0, 1e-12);
+    assert_near(compare::ssim(&wide(a), &wide(b)).unwrap(), sum / 4.0, 1e-12);
+    assert_near(compare::ssim(&tall(a), &tall(b)).unwrap(), sum / 4.0, 1e-12);
 }
 
 #[test]
 fn tiles_and_chunks_do_not_change_the_metrics() {
-    // Larger than a tile of 256 x 256 pixels and a chunk of 65,536. Contributions of distant pixels add up.
+    // The image is larger than a tile of 256 x 256 pixels and a chunk of 65,536 pixels. The contributions of distant
+    // pixels add up.
     let noise = |x: u32, y: u32, c: u32| ((x * 7919 + y * 104_729 + c * 1_299_709) % 251) as f32;
     let b = picture(600, 300, BYTES, move |x, y, c| (noise(x, y, c) / 2.0).floor());
-    let one = |places: &'static [(u32, u32)]| {
+    let with_errors_at = |pixels: &'static [(u32, u32)]| {
         picture(600, 300, BYTES, move |x, y, c| {
             let value = (noise(x, y, c) / 2.0).floor();
-            if places.contains(&(x, y)) { value + 90.0 } else { value }
+            if pixels.contains(&(x, y)) { value + 90.0 } else { value }
         })
     };
-    let (first, second) = (one(&[(255, 255)]), one(&[(512, 100)]));
-    let both = one(&[(255, 255), (512, 100)]);
-    is_near(flip(&both, &b), flip(&first, &b) + flip(&second, &b), 1e-9);
-    let lost = |a: &Picture| 1.0 - compare::ssim(a, &b).unwrap();
-    assert!(lost(&first) > 1e-7);
-    is_near(lost(&both), lost(&first) + lost(&second), 1e-11);
+    let (first, second) = (with_errors_at(&[(255, 255)]), with_errors_at(&[(512, 100)]));
+    let both = with_errors_at(&[(255, 255), (512, 100)]);
+    assert_near(flip(&both, &b), flip(&first, &b) + flip(&second, &b), 1e-9);
+    let dissimilarity = |a: &Picture| 1.0 - compare::ssim(a, &b).unwrap();
+    assert!(dissimilarity(&first) > 1e-7);
+    assert_near(
+        dissimilarity(&both),
+        dissimilarity(&first) + dissimilarity(&second),
+        1e-11,
+    );
     let found = color(&both, &b);
     assert_eq!((found.different, found.first), (2, Some(PixelCoord { x: 512, y: 100 })));
-    is_near(
+    assert_near(
         found.rmse,
         (6.0 * (90.0_f64 / 255.0).powi(2) / (3.0 * 180_000.0)).sqrt(),
         1e-12,
@@ -177,10 +185,10 @@ fn tiles_and_chunks_do_not_change_the_metrics() {
 #[test]
 fn flip_decreases_with_the_viewing_distance() {
     let (a, b) = formula(BYTES);
-    let at = |ppd: f64| compare::flip(&a, &b, ppd, None).unwrap().mean;
-    assert!(at(20.0) > at(67.0) && at(67.0) > at(300.0));
+    let flip_at = |ppd: f64| compare::flip(&a, &b, ppd, None).unwrap().mean;
+    assert!(flip_at(20.0) > flip_at(67.0) && flip_at(67.0) > flip_at(300.0));
     for ppd in [1.0, 1000.0] {
-        assert!((0.0..=1.0).contains(&at(ppd)), "{ppd}");
+        assert!((0.0..=1.0).contains(&flip_at(ppd)), "{ppd}");
     }
 }
 
@@ -191,10 +199,10 @@ fn flip_of_linear_values_adapts_its_exposures_to_the_reference() {
     let found = flip(&flat(1.1), &flat(1.0));
     assert!(found > 0.01);
     for scale in [1e-30_f32, 1e-3, 1e3, 1e30] {
-        is_near(flip(&flat(1.1 * scale), &flat(scale)), found, 1e-4);
+        assert_near(flip(&flat(1.1 * scale), &flat(scale)), found, 1e-4);
     }
     // black, mostly black, negative and infinite images
-    let spot = |value: f32| {
+    let single_pixel = |value: f32| {
         picture(
             12,
             12,
@@ -203,8 +211,11 @@ fn flip_of_linear_values_adapts_its_exposures_to_the_reference() {
         )
     };
     assert_eq!(flip(&flat(0.0), &flat(-1.0)), 0.0);
-    let (bright, both) = (flip(&spot(5.0), &flat(0.0)), flip(&spot(5.0), &spot(4.0)));
-    assert!(bright > both && both > 0.0, "{bright} {both}");
-    assert_eq!(flip(&spot(f32::INFINITY), &spot(1.0)), 0.0);
-    assert!(flip(&spot(f32::MAX), &spot(f32::MIN_POSITIVE)).is_finite());
+    let (bright, similar) = (
+        flip(&single_pixel(5.0), &flat(0.0)),
+        flip(&single_pixel(5.0), &single_pixel(4.0)),
+    );
+    assert!(bright > similar && similar > 0.0, "{bright} {similar}");
+    assert_eq!(flip(&single_pixel(f32::INFINITY), &single_pixel(1.0)), 0.0);
+    assert!(flip(&single_pixel(f32::MAX), &single_pixel(f32::MIN_POSITIVE)).is_finite());
 }

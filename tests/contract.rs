@@ -29,12 +29,17 @@ pub fn subjects() -> [Packed; 4] {
         error: 0.02,
         max_samples: Some(SAMPLES),
     });
-    let paths = [&plain, &adaptive].map(|scene| scenes::packed(&along_paths(scene)).with_layers());
-    let [layered, both] = paths;
-    [scenes::packed(&plain), scenes::packed(&adaptive), layered, both]
+    let paths = [&plain, &adaptive].map(|scene| scenes::packed(&with_path_integrator(scene)).with_layers());
+    let [layered, layered_adaptive] = paths;
+    [
+        scenes::packed(&plain),
+        scenes::packed(&adaptive),
+        layered,
+        layered_adaptive,
+    ]
 }
 
-fn along_paths(scene: &Description) -> Description {
+fn with_path_integrator(scene: &Description) -> Description {
     let mut scene = scene.clone();
     scene.render.integrator = Some(wgray::scene::Integrator::Path);
     scene.render.ambient = wgray::DVec3::ZERO;
@@ -42,7 +47,7 @@ fn along_paths(scene: &Description) -> Description {
     scene
 }
 
-fn picture() -> Region {
+fn full_region() -> Region {
     Region::whole(SIZE.0, SIZE.1)
 }
 
@@ -51,125 +56,130 @@ fn region(x0: u32, y0: u32, x1: u32, y1: u32) -> Region {
 }
 
 pub fn bits(film: &Film) -> (Region, Vec<u32>) {
-    let all = film.lists().map(|list| bytemuck::cast_slice(list).to_vec());
-    (film.region, all.collect::<Vec<_>>().concat())
+    let words = film.lists().map(|list| bytemuck::cast_slice(list).to_vec());
+    (film.region, words.collect::<Vec<_>>().concat())
 }
 
-fn film_of(backend: &mut dyn Backend) -> (Region, Vec<u32>) {
+fn film_bits(backend: &mut dyn Backend) -> (Region, Vec<u32>) {
     bits(&backend.film().expect("a film"))
 }
 
-/// Renders all samples: the pilot pass, then the rest.
-fn whole(backend: &mut dyn Backend) -> Film {
-    let all = backend.samples_of_all().min(SAMPLES);
-    backend.begin(picture()).expect("a film");
-    backend.render(picture(), 0..all).expect("pilot samples");
-    backend.render(picture(), all..SAMPLES).expect("further samples");
+/// Renders all samples: the pilot pass, then the further samples.
+fn complete_film(backend: &mut dyn Backend) -> Film {
+    let pilot = backend.samples_of_all().min(SAMPLES);
+    backend.begin(full_region()).expect("a film");
+    backend.render(full_region(), 0..pilot).expect("pilot samples");
+    backend.render(full_region(), pilot..SAMPLES).expect("further samples");
     backend.film().expect("a film")
 }
 
-type Make<'a> = dyn Fn() -> Box<dyn Backend + 'a> + 'a;
+type MakeBackend<'a> = dyn Fn() -> Box<dyn Backend + 'a> + 'a;
 /// A sentence and its test, which returns the deviation as an error.
-type Sentence = (&'static str, fn(&Packed, &Make) -> Result<(), String>);
+type Sentence = (&'static str, fn(&Packed, &MakeBackend) -> Result<(), String>);
 
-fn hold(what: bool, why: &str) -> Result<(), String> {
-    match what {
+fn check(condition: bool, deviation: &str) -> Result<(), String> {
+    match condition {
         true => Ok(()),
-        false => Err(why.to_string()),
+        false => Err(deviation.to_string()),
     }
 }
 
 const SENTENCES: &[Sentence] = &[
     ("a new backend has no film", |_, make| {
         let mut b = make();
-        hold(
+        check(
             matches!(b.film(), Err(RenderError::NoFilm)),
-            "a film can be read before one is begun",
+            "a film can be read before `begin`",
         )?;
-        let rendered = b.render(picture(), 0..1);
-        hold(
+        let rendered = b.render(full_region(), 0..1);
+        check(
             matches!(rendered, Err(RenderError::NoFilm)),
             "samples are accepted without a film",
         )
     }),
     ("a film starts empty", |_, make| {
         let mut b = make();
-        whole(&mut *b);
+        complete_film(&mut *b);
         b.begin(region(2, 3, 7, 9)).map_err(|e| e.to_string())?;
         let film = b.film().map_err(|e| e.to_string())?;
-        hold(film.region == region(2, 3, 7, 9), "another region")?;
-        hold(
+        check(film.region == region(2, 3, 7, 9), "another region")?;
+        check(
             film.lists().flatten().all(|sum| *sum == glam::Vec4::ZERO),
             "the sums of the previous film remain",
         )
     }),
-    ("a film has the scene's form", |packed, make| {
+    ("a film has the scene's layout", |packed, make| {
         let mut b = make();
-        for of in [picture(), region(2, 3, 7, 9)] {
-            b.begin(of).map_err(|e| e.to_string())?;
+        for film_region in [full_region(), region(2, 3, 7, 9)] {
+            b.begin(film_region).map_err(|e| e.to_string())?;
             let film = b.film().map_err(|e| e.to_string())?;
             let lengths = |film: &Film| film.lists().map(Vec::len).collect::<Vec<_>>();
-            hold(
-                lengths(&film) == lengths(&Film::of(of, packed.film_layout())),
+            check(
+                lengths(&film) == lengths(&Film::of(film_region, packed.film_layout())),
                 "lists have the wrong length",
             )?;
-            hold(
+            check(
                 film.has_layers() == packed.film_layout().layers,
                 "layers are missing or unrequested",
             )?;
         }
         Ok(())
     }),
-    ("layers do not change the other values", |packed, make| {
-        let film = whole(&mut *make());
+    ("layers do not change the other lists", |packed, make| {
+        let film = complete_film(&mut *make());
         let mut plain = packed.clone();
         plain.specialization.layers = 0;
-        let other = whole(&mut Cpu::new(&plain));
+        let plain_film = complete_film(&mut Cpu::new(&plain));
         let same =
             |a: &[glam::Vec4], b: &[glam::Vec4]| bytemuck::cast_slice::<_, u32>(a) == bytemuck::cast_slice::<_, u32>(b);
-        hold(same(&film.sums, &other.sums), "the sums differ")?;
-        hold(same(&film.moments, &other.moments), "the moments differ")?;
-        hold(same(&film.pilot_sums, &other.pilot_sums), "the pilot sums differ")
+        check(same(&film.sums, &plain_film.sums), "the sums differ")?;
+        check(same(&film.moments, &plain_film.moments), "the moments differ")?;
+        check(same(&film.pilot_sums, &plain_film.pilot_sums), "the pilot sums differ")
     }),
     ("reading a film changes nothing", |_, make| {
         let mut b = make();
-        b.begin(picture()).map_err(|e| e.to_string())?;
-        b.render(picture(), 0..4).map_err(|e| e.to_string())?;
-        let first = film_of(&mut *b);
-        hold(first == film_of(&mut *b), "the second copy differs")?;
-        b.render(picture(), 4..8).map_err(|e| e.to_string())?;
-        let mut other = make();
-        other.begin(picture()).map_err(|e| e.to_string())?;
-        other.render(picture(), 0..8).map_err(|e| e.to_string())?;
-        hold(film_of(&mut *b) == film_of(&mut *other), "samples after a copy differ")
+        b.begin(full_region()).map_err(|e| e.to_string())?;
+        b.render(full_region(), 0..4).map_err(|e| e.to_string())?;
+        let first = film_bits(&mut *b);
+        check(first == film_bits(&mut *b), "the second copy differs")?;
+        b.render(full_region(), 4..8).map_err(|e| e.to_string())?;
+        let mut uninterrupted = make();
+        uninterrupted.begin(full_region()).map_err(|e| e.to_string())?;
+        uninterrupted.render(full_region(), 0..8).map_err(|e| e.to_string())?;
+        check(
+            film_bits(&mut *b) == film_bits(&mut *uninterrupted),
+            "samples after a copy differ",
+        )
     }),
     ("any backend resumes a film", |packed, make| {
         let mut b = make();
-        let expected = bits(&whole(&mut *b));
-        let all = b.samples_of_all().min(SAMPLES);
-        for middle in [1, all / 2, all, all + (SAMPLES - all) / 2] {
-            let mut start = Cpu::new(packed);
-            start.begin(picture()).map_err(|e| e.to_string())?;
-            start.render(picture(), 0..middle.min(all)).map_err(|e| e.to_string())?;
-            start
-                .render(picture(), all..middle.max(all))
+        let expected = bits(&complete_film(&mut *b));
+        let pilot = b.samples_of_all().min(SAMPLES);
+        for sample in [1, pilot / 2, pilot, pilot + (SAMPLES - pilot) / 2] {
+            let mut interrupted = Cpu::new(packed);
+            interrupted.begin(full_region()).map_err(|e| e.to_string())?;
+            interrupted
+                .render(full_region(), 0..sample.min(pilot))
                 .map_err(|e| e.to_string())?;
-            let film = start.film().map_err(|e| e.to_string())?;
+            interrupted
+                .render(full_region(), pilot..sample.max(pilot))
+                .map_err(|e| e.to_string())?;
+            let film = interrupted.film().map_err(|e| e.to_string())?;
             let mut b = make();
             b.resume(film.clone()).map_err(|e| e.to_string())?;
-            hold(film_of(&mut *b) == bits(&film), "resuming changes the film")?;
-            b.render(picture(), middle..all.max(middle))
+            check(film_bits(&mut *b) == bits(&film), "resuming changes the film")?;
+            b.render(full_region(), sample..pilot.max(sample))
                 .map_err(|e| e.to_string())?;
-            b.render(picture(), middle.max(all)..SAMPLES)
+            b.render(full_region(), sample.max(pilot)..SAMPLES)
                 .map_err(|e| e.to_string())?;
-            hold(film_of(&mut *b) == expected, "a resumed and completed film differs")?;
+            check(film_bits(&mut *b) == expected, "a resumed and completed film differs")?;
         }
         Ok(())
     }),
-    ("a film of another form is rejected", |packed, make| {
+    ("a film of another layout is rejected", |packed, make| {
         let mut b = make();
-        let film = whole(&mut *b);
-        let before = film_of(&mut *b);
+        let film = complete_film(&mut *b);
+        let before = film_bits(&mut *b);
         for wrong in [
             Film {
                 sums: film.sums[1..].to_vec(),
@@ -200,20 +210,20 @@ const SENTENCES: &[Sentence] = &[
             },
         ] {
             let result = b.resume(wrong);
-            hold(
+            check(
                 matches!(result, Err(RenderError::FilmMismatch(_))),
-                "a film of another form is accepted",
+                "a film of another layout is accepted",
             )?;
         }
-        hold(film_of(&mut *b) == before, "a rejection changes the film")
+        check(film_bits(&mut *b) == before, "a rejection changes the film")
     }),
-    ("every split of the work gives the same film", |_, make| {
+    ("every partition of the work gives the same film", |_, make| {
         let mut b = make();
-        let expected = bits(&whole(&mut *b));
-        let all = b.samples_of_all().min(SAMPLES);
+        let expected = bits(&complete_film(&mut *b));
+        let pilot = b.samples_of_all().min(SAMPLES);
         let tiles = [region(0, 0, 20, 1), region(0, 1, 9, 12), region(9, 1, 20, 12)];
-        b.begin(picture()).map_err(|e| e.to_string())?;
-        for (start, end) in [(0, all), (all, SAMPLES)] {
+        b.begin(full_region()).map_err(|e| e.to_string())?;
+        for (start, end) in [(0, pilot), (pilot, SAMPLES)] {
             for tile in tiles.iter().rev() {
                 let mut first = start;
                 for length in (1..).map(|i| i * i) {
@@ -226,65 +236,65 @@ const SENTENCES: &[Sentence] = &[
                 }
             }
         }
-        hold(film_of(&mut *b) == expected, "small tiles and ranges change the film")
+        check(film_bits(&mut *b) == expected, "small tiles and ranges change the film")
     }),
     ("empty tiles and ranges change nothing", |_, make| {
         let mut b = make();
-        let expected = bits(&whole(&mut *b));
+        let expected = bits(&complete_film(&mut *b));
         for (tile, samples) in [
-            (picture(), 7..7),
+            (full_region(), 7..7),
             (region(3, 3, 3, 9), 0..4),
             (region(99, 99, 99, 99), 0..4),
-            (picture(), Range { start: 9, end: 3 }),
+            (full_region(), Range { start: 9, end: 3 }),
         ] {
             b.render(tile, samples).map_err(|e| e.to_string())?;
         }
-        hold(film_of(&mut *b) == expected, "empty work changes the film")?;
+        check(film_bits(&mut *b) == expected, "empty work changes the film")?;
         b.begin(region(5, 5, 5, 5)).map_err(|e| e.to_string())?;
         let film = b.film().map_err(|e| e.to_string())?;
-        hold(film.sums.is_empty(), "an empty film has pixels")
+        check(film.sums.is_empty(), "an empty film has pixels")
     }),
     ("regions outside are rejected", |_, make| {
         let mut b = make();
         let outside = |result: Result<(), RenderError>| matches!(result, Err(RenderError::Outside { .. }));
-        hold(outside(b.begin(region(0, 0, 21, 12))), "a film may exceed the image")?;
+        check(outside(b.begin(region(0, 0, 21, 12))), "a film may exceed the image")?;
         b.begin(region(4, 4, 10, 10)).map_err(|e| e.to_string())?;
-        for tile in [region(3, 4, 10, 10), region(4, 4, 11, 10), picture()] {
-            hold(outside(b.render(tile, 0..1)), "a tile may exceed the film")?;
+        for tile in [region(3, 4, 10, 10), region(4, 4, 11, 10), full_region()] {
+            check(outside(b.render(tile, 0..1)), "a tile may exceed the film")?;
         }
         let hits = b.first_hits(region(0, 0, 20, 13)).map(|_| ());
-        hold(outside(hits), "first hits may exceed the image")?;
+        check(outside(hits), "first hits may exceed the image")?;
         let film = b.film().map_err(|e| e.to_string())?;
-        hold(
+        check(
             film.sums.iter().all(|sum| *sum == glam::Vec4::ZERO),
             "a rejection changes the film",
         )
     }),
     ("submitted work is pending until polled or waited for", |_, make| {
         let mut b = make();
-        hold(b.poll().map_err(|e| e.to_string())?, "work is pending before a submit")?;
+        check(b.poll().map_err(|e| e.to_string())?, "work is pending before a submit")?;
         b.wait().map_err(|e| e.to_string())?;
-        b.begin(picture()).map_err(|e| e.to_string())?;
-        b.submit(picture(), 0..8).map_err(|e| e.to_string())?;
+        b.begin(full_region()).map_err(|e| e.to_string())?;
+        b.submit(full_region(), 0..8).map_err(|e| e.to_string())?;
         let pending = |result: Result<(), RenderError>| matches!(result, Err(RenderError::Pending));
-        hold(pending(b.submit(picture(), 8..9)), "a second submit is accepted")?;
-        hold(pending(b.film().map(|_| ())), "a film is read while work is pending")?;
-        hold(pending(b.begin(picture())), "a film is begun while work is pending")?;
-        hold(
-            pending(b.resume(Film::new(picture()))),
+        check(pending(b.submit(full_region(), 8..9)), "a second submit is accepted")?;
+        check(pending(b.film().map(|_| ())), "a film is read while work is pending")?;
+        check(pending(b.begin(full_region())), "a film is begun while work is pending")?;
+        check(
+            pending(b.resume(Film::new(full_region()))),
             "a film is resumed while work is pending",
         )?;
-        hold(
-            pending(b.first_hits(picture()).map(|_| ())),
+        check(
+            pending(b.first_hits(full_region()).map(|_| ())),
             "first hits are computed while work is pending",
         )?;
         while !b.poll().map_err(|e| e.to_string())? {
             std::thread::yield_now();
         }
-        let polled = film_of(&mut *b);
-        b.begin(picture()).map_err(|e| e.to_string())?;
-        b.render(picture(), 0..8).map_err(|e| e.to_string())?;
-        hold(film_of(&mut *b) == polled, "polling and waiting give different films")
+        let polled = film_bits(&mut *b);
+        b.begin(full_region()).map_err(|e| e.to_string())?;
+        b.render(full_region(), 0..8).map_err(|e| e.to_string())?;
+        check(film_bits(&mut *b) == polled, "polling and waiting give different films")
     }),
     (
         "the pilot samples of all pixels precede further samples",
@@ -293,44 +303,45 @@ const SENTENCES: &[Sentence] = &[
                 return Ok(());
             }
             let mut b = make();
-            let all = b.samples_of_all();
-            b.begin(picture()).map_err(|e| e.to_string())?;
-            b.render(region(0, 0, 20, 11), 0..all).map_err(|e| e.to_string())?;
-            let early = b.render(region(0, 0, 20, 1), all..all + 1);
-            hold(
+            let pilot = b.samples_of_all();
+            b.begin(full_region()).map_err(|e| e.to_string())?;
+            b.render(region(0, 0, 20, 11), 0..pilot).map_err(|e| e.to_string())?;
+            let early = b.render(region(0, 0, 20, 1), pilot..pilot + 1);
+            check(
                 matches!(early, Err(RenderError::PilotIncomplete { .. })),
                 "further samples are accepted before the pilot samples are complete",
             )?;
-            b.render(region(0, 11, 20, 12), 0..all).map_err(|e| e.to_string())?;
-            b.render(region(0, 0, 20, 1), all..all + 1).map_err(|e| e.to_string())?;
-            let expected = bits(&whole(&mut *b));
-            b.begin(picture()).map_err(|e| e.to_string())?;
-            let most = region(0, 0, 20, 11);
-            b.render(most, 0..all).map_err(|e| e.to_string())?;
+            b.render(region(0, 11, 20, 12), 0..pilot).map_err(|e| e.to_string())?;
+            b.render(region(0, 0, 20, 1), pilot..pilot + 1)
+                .map_err(|e| e.to_string())?;
+            let expected = bits(&complete_film(&mut *b));
+            b.begin(full_region()).map_err(|e| e.to_string())?;
+            let upper_rows = region(0, 0, 20, 11);
+            b.render(upper_rows, 0..pilot).map_err(|e| e.to_string())?;
             b.render(region(0, 11, 20, 12), 0..SAMPLES).map_err(|e| e.to_string())?;
-            b.render(most, all..SAMPLES).map_err(|e| e.to_string())?;
-            hold(
-                film_of(&mut *b) == expected,
-                "a range of pilot and further samples for the last tile changes the film",
+            b.render(upper_rows, pilot..SAMPLES).map_err(|e| e.to_string())?;
+            check(
+                film_bits(&mut *b) == expected,
+                "a range with pilot and further samples of the last tile changes the film",
             )
         },
     ),
     ("first hits need no film and do not change it", |_, make| {
         let mut b = make();
-        let hits = b.first_hits(picture()).map_err(|e| e.to_string())?;
-        hold(hits.len() == 240, "wrong number of first hits")?;
-        let before = bits(&whole(&mut *b));
+        let hits = b.first_hits(full_region()).map_err(|e| e.to_string())?;
+        check(hits.len() == 240, "wrong number of first hits")?;
+        let before = bits(&complete_film(&mut *b));
         let part = b.first_hits(region(0, 0, 20, 2)).map_err(|e| e.to_string())?;
-        hold(
+        check(
             bytemuck::cast_slice::<_, u8>(&part) == bytemuck::cast_slice::<_, u8>(&hits[..40]),
             "the first hits of a part differ",
         )?;
-        hold(film_of(&mut *b) == before, "first hits change the film")
+        check(film_bits(&mut *b) == before, "first hits change the film")
     }),
 ];
 
 /// Returns the violated sentences with the deviations.
-fn broken<'a>(packed: &'a Packed, make: &Make<'a>) -> Vec<String> {
+fn violations<'a>(packed: &'a Packed, make: &MakeBackend<'a>) -> Vec<String> {
     let found = SENTENCES.iter().filter_map(|(sentence, holds)| {
         let deviation = holds(packed, make).err()?;
         Some(format!("{sentence}: {deviation}"))
@@ -341,21 +352,21 @@ fn broken<'a>(packed: &'a Packed, make: &Make<'a>) -> Vec<String> {
 #[test]
 fn every_backend_fulfills_the_contract() {
     for packed in &subjects() {
-        for way in exact_modes() {
-            let problems = broken(packed, &|| backend(packed, way));
-            assert_eq!(problems, Vec::<String>::new(), "{way:?}, {:?}", packed.film_layout());
+        for mode in exact_modes() {
+            let problems = violations(packed, &|| backend(packed, mode));
+            assert_eq!(problems, Vec::<String>::new(), "{mode:?}, {:?}", packed.film_layout());
         }
     }
 }
 
 /// A backend with one deliberate defect.
-struct Wrong<'a> {
-    inner: Cpu<'a>,
-    how: How,
+struct DefectiveBackend<'a> {
+    inner: Cpu<&'a Packed>,
+    defect: Defect,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum How {
+enum Defect {
     KeepsTheFilm,
     EmptiesTheFilmByReading,
     IgnoresAMissingFilm,
@@ -370,33 +381,33 @@ enum How {
     WritesLayersIntoTheSums,
 }
 
-const WRONGS: [How; 12] = [
-    How::KeepsTheFilm,
-    How::EmptiesTheFilmByReading,
-    How::IgnoresAMissingFilm,
-    How::DropsTheResumedFilm,
-    How::AddsASampleTwice,
-    How::ClampsTiles,
-    How::AcceptsASecondSubmit,
-    How::FirstHitsEndTheFilm,
-    How::AcceptsFurtherSamplesEarly,
-    How::DropsResumedLayers,
-    How::OmitsLayers,
-    How::WritesLayersIntoTheSums,
+const DEFECTS: [Defect; 12] = [
+    Defect::KeepsTheFilm,
+    Defect::EmptiesTheFilmByReading,
+    Defect::IgnoresAMissingFilm,
+    Defect::DropsTheResumedFilm,
+    Defect::AddsASampleTwice,
+    Defect::ClampsTiles,
+    Defect::AcceptsASecondSubmit,
+    Defect::FirstHitsEndTheFilm,
+    Defect::AcceptsFurtherSamplesEarly,
+    Defect::DropsResumedLayers,
+    Defect::OmitsLayers,
+    Defect::WritesLayersIntoTheSums,
 ];
 
-impl Backend for Wrong<'_> {
+impl Backend for DefectiveBackend<'_> {
     fn begin(&mut self, region: Region) -> Result<(), RenderError> {
-        match self.how == How::KeepsTheFilm && self.inner.film().is_ok() {
+        match self.defect == Defect::KeepsTheFilm && self.inner.film().is_ok() {
             true => Ok(()),
             false => self.inner.begin(region),
         }
     }
 
     fn resume(&mut self, film: Film) -> Result<(), RenderError> {
-        match self.how {
-            How::DropsTheResumedFilm => self.inner.begin(film.region),
-            How::DropsResumedLayers => self.inner.resume(Film {
+        match self.defect {
+            Defect::DropsTheResumedFilm => self.inner.begin(film.region),
+            Defect::DropsResumedLayers => self.inner.resume(Film {
                 layers: film.layers.map(|layer| vec![glam::Vec4::ZERO; layer.len()]),
                 ..film
             }),
@@ -406,15 +417,15 @@ impl Backend for Wrong<'_> {
 
     fn submit(&mut self, tile: Region, samples: Range<u32>) -> Result<(), RenderError> {
         let (mut tile, mut samples) = (tile, samples);
-        match self.how {
-            How::AddsASampleTwice if samples.start > 0 => samples.start -= 1,
-            How::ClampsTiles => tile = tile.within(self.inner.film()?.region),
-            How::AcceptsASecondSubmit => self.inner.wait()?,
+        match self.defect {
+            Defect::AddsASampleTwice if samples.start > 0 => samples.start -= 1,
+            Defect::ClampsTiles => tile = tile.within(self.inner.film()?.region),
+            Defect::AcceptsASecondSubmit => self.inner.wait()?,
             _ => {}
         }
         match self.inner.submit(tile, samples) {
-            Err(RenderError::NoFilm) if self.how == How::IgnoresAMissingFilm => Ok(()),
-            Err(RenderError::PilotIncomplete { .. }) if self.how == How::AcceptsFurtherSamplesEarly => Ok(()),
+            Err(RenderError::NoFilm) if self.defect == Defect::IgnoresAMissingFilm => Ok(()),
+            Err(RenderError::PilotIncomplete { .. }) if self.defect == Defect::AcceptsFurtherSamplesEarly => Ok(()),
             result => result,
         }
     }
@@ -429,19 +440,19 @@ impl Backend for Wrong<'_> {
 
     fn film(&mut self) -> Result<Film, RenderError> {
         let mut film = self.inner.film()?;
-        match self.how {
-            How::OmitsLayers => film.layers = Film::new(film.region).layers,
-            How::WritesLayersIntoTheSums if film.has_layers() => film.sums = film.layers[0].clone(),
+        match self.defect {
+            Defect::OmitsLayers => film.layers = Film::new(film.region).layers,
+            Defect::WritesLayersIntoTheSums if film.has_layers() => film.sums = film.layers[0].clone(),
             _ => {}
         }
-        if self.how == How::EmptiesTheFilmByReading {
+        if self.defect == Defect::EmptiesTheFilmByReading {
             self.inner.begin(film.region)?;
         }
         Ok(film)
     }
 
     fn first_hits(&mut self, region: Region) -> Result<Vec<FirstHit>, RenderError> {
-        if self.how == How::FirstHitsEndTheFilm {
+        if self.defect == Defect::FirstHitsEndTheFilm {
             self.inner.begin(region)?;
         }
         self.inner.first_hits(region)
@@ -463,16 +474,16 @@ impl Backend for Wrong<'_> {
 #[test]
 fn a_contract_violation_is_found() {
     let subjects = subjects();
-    for how in WRONGS {
+    for defect in DEFECTS {
         let found = subjects.iter().any(|packed| {
             let make = || -> Box<dyn Backend> {
-                Box::new(Wrong {
+                Box::new(DefectiveBackend {
                     inner: Cpu::new(packed),
-                    how,
+                    defect,
                 })
             };
-            !broken(packed, &make).is_empty()
+            !violations(packed, &make).is_empty()
         });
-        assert!(found, "{how:?}");
+        assert!(found, "{defect:?}");
     }
 }

@@ -30,13 +30,18 @@ normal = [0, 0, 1]
 tangent = [1, 0, 0]
 ";
 
-/// Returns n copies of `one`: `{i}` is the number, `{x}`, `{y}` and `{z}` a position.
-fn scene(n: usize, one: &str) -> String {
+/// Returns a scene with n copies of `element`, in which `{i}` is the number of the copy, and `{x}`, `{y}` and `{z}` are
+/// coordinates.
+fn scene(n: usize, element: &str) -> String {
     let mut text = START.to_owned();
     for i in 0..n {
         let [x, y, z] = [7919, 104_729, 1_299_709].map(|step| format!("{:.3}", (i * step % 1000) as f64 / 250.0 - 2.0));
-        let one = one.replace("{i}", &i.to_string());
-        let _ = writeln!(text, "{}", one.replace("{x}", &x).replace("{y}", &y).replace("{z}", &z));
+        let element = element.replace("{i}", &i.to_string());
+        let _ = writeln!(
+            text,
+            "{}",
+            element.replace("{x}", &x).replace("{y}", &y).replace("{z}", &z)
+        );
     }
     text
 }
@@ -59,7 +64,7 @@ const KINDS: [(&str, &str); 13] = [
         "triangles",
         "[[shapes]]\ntype = 'triangle'\nmaterial = 'first'\nvertices = [[{x}, {y}, {z}], [9, {y}, {z}], [{x}, 9, {y}]]",
     ),
-    // All other triangles are on the same side of each triangle.
+    // For each triangle, all other triangles are on the same side.
     (
         "triangles on a slope",
         "[[shapes]]\ntype = 'triangle'\nmaterial = 'first'\nvertices = [[{x}, {y}, {x}], [9, {y}, 9], [9, 9, 9]]",
@@ -74,11 +79,11 @@ const KINDS: [(&str, &str); 13] = [
         "[[shapes]]\ntype = 'plane'\nmaterial = 'first'\npoint = [{x}, {y}, {z}]\nnormal = [0, 0, 1]\ntangent = [1, 0, 0]",
     ),
     (
-        "points",
+        "point lights",
         "[[lights]]\ntype = 'point'\nposition = [{x}, {y}, {z}]\ncolor = [1, 1, 1]",
     ),
     (
-        "directions",
+        "directional lights",
         "[[lights]]\ntype = 'directional'\ndirection = [{x}, {y}, 9]\ncolor = [1, 1, 1]",
     ),
     (
@@ -92,7 +97,7 @@ const KINDS: [(&str, &str); 13] = [
         "[textures.t{i}]\ntype = 'checker'\neven = [0, 0, 0]\nodd = [1, 1, 1]\n[materials.m{i}]\ntype = 'phong'\n\
          color = { texture = 't{i}' }",
     ),
-    // The parent table `materials` also exists, so the parser handles all materials in one piece.
+    // The parent table `materials` also exists, so the parser handles all materials at once.
     (
         "materials in one table",
         "[materials.m{i}.color]\ntexture = 't'\n[materials.m{i}]\ntype = 'mirror'",
@@ -104,7 +109,7 @@ fn packed(text: &str) -> Option<Packed> {
     scene.ok().map(|scene| pack(&scene))
 }
 
-/// Returns the CPU time of the thread in seconds. The resolution of `/proc`, several milliseconds, is too coarse.
+/// Returns the CPU time of `work` in seconds. The resolution of `/proc`, several milliseconds, is too coarse.
 fn processor_time(work: impl Fn()) -> f64 {
     #[cfg(unix)]
     let now = || {
@@ -124,8 +129,8 @@ fn processor_time(work: impl Fn()) -> f64 {
     now() - start
 }
 
-/// Measures three times and returns the minimum. Uses a pool of one thread, which runs no work of other tests.
-fn least_of_three(work: impl Fn() + Sync) -> f64 {
+/// Returns the minimum of three measurements, in a pool of one thread that runs no work of other tests.
+fn min_of_three(work: impl Fn() + Sync) -> f64 {
     let thread = rayon::ThreadPoolBuilder::new()
         .num_threads(1)
         .build()
@@ -134,32 +139,32 @@ fn least_of_three(work: impl Fn() + Sync) -> f64 {
     thread.install(times)
 }
 
-/// Returns the ratio of the times. Repeats the measurement while the ratio is above `bound`, because other processes
-/// may slow it down.
-fn ratio_below(bound: f64, large: impl Fn() + Sync, small: impl Fn() + Sync) -> f64 {
+/// Returns the ratio of the CPU times. Repeats the measurements while the ratio is above `limit`, because other
+/// processes may disturb a measurement.
+fn ratio_below(limit: f64, large: impl Fn() + Sync, small: impl Fn() + Sync) -> f64 {
     const ROUNDS: usize = 8;
-    let (mut most, mut least) = (f64::INFINITY, f64::INFINITY);
+    let (mut large_time, mut small_time) = (f64::INFINITY, f64::INFINITY);
     for _ in 0..ROUNDS {
-        most = most.min(least_of_three(&large));
-        least = least.min(least_of_three(&small));
-        if most / least < bound {
+        large_time = large_time.min(min_of_three(&large));
+        small_time = small_time.min(min_of_three(&small));
+        if large_time / small_time < limit {
             break;
         }
     }
-    most / least
+    large_time / small_time
 }
 
 #[test]
 fn parsing_and_packing_take_linear_time() {
-    for (name, one) in KINDS {
-        let (small, large) = (scene(1500, one), scene(12_000, one));
+    for (name, element) in KINDS {
+        let (small, large) = (scene(1500, element), scene(12_000, element));
         let pack = |text: &str| {
             packed(text);
         };
         // 8 times the input: n log n takes 10 times as long, n^2 64 times.
         let ratio = ratio_below(24.0, || pack(&large), || pack(&small));
         println!("{name}: {ratio:.1}");
-        assert!(ratio < 24.0, "{name}: 8 times as many take {ratio} times as long");
+        assert!(ratio < 24.0, "{name}: 8 times the input takes {ratio} times as long");
     }
 }
 
@@ -175,12 +180,12 @@ fn quadratic_work_is_found() {
 
 #[test]
 fn kernels_do_not_grow_with_materials_lights_and_textures() {
-    for (name, one) in KINDS {
-        if packed(&scene(2, one)).is_none() {
-            continue; // an error, reported early
+    for (name, element) in KINDS {
+        if packed(&scene(2, element)).is_none() {
+            continue; // an invalid scene
         }
-        let [small, large] = [600, 6000].map(|n| packed(&scene(n, one)).expect("a scene"));
-        let check = |packed: &Packed| check_kernels(packed, sources::shaders(), Forms::All).expect("good kernels");
+        let [small, large] = [600, 6000].map(|n| packed(&scene(n, element)).expect("a scene"));
+        let check = |packed: &Packed| check_kernels(packed, sources::shaders(), Forms::All).expect("valid kernels");
         let ratio = ratio_below(3.0, || check(&large), || check(&small));
         println!("{name}: {ratio:.2}");
         assert!(ratio < 3.0, "{name}: {ratio}");
@@ -202,19 +207,19 @@ fn check_within(kibibytes: u32, scene: &Path) -> (Option<i32>, String) {
     )
 }
 
-/// Returns the minimum address space in KiB, to within 500, for a scene.
+/// Returns the minimum address space for a scene in KiB, to within 500 KiB.
 #[cfg(target_os = "linux")]
 fn address_space(scene: &Path) -> u32 {
-    let (mut too_little, mut enough) = (0, 200_000);
-    assert_eq!(check_within(enough, scene).0, Some(0));
-    while enough - too_little > 500 {
-        let middle = (too_little + enough) / 2;
-        match check_within(middle, scene).0 {
-            Some(0) => enough = middle,
-            _ => too_little = middle,
+    let (mut insufficient, mut sufficient) = (0, 200_000);
+    assert_eq!(check_within(sufficient, scene).0, Some(0));
+    while sufficient - insufficient > 500 {
+        let limit = (insufficient + sufficient) / 2;
+        match check_within(limit, scene).0 {
+            Some(0) => sufficient = limit,
+            _ => insufficient = limit,
         }
     }
-    enough
+    sufficient
 }
 
 #[cfg(target_os = "linux")]
@@ -227,7 +232,7 @@ fn memory_is_a_small_multiple_of_the_scene_file() {
     let small = folder.path().join("small.toml");
     std::fs::write(&small, scene(1, SPHERE)).unwrap();
     let program = address_space(&small);
-    // docs/performance.md: 400 bytes for a sphere with its text; memory is allocated in larger pieces.
+    // docs/performance.md states 400 bytes for a sphere with its text; memory is allocated in larger pieces.
     let (code, message) = check_within(program + 65_000, &path);
     assert_eq!(code, Some(0), "{message}");
     assert!(message.contains("; 100001 shapes; "), "{message}");

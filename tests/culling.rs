@@ -17,9 +17,10 @@ fn some_scenes(count: usize) -> Vec<Packed> {
     (0..count).map(scene).collect()
 }
 
-/// Returns how many primitives are culled, and how many of them wrongly. Points are up to 30 radii away, and up to 200
-/// in local space: at thousands of radii both tests are dominated by rounding. `bound` changes the bounding spheres.
-fn count_culled(scenes: &[Packed], bound: impl Fn(Sphere) -> Sphere) -> (usize, usize) {
+/// Returns how many primitives are culled, and how many of them wrongly. Shaded points are at most 30 radii away, and
+/// at most 200 units in local space, because rounding dominates at thousands of radii. `change_sphere` changes the
+/// bounding spheres.
+fn count_culled(scenes: &[Packed], change_sphere: impl Fn(Sphere) -> Sphere) -> (usize, usize) {
     let random = Random::new(11);
     let (mut culled, mut wrong) = (0, 0);
     for scene in scenes
@@ -27,17 +28,17 @@ fn count_culled(scenes: &[Packed], bound: impl Fn(Sphere) -> Sphere) -> (usize, 
         .filter(|scene| !scene.lighting.lights.is_empty() && !scene.primitives.is_empty())
     {
         for _ in 0..200 {
-            let near = scene.bounds[random.below(scene.bounds.len() as u32) as usize];
-            let t_max = random.pick(&[0.5, 1.0, 4.0, 30.0]) * near.radius;
+            let bounds = scene.bounds[random.below(scene.bounds.len() as u32) as usize];
+            let t_max = random.pick(&[0.5, 1.0, 4.0, 30.0]) * bounds.radius;
             if t_max > 1e9 {
                 continue; // the bounding sphere of a plane
             }
-            let p = near.center + Vec3::from_array([(); 3].map(|()| random.between(-1.0, 1.0) as f32)) * t_max;
+            let p = bounds.center + Vec3::from_array([(); 3].map(|()| random.between(-1.0, 1.0) as f32)) * t_max;
             let light = &scene.lighting.lights[random.below(scene.lighting.lights.len() as u32) as usize];
             if light.kind == ENVIRONMENT {
-                continue; // no frustum
+                continue; // an environment has no frustum
             }
-            let cone = light_frustum(light, p);
+            let frustum = light_frustum(light, p);
             let block = SampleBlock {
                 pattern: RANDOM,
                 side: 32,
@@ -48,7 +49,7 @@ fn count_culled(scenes: &[Packed], bound: impl Fn(Sphere) -> Sphere) -> (usize, 
             };
             let primitives = scene.primitives.iter().zip(&scene.bounds);
             for (q, sphere) in primitives.filter(|(q, _)| vector_to_local(q, p - q.anchor).length() < 200.0) {
-                if !may_block(&bound(*sphere), &cone) {
+                if !may_block(&change_sphere(*sphere), &frustum) {
                     culled += 1;
                     wrong += usize::from(occlusion_mask(q.kind, q, p, false, light, block) != 0);
                 }
@@ -69,5 +70,8 @@ fn culled_primitives_occlude_nothing() {
         radius: 0.9 * sphere.radius,
         ..sphere
     };
-    assert!(count_culled(&scenes, smaller).1 > 0, "too small spheres are not found");
+    assert!(
+        count_culled(&scenes, smaller).1 > 0,
+        "spheres that are too small are not found"
+    );
 }

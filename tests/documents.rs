@@ -36,8 +36,9 @@ fn prose(page: &str) -> impl Iterator<Item = &str> {
 
 fn links(page: &str) -> Vec<String> {
     let targets = |line: &str| -> Vec<String> {
-        let rest = line.split("](").skip(1);
-        rest.filter_map(|rest| Some(rest.split_once(')')?.0.to_owned()))
+        let parts = line.split("](").skip(1);
+        parts
+            .filter_map(|part| Some(part.split_once(')')?.0.to_owned()))
             .collect()
     };
     prose(page).flat_map(targets).collect()
@@ -59,7 +60,7 @@ fn anchors(page: &str) -> Vec<String> {
 
 /// Returns the relative links whose targets do not exist.
 fn broken_links(page: &Path, text: &str) -> Vec<String> {
-    let leads_nowhere = |link: &String| {
+    let is_broken = |link: &String| {
         if link.contains("://") {
             return false;
         }
@@ -78,7 +79,7 @@ fn broken_links(page: &Path, text: &str) -> Vec<String> {
         };
         !headings.iter().any(|heading| heading == anchor)
     };
-    let broken = links(text).into_iter().filter(leads_nowhere);
+    let broken = links(text).into_iter().filter(is_broken);
     broken.map(|link| format!("{}: {link}", page.display())).collect()
 }
 
@@ -115,8 +116,8 @@ fn broken_links_are_found() {
 
 #[test]
 fn the_table_of_pages_is_complete() {
-    let map = read(Path::new("docs/README.md"));
-    let listed = links(&map);
+    let overview = read(Path::new("docs/README.md"));
+    let listed = links(&overview);
     for page in pages_in("docs") {
         let name = page.strip_prefix("docs").unwrap().to_str().unwrap().to_owned();
         let rows = listed.iter().filter(|link| **link == name).count();

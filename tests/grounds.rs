@@ -13,7 +13,7 @@ use crate::pictures::{differing, exact_modes, means, reference, render};
 use crate::random::Random;
 use crate::scenes::packed;
 
-/// The coordinates in the text are in units of the size.
+/// The scale and position of a test scene. Coordinates and radii are in units of `size`.
 struct Setting {
     size: f64,
     offset: DVec3,
@@ -60,14 +60,14 @@ fn settings() -> Vec<Setting> {
     all
 }
 
-const ABOVE: [f64; 3] = [0.3, -4.0, 1.5];
+const CAMERA: [f64; 3] = [0.3, -4.0, 1.5];
 const LIGHT: [f64; 3] = [2.0, -2.5, 4.0];
 
-fn same_on_all_paths(d: &Description) {
+fn assert_equal_on_all_backends(d: &Description) {
     let packed = packed(d);
     let cpu = reference(&packed);
-    for way in exact_modes() {
-        assert_eq!(differing(&render(&packed, way), &cpu), 0, "{way:?}");
+    for mode in exact_modes() {
+        assert_eq!(differing(&render(&packed, mode), &cpu), 0, "{mode:?}");
     }
 }
 
@@ -75,7 +75,7 @@ fn same_on_all_paths(d: &Description) {
 /// than this tolerance.
 const TOLERANCE: f64 = 1e-3;
 
-fn wrong(d: &Description) -> usize {
+fn count_wrong_pixels(d: &Description) -> usize {
     let truth = Oracle::new(d, Flaw::None).picture();
     let cpu = reference(&packed(d));
     let close = |(a, b): (&f64, &f64)| (a - b).abs() <= TOLERANCE;
@@ -83,19 +83,19 @@ fn wrong(d: &Description) -> usize {
     pixels.filter(|(a, b)| !a.iter().zip(*b).all(close)).count()
 }
 
-/// Checks that at most `most` pixels differ for each radius.
-fn check(radii: &[f64], most: usize, shapes: impl Fn(&Setting, f64) -> String) {
+/// Checks that at most `max_wrong` pixels differ for each radius.
+fn check(radii: &[f64], max_wrong: usize, shapes: impl Fn(&Setting, f64) -> String) {
     for setting in settings() {
         for &radius in radii {
-            let d = setting.scene(ABOVE, [0.0, 0.0, 0.2], LIGHT, &shapes(&setting, radius));
-            let found = wrong(&d);
+            let d = setting.scene(CAMERA, [0.0, 0.0, 0.2], LIGHT, &shapes(&setting, radius));
+            let wrong_pixels = count_wrong_pixels(&d);
             if radius == 1e3 && setting.size == 1.0 && setting.offset != DVec3::ZERO {
-                same_on_all_paths(&d);
+                assert_equal_on_all_backends(&d);
             }
             let (size, offset) = (setting.size, setting.offset);
             assert!(
-                found <= most,
-                "radius {radius}, size {size}, offset {offset}: {found} pixels of 1,728 are wrong"
+                wrong_pixels <= max_wrong,
+                "radius {radius}, size {size}, offset {offset}: {wrong_pixels} pixels of 1,728 are wrong"
             );
         }
     }
@@ -109,18 +109,18 @@ fn spheres_do_not_shadow_themselves() {
 }
 
 #[test]
-fn small_spheres_on_large_ones_have_their_contact_shadows() {
+fn small_spheres_on_large_spheres_have_their_contact_shadows() {
     check(&[100.0, 1e3, 1e4], 4, |s, radius| {
-        let on_it = |x: f64, r: f64| {
-            let up = ((radius + r).powi(2) - x * x).sqrt() - radius;
-            s.sphere("dull", [x, 0.0, up], r)
+        let on_ground = |x: f64, r: f64| {
+            let height = ((radius + r).powi(2) - x * x).sqrt() - radius;
+            s.sphere("dull", [x, 0.0, height], r)
         };
         let ground = s.sphere("dull", [0.0, 0.0, -radius], radius);
-        ground + &on_it(-0.6, 0.5) + &on_it(0.4, 0.2) + &on_it(0.9, 0.05)
+        ground + &on_ground(-0.6, 0.5) + &on_ground(0.4, 0.2) + &on_ground(0.9, 0.05)
     });
 }
 
-/// A grain of radius 1e-3, seen from near: the ground is ten million times as large.
+/// The camera is near a grain of radius 1e-3. The ground is up to ten million times as large.
 #[test]
 fn a_grain_on_the_largest_ground_has_its_contact_shadow() {
     for offset in [DVec3::ZERO, DVec3::splat(1000.7)] {
@@ -129,7 +129,7 @@ fn a_grain_on_the_largest_ground_has_its_contact_shadow() {
             let shapes =
                 setting.sphere("dull", [0.0, 0.0, -radius], radius) + &setting.sphere("dull", [0.0, 0.0, 1e-3], 1e-3);
             let d = setting.scene([0.0, -0.006, 0.003], [0.0, 0.0, 0.0005], LIGHT, &shapes);
-            let found = wrong(&d);
+            let found = count_wrong_pixels(&d);
             assert!(found <= 4, "radius {radius}, offset {offset}: {found} pixels");
         }
     }
@@ -149,15 +149,15 @@ fn mirrors_and_glass_of_all_radii_match_the_oracle() {
 fn the_inside_of_a_sphere_is_lit_from_inside_only() {
     for setting in settings() {
         for radius in [1.0, 100.0, 1e4] {
-            let up = |height: f64| [0.1, 0.0, height - radius];
+            let at_height = |height: f64| [0.1, 0.0, height - radius];
             let shapes = setting.sphere("dull", [0.0, 0.0, -radius], radius);
-            let outside = setting.scene(up(radius - 0.3), [0.0, 0.2, 0.0], [0.0, 0.0, 0.5], &shapes);
-            let inside = setting.scene(up(radius - 0.3), [0.0, 0.2, 0.0], [0.0, 0.0, -0.5], &shapes);
+            let outside = setting.scene(at_height(radius - 0.3), [0.0, 0.2, 0.0], [0.0, 0.0, 0.5], &shapes);
+            let inside = setting.scene(at_height(radius - 0.3), [0.0, 0.2, 0.0], [0.0, 0.0, -0.5], &shapes);
             if radius == 100.0 && setting.size == 1.0 {
-                same_on_all_paths(&outside);
+                assert_equal_on_all_backends(&outside);
             }
             for d in [outside, inside] {
-                let found = wrong(&d);
+                let found = count_wrong_pixels(&d);
                 assert!(found <= 1, "radius {radius}, size {}: {found} pixels", setting.size);
             }
         }
@@ -173,13 +173,23 @@ fn adjacent_faces_do_not_shadow_each_other_at_shared_edges() {
             let vertices = [a, b, c].map(p).join(", ");
             format!("[[shapes]]\ntype = 'triangle'\nmaterial = 'dull'\nvertices = [{vertices}]\n")
         };
-        // a tilted square of two triangles, and a third below as a shadow receiver
+        // a tilted square of two triangles, and a third triangle below as a shadow receiver
         let tilt = |x: f64, y: f64| [x, y, 0.3 * x + 0.1 * y];
         let corners = [tilt(-3.0, -3.0), tilt(3.0, -3.0), tilt(3.0, 3.0), tilt(-3.0, 3.0)];
-        let below = floor([-1.0, -1.0, -3.0], [1.0, -1.0, -3.0], [0.0, 1.0, -3.0]);
+        let receiver = floor([-1.0, -1.0, -3.0], [1.0, -1.0, -3.0], [0.0, 1.0, -3.0]);
         let square = floor(corners[0], corners[1], corners[2]) + &floor(corners[0], corners[2], corners[3]);
-        let d = setting.scene([0.0, -0.01, 5.0], [0.0, 0.0, 0.0], [-6.0, 5.5, 2.0], &(below + &square));
-        assert_eq!(wrong(&d), 0, "a square of triangles, size {}", setting.size);
+        let d = setting.scene(
+            [0.0, -0.01, 5.0],
+            [0.0, 0.0, 0.0],
+            [-6.0, 5.5, 2.0],
+            &(receiver + &square),
+        );
+        assert_eq!(
+            count_wrong_pixels(&d),
+            0,
+            "a square of triangles, size {}",
+            setting.size
+        );
         // a box of rectangles on a floor, and a tetrahedron beside it
         let face = |center: [f64; 3], side: f64, normal: [f64; 3], tangent: [f64; 3]| {
             format!(
@@ -201,8 +211,8 @@ fn adjacent_faces_do_not_shadow_each_other_at_shared_edges() {
             "[[shapes]]\ntype = 'tetrahedron'\nmaterial = 'dull'\nvertices = [{}]\n",
             corners.join(", ")
         );
-        let d = setting.scene(ABOVE, [0.2, 0.0, 0.4], [-3.0, -2.0, 3.0], &(box_faces + &solid));
-        let found = wrong(&d);
+        let d = setting.scene(CAMERA, [0.2, 0.0, 0.4], [-3.0, -2.0, 3.0], &(box_faces + &solid));
+        let found = count_wrong_pixels(&d);
         assert!(
             found <= 2,
             "a box, size {}, offset {}: {found} pixels",
@@ -212,11 +222,11 @@ fn adjacent_faces_do_not_shadow_each_other_at_shared_edges() {
     }
 }
 
-/// Evaluated in f64, `ray_origin` is above the surface for all sizes, by less than 1e-5 of the coordinates.
+/// In f64, `ray_origin` is above the surface for all sizes, by less than 1e-5 of the coordinates.
 #[test]
 fn ray_origins_are_slightly_above_their_surface() {
     let random = Random::new(5);
-    let mut highest = 0.0f64;
+    let mut max_height = 0.0f64;
     for setting in settings() {
         for radius in [1e-3, 0.1, 1.0, 1e2, 1e4] {
             let shapes = setting.sphere("dull", [0.0, 0.0, -radius], radius);
@@ -225,8 +235,8 @@ fn ray_origins_are_slightly_above_their_surface() {
             let (scene, size) = (packed(&d), setting.size);
             let center = DVec3::new(0.0, 0.0, -radius) * size + setting.offset - scene.origin;
             for _ in 0..2000 {
-                let at = glam::Vec2::new((random.unit() * 48.0) as f32, (random.unit() * 36.0) as f32);
-                let ray = camera_ray(&scene.camera, at);
+                let pixel = glam::Vec2::new((random.unit() * 48.0) as f32, (random.unit() * 36.0) as f32);
+                let ray = camera_ray(&scene.camera, pixel);
                 let hit = closest_hit(&scene, ray, NO_PRIMITIVE, NO_PRIMITIVE);
                 if hit.primitive == NO_INDEX {
                     continue;
@@ -237,10 +247,10 @@ fn ray_origins_are_slightly_above_their_surface() {
                 let position = surface.position.as_dvec3();
                 let offset = (surface.ray_origin - surface.position).length();
                 assert!(height > 0.0, "radius {radius}, size {size}: {height:e} of {offset:e}");
-                highest = highest.max(height / position.abs().max_element().max(distance * size));
+                max_height = max_height.max(height / position.abs().max_element().max(distance * size));
             }
         }
     }
-    println!("at most {highest:.1e} of the distance above");
-    assert!(highest < 1e-5, "{highest}");
+    println!("ray origins are at most {max_height:.1e} of the distance above their surface");
+    assert!(max_height < 1e-5, "{max_height}");
 }

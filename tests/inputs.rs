@@ -1,6 +1,7 @@
-//! Random inputs for the probes of CPU and GPU functions. Most arguments are consistent, such as a primitive and a ray
-//! to its interior, to its edge or past it, to cover every branch. Some components are replaced by edge values or by
-//! each other, rounded to halves so that comparisons find equal values, or of any magnitude.
+//! Random inputs for the probes of CPU and GPU functions. To cover every branch, most arguments are consistent, such as
+//! a primitive and a ray to the primitive's interior, to its edge or past it. Some components are replaced: by edge
+//! values, by other components, by multiples of 1/2 so that comparisons find equal values, or by values of any
+//! magnitude.
 
 use bytemuck::Zeroable as _;
 use glam::{DMat3, DVec2, DVec3, UVec2, UVec4, Vec2, Vec3, Vec4};
@@ -60,42 +61,42 @@ const EDGES: &[f32] = &[
     0.333_333_34,
 ];
 
-/// Returns the words of the arguments of `calls` calls.
+/// Returns the argument words of `calls` calls.
 pub fn inputs(function: &Function, calls: usize, seed: u64) -> Vec<u32> {
     let random = Random::new(seed);
     let mut words = Vec::new();
     for _ in 0..calls {
-        call(function, &random, &mut words);
+        write_call(function, &random, &mut words);
     }
     words
 }
 
-fn call(function: &Function, random: &Random, words: &mut Vec<u32>) {
+fn write_call(function: &Function, random: &Random, words: &mut Vec<u32>) {
     let situation = Situation::new(function.name(), random);
-    let manner = random.below(12);
-    let mut before = 0.0;
+    let mode = random.below(12);
+    let mut previous = 0.0;
     for (name, ty) in function.arguments() {
         let start = words.len();
         situation.argument((function.name(), &name), function.module, ty, random, words);
         for (word, kind) in words[start..].iter_mut().zip(scalars(function.module, ty)) {
             if kind == ScalarKind::Float {
                 let x = f32::from_bits(*word);
-                *word = match manner {
-                    0 => wild(random),
+                *word = match mode {
+                    0 => any_float(random),
                     1 if random.once_in(4) => random.pick(EDGES),
                     2 if random.once_in(8) => neighbour(x, random),
                     3 => (x * 2.0).round() / 2.0,
-                    4 if random.once_in(4) => before,
+                    4 if random.once_in(4) => previous,
                     _ => x,
                 }
                 .to_bits();
-                before = f32::from_bits(*word);
+                previous = f32::from_bits(*word);
             }
         }
     }
 }
 
-fn wild(random: &Random) -> f32 {
+fn any_float(random: &Random) -> f32 {
     let sign = random.pick(&[1.0, -1.0]);
     (sign * random.magnitude(-44.0, 38.0)) as f32
 }
@@ -134,8 +135,8 @@ struct Face {
 impl Face {
     fn new(random: &Random, anchor: DVec3, columns: DMat3) -> Face {
         let size = random.pick(&[1.0, 1.0, 1e-3, 1e3]);
-        let at = vector(random) * random.pick(&[0.0, 1.0, 100.0]);
-        let mut corners = [(); 3].map(|()| (at + vector(random)) * size);
+        let offset = vector(random) * random.pick(&[0.0, 1.0, 100.0]);
+        let mut corners = [(); 3].map(|()| (offset + vector(random)) * size);
         match random.below(8) {
             0 => corners[2] = corners[0].lerp(corners[1], random.unit()), // degenerate
             1 => corners.iter_mut().for_each(|corner| corner.z = size),
@@ -149,15 +150,15 @@ impl Face {
             2 => DVec2::new(x, y) * 3.0 - 1.0,
             _ => DVec2::new(x * 0.5, y * 0.5),
         };
-        let met = point_of(&corners, barycentric);
+        let intersection = point_of(&corners, barycentric);
         let away = match random.below(6) {
             0 => random.pick(&DVec3::AXES) * random.pick(&[1.0, -1.0]),
             1 => (corners[1] - corners[0]) / size, // parallel to the triangle's plane
             _ => vector(random),
         };
-        let origin = met - away * size * random.pick(&[0.1, 1.0, 100.0, -1.0]);
+        let origin = intersection - away * size * random.pick(&[0.1, 1.0, 100.0, -1.0]);
         let rows = columns.inverse().transpose();
-        let uvs = random.below(2);
+        let has_uvs = random.below(2);
         let instance = Instance {
             x: rows.x_axis.as_vec3(),
             y: rows.y_axis.as_vec3(),
@@ -168,7 +169,7 @@ impl Face {
             w: columns.z_axis.as_vec3(),
             shape: random.below(4),
             attributes: random.pick(&[NO_INDEX, 9]),
-            has_uvs: uvs,
+            has_uvs,
             size: corners
                 .iter()
                 .map(|corner| corner.abs().max_element())
@@ -191,15 +192,15 @@ impl Face {
         [self.corners[1] - self.corners[0], self.corners[2] - self.corners[0]]
     }
 
-    fn spot(&self, random: &Random) -> HitPrimitive {
+    fn hit_primitive(&self, random: &Random) -> HitPrimitive {
         let i = &self.instance;
         let columns = [i.u, i.v, i.w].map(Vec3::as_dvec3);
         let to_world = DMat3::from_cols(columns[0], columns[1], columns[2]);
         let [edge_1, edge_2] = self.edges().map(|edge| (to_world * edge).as_vec3());
         let normal = edge_1.as_dvec3().cross(edge_2.as_dvec3()).normalize_or(DVec3::Z);
-        let bent = || (normal + vector(random) * 0.3).normalize().as_vec3();
+        let vertex_normal = || (normal + vector(random) * 0.3).normalize().as_vec3();
         let has_normals = !random.once_in(4);
-        let [normal_0, normal_1, normal_2] = [(); 3].map(|()| if has_normals { bent() } else { Vec3::ZERO });
+        let [normal_0, normal_1, normal_2] = [(); 3].map(|()| if has_normals { vertex_normal() } else { Vec3::ZERO });
         let has_tangents = random.once_in(2);
         let [tangents_0, tangents_1, tangents_2] = [(); 3].map(|()| match has_tangents {
             true => Tangents {
@@ -228,13 +229,13 @@ impl Face {
         }
     }
 
-    /// Returns the root of a BVH over the triangle and others.
+    /// Returns the root of a BVH over the triangle and other triangles.
     fn node(&self, random: &Random) -> Node {
         let size = self.edges()[0].length();
-        let away = || vector(random) * size * random.pick(&[0.5, 3.0]);
-        let around = |by: DVec3| Aabb::around(&self.corners.map(|corner| (corner + by).as_vec3()));
+        let random_offset = || vector(random) * size * random.pick(&[0.5, 3.0]);
+        let bounds = |offset: DVec3| Aabb::around(&self.corners.map(|corner| (corner + offset).as_vec3()));
         let boxes: Vec<Aabb> = (0..=random.below(40))
-            .map(|i| around(if i == 0 { DVec3::ZERO } else { away() }))
+            .map(|i| bounds(if i == 0 { DVec3::ZERO } else { random_offset() }))
             .collect();
         bytemuck::cast(build(&boxes, 1 + random.below(4)).nodes[0])
     }
@@ -260,8 +261,8 @@ impl Face {
                 "edge_2" => self.edges()[1],
                 "origin" => self.origin,
                 "direction" => self.direction,
-                "least" => self.direction - self.spread,
-                "most" => self.direction + self.spread,
+                "min_direction" => self.direction - self.spread,
+                "max_direction" => self.direction + self.spread,
                 _ => return None,
             }
             .as_vec3(),
@@ -272,9 +273,9 @@ impl Face {
 /// Returns orthogonal axes, two of equal length.
 fn cylinder_columns(random: &Random, scale: f64) -> DMat3 {
     let axis = vector(random).normalize();
-    let across = axis.cross(vector(random)).normalize_or(axis.any_orthonormal_vector());
+    let perpendicular = axis.cross(vector(random)).normalize_or(axis.any_orthonormal_vector());
     let height = scale * random.pick(&[1.0, random.magnitude(-3.0, 3.0)]);
-    DMat3::from_cols(across * scale, axis.cross(across) * scale, axis * height)
+    DMat3::from_cols(perpendicular * scale, axis.cross(perpendicular) * scale, axis * height)
 }
 
 fn point_of(corners: &[DVec3; 3], barycentric: DVec2) -> DVec3 {
@@ -283,7 +284,7 @@ fn point_of(corners: &[DVec3; 3], barycentric: DVec2) -> DVec3 {
 }
 
 /// Functions whose arguments come from a [`Face`].
-const OF_FACES: &[&str] = &[
+const FACE_FUNCTIONS: &[&str] = &[
     "slabs",
     "box_interval",
     "ray_interval",
@@ -301,7 +302,8 @@ const OF_FACES: &[&str] = &[
 ];
 
 impl Situation {
-    /// Returns a situation for a function. A function with a kind of primitive in its name gets this kind.
+    /// Returns a situation for a function. If the function's name contains a kind of primitive, the primitive is of
+    /// this kind.
     fn new(function: &str, random: &Random) -> Situation {
         let center = DVec3::from_array([(); 3].map(|()| random.between(-2.0, 2.0))) * random.pick(&[0.0, 1.0, 100.0]);
         let scale = random.magnitude(-3.0, 3.0);
@@ -309,12 +311,12 @@ impl Situation {
         if random.once_in(4) {
             columns = DMat3::from_diagonal(DVec3::splat(scale)); // axis-aligned
         }
-        let any_kind = random.below(KINDS);
-        let named = PRIMITIVE_KINDS
+        let random_kind = random.below(KINDS);
+        let kind_in_name = PRIMITIVE_KINDS
             .iter()
             .position(|kind| function.contains(&kind.name.to_lowercase()));
-        let kind = named.map_or(any_kind, |kind| kind as u32);
-        // the anchor of a solid is on or near its surface
+        let kind = kind_in_name.map_or(random_kind, |kind| kind as u32);
+        // The anchor of a solid is on or near the surface of the solid.
         let (mut middle, mut level) = (DVec3::ZERO, -1.0);
         if kind == ELLIPSOID && random.once_in(2) {
             middle = -local_point(kind, random).normalize_or(DVec3::Z) * random.pick(&[1.0, 1.0, 1.1]);
@@ -323,8 +325,8 @@ impl Situation {
         if kind == CYLINDER {
             columns = cylinder_columns(random, scale);
             if random.once_in(2) {
-                let at = local_point(kind, random);
-                middle = -at.truncate().normalize_or(DVec2::X).extend(at.z.clamp(-1.0, 1.0));
+                let point = local_point(kind, random);
+                middle = -point.truncate().normalize_or(DVec2::X).extend(point.z.clamp(-1.0, 1.0));
                 level = middle.truncate().length_squared() - 1.0;
             }
         }
@@ -385,7 +387,7 @@ impl Situation {
         }
     }
 
-    /// Writes the words of an argument. The type selects the values; for numbers and vectors, the name also matters.
+    /// Writes the words of an argument. The values depend on the type, and for numbers and vectors also on the name.
     fn argument(
         &self,
         (function, name): (&str, &str),
@@ -423,7 +425,7 @@ impl Situation {
             "Path" => self.path(random).write(words),
             "Derivative" => derivative(random).write(words),
             "Differential" => differential(random).write(words),
-            "HitDifferential" => arrival(random).write(words),
+            "HitDifferential" => hit_differential(random).write(words),
             "Footprint" => footprint(random).write(words),
             "Texture" => texture(random).write(words),
             "i32" => words.push((random.pick(&[random.below(20), random.below(40_000)]) as i32 - 20) as u32),
@@ -445,7 +447,7 @@ impl Situation {
             .write(words),
             "Instance" => self.face.instance.write(words),
             "Node" => self.face.node(random).write(words),
-            "HitPrimitive" => self.face.spot(random).write(words),
+            "HitPrimitive" => self.face.hit_primitive(random).write(words),
             "Slabs" => {
                 let (origin, direction) = (self.face.origin.as_vec3(), self.face.direction.as_vec3());
                 slabs(origin, direction, self.face.pad()).write(words);
@@ -453,9 +455,15 @@ impl Situation {
             "Shear" => shear_of(self.face.direction.as_vec3()).write(words),
             "RayInterval" => {
                 let argument = |name| self.face.vector(name).unwrap_or_default();
-                ray_interval(argument("origin"), argument("least"), argument("most"), self.face.pad()).write(words);
+                ray_interval(
+                    argument("origin"),
+                    argument("min_direction"),
+                    argument("max_direction"),
+                    self.face.pad(),
+                )
+                .write(words);
             }
-            "vec3<f32>" if OF_FACES.contains(&function) && self.face.vector(name).is_some() => {
+            "vec3<f32>" if FACE_FUNCTIONS.contains(&function) && self.face.vector(name).is_some() => {
                 self.face.vector(name).unwrap_or_default().write(words);
             }
             "vec2<f32>" if function.starts_with("face_") => self.face.barycentric.as_vec2().write(words),
@@ -465,7 +473,7 @@ impl Situation {
             }
             "vec3<f32>" => self.vector(name, random).write(words),
             "f32" => self.number(name, random).write(words),
-            "u32" => whole(function, name, random).write(words),
+            "u32" => integer(function, name, random).write(words),
             "vec2<f32>" if ["long", "short", "a", "b", "tail", "head"].contains(&name) => {
                 let edge = vector(random).truncate() * random.magnitude(-3.0, 2.5);
                 edge.as_vec2().write(words);
@@ -480,7 +488,7 @@ impl Situation {
                 let size = random.pick(&[1.0, 1.0, 400.0]);
                 words.extend([(); 2].map(|()| ((random.unit() * size) as f32).to_bits()));
             }
-            _ => anything(&scalars(module, ty), random, words),
+            _ => arbitrary(&scalars(module, ty), random, words),
         }
     }
 
@@ -561,25 +569,25 @@ impl Situation {
             let radius = self.direction.length() * random.pick(&[0.0, 0.01, 0.5, 1.0, 2.0]);
             (center.as_vec3(), axis.as_vec3(), radius as f32)
         });
-        let each = |number: &dyn Fn(&(Vec3, Vec3, f32)) -> f32| Vec4::from_array(children.each_ref().map(number));
-        let below = |n: u32| UVec4::from_array([(); 4].map(|()| random.below(n)));
+        let per_child = |value: &dyn Fn(&(Vec3, Vec3, f32)) -> f32| Vec4::from_array(children.each_ref().map(value));
+        let integers = |n: u32| UVec4::from_array([(); 4].map(|()| random.below(n)));
         LightNode {
-            x: each(&|(center, ..)| center.x),
-            y: each(&|(center, ..)| center.y),
-            z: each(&|(center, ..)| center.z),
-            radius: each(&|(.., radius)| *radius),
-            axis_x: each(&|(_, axis, _)| axis.x),
-            axis_y: each(&|(_, axis, _)| axis.y),
-            axis_z: each(&|(_, axis, _)| axis.z),
-            cosine: each(&|_| random.pick(&[1.0, -1.0, random.between(-1.0, 1.0)]) as f32),
-            intensity: each(&|_| random.pick(&[random.magnitude(-9.0, 0.0), 0.0]) as f32),
-            edge: each(&|_| random.pick(&[0.0, random.unit()]) as f32),
-            sides: below(2) + 1,
+            x: per_child(&|(center, ..)| center.x),
+            y: per_child(&|(center, ..)| center.y),
+            z: per_child(&|(center, ..)| center.z),
+            radius: per_child(&|(.., radius)| *radius),
+            axis_x: per_child(&|(_, axis, _)| axis.x),
+            axis_y: per_child(&|(_, axis, _)| axis.y),
+            axis_z: per_child(&|(_, axis, _)| axis.z),
+            cosine: per_child(&|_| random.pick(&[1.0, -1.0, random.between(-1.0, 1.0)]) as f32),
+            intensity: per_child(&|_| random.pick(&[random.magnitude(-9.0, 0.0), 0.0]) as f32),
+            edge: per_child(&|_| random.pick(&[0.0, random.unit()]) as f32),
+            sides: integers(2) + 1,
             parent: UVec4::new(random.pick(&[NO_INDEX, 0]), 0, 0, 0),
             children: UVec4::splat(random.pick(&[NO_INDEX, 1])),
-            density: each(&|_| random.magnitude(-9.0, 9.0) as f32),
-            instance: below(2),
-            index: below(4),
+            density: per_child(&|_| random.magnitude(-9.0, 9.0) as f32),
+            instance: integers(2),
+            index: integers(4),
         }
     }
 
@@ -607,7 +615,7 @@ impl Situation {
             "local" => self.local,
             "p" => random.pick(&[self.start, self.target]),
             "from_anchor" => self.local + self.primitive.middle.as_dvec3(),
-            "to" | "direction" => self.direction,
+            "to_light" | "direction" => self.direction,
             "wi" | "wo" | "normal" | "coat_normal" | "half" | "w" | "m" => vector(random).normalize(),
             _ => vector(random) * random.magnitude(-2.0, 2.0),
         };
@@ -621,9 +629,11 @@ impl Situation {
             "far_low" | "far_high" => random.pick(&[0.0, random.between(-2.0, 2.0) as f32]),
             "limit" => random.pick(&[INFINITE_T, INFINITE_T, self.t() as f32, (2.0 * self.t()) as f32]),
             "t" => random.pick(&[self.t() as f32, INFINITE_T]),
-            "start" => (self.local_start.length_squared() - 1.0) as f32,
+            "start_level" => (self.local_start.length_squared() - 1.0) as f32,
             "t_max" => random.pick(&[self.light.t_max, 1.0 - 1e-5, 1e10, 1.0]),
-            "cosine" | "cosine_i" | "cosine_t" | "random" | "line_width" | "on" => random.unit() as f32,
+            "cosine" | "cosine_i" | "cosine_t" | "random" | "line_width" | "duty" | "surface_level" => {
+                random.unit() as f32
+            }
             "alpha" => alpha(random).x,
             "roughness" => random.between(f64::from(MIN_SHEEN_ROUGHNESS), 1.0) as f32,
             "eta" | "anisotropy" => random.magnitude(-1.0, 1.0) as f32,
@@ -642,9 +652,9 @@ impl Situation {
 }
 
 fn alpha(random: &Random) -> Vec2 {
-    let one = || random.pick(&[SMALLEST_ALPHA, 1.0, (random.unit() as f32).max(SMALLEST_ALPHA)]);
-    let x = one();
-    random.pick(&[Vec2::splat(x), Vec2::new(x, one())])
+    let component = || random.pick(&[SMALLEST_ALPHA, 1.0, (random.unit() as f32).max(SMALLEST_ALPHA)]);
+    let x = component();
+    random.pick(&[Vec2::splat(x), Vec2::new(x, component())])
 }
 
 /// Returns a vector of length 0.1 or more.
@@ -666,7 +676,7 @@ fn local_point(kind: u32, random: &Random) -> DVec3 {
     let coordinate = || random.between(-1.2, 1.2);
     let p = DVec3::new(coordinate(), coordinate(), coordinate());
     let side = || random.pick(&[-1.0, 0.0, 1.0]);
-    let around = p.truncate().normalize_or(DVec2::X);
+    let on_circle = p.truncate().normalize_or(DVec2::X);
     let case = random.below(5);
     match (kind, case) {
         (_, 0) => p,
@@ -676,19 +686,19 @@ fn local_point(kind: u32, random: &Random) -> DVec3 {
         (TRIANGLE, 2) => DVec3::new(0.0, p.y, 0.0),
         (TRIANGLE, _) => DVec3::new(random.between(0.0, 0.6), random.between(0.0, 0.6), 0.0),
         (ELLIPSOID, _) => p.normalize_or(DVec3::Z),
-        (DISK, 1) => around.extend(0.0),
-        (CYLINDER, 1) => around.extend(side()),
+        (DISK, 1) => on_circle.extend(0.0),
+        (CYLINDER, 1) => on_circle.extend(side()),
         (CYLINDER, 2) => p.truncate().extend(random.pick(&[-1.0, 1.0])),
-        (CYLINDER, _) => around.extend(p.z),
+        (CYLINDER, _) => on_circle.extend(p.z),
         _ => DVec3::new(p.x, p.y, 0.0),
     }
 }
 
 fn derivative(random: &Random) -> Derivative {
-    let any = || (vector(random) * random.pick(&[0.0, 1e-3, 1e-3, 1.0])).as_vec3();
+    let random_vector = || (vector(random) * random.pick(&[0.0, 1e-3, 1e-3, 1.0])).as_vec3();
     Derivative {
-        position: any(),
-        direction: any(),
+        position: random_vector(),
+        direction: random_vector(),
     }
 }
 
@@ -699,7 +709,7 @@ fn differential(random: &Random) -> Differential {
     }
 }
 
-fn arrival(random: &Random) -> HitDifferential {
+fn hit_differential(random: &Random) -> HitDifferential {
     let Differential { x, y } = differential(random);
     HitDifferential {
         x,
@@ -745,8 +755,8 @@ fn texture(random: &Random) -> Texture {
 
 fn block(random: &Random) -> SampleBlock {
     SampleBlock {
-        pattern: whole("block_sample", "pattern", random),
-        side: whole("block_sample", "side", random),
+        pattern: integer("block_sample", "pattern", random),
+        side: integer("block_sample", "side", random),
         first: 32 * random.below(4),
         count: 1 + random.below(32),
         group: random.below(16),
@@ -773,7 +783,7 @@ fn material(random: &Random) -> Material {
     material.rotation = random.between(-2.0, 2.0) as f32;
     material.loss = random.pick(&[0.0, random.unit() as f32]);
     material.exponent = exponent;
-    for number in [
+    for parameter in [
         &mut material.metallic,
         &mut material.transmission,
         &mut material.specular_weight,
@@ -782,7 +792,7 @@ fn material(random: &Random) -> Material {
         &mut material.sheen_roughness,
         &mut material.anisotropy,
     ] {
-        *number = random.pick(&[0.0, 1.0, random.unit() as f32]);
+        *parameter = random.pick(&[0.0, 1.0, random.unit() as f32]);
     }
     material.sheen = color(random);
     material.thin = random.below(2);
@@ -802,7 +812,7 @@ fn mixture(random: &Random) -> PrincipledLobes {
     let wo = vector(random).normalize().as_vec3();
     let normal = random.pick(&[DVec3::Z, vector(random).normalize()]).as_vec3();
     let outside = random.once_in(2);
-    // The tables are defined for 0 to 1.
+    // The albedo tables have values from 0 to 1.
     let share = || random.pick(&[0.0, 1e-4, 0.3, 0.7, 1.0]) as f32;
     let energy = Vec3::new(share(), share(), share());
     principled_mixture(
@@ -815,15 +825,15 @@ fn mixture(random: &Random) -> PrincipledLobes {
     )
 }
 
-/// Returns an integer, small if it is a count or an index.
-fn whole(function: &str, name: &str, random: &Random) -> u32 {
+/// Returns an integer; counts and indices are small.
+fn integer(function: &str, name: &str, random: &Random) -> u32 {
     match name {
         "lobes" => random.below(32),
         "kind" | "pattern" | "wrap" | "format" => random.below(8),
         "size" => 1 + random.pick(&[random.below(20), random.below(16_384)]),
         "level" => random.below(15),
         "blades" | "corners" => random.pick(&[0, 3, 4, 5, 6, 16]),
-        // For both hemispheres of an environment map.
+        // Covers both hemispheres of an environment map.
         "width" => 1 + random.pick(&[random.below(4), random.below(16_384)]),
         "height" => 5 + random.pick(&[random.below(4), random.below(16_380)]),
         "row" => random.below(6),
@@ -837,8 +847,8 @@ fn whole(function: &str, name: &str, random: &Random) -> u32 {
         "octant" | "slot" => random.below(8),
         "axis" => random.below(3),
         "side" => 1 + random.below(16),
-        "first" if function == "samples_wanted" => 1 + random.below(64),
-        "most" => random.below(65_537),
+        "pilot_samples" => 1 + random.below(64),
+        "max_samples" => random.below(65_537),
         _ => random.pick(&[
             0,
             1,
@@ -850,7 +860,7 @@ fn whole(function: &str, name: &str, random: &Random) -> u32 {
     }
 }
 
-fn anything(kinds: &[ScalarKind], random: &Random, words: &mut Vec<u32>) {
+fn arbitrary(kinds: &[ScalarKind], random: &Random, words: &mut Vec<u32>) {
     for kind in kinds {
         words.push(match kind {
             ScalarKind::Float => (random.between(-1.0, 1.0) as f32).to_bits(),

@@ -1,5 +1,5 @@
-//! Interrupted and resumed jobs: the film has the same bits wherever the work was interrupted and whichever backend
-//! resumes it. Damaged pieces in a checkpoint are rejected.
+//! Interrupted and resumed jobs: neither the interruption nor the backend that resumes the job changes the bits of the
+//! film. Damaged pieces in a checkpoint are rejected.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -22,21 +22,21 @@ use crate::scenes;
 
 /// A checkpoint store in memory, written at every opportunity.
 #[derive(Default)]
-struct Shelf {
+struct MemoryStore {
     pieces: BTreeMap<u32, FilmPiece>,
-    /// Loses the progress of an unfinished piece (negative control).
+    /// Negative control: loses the progress of unfinished pieces.
     forgetful: bool,
 }
 
-impl CheckpointStore for Shelf {
+impl CheckpointStore for MemoryStore {
     fn pieces(&self) -> Vec<StoredPiece> {
-        let kept = |(y, piece): (&u32, &FilmPiece)| StoredPiece {
+        let stored = |(y, piece): (&u32, &FilmPiece)| StoredPiece {
             number: *y as usize,
             region: piece.region,
             film: piece.film.region,
             reached: piece.reached.clone(),
         };
-        self.pieces.iter().map(kept).collect()
+        self.pieces.iter().map(stored).collect()
     }
 
     fn load(&mut self, number: usize) -> Result<FilmPiece, RenderError> {
@@ -65,14 +65,14 @@ impl CheckpointStore for Shelf {
     }
 }
 
-/// Renders up to `calls` dispatches. Returns the film if complete.
-fn some_calls(
+/// Renders up to `max_dispatches` dispatches. Returns the film if it is complete.
+fn render_dispatches(
     packed: &Packed,
     backend: &mut dyn Backend,
     store: &mut dyn CheckpointStore,
     split: &WorkSplit,
     at_once: bool,
-    calls: usize,
+    max_dispatches: usize,
 ) -> Option<Film> {
     let (region, order) = (whole(packed), if at_once { Order::Pixels } else { Order::Rows });
     let mut bands = Bands::new(
@@ -86,11 +86,11 @@ fn some_calls(
     if at_once {
         bands = bands.as_a_whole(packed.film_layout()).expect("memory");
     }
-    let mut made = 0;
+    let mut dispatches = 0;
     let mut watch = |_: &mut dyn Backend, _: Region, share: f64| {
         assert!((0.0..=1.0 + 1e-9).contains(&share), "{share}");
-        made += 1;
-        Ok(Flow::from(made < calls))
+        dispatches += 1;
+        Ok(Flow::from(dispatches < max_dispatches))
     };
     let mut film = Film::of(region, packed.film_layout());
     loop {
@@ -110,13 +110,13 @@ fn some_calls(
     }
 }
 
-/// Interrupts a job after every `calls` dispatches. Returns `None` if the job never completes.
-fn in_pieces(
+/// Interrupts a job after every `max_dispatches` dispatches. Returns `None` if the job does not complete.
+fn render_interrupted(
     packed: &Packed,
     store: &mut dyn CheckpointStore,
     split: &WorkSplit,
     at_once: bool,
-    calls: usize,
+    max_dispatches: usize,
 ) -> Option<Film> {
     (0..1000).find_map(|round| {
         let mut backend: Box<dyn Backend> = match round % 3 {
@@ -124,7 +124,7 @@ fn in_pieces(
             1 => Box::new(Cpu::new(packed)),
             _ => pictures::backend(packed, RenderMode::Baked),
         };
-        some_calls(packed, &mut *backend, store, split, at_once, calls)
+        render_dispatches(packed, &mut *backend, store, split, at_once, max_dispatches)
     })
 }
 
@@ -154,10 +154,10 @@ fn interrupted_and_resumed_work_gives_the_same_film() {
             whole(&packed),
             &WorkSplit::default(),
         ));
-        for (split, calls) in splits().into_iter().zip([1, 23, 57]) {
+        for (split, max_dispatches) in splits().into_iter().zip([1, 23, 57]) {
             for at_once in [false, true] {
-                let mut shelf = Shelf::default();
-                let film = in_pieces(&packed, &mut shelf, &split, at_once, calls).expect("an end");
+                let mut store = MemoryStore::default();
+                let film = render_interrupted(&packed, &mut store, &split, at_once, max_dispatches).expect("an end");
                 assert!(
                     bits(&film) == expected,
                     "{split:?}, all at once: {at_once}, {:?}",
@@ -178,12 +178,12 @@ fn a_store_that_loses_progress_is_found() {
         whole(&packed),
         &WorkSplit::default(),
     ));
-    let mut shelf = Shelf {
+    let mut store = MemoryStore {
         forgetful: true,
-        ..Shelf::default()
+        ..MemoryStore::default()
     };
     let [_, split, _] = splits();
-    let film = in_pieces(&packed, &mut shelf, &split, false, 23);
+    let film = render_interrupted(&packed, &mut store, &split, false, 23);
     assert!(film.is_none_or(|film| bits(&film) != expected));
 }
 
@@ -195,16 +195,16 @@ fn at_the_time_limit_every_pixel_has_a_sample() {
             samples_per_dispatch: Some(1),
             rows_per_dispatch: Some(1),
         };
-        let (mut cpu, mut shelf) = (Cpu::new(&packed), Shelf::default());
+        let (mut cpu, mut store) = (Cpu::new(&packed), MemoryStore::default());
         let region = whole(&packed);
-        let most = cpu.largest_film();
+        let max_pixels = cpu.largest_film();
         let bands = Bands::new(
             region,
             packed.sampling.pixel_samples,
             &split,
             Order::Pixels,
-            most,
-            &mut shelf,
+            max_pixels,
+            &mut store,
         );
         let mut bands = bands.as_a_whole(packed.film_layout()).expect("memory");
         let mut watch = |_: &mut dyn Backend, _: Region, _: f64| Ok(Flow::TimeIsUp);
@@ -218,8 +218,8 @@ fn at_the_time_limit_every_pixel_has_a_sample() {
     }
 }
 
-/// Returns the film of the first samples of all pixels.
-fn of_samples(packed: &Packed, samples: u32) -> Film {
+/// Returns the film of the first `samples` samples of all pixels.
+fn film_of_samples(packed: &Packed, samples: u32) -> Film {
     let (mut cpu, region) = (Cpu::new(packed), whole(packed));
     let pilot = cpu.samples_of_all().min(samples);
     cpu.begin(region).expect("a film");
@@ -236,14 +236,14 @@ fn last_pass(bands: &mut Bands) -> Film {
     };
     bands.last_pass(&mut output).expect("a pass");
     let mut films = films.into_iter();
-    let mut all = films.next().expect("a band");
+    let mut joined = films.next().expect("a band");
     for film in films {
-        all.region.y1 = film.region.y1;
-        for (list, of_band) in all.lists_mut().zip(film.lists()) {
-            list.extend(of_band);
+        joined.region.y1 = film.region.y1;
+        for (list, band_list) in joined.lists_mut().zip(film.lists()) {
+            list.extend(band_list);
         }
     }
-    all
+    joined
 }
 
 /// After an interrupted pass, the film of the previous pass remains.
@@ -251,28 +251,28 @@ fn last_pass(bands: &mut Bands) -> Film {
 fn the_last_pass_is_a_complete_image() {
     for packed in subjects() {
         assert!(
-            bits(&of_samples(&packed, 3)) != bits(&of_samples(&packed, 4)),
+            bits(&film_of_samples(&packed, 3)) != bits(&film_of_samples(&packed, 4)),
             "3 and 4 samples give the same film"
         );
-        for way in pictures::exact_modes() {
-            for cut in splits() {
-                let mut backend = pictures::backend(&packed, way);
-                let (region, most) = (whole(&packed), backend.largest_film());
+        for mode in pictures::exact_modes() {
+            for split in splits() {
+                let mut backend = pictures::backend(&packed, mode);
+                let (region, max_pixels) = (whole(&packed), backend.largest_film());
                 let mut no_checkpoint = NoCheckpoint;
                 let order = Order::Pixels;
                 let bands = Bands::new(
                     region,
                     packed.sampling.pixel_samples,
-                    &cut,
+                    &split,
                     order,
-                    most,
+                    max_pixels,
                     &mut no_checkpoint,
                 );
                 let mut bands = bands.in_passes(packed.film_layout()).expect("memory");
-                let (mut calls, mut passes, mut interrupted) = (0, vec![0], 0);
+                let (mut dispatches, mut passes, mut interrupted) = (0, vec![0], 0);
                 let mut watch = |_: &mut dyn Backend, _: Region, _: f64| {
-                    calls += 1;
-                    Ok(Flow::from(calls % 3 != 0))
+                    dispatches += 1;
+                    Ok(Flow::from(dispatches % 3 != 0))
                 };
                 loop {
                     match bands.next_pass(&mut *backend, &mut watch, &mut || {}) {
@@ -286,8 +286,11 @@ fn the_last_pass_is_a_complete_image() {
                         passes.push(samples);
                     }
                     if samples > 0 {
-                        let (found, wanted) = (last_pass(&mut bands), of_samples(&packed, samples));
-                        assert!(bits(&found) == bits(&wanted), "{way:?}, {cut:?}, {samples} samples");
+                        let (found, expected) = (last_pass(&mut bands), film_of_samples(&packed, samples));
+                        assert!(
+                            bits(&found) == bits(&expected),
+                            "{mode:?}, {split:?}, {samples} samples"
+                        );
                     }
                 }
                 assert!(interrupted > 0 && passes.is_sorted(), "{interrupted}, {passes:?}");
@@ -319,13 +322,13 @@ fn open(
         path: path.to_owned(),
         resume: true,
         interval: Duration::ZERO,
-        // A child process that another test starts inherits the file and the lock for a moment.
+        // A child process of another test briefly inherits the file and the lock.
         wait: Box::new(move || {
             rounds += 1;
             assert!(rounds < 200, "another process still writes the checkpoint");
             true
         }),
-        report: Box::new(move |what| sender.send(what.to_owned()).expect("a listener")),
+        report: Box::new(move |warning| sender.send(warning.to_owned()).expect("a receiver")),
     };
     let checkpoint = Checkpoint::open(opening, identity.clone(), packed.film_layout())?;
     Ok((checkpoint, warnings.try_iter().collect()))
@@ -336,8 +339,15 @@ fn folder_with_checkpoint(packed: &Packed, identity: &Identity) -> (tempfile::Te
     let path = folder.path().join("c");
     let (mut checkpoint, warnings) = open(&path, packed, identity).expect("a checkpoint");
     assert!(warnings.is_empty(), "{warnings:?}");
-    let [_, cut, _] = splits();
-    let film = some_calls(packed, &mut Cpu::new(packed), &mut checkpoint, &cut, false, usize::MAX);
+    let [_, split, _] = splits();
+    let film = render_dispatches(
+        packed,
+        &mut Cpu::new(packed),
+        &mut checkpoint,
+        &split,
+        false,
+        usize::MAX,
+    );
     (folder, path, film.expect("a film"))
 }
 
@@ -345,57 +355,57 @@ fn folder_with_checkpoint(packed: &Packed, identity: &Identity) -> (tempfile::Te
 fn pieces_before_the_damage_are_used() {
     let (packed, identity) = cornell();
     let (_folder, path, film) = folder_with_checkpoint(&packed, &identity);
-    let good = std::fs::read(&path).expect("the file");
+    let intact = std::fs::read(&path).expect("the file");
     let (checkpoint, _) = open(&path, &packed, &identity).expect("a checkpoint");
-    let whole_file = checkpoint.pieces();
+    let all_pieces = checkpoint.pieces();
     drop(checkpoint);
-    assert!(whole_file.len() > 2, "{}", whole_file.len());
+    assert!(all_pieces.len() > 2, "{}", all_pieces.len());
     let header = {
-        let length = u32::from_le_bytes(good[16..20].try_into().expect("four bytes")) as usize;
+        let length = u32::from_le_bytes(intact[16..20].try_into().expect("four bytes")) as usize;
         16 + 4 + length + 32
     };
-    for at in (0..good.len()).step_by(good.len() / 211) {
-        for cut_short in [false, true] {
-            let mut bytes = good.clone();
-            match cut_short {
-                true => bytes.truncate(at),
-                false => bytes[at] ^= 0x10,
+    for offset in (0..intact.len()).step_by(intact.len() / 211) {
+        for truncate in [false, true] {
+            let mut bytes = intact.clone();
+            match truncate {
+                true => bytes.truncate(offset),
+                false => bytes[offset] ^= 0x10,
             }
             std::fs::write(&path, &bytes).expect("a file");
             match open(&path, &packed, &identity) {
                 Err(error) => {
-                    assert!(at < header, "byte {at}: {error}");
+                    assert!(offset < header, "byte {offset}: {error}");
                     assert!(
                         matches!(error, CheckpointError::Unreadable { .. }),
-                        "byte {at}: {error}"
+                        "byte {offset}: {error}"
                     );
                 }
                 Ok((mut checkpoint, warnings)) => {
-                    assert!(at >= header, "a damaged header was accepted: byte {at}");
+                    assert!(offset >= header, "a damaged header was accepted: byte {offset}");
                     // A truncation between two pieces is not damage.
                     assert!(
-                        warnings.len() == 1 || (cut_short && warnings.is_empty()),
-                        "byte {at}: {warnings:?}"
+                        warnings.len() == 1 || (truncate && warnings.is_empty()),
+                        "byte {offset}: {warnings:?}"
                     );
-                    let left = checkpoint.pieces();
-                    assert_ne!(left, whole_file);
-                    // On a slow machine, an older unfinished piece may replace a damaged one.
-                    for piece in left.into_iter().filter(|piece| whole_file.contains(piece)) {
+                    let remaining = checkpoint.pieces();
+                    assert_ne!(remaining, all_pieces);
+                    // On a slow machine, an older unfinished piece may replace a damaged piece.
+                    for piece in remaining.into_iter().filter(|piece| all_pieces.contains(piece)) {
                         let FilmPiece {
                             region, film: found, ..
                         } = checkpoint.load(piece.number).expect("a piece");
                         assert_eq!(bits(&film.clone().part(region)), bits(&found.part(region)));
                     }
-                    let [_, cut, _] = splits();
-                    let again = some_calls(
+                    let [_, split, _] = splits();
+                    let completed = render_dispatches(
                         &packed,
                         &mut Cpu::new(&packed),
                         &mut checkpoint,
-                        &cut,
+                        &split,
                         false,
                         usize::MAX,
                     );
-                    assert_eq!(bits(&again.expect("a film")), bits(&film));
+                    assert_eq!(bits(&completed.expect("a film")), bits(&film));
                 }
             }
         }
@@ -427,8 +437,8 @@ fn replaced_pieces_do_not_accumulate() {
         checkpoint.keep(&piece);
         checkpoint.sync();
         largest = largest.max(std::fs::metadata(&path).expect("the file").len());
-        let [kept] = checkpoint.pieces().try_into().expect("one piece");
-        assert_eq!(checkpoint.load(kept.number).expect("a piece"), piece);
+        let [stored] = checkpoint.pieces().try_into().expect("one piece");
+        assert_eq!(checkpoint.load(stored.number).expect("a piece"), piece);
     }
     assert!(largest > 3 * bytes, "no replaced piece was ever in the file: {largest}");
     assert!(largest < 3 * bytes + (64 << 20) + 4096, "{largest}");
@@ -442,14 +452,14 @@ type Change<'a, T> = (&'a str, &'a dyn Fn(&mut T));
 #[test]
 fn different_jobs_have_different_identities() {
     let scene = scenes::scene("cornell.toml");
-    let of = |change: &dyn Fn(&mut wgray::Description)| {
+    let identity_with = |change: &dyn Fn(&mut wgray::Description)| {
         let mut scene = scene.clone();
         change(&mut scene);
         let packed = scenes::packed(&scene);
         Identity::of(&packed, whole(&packed), false)
     };
-    let this = of(&|_| ());
-    assert_eq!(this, of(&|_| ()), "the identities of one scene differ");
+    let identity = identity_with(&|_| ());
+    assert_eq!(identity, identity_with(&|_| ()), "the identities of one scene differ");
     let changes: [Change<wgray::Description>; 6] = [
         ("its size is", &|scene| scene.image.width += 1),
         ("its number of samples is", &|scene| {
@@ -460,23 +470,23 @@ fn different_jobs_have_different_identities() {
         ("its scene or an option", &|scene| scene.shapes.truncate(3)),
         ("its scene or an option", &|scene| scene.lights.truncate(0)),
     ];
-    for (what, change) in changes {
-        let difference = this.difference(&of(change)).unwrap_or_default();
-        assert!(difference.starts_with(what), "{what}: {difference}");
+    for (expected_start, change) in changes {
+        let difference = identity.difference(&identity_with(change)).unwrap_or_default();
+        assert!(difference.starts_with(expected_start), "{expected_start}: {difference}");
     }
     let changes: [Change<Identity>; 6] = [
         ("its version", &|job| job.version.push('1')),
         ("its crop is", &|job| job.region[0] = 1),
         ("its sampling is adaptive, not uniform", &|job| job.adaptive = true),
         ("its layers are means over the samples, not", &|job| job.layers = true),
-        ("its rounding is with, not without", &|job| job.exact_rounding = true),
+        ("it was rendered with, not without", &|job| job.exact_rounding = true),
         ("its shaders differ", &|job| job.shaders.push('1')),
     ];
-    for (what, change) in changes {
-        let mut other = this.clone();
-        change(&mut other);
-        let difference = this.difference(&other).unwrap_or_default();
-        assert!(difference.starts_with(what), "{what}: {difference}");
+    for (expected_start, change) in changes {
+        let mut changed = identity.clone();
+        change(&mut changed);
+        let difference = identity.difference(&changed).unwrap_or_default();
+        assert!(difference.starts_with(expected_start), "{expected_start}: {difference}");
     }
     // Layers do not change the scene hash.
     let [_, _, layered, _] = subjects();
@@ -487,7 +497,7 @@ fn different_jobs_have_different_identities() {
 
 #[test]
 fn tiles_partition_the_rows() {
-    for (height, of) in [(1, 1), (7, 3), (7, 7), (65_536, 1), (65_536, 65_536), (65_536, 9999)] {
+    for (height, count) in [(1, 1), (7, 3), (7, 7), (65_536, 1), (65_536, 65_536), (65_536, 9999)] {
         let region = Region {
             x0: 3,
             y0: 11,
@@ -495,10 +505,10 @@ fn tiles_partition_the_rows() {
             y1: 11 + height,
         };
         let mut next = region.y0;
-        for number in 1..=of {
-            let rows = Tile { number, of }.rows(region).expect("rows");
+        for number in 1..=count {
+            let rows = Tile { number, of: count }.rows(region).expect("rows");
             assert_eq!((rows.x0, rows.x1, rows.y0), (3, 5, next));
-            assert!(rows.height() == height / of || rows.height() == height / of + 1);
+            assert!(rows.height() == height / count || rows.height() == height / count + 1);
             next = rows.y1;
         }
         assert_eq!(next, region.y1);

@@ -22,7 +22,7 @@ pub fn scalars(module: &Module, ty: Handle<Type>) -> Vec<ScalarKind> {
             size: naga::ArraySize::Constant(n),
             ..
         } => scalars(module, *base).repeat(n.get() as usize),
-        other => panic!("no kernel can be generated for a function of {other:?}"),
+        other => panic!("no kernel can be generated for a function with the type {other:?}"),
     }
 }
 
@@ -31,15 +31,15 @@ pub struct Function<'a> {
     pub function: &'a naga::Function,
 }
 
-/// Returns the functions of the shared files, each with the name of the file.
+/// Returns the functions of the shared files, each with the name of its file.
 pub fn functions<'a>(module: &'a Module, source: &Source) -> Vec<(String, Function<'a>)> {
-    let of = |(handle, function)| {
+    let with_file = |(handle, function)| {
         (
             file_of(source, module.functions.get_span(handle)),
             Function { module, function },
         )
     };
-    module.functions.iter().map(of).collect()
+    module.functions.iter().map(with_file).collect()
 }
 
 impl Function<'_> {
@@ -74,7 +74,7 @@ impl Function<'_> {
         scalars(self.module, self.result())
     }
 
-    /// Returns a kernel that reads call `id.x` from `probe_in` and writes to `probe_out`.
+    /// Returns a kernel that reads the arguments of call `id.x` from `probe_in` and writes the result to `probe_out`.
     pub fn kernel(&self) -> String {
         let mut text = "@group(0) @binding(0) var<storage, read> probe_in: array<u32>;\n\
                         @group(0) @binding(1) var<storage, read_write> probe_out: array<u32>;\n\
@@ -99,7 +99,7 @@ impl Function<'_> {
         text
     }
 
-    /// Returns an expression of a type that reads `probe_in` from word `next` on.
+    /// Returns an expression that reads a value of a type from `probe_in`, starting at word `next`.
     fn read(&self, ty: Handle<Type>, next: &mut u32) -> String {
         let list = |parts: Vec<String>| format!("{}({})", type_name(self.module, ty), parts.join(", "));
         match &self.module.types[ty].inner {
@@ -113,7 +113,7 @@ impl Function<'_> {
                 size: naga::ArraySize::Constant(n),
                 ..
             } => list((0..n.get()).map(|_| self.read(*base, next)).collect()),
-            other => panic!("no kernel can be generated for an argument {other:?}"),
+            other => panic!("no kernel can be generated for an argument of type {other:?}"),
         }
     }
 
@@ -140,7 +140,7 @@ impl Function<'_> {
                     self.write(*base, &format!("{value}[{i}]"), next, text);
                 }
             }
-            other => panic!("no kernel can be generated for a result {other:?}"),
+            other => panic!("no kernel can be generated for a result of type {other:?}"),
         }
     }
 
@@ -153,7 +153,7 @@ impl Function<'_> {
         self.run_rounded(device, shared, words, Rounding::Device)
     }
 
-    /// Like [`Function::run_in`], but selects software or native division and square roots.
+    /// Like [`Function::run_in`], but with software or native division and square roots.
     pub fn run_rounded(&self, device: &Device, shared: &Source, words: &[u32], rounding: Rounding) -> Vec<u32> {
         let mut source = shared.clone();
         source.append("probe", &self.kernel());
@@ -183,8 +183,15 @@ fn write_word(kind: ScalarKind, value: &str, next: &mut u32, text: &mut String) 
     *next += 1;
 }
 
-/// Runs the entry point `probe`, on exact devices as SPIR-V like the kernels of the renderer.
-fn run(device: &Device, source: &Source, rounding: Rounding, input: &[u32], calls: usize, output: usize) -> Vec<u32> {
+/// Runs the entry point `probe`. On exact devices, the kernel is compiled to SPIR-V, like the kernels of the renderer.
+fn run(
+    device: &Device,
+    source: &Source,
+    rounding: Rounding,
+    input_words: &[u32],
+    calls: usize,
+    output_words: usize,
+) -> Vec<u32> {
     let (wgpu, queue) = device.wgpu();
     let checked =
         check(source).unwrap_or_else(|error| panic!("{error}\n{}", error.excerpt.clone().unwrap_or_default()));
@@ -207,7 +214,7 @@ fn run(device: &Device, source: &Source, rounding: Rounding, input: &[u32], call
         let source = wgpu::ShaderSource::Wgsl(source.text.as_str().into());
         wgpu.create_shader_module(wgpu::ShaderModuleDescriptor { label: None, source })
     };
-    let entry = |binding, read_only| wgpu::BindGroupLayoutEntry {
+    let storage_entry = |binding, read_only| wgpu::BindGroupLayoutEntry {
         binding,
         visibility: wgpu::ShaderStages::COMPUTE,
         ty: wgpu::BindingType::Buffer {
@@ -219,7 +226,7 @@ fn run(device: &Device, source: &Source, rounding: Rounding, input: &[u32], call
     };
     let layout = wgpu.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
         label: None,
-        entries: &[entry(0, true), entry(1, false)],
+        entries: &[storage_entry(0, true), storage_entry(1, false)],
     });
     let pipeline_layout = wgpu.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
         label: None,
@@ -234,18 +241,18 @@ fn run(device: &Device, source: &Source, rounding: Rounding, input: &[u32], call
         compilation_options: Default::default(),
         cache: None,
     });
-    let read = wgpu.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+    let input_buffer = wgpu.create_buffer_init(&wgpu::util::BufferInitDescriptor {
         label: None,
-        contents: bytemuck::cast_slice(input),
+        contents: bytemuck::cast_slice(input_words),
         usage: wgpu::BufferUsages::STORAGE,
     });
     let buffer = |usage| wgpu::BufferDescriptor {
         label: None,
-        size: output as u64 * 4,
+        size: output_words as u64 * 4,
         usage,
         mapped_at_creation: false,
     };
-    let written = wgpu.create_buffer(&buffer(wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC));
+    let output_buffer = wgpu.create_buffer(&buffer(wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC));
     let staging = wgpu.create_buffer(&buffer(wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ));
     let group = wgpu.create_bind_group(&wgpu::BindGroupDescriptor {
         label: None,
@@ -253,11 +260,11 @@ fn run(device: &Device, source: &Source, rounding: Rounding, input: &[u32], call
         entries: &[
             wgpu::BindGroupEntry {
                 binding: 0,
-                resource: read.as_entire_binding(),
+                resource: input_buffer.as_entire_binding(),
             },
             wgpu::BindGroupEntry {
                 binding: 1,
-                resource: written.as_entire_binding(),
+                resource: output_buffer.as_entire_binding(),
             },
         ],
     });
@@ -267,7 +274,7 @@ fn run(device: &Device, source: &Source, rounding: Rounding, input: &[u32], call
     pass.set_bind_group(0, &group, &[]);
     pass.dispatch_workgroups(calls.div_ceil(64) as u32, 1, 1);
     drop(pass);
-    encoder.copy_buffer_to_buffer(&written, 0, &staging, 0, staging.size());
+    encoder.copy_buffer_to_buffer(&output_buffer, 0, &staging, 0, staging.size());
     queue.submit([encoder.finish()]);
     staging.map_async(wgpu::MapMode::Read, .., |result| {
         result.expect("a buffer that can be mapped")

@@ -63,40 +63,40 @@ normal = [0, 0, 1]
 tangent = [1, 0, 0]
 "#;
 
-/// Returns the scene with other keys in `[render]`.
-fn with(settings: &str) -> String {
+/// Returns the text of the scene with `settings` in `[render]`, which replace settings of the same names.
+fn scene_with(settings: &str) -> String {
     let keys: Vec<&str> = settings.lines().filter_map(|line| line.split(" =").next()).collect();
-    let kept = SCENE
+    let lines = SCENE
         .lines()
         .filter(|line| !keys.iter().any(|key| line.starts_with(&format!("{key} ="))));
-    let text = kept.collect::<Vec<_>>().join("\n");
+    let text = lines.collect::<Vec<_>>().join("\n");
     text.replace("[render]", &format!("[render]\n{settings}"))
 }
 
 const ADAPTIVE: &str = "adaptive = { error = 0.02, max_samples = 64 }";
 
-/// Returns scenes for each form of film with layers.
+/// Returns a scene for each film layout with layers.
 fn subjects() -> Vec<(&'static str, Packed)> {
     let adaptive_alpha = format!("{ADAPTIVE}\nalpha = true");
     vec![
         ("plain", parse(SCENE).with_layers()),
-        ("adaptive", parse(&with(ADAPTIVE)).with_layers()),
+        ("adaptive", parse(&scene_with(ADAPTIVE)).with_layers()),
         (
             "filtered",
-            parse(&with("filter = { type = \"mitchell\" }")).with_layers(),
+            parse(&scene_with("filter = { type = \"mitchell\" }")).with_layers(),
         ),
-        ("alpha", parse(&with("alpha = true"))),
-        ("adaptive, alpha", parse(&with(&adaptive_alpha))),
+        ("alpha", parse(&scene_with("alpha = true"))),
+        ("adaptive, alpha", parse(&scene_with(&adaptive_alpha))),
     ]
 }
 
-fn other_layers(a: &Film, b: &Film) -> usize {
-    let only = |film: &Film| Film {
+fn differing_layers(a: &Film, b: &Film) -> usize {
+    let layers_only = |film: &Film| Film {
         sums: vec![Vec4::ZERO; film.sums.len()],
         moments: Vec::new(),
         ..film.clone()
     };
-    differing(&only(a), &only(b))
+    differing(&layers_only(a), &layers_only(b))
 }
 
 #[test]
@@ -125,10 +125,10 @@ fn layers_do_not_depend_on_backend_or_work_split() {
                 assert_eq!(differing(&found, &crop(&expected, part)), 0, "{name}, {mode:?}, {part}");
             }
         }
-        let mut other = packed.clone();
-        other.camera.seed += 1;
+        let mut reseeded = packed.clone();
+        reseeded.camera.seed += 1;
         assert!(
-            other_layers(&reference(&other), &expected) > 0,
+            differing_layers(&reference(&reseeded), &expected) > 0,
             "{name}: the comparison cannot fail"
         );
     }
@@ -149,28 +149,29 @@ fn layers_do_not_change_the_image() {
             assert_eq!(differing(&found, &expected), 0, "{name}, {mode:?}");
         }
     }
-    let [plain, alpha] = [SCENE, &with("alpha = true")].map(|text| reference(&parse(text).without_layers()));
+    let [plain, alpha] = [SCENE, &scene_with("alpha = true")].map(|text| reference(&parse(text).without_layers()));
     assert!(differing(&plain, &alpha) > 0, "alpha does not hide the background");
 }
 
 #[test]
 fn emission_direct_and_indirect_light_sum_to_the_image() {
-    let mut clamped = subjects();
-    clamped.push(("clamped", parse(&with("clamp = 0.05")).with_layers()));
-    for (name, packed) in clamped {
+    let mut cases = subjects();
+    cases.push(("clamped", parse(&scene_with("clamp = 0.05")).with_layers()));
+    for (name, packed) in cases {
         let film = reference(&packed);
-        let mut without = 0;
+        let mut incomplete = 0;
         for (i, mean) in film.means().enumerate() {
             let [emission, direct, indirect] =
                 [Layer::Emission, Layer::Direct, Layer::Indirect].map(|layer| Vec3::from(film.layer(layer, i)));
             let (sum, mean) = (emission + direct + indirect, Vec3::from(mean));
-            let near = |sum: Vec3| (sum - mean).abs().max_element() <= 1e-5 * (1.0 + mean.max_element());
-            assert!(near(sum), "{name}, pixel {i}: {sum} for {mean}");
-            without += usize::from(!near(emission + direct)) + usize::from(!near(direct + indirect));
+            let matches_image = |sum: Vec3| (sum - mean).abs().max_element() <= 1e-5 * (1.0 + mean.max_element());
+            assert!(matches_image(sum), "{name}, pixel {i}: {sum} for {mean}");
+            incomplete +=
+                usize::from(!matches_image(emission + direct)) + usize::from(!matches_image(direct + indirect));
         }
         assert!(
-            without > 100,
-            "{name}: without one of the layers, only {without} pixels differ"
+            incomplete > 100,
+            "{name}: only {incomplete} sums without one of the layers differ"
         );
     }
 }
@@ -178,7 +179,7 @@ fn emission_direct_and_indirect_light_sum_to_the_image() {
 #[test]
 fn light_layers_are_split_by_path_length() {
     let sums = |depth: u32| {
-        let film = reference(&parse(&with(&format!("max_depth = {depth}"))).with_layers());
+        let film = reference(&parse(&scene_with(&format!("max_depth = {depth}"))).with_layers());
         [Layer::Emission, Layer::Direct, Layer::Indirect].map(|layer| {
             let pixels = 0..film.sums.len();
             pixels
@@ -186,18 +187,18 @@ fn light_layers_are_split_by_path_length() {
                 .sum::<f32>()
         })
     };
-    let [none, once, often] = [0, 1, 4].map(sums);
-    assert!(none[0] > 0.0 && none[1..] == [0.0, 0.0], "{none:?}");
-    assert!(once[1] > 0.0 && once[2] == 0.0, "{once:?}");
-    assert!(often[2] > 0.0, "{often:?}");
-    // Light of short paths does not depend on the maximum depth.
-    assert_eq!([none[0], once[0]], [often[0]; 2]);
-    assert_eq!(once[1], often[1]);
+    let [depth_0, depth_1, depth_4] = [0, 1, 4].map(sums);
+    assert!(depth_0[0] > 0.0 && depth_0[1..] == [0.0, 0.0], "{depth_0:?}");
+    assert!(depth_1[1] > 0.0 && depth_1[2] == 0.0, "{depth_1:?}");
+    assert!(depth_4[2] > 0.0, "{depth_4:?}");
+    // The light of short paths does not depend on the maximum depth.
+    assert_eq!([depth_0[0], depth_1[0]], [depth_4[0]; 2]);
+    assert_eq!(depth_1[1], depth_4[1]);
 }
 
-/// Returns a scene with a rectangle of 1 x 1 units, the size of a pixel.
-fn facing(size: (u32, u32), place: [f64; 2], more: &str, from_behind: bool) -> String {
-    let ([x, z], (width, height)) = (place, size);
+/// Returns a scene with a rectangle of 1 x 1 units, which is the size of a pixel.
+fn rectangle_scene(size: (u32, u32), center: [f64; 2], settings: &str, from_behind: bool) -> String {
+    let ([x, z], (width, height)) = (center, size);
     let y = if from_behind { 5 } else { -5 };
     format!(
         r#"
@@ -209,7 +210,7 @@ color = [0.5, 0.25, 2]
 integrator = "path"
 max_depth = 0
 pixel_samples = {{ pattern = "grid", count = 16 }}
-{more}
+{settings}
 [materials.m]
 type = "diffuse"
 color = [0.25, 0.5, 0.75]
@@ -226,7 +227,7 @@ tangent = [1, 0, 0]
 }
 
 /// Returns the film, which must be equal for all exact configurations.
-fn on_all(packed: &Packed) -> Film {
+fn render_all_modes(packed: &Packed) -> Film {
     let expected = reference(packed);
     for mode in exact_modes() {
         assert_eq!(differing(&render(packed, mode), &expected), 0, "{mode:?}");
@@ -237,14 +238,14 @@ fn on_all(packed: &Packed) -> Film {
 #[test]
 fn layers_of_a_flat_shape() {
     for behind in [false, true] {
-        let film = on_all(&parse(&facing((3, 1), [0.0, 0.0], "", behind)).with_layers());
-        for (pixel, there) in [(0, 0.0), (1, 1.0), (2, 0.0)] {
+        let film = render_all_modes(&parse(&rectangle_scene((3, 1), [0.0, 0.0], "", behind)).with_layers());
+        for (pixel, alpha) in [(0, 0.0), (1, 1.0), (2, 0.0)] {
             let layer = |layer| Vec3::from(film.layer(layer, pixel));
-            assert_eq!(film.alpha(pixel), there);
-            assert_eq!(layer(Layer::Normal), Vec3::NEG_Y * there, "behind {behind}");
-            assert_eq!(layer(Layer::Albedo), Vec3::new(0.25, 0.5, 0.75) * there);
-            let background = Vec3::new(0.5, 0.25, 2.0) * (1.0 - there);
-            assert_eq!(layer(Layer::Emission), Vec3::new(0.5, 0.25, 4.0) * there + background);
+            assert_eq!(film.alpha(pixel), alpha);
+            assert_eq!(layer(Layer::Normal), Vec3::NEG_Y * alpha, "behind {behind}");
+            assert_eq!(layer(Layer::Albedo), Vec3::new(0.25, 0.5, 0.75) * alpha);
+            let background = Vec3::new(0.5, 0.25, 2.0) * (1.0 - alpha);
+            assert_eq!(layer(Layer::Emission), Vec3::new(0.5, 0.25, 4.0) * alpha + background);
         }
     }
 }
@@ -253,13 +254,13 @@ fn layers_of_a_flat_shape() {
 fn mean_normals_of_flat_surfaces_equal_the_first_hits() {
     let packed = parse(SCENE).with_layers();
     let (film, hits) = (reference(&packed), first_hits(&packed, RenderMode::Cpu));
-    let (mut flat, mut bent) = (0, 0);
+    let (mut flat, mut shortened) = (0, 0);
     for (i, hit) in hits.iter().enumerate() {
         let mean = Vec3::from(film.layer(Layer::Normal, i));
         assert!(mean.length() < 1.0 + 1e-6, "pixel {i}: {mean}");
         match hit.shape {
             3 if film.alpha(i) == 1.0 && (mean - hit.shading_normal).length() < 1e-6 => flat += 1,
-            0 if mean.length() < 0.9999 => bent += 1,
+            0 if mean.length() < 0.9999 => shortened += 1,
             _ => {}
         }
     }
@@ -268,8 +269,8 @@ fn mean_normals_of_flat_surfaces_equal_the_first_hits() {
         "only {flat} pixels of the ground have the normal of the first hit"
     );
     assert!(
-        bent > 20,
-        "mean normals are normalized: only {bent} pixels of the sphere are shorter"
+        shortened > 20,
+        "mean normals are normalized: only {shortened} pixels of the sphere are shorter"
     );
 }
 
@@ -280,12 +281,12 @@ fn mean_normals_include_normal_maps() {
     crate::textures::write_exr(&folder.path().join("n.exr"), 2, 2, |_, _| {
         (tilted * 0.5 + 0.5).to_array()
     });
-    let text = facing((3, 1), [0.0, 0.0], "", false).replace(
+    let text = rectangle_scene((3, 1), [0.0, 0.0], "", false).replace(
         "[materials.m]",
         "[textures.n]\ntype = 'image'\nfile = 'n.exr'\n[materials.m]\nnormal_map = { texture = 'n' }",
     );
     let packed = crate::textures::scene(&text, folder.path()).with_layers();
-    let (film, hits) = (on_all(&packed), first_hits(&packed, RenderMode::Cpu));
+    let (film, hits) = (render_all_modes(&packed), first_hits(&packed, RenderMode::Cpu));
     let mean = Vec3::from(film.layer(Layer::Normal, 1));
     assert!((mean - Vec3::new(0.6, -0.8, 0.0)).length() < 1e-5, "{mean}");
     assert_eq!(
@@ -297,7 +298,7 @@ fn mean_normals_include_normal_maps() {
 
 #[test]
 fn albedo_is_recorded_through_mirrors() {
-    let text = facing((1, 1), [0.0, -0.5], "", false)
+    let text = rectangle_scene((1, 1), [0.0, -0.5], "", false)
         .replace("max_depth = 0", "max_depth = 2")
         .replace(
             "[[shapes]]",
@@ -320,51 +321,52 @@ normal = [0, 1, 0]
 tangent = [1, 0, 0]
 [[shapes]]"#,
         );
-    let film = on_all(&parse(&text).with_layers());
+    let film = render_all_modes(&parse(&text).with_layers());
     let albedo = Vec3::from(film.layer(Layer::Albedo, 0));
     assert!((albedo - Vec3::new(0.125, 0.125, 0.75)).length() < 1e-6, "{albedo}");
     assert_eq!(
         film.layer(Layer::Normal, 0),
         [0.0, -1.0, 0.0],
-        "not the normal of the mirror"
+        "the layer does not have the normal of the mirror"
     );
 }
 
 #[test]
 fn alpha_is_the_fraction_of_samples_that_hit() {
-    for (place, shares) in [
+    for (center, shares) in [
         ([0.0, 0.0], [0.0, 1.0, 0.0]),
         ([0.5, 0.0], [0.0, 0.5, 0.5]),
         ([-0.75, 0.5], [0.375, 0.125, 0.0]),
         ([9.0, 0.0], [0.0; 3]),
     ] {
-        let packed = parse(&facing((3, 1), place, "alpha = true", false));
-        let form = FilmLayout {
+        let packed = parse(&rectangle_scene((3, 1), center, "alpha = true", false));
+        let layout = FilmLayout {
             adaptive: false,
             layers: true,
         };
-        assert_eq!(packed.film_layout(), form, "alpha does not request layers");
-        let film = on_all(&packed);
+        assert_eq!(packed.film_layout(), layout, "alpha does not request layers");
+        let film = render_all_modes(&packed);
         for (i, share) in shares.into_iter().enumerate() {
-            assert_eq!(film.alpha(i), share, "{place:?}, pixel {i}");
+            assert_eq!(film.alpha(i), share, "{center:?}, pixel {i}");
             // Colors are premultiplied; the environment is invisible.
             let color = Vec3::new(0.5, 0.25, 4.0) * share;
             assert_eq!(
                 Vec3::from(wgray_render::film::mean(film.sums[i])),
                 color,
-                "{place:?}, pixel {i}"
+                "{center:?}, pixel {i}"
             );
         }
     }
     // The rectangle covers a quarter of the only pixel.
-    let film = on_all(&parse(&facing((1, 1), [0.5, 0.5], "alpha = true", false)));
+    let film = render_all_modes(&parse(&rectangle_scene((1, 1), [0.5, 0.5], "alpha = true", false)));
     assert_eq!(film.alpha(0), 0.25);
 }
 
 #[test]
 fn negative_filter_lobes_exceed_the_range_of_alpha() {
     let filter = "filter = { type = \"mitchell\" }\nalpha = true";
-    let text = facing((7, 1), [-1.0, 0.0], filter, false).replace("\"grid\", count = 16", "\"sobol\", count = 1024");
+    let text =
+        rectangle_scene((7, 1), [-1.0, 0.0], filter, false).replace("\"grid\", count = 16", "\"sobol\", count = 1024");
     let film = reference(&parse(&text));
     let alphas: Vec<f32> = (0..7).map(|i| film.alpha(i)).collect();
     assert!(alphas.iter().any(|alpha| *alpha < 0.0), "{alphas:?}");
@@ -383,11 +385,7 @@ fn png_alpha_is_straight_and_exr_alpha_premultiplied() {
     assert_eq!(straight([0.25, 0.125, 0.5], 0.5), [186, 136, 255, 128]);
     assert_eq!(straight([0.5, 0.25, 1.0], 1.0), [186, 136, 255, 255]);
     assert_eq!(straight([0.0; 3], 0.0), [0; 4]);
-    assert_eq!(
-        straight([-0.01; 3], -0.01),
-        [0; 4],
-        "negative values of a filter's lobes"
-    );
+    assert_eq!(straight([-0.01; 3], -0.01), [0; 4], "negative values from filter lobes");
     assert_eq!(straight([1.1, 0.55, 0.0], 1.1), [255, 186, 0, 255]);
     assert_eq!(straight([f32::NAN; 3], f32::NAN), [0; 4]);
 }
@@ -411,8 +409,8 @@ fn floats(picture: &Picture, name: &str) -> Vec<f32> {
 
 #[test]
 fn the_library_has_layers_and_alpha() {
-    let half = facing((3, 1), [0.5, 0.0], "alpha = true", false);
-    let with_alpha = picture(&half, vec![Aov::Albedo, Aov::ShadingNormal, Aov::Depth]);
+    let text = rectangle_scene((3, 1), [0.5, 0.0], "alpha = true", false);
+    let with_alpha = picture(&text, vec![Aov::Albedo, Aov::ShadingNormal, Aov::Depth]);
     assert_eq!(with_alpha.alpha(), Some(vec![0.0, 0.5, 0.5]));
     assert_eq!(floats(&with_alpha, "A"), [0.0, 0.5, 0.5]);
     assert_eq!(floats(&with_alpha, "R"), [0.0, 0.25, 0.25]);
@@ -423,8 +421,8 @@ fn the_library_has_layers_and_alpha() {
         None,
         "a layer that was not requested is written"
     );
-    let [off, on] = [[0; 4], [186, 136, 255, 128]];
-    assert_eq!(with_alpha.rgba8(), [off, on, on].concat());
+    let [clear, covered] = [[0; 4], [186, 136, 255, 128]];
+    assert_eq!(with_alpha.rgba8(), [clear, covered, covered].concat());
     assert_eq!(with_alpha.rgb8()[3..6], [0.25, 0.125, 2.0].map(wgray::image::encode));
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name);
@@ -439,7 +437,7 @@ fn the_library_has_layers_and_alpha() {
     with_alpha.save(path("a.exr")).unwrap();
     assert_eq!(wgray::image::read_exr(&path("a.exr")).unwrap(), with_alpha.pixels());
 
-    let plain = picture(&half.replace("alpha = true", ""), Vec::new());
+    let plain = picture(&text.replace("alpha = true", ""), Vec::new());
     assert_eq!((plain.alpha(), plain.channel("A")), (None, None));
     assert_eq!(plain.rgba8().chunks(4).map(|p| p[3]).collect::<Vec<_>>(), [255; 3]);
     plain.save(path("b.png")).unwrap();
@@ -497,18 +495,24 @@ fn film_layouts_have_their_own_kernels() {
         gpu.update(&parse(&SCENE.replace("0.9, 0.8, 0.7", "0.7, 0.8, 0.9")))
             .unwrap()
     );
-    assert!(!gpu.update(&layered).unwrap(), "the kernel writes no layers");
+    assert!(
+        !gpu.update(&layered).unwrap(),
+        "a kernel without layers accepts a scene with layers"
+    );
     let mut gpu = Gpu::new(device, &layered, sources::shaders(), options).unwrap();
-    let other = parse(&SCENE.replace("0.9, 0.8, 0.7", "0.7, 0.8, 0.9"));
-    assert!(!gpu.update(&other).unwrap(), "the kernel writes layers");
-    let other = other.with_layers();
-    assert!(gpu.update(&other).unwrap());
-    let found = film(&mut gpu, &other, whole(&other), &WorkSplit::default());
+    let recolored = parse(&SCENE.replace("0.9, 0.8, 0.7", "0.7, 0.8, 0.9"));
+    assert!(
+        !gpu.update(&recolored).unwrap(),
+        "a kernel with layers accepts a scene without layers"
+    );
+    let recolored = recolored.with_layers();
+    assert!(gpu.update(&recolored).unwrap());
+    let found = film(&mut gpu, &recolored, whole(&recolored), &WorkSplit::default());
     assert!(found.has_layers());
     if adapter::bit_exact(device) {
-        assert_eq!(differing(&found, &reference(&other)), 0);
+        assert_eq!(differing(&found, &reference(&recolored)), 0);
         assert!(
-            other_layers(&found, &reference(&layered)) > 0,
+            differing_layers(&found, &reference(&layered)) > 0,
             "the comparison cannot fail"
         );
     }

@@ -129,14 +129,14 @@ fn overrides_are_the_fields_of_the_specialization() {
         let field = name.to_lowercase();
         assert!(
             fields.contains(&field.as_str()),
-            "{name} is the upper case of a field's name"
+            "{name} is not the upper case of a field's name"
         );
     }
 }
 
 #[test]
 fn every_shader_file_is_built_in() {
-    let mut found = Vec::new();
+    let mut files = Vec::new();
     for folder in ["", "integrators/", "kernels/"] {
         for entry in std::fs::read_dir(sources::path("shaders").join(folder)).expect("the shaders") {
             let name = entry
@@ -145,12 +145,12 @@ fn every_shader_file_is_built_in() {
                 .into_string()
                 .expect("a plain name");
             if name.ends_with(".wgsl") {
-                found.push(format!("{folder}{name}"));
+                files.push(format!("{folder}{name}"));
             }
         }
     }
-    found.sort();
-    let mut known: Vec<&str> = built_in().map(|(name, _)| name).collect();
-    known.sort_unstable();
-    assert_eq!(found, known);
+    files.sort();
+    let mut built_in_files: Vec<&str> = built_in().map(|(name, _)| name).collect();
+    built_in_files.sort_unstable();
+    assert_eq!(files, built_in_files);
 }

@@ -10,12 +10,14 @@ use wgray_render::records::Packed;
 use crate::pictures::{both, differing, exact_modes, means, render};
 use crate::scenes::{self, parse};
 
-/// Width and height of the image in pixels; `FOV` is in degrees.
+/// Width and height of the image in pixels.
 const SIDE: u32 = 64;
+/// Field of view in degrees.
 const FOV: f64 = 10.0;
 
-/// Returns an emissive disk of radius 0.005 `distance`, seen along y from the origin; `lens`: lines of `[camera]`.
-fn spot(distance: f64, lens: &str, samples: u32) -> Packed {
+/// Returns a scene with an emissive disk of radius 0.005 `distance`. The camera is at the origin and looks along y;
+/// `lens` holds lines of `[camera]`.
+fn disk_scene(distance: f64, lens: &str, samples: u32) -> Packed {
     let radius = 0.005 * distance;
     parse(&format!(
         "image = {{ width = {SIDE}, height = {SIDE} }}
@@ -47,117 +49,124 @@ fn pixels() -> f64 {
 }
 
 /// Returns the offset of a pixel center from the image center, in pixels to the right and up.
-fn place(i: usize) -> (f64, f64) {
+fn pixel_offset(i: usize) -> (f64, f64) {
     let side = SIDE as usize;
     let half = f64::from(SIDE) / 2.0;
     ((i % side) as f64 + 0.5 - half, half - (i / side) as f64 - 0.5)
 }
 
-/// Returns relative errors in the image of a disk that is blurred to this radius at distance 1: the maximum error of
-/// the mean radiance in rings, and the error of the total.
-fn wrong(picture: &[[f64; 3]], radius: f64) -> (f64, f64) {
-    let (circle, spot) = (radius * pixels(), 0.005 * pixels());
-    let within = spot * spot / (circle * circle); // fraction of the aperture that sees the disk
+/// Returns two relative errors in the image of a disk that is blurred to `radius` at distance 1: the maximum error of
+/// the mean radiance in rings, and the error of the total radiance.
+fn relative_errors(picture: &[[f64; 3]], radius: f64) -> (f64, f64) {
+    let (circle_radius, disk_radius) = (radius * pixels(), 0.005 * pixels());
+    // The fraction of the aperture that sees the disk.
+    let aperture_fraction = disk_radius * disk_radius / (circle_radius * circle_radius);
     let mut worst = 0.0_f64;
     let mut total = 0.0;
-    let rings = [0.0, 0.4, 0.7, 1.0].map(|share| share * (circle - spot - 1.0));
+    let rings = [0.0, 0.4, 0.7, 1.0].map(|share| share * (circle_radius - disk_radius - 1.0));
     let mut sums = [(0.0, 0.0); 3];
     for (i, mean) in picture.iter().enumerate() {
-        let (x, y) = place(i);
-        let away = x.hypot(y);
+        let (x, y) = pixel_offset(i);
+        let distance = x.hypot(y);
         total += mean[0];
         for (ring, sum) in rings.windows(2).zip(&mut sums) {
-            if (ring[0]..ring[1]).contains(&away) {
+            if (ring[0]..ring[1]).contains(&distance) {
                 *sum = (sum.0 + mean[0], sum.1 + 1.0);
             }
         }
-        if away > circle + spot + 1.0 {
-            worst = worst.max(mean[0] / within);
+        if distance > circle_radius + disk_radius + 1.0 {
+            worst = worst.max(mean[0] / aperture_fraction);
         }
     }
     for (sum, count) in sums {
-        worst = worst.max((sum / count / within - 1.0).abs());
+        worst = worst.max((sum / count / aperture_fraction - 1.0).abs());
     }
-    let whole = std::f64::consts::PI * spot * spot;
-    (worst, (total / whole - 1.0).abs())
+    let expected_total = std::f64::consts::PI * disk_radius * disk_radius;
+    (worst, (total / expected_total - 1.0).abs())
 }
 
 #[test]
 fn an_out_of_focus_disk_blurs_to_its_circle_of_confusion() {
     // An aperture of radius r focused at f blurs a point at z to a circle of radius r |1 / f - 1 / z| at distance 1.
     let lens = "aperture = 0.4\nfocus_distance = 4";
-    for way in both() {
+    for mode in both() {
         for distance in [12.0, 2.5] {
             let radius = 0.2 * (1.0_f64 / 4.0 - 1.0 / distance).abs();
-            let packed = spot(distance, lens, 1024);
-            let picture = means(&render(&packed, way));
-            let (worst, lost) = wrong(&picture, radius);
-            assert!(worst < 0.03, "{way:?} {distance}: {worst}");
-            assert!(lost < 0.02, "{way:?} {distance}: {lost}");
-            assert!(wrong(&picture, 1.1 * radius).0 > 0.1, "a larger circle passes");
-            assert!(wrong(&picture, 0.9 * radius).0 > 0.1, "a smaller circle passes");
+            let packed = disk_scene(distance, lens, 1024);
+            let picture = means(&render(&packed, mode));
+            let (worst, total_error) = relative_errors(&picture, radius);
+            assert!(worst < 0.03, "{mode:?} {distance}: {worst}");
+            assert!(total_error < 0.02, "{mode:?} {distance}: {total_error}");
+            assert!(
+                relative_errors(&picture, 1.1 * radius).0 > 0.1,
+                "a larger circle passes"
+            );
+            assert!(
+                relative_errors(&picture, 0.9 * radius).0 > 0.1,
+                "a smaller circle passes"
+            );
         }
     }
 }
 
 #[test]
-fn the_aperture_may_be_an_f_number() {
+fn an_f_number_sets_the_aperture() {
     // The default focus distance is the distance to `look_at`.
-    let by = |lens: &str| spot(12.0, lens, 1).camera;
+    let camera_with = |lens: &str| disk_scene(12.0, lens, 1).camera;
     assert_eq!(
-        by("focal_length = 0.8\nf_number = 2"),
-        by("aperture = 0.4\nfocus_distance = 4")
+        camera_with("focal_length = 0.8\nf_number = 2"),
+        camera_with("aperture = 0.4\nfocus_distance = 4")
     );
     assert_ne!(
-        by("focal_length = 0.8\nf_number = 4"),
-        by("aperture = 0.4\nfocus_distance = 4")
+        camera_with("focal_length = 0.8\nf_number = 4"),
+        camera_with("aperture = 0.4\nfocus_distance = 4")
     );
 }
 
 #[test]
 fn the_focus_plane_is_sharp() {
     let lens = "aperture = 0.4\nfocus_distance = 5";
-    for way in both() {
-        let with = means(&render(&spot(5.0, lens, 256), way));
-        let without = means(&render(&spot(5.0, "", 256), way));
-        let defocused = means(&render(&spot(5.5, lens, 256), way));
-        // Equal pixel samples, up to rounding at the edge of the disk.
-        let difference = |a: &[[f64; 3]]| a.iter().zip(&without).map(|(a, b)| (a[0] - b[0]).abs()).sum::<f64>();
-        assert!(difference(&with) < 0.05, "{way:?}: {}", difference(&with));
-        assert!(difference(&defocused) > 1.0, "{way:?}: {}", difference(&defocused));
+    for mode in both() {
+        let focused = means(&render(&disk_scene(5.0, lens, 256), mode));
+        let pinhole = means(&render(&disk_scene(5.0, "", 256), mode));
+        let defocused = means(&render(&disk_scene(5.5, lens, 256), mode));
+        // The pixel samples are equal up to rounding at the edge of the disk.
+        let difference = |a: &[[f64; 3]]| a.iter().zip(&pinhole).map(|(a, b)| (a[0] - b[0]).abs()).sum::<f64>();
+        assert!(difference(&focused) < 0.05, "{mode:?}: {}", difference(&focused));
+        assert!(difference(&defocused) > 1.0, "{mode:?}: {}", difference(&defocused));
     }
 }
 
 #[test]
 fn blades_give_a_polygon_with_a_corner_at_the_top() {
     let lens = "aperture = 0.4\nfocus_distance = 4\nblades = 3\nblade_rotation = ";
-    let lit = |packed: &Packed, (x, y): (f64, f64), way| {
-        let picture = means(&render(packed, way));
-        let pixel = |i: usize| (place(i).0 - x).hypot(place(i).1 - y) < 2.0;
+    let is_lit = |packed: &Packed, (x, y): (f64, f64), mode| {
+        let picture = means(&render(packed, mode));
+        let is_near = |i: usize| (pixel_offset(i).0 - x).hypot(pixel_offset(i).1 - y) < 2.0;
         (0..picture.len())
-            .filter(|i| pixel(*i))
+            .filter(|i| is_near(*i))
             .map(|i| picture[i][0])
             .sum::<f64>()
             > 0.0
     };
-    for way in both() {
-        let circle = 0.2 * (1.0 / 4.0 - 1.0 / 12.0) * pixels();
-        let turned = |degrees: f64| {
+    for mode in both() {
+        let circle_radius = 0.2 * (1.0 / 4.0 - 1.0 / 12.0) * pixels();
+        let point_at = |degrees: f64| {
             let (sin, cos) = (90.0 + degrees).to_radians().sin_cos();
-            (0.8 * circle * cos, 0.8 * circle * sin)
+            (0.8 * circle_radius * cos, 0.8 * circle_radius * sin)
         };
         // Far points show the aperture upright. The middle of a side, 60 degrees from a corner, is half as far from the
         // center as a corner.
         for degrees in [0.0, 30.0, -100.0] {
-            let far = spot(12.0, &format!("{lens}{degrees}"), 64);
-            assert!(lit(&far, turned(degrees), way), "{way:?} {degrees}");
-            assert!(!lit(&far, turned(degrees + 60.0), way), "{way:?} {degrees}");
-            assert!(lit(&far, turned(degrees + 120.0), way), "{way:?} {degrees}");
+            let far = disk_scene(12.0, &format!("{lens}{degrees}"), 64);
+            assert!(is_lit(&far, point_at(degrees), mode), "{mode:?} {degrees}");
+            assert!(!is_lit(&far, point_at(degrees + 60.0), mode), "{mode:?} {degrees}");
+            assert!(is_lit(&far, point_at(degrees + 120.0), mode), "{mode:?} {degrees}");
         }
         // Near points show the aperture upside down, with nearly the same circle of confusion.
-        let near = spot(2.4, &format!("{lens}0"), 64);
-        assert!(lit(&near, turned(180.0), way), "{way:?}");
-        assert!(!lit(&near, turned(0.0), way), "{way:?}");
+        let near = disk_scene(2.4, &format!("{lens}0"), 64);
+        assert!(is_lit(&near, point_at(180.0), mode), "{mode:?}");
+        assert!(!is_lit(&near, point_at(0.0), mode), "{mode:?}");
     }
 }
 
@@ -169,13 +178,13 @@ fn apertures_are_sampled_uniformly() {
         let count = 1 << 14;
         // Polar second moment over area: Young and Budynas, "Roark's Formulas for Stress and Strain", table A.1.
         let expected = if blades == 0 { 0.5 } else { (2.0 + turn.cos()) / 6.0 };
-        let (mut middle, mut moment, mut inner, mut farthest) = (Vec2::ZERO.as_dvec2(), 0.0, 0.0, 0.0_f64);
+        let (mut mean, mut moment, mut inner, mut farthest) = (Vec2::ZERO.as_dvec2(), 0.0, 0.0, 0.0_f64);
         for i in 0..count {
             let p = lens_sample(blades, sobol_sample(i, glam::UVec2::new(3, 7))).as_dvec2();
-            middle += p / f64::from(count);
+            mean += p / f64::from(count);
             moment += p.length_squared() / f64::from(count);
             // Distance from the center as a fraction of the distance to the edge.
-            let out = match blades {
+            let edge_fraction = match blades {
                 0 => p.length(),
                 _ => (0..blades)
                     .map(|side| {
@@ -184,11 +193,11 @@ fn apertures_are_sampled_uniformly() {
                     })
                     .fold(0.0, f64::max),
             };
-            assert!(out < 1.0 + 1e-6, "{blades}: {p}");
-            inner += f64::from(u8::from(out < 0.5)) / f64::from(count);
+            assert!(edge_fraction < 1.0 + 1e-6, "{blades}: {p}");
+            inner += f64::from(u8::from(edge_fraction < 0.5)) / f64::from(count);
             farthest = farthest.max(p.length());
         }
-        assert!(middle.length() < 2e-3, "{blades}: {middle}");
+        assert!(mean.length() < 2e-3, "{blades}: {mean}");
         assert!((moment - expected).abs() < 2e-3, "{blades}: {moment} {expected}");
         assert!((inner - 0.25).abs() < 3e-3, "{blades}: {inner}");
         assert!(farthest > 0.98 && farthest < 1.0 + 1e-6, "{blades}: {farthest}");
@@ -197,25 +206,30 @@ fn apertures_are_sampled_uniformly() {
 
 #[test]
 fn lens_samples_are_stratified_and_independent_of_pixel_samples() {
-    // Each quarter of the lens gets 4 of 16 samples. Over 64 pixels, each pair of pixel and lens quarters gets 64.
-    let packed = spot(12.0, "aperture = 2\nfocus_distance = 1", 16);
+    // Each quarter of the lens gets 4 of 16 samples. Over 64 pixels, each pair of a pixel quarter and a
+    // lens quarter gets 64 samples.
+    let packed = disk_scene(12.0, "aperture = 2\nfocus_distance = 1", 16);
     let mut counts = [[0_u32; 4]; 4];
     for pixel in 0..64 {
-        let mut of_lens = [0; 4];
+        let mut lens_counts = [0; 4];
         for sample in 0..16 {
             let pixel = glam::UVec2::new(pixel, 9);
             let ray = wgray_render::cpu::pixel::camera_sample(&packed, pixel, sample).ray;
             let lens = ray.origin / packed.camera.lens_u.length();
-            let straight =
+            let image_point =
                 (ray.direction / ray.direction.y + ray.origin * packed.camera.inverse_focus) * pixels() as f32;
-            let at = Vec2::new(straight.x + SIDE as f32 / 2.0, SIDE as f32 / 2.0 - straight.z) - pixel.as_vec2();
-            // The square-to-disk mapping preserves the sectors between the diagonals, of equal areas.
+            let sample_point =
+                Vec2::new(image_point.x + SIDE as f32 / 2.0, SIDE as f32 / 2.0 - image_point.z) - pixel.as_vec2();
+            // The square-to-disk mapping preserves the sectors between the diagonals, which have equal areas.
             let sector = usize::from(lens.x > lens.z) + 2 * usize::from(lens.x > -lens.z);
-            let quarter = usize::from(at.x > 0.5) + 2 * usize::from(at.y > 0.5);
-            of_lens[sector] += 1;
+            let quarter = usize::from(sample_point.x > 0.5) + 2 * usize::from(sample_point.y > 0.5);
+            lens_counts[sector] += 1;
             counts[sector][quarter] += 1;
         }
-        assert!(of_lens.iter().all(|count| (2..=6).contains(count)), "{of_lens:?}");
+        assert!(
+            lens_counts.iter().all(|count| (2..=6).contains(count)),
+            "{lens_counts:?}"
+        );
     }
     for count in counts.iter().flatten() {
         assert!(
@@ -227,14 +241,17 @@ fn lens_samples_are_stratified_and_independent_of_pixel_samples() {
 
 #[test]
 fn lens_rays_converge_in_the_focus_plane() {
-    let packed = spot(12.0, "aperture = 0.4\nfocus_distance = 4", 1);
-    for at in [Vec2::new(1.0, 60.0), Vec2::new(40.5, 3.25)] {
-        let middle = camera_ray(&packed.camera, at).direction;
+    let packed = disk_scene(12.0, "aperture = 0.4\nfocus_distance = 4", 1);
+    for pixel_point in [Vec2::new(1.0, 60.0), Vec2::new(40.5, 3.25)] {
+        let center_direction = camera_ray(&packed.camera, pixel_point).direction;
         for p in [Vec2::X, Vec2::new(-0.3, 0.9), Vec2::ZERO] {
-            let ray = lens_ray(&packed.camera, at, p);
+            let ray = lens_ray(&packed.camera, pixel_point, p);
             let start = ray.origin - packed.camera.position;
             let point = start + ray.direction * (4.0 / ray.direction.y);
-            assert!(point.distance(middle * (4.0 / middle.y)) < 2e-6, "{at} {p}: {point}");
+            assert!(
+                point.distance(center_direction * (4.0 / center_direction.y)) < 2e-6,
+                "{pixel_point} {p}: {point}"
+            );
             assert!((start - Vec3::new(0.2 * p.x, 0.0, 0.2 * p.y)).length() < 1e-6);
         }
     }
@@ -242,12 +259,12 @@ fn lens_rays_converge_in_the_focus_plane() {
 
 #[test]
 fn limits_of_the_ranges_render_equally() {
-    let pinhole = spot(12.0, "", 16);
+    let pinhole = disk_scene(12.0, "", 16);
     for aperture in ["0", "1e-300", "1e-9", "1", "1e9"] {
         for focus in ["1e-9", "1e-3", "1e9"] {
-            let packed = spot(12.0, &format!("aperture = {aperture}\nfocus_distance = {focus}"), 16);
+            let packed = disk_scene(12.0, &format!("aperture = {aperture}\nfocus_distance = {focus}"), 16);
             assert_eq!(packed.specialization.lens == 0, aperture == "0");
-            let films: Vec<_> = exact_modes().into_iter().map(|way| render(&packed, way)).collect();
+            let films: Vec<_> = exact_modes().into_iter().map(|mode| render(&packed, mode)).collect();
             for film in &films {
                 assert!(film.sums.iter().all(|sum| sum.is_finite()), "{aperture} {focus}");
                 assert_eq!(differing(film, &films[0]), 0, "{aperture} {focus}");
@@ -273,7 +290,7 @@ fn invalid_lenses_are_rejected() {
         ),
         (
             "focus_distance = 0",
-            "camera.focus_distance: 0 must be finite and greater than 0, from 1e-9 to 1e9",
+            "camera.focus_distance: 0 must be from 1e-9 to 1e9",
         ),
         (
             "blades = 2",
@@ -316,9 +333,9 @@ fn a_path_animates_focus_and_aperture() {
         path.keys = [{ frame = 1, focus_distance = 2 }, { frame = 2, aperture = 0 }, { frame = 3, focus_distance = 4, aperture = 1 }]
         ";
     let scene = Scene::parse(text, "s.toml").unwrap();
-    let still = scene.camera.lens.unwrap();
+    let still_lens = scene.camera.lens.unwrap();
     assert_eq!(
-        (still.radius, still.focus),
+        (still_lens.radius, still_lens.focus),
         (0.05, 2.0),
         "a still image does not use the lens of the camera"
     );
@@ -336,7 +353,7 @@ fn a_path_animates_focus_and_aperture() {
         ),
         (
             "focus_distance = 0",
-            "camera.path.keys[0].focus_distance: 0 must be finite",
+            "camera.path.keys[0].focus_distance: 0 must be from 1e-9 to 1e9",
         ),
         (
             "height = 1",

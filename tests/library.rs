@@ -44,7 +44,7 @@ normal = [0, 0, 1]
 tangent = [1, 0, 0]
 "#;
 
-fn described() -> Description {
+fn description() -> Description {
     let samples = |pattern, count| SamplesDescription {
         pattern: Some(pattern),
         count,
@@ -72,7 +72,7 @@ fn described() -> Description {
     .with_shape(PlaneDescription::new("red", [0.0; 3], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]))
 }
 
-fn on_cpu() -> Options {
+fn cpu_options() -> Options {
     Options {
         device: Device::Cpu,
         ..Options::default()
@@ -80,7 +80,7 @@ fn on_cpu() -> Options {
 }
 
 fn scene() -> Scene {
-    described().validate().expect("a valid scene")
+    description().validate().expect("a valid scene")
 }
 
 fn floats(picture: &Picture, name: &str) -> Vec<f32> {
@@ -91,15 +91,15 @@ fn floats(picture: &Picture, name: &str) -> Vec<f32> {
 }
 
 #[test]
-fn a_scene_built_in_code_equals_one_from_a_file() {
+fn a_scene_built_in_code_equals_a_scene_from_a_file() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("scene.toml");
     std::fs::write(&path, FILE).unwrap();
     let loaded = Scene::load(&path).unwrap();
     assert_eq!(scene(), loaded);
-    let other = described().with_shape(SphereDescription::new("red", [1.0, 0.0, 0.5], 0.5));
-    assert_ne!(other.validate().unwrap(), loaded);
-    let picture = wgray::render(&loaded, &on_cpu()).unwrap();
+    let larger = description().with_shape(SphereDescription::new("red", [1.0, 0.0, 0.5], 0.5));
+    assert_ne!(larger.validate().unwrap(), loaded);
+    let picture = wgray::render(&loaded, &cpu_options()).unwrap();
     assert_eq!((picture.width(), picture.height()), (24, 16));
     assert_eq!(picture.device().name, "cpu");
     let different = picture
@@ -115,9 +115,9 @@ fn a_scene_built_in_code_equals_one_from_a_file() {
 fn invalid_scenes_are_reported_with_key_value_and_rule() {
     let ball = SphereDescription::new("red", [0.0, 0.0, 0.5], -1.0);
     let message = |description: Description| Error::from(description.validate().unwrap_err()).to_string();
-    let error = message(described().with_shape(ball));
-    assert!(error.starts_with("shapes[2].radius: -1 must be finite"), "{error}");
-    let error = message(described().with_shape(SphereDescription::new("blue", [0.0; 3], 1.0)));
+    let error = message(description().with_shape(ball));
+    assert!(error.starts_with("shapes[2].radius: -1 must be from 1e-9"), "{error}");
+    let error = message(description().with_shape(SphereDescription::new("blue", [0.0; 3], 1.0)));
     assert!(
         error.starts_with("shapes[2].material: there is no material \"blue\""),
         "{error}"
@@ -136,11 +136,11 @@ fn invalid_scenes_are_reported_with_key_value_and_rule() {
 fn invalid_options_are_rejected() {
     let crop = |x0, y0, x1, y1| Options {
         crop: Some(Region { x0, y0, x1, y1 }),
-        ..on_cpu()
+        ..cpu_options()
     };
     let aov = Options {
         aovs: vec![Aov::Depth, Aov::SampleCount],
-        ..on_cpu()
+        ..cpu_options()
     };
     for (options, expected) in [
         (
@@ -158,7 +158,7 @@ fn invalid_options_are_rejected() {
 }
 
 #[test]
-fn a_crop_equals_that_part_of_the_image() {
+fn a_crop_equals_its_part_of_the_image() {
     let region = Region {
         x0: 5,
         y0: 3,
@@ -166,20 +166,20 @@ fn a_crop_equals_that_part_of_the_image() {
         y1: 11,
     };
     let aovs = vec![Aov::Depth, Aov::Normal, Aov::Primitive];
-    let whole = Options { aovs, ..on_cpu() };
+    let full = Options { aovs, ..cpu_options() };
     let part = Options {
         crop: Some(region),
-        ..whole.clone()
+        ..full.clone()
     };
-    let (whole, part) = (
-        wgray::render(&scene(), &whole).unwrap(),
+    let (full, part) = (
+        wgray::render(&scene(), &full).unwrap(),
         wgray::render(&scene(), &part).unwrap(),
     );
     assert_eq!(part.region(), region);
     for name in ["R", "G", "B", "depth.Z", "normal.X", "normal.Z"] {
-        let rows = floats(&whole, name);
-        let cut = rows.chunks(24).take(11).skip(3).flat_map(|row| row[5..20].to_vec());
-        assert_eq!(floats(&part, name), cut.collect::<Vec<_>>(), "{name}");
+        let rows = floats(&full, name);
+        let cropped = rows.chunks(24).take(11).skip(3).flat_map(|row| row[5..20].to_vec());
+        assert_eq!(floats(&part, name), cropped.collect::<Vec<_>>(), "{name}");
     }
     let Some(Channel::Whole(shapes)) = part.channel("primitive.ID") else {
         panic!("no shapes")
@@ -194,7 +194,7 @@ fn the_extension_selects_the_format() {
     let path = |name: &str| folder.path().join(name);
     let options = Options {
         aovs: vec![Aov::Depth, Aov::Depth],
-        ..on_cpu()
+        ..cpu_options()
     };
     let picture = wgray::render(&scene(), &options).unwrap();
     assert_eq!(picture.aovs(), [Aov::Depth]);
@@ -210,8 +210,8 @@ fn the_extension_selects_the_format() {
         "{error}"
     );
     assert!(!path("a.gif").exists());
-    // With the given settings, or with the settings of the scene.
-    let saved = SaveOptions {
+    // `save_with` uses its options; the view settings come from the scene.
+    let save_options = SaveOptions {
         bit_depth: BitDepth::Sixteen,
         metadata: Metadata {
             pairs: vec![("Source".to_owned(), "a test, 21 °C, 数".to_owned())],
@@ -219,11 +219,11 @@ fn the_extension_selects_the_format() {
         ..SaveOptions::default()
     };
     for name in ["b.png", "b.jpg", "b.webp", "b.exr"] {
-        picture.save_with(path(name), &saved).unwrap();
+        picture.save_with(path(name), &save_options).unwrap();
     }
     assert_eq!(image::open(path("b.png")).unwrap().color(), image::ColorType::Rgb16);
     assert_eq!(png("b.webp").into_raw(), picture.rgb8());
-    let mut description = described();
+    let mut description = description();
     description.image.view_transform = ViewTransform::Srgb;
     description.image.exposure = -1.0;
     let darker = wgray::render(&description.validate().unwrap(), &options).unwrap();
@@ -239,8 +239,8 @@ fn the_extension_selects_the_format() {
 }
 
 #[test]
-fn a_progressive_image_equals_the_rendered_one_and_can_be_cancelled() {
-    let mut adaptive = described();
+fn a_progressive_image_equals_the_rendered_image_and_can_be_cancelled() {
+    let mut adaptive = description();
     adaptive.render.adaptive = Some(AdaptiveDescription {
         error: 0.01,
         max_samples: Some(64),
@@ -259,20 +259,20 @@ fn a_progressive_image_equals_the_rendered_one_and_can_be_cancelled() {
                 x1: 130,
                 y1: 129,
             }),
-            ..on_cpu()
+            ..cpu_options()
         };
         let rendered = wgray::render(&scene, &options).unwrap();
-        let mut seen: Vec<(f64, Picture)> = Vec::new();
-        let grown = wgray::render_progressive(&scene, &options, &mut |progress| {
-            seen.push((progress.share(), progress.picture()?));
+        let mut images: Vec<(f64, Picture)> = Vec::new();
+        let result = wgray::render_progressive(&scene, &options, &mut |progress| {
+            images.push((progress.share(), progress.picture()?));
             Ok(ControlFlow::Continue(()))
         });
-        assert!(grown.unwrap() == rendered);
-        assert!(seen.len() > 1, "{}", seen.len());
-        assert!(seen.is_sorted_by(|a, b| a.0 <= b.0));
-        let (share, last) = seen.pop().unwrap();
+        assert!(result.unwrap() == rendered);
+        assert!(images.len() > 1, "{}", images.len());
+        assert!(images.is_sorted_by(|a, b| a.0 <= b.0));
+        let (share, last) = images.pop().unwrap();
         assert!((share - 1.0).abs() < 1e-9 && last == rendered, "{share}");
-        assert!(seen[0].1 != rendered, "the first image equals the last");
+        assert!(images[0].1 != rendered, "the first image equals the last");
 
         let cancelled = wgray::render_progressive(&scene, &options, &mut |_| Ok(ControlFlow::Break(())));
         assert!(matches!(cancelled, Err(Error::Render(RenderError::Cancelled))));
@@ -289,20 +289,20 @@ fn an_image_in_memory_equals_a_file() {
     let colors: Vec<[u8; 3]> = (0..12).map(|i| [i * 20, 255 - i * 9, 40]).collect();
     let bytes: Vec<u8> = colors.concat();
     image::save_buffer(folder.path().join("a.png"), &bytes, 4, 3, image::ColorType::Rgb8).unwrap();
-    let described = described()
+    let description = description()
         .with_texture("a", ImageTextureDescription::new("a.png"))
         .with_material("red", PhongDescription::new(ColorDescription::texture("a")));
-    let with = |width, height, texels| {
+    let validate_with_image = |width, height, texels| {
         let image = Image { width, height, texels };
         let mut assets = Assets::default();
         assets.images.insert("a.png".to_string(), Arc::new(image));
-        described.validate_with(&assets)
+        description.validate_with(&assets)
     };
-    let read = described.validate_with(&Assets::beside(folder.path())).unwrap();
-    let made = with(4, 3, Texels::Bytes(Encoding::Srgb, colors.clone())).unwrap();
-    assert_eq!(read.textures, made.textures);
-    assert_eq!((read.files.len(), made.files.len()), (1, 0));
-    let error = |width, height, texels| with(width, height, texels).unwrap_err().to_string();
+    let from_file = description.validate_with(&Assets::beside(folder.path())).unwrap();
+    let from_memory = validate_with_image(4, 3, Texels::Bytes(Encoding::Srgb, colors.clone())).unwrap();
+    assert_eq!(from_file.textures, from_memory.textures);
+    assert_eq!((from_file.files.len(), from_memory.files.len()), (1, 0));
+    let error = |width, height, texels| validate_with_image(width, height, texels).unwrap_err().to_string();
     for (width, height, texels, rule) in [
         (
             4,
@@ -310,7 +310,7 @@ fn an_image_in_memory_equals_a_file() {
             Texels::Bytes(Encoding::Srgb, colors),
             "has 12 texels; its size is 4 x 4",
         ),
-        (0, 1, Texels::Floats(Vec::new()), "must have a texel at least"),
+        (0, 1, Texels::Floats(Vec::new()), "must have at least one texel"),
         (
             1,
             1,
@@ -345,8 +345,8 @@ fn without_the_feature_gpu_only_the_cpu_exists() {
     let scene = scene();
     let picture = wgray::render(&scene, &Options::default()).unwrap();
     assert_eq!(picture.device().name, "cpu");
-    assert!(picture == wgray::render(&scene, &on_cpu()).unwrap());
-    for (device, asked) in [(Device::Gpu, "a GPU: "), (Device::from("llvmpipe"), "'llvmpipe': ")] {
+    assert!(picture == wgray::render(&scene, &cpu_options()).unwrap());
+    for (device, start) in [(Device::Gpu, "a GPU: "), (Device::from("llvmpipe"), "'llvmpipe': ")] {
         let options = Options {
             device,
             ..Options::default()
@@ -355,7 +355,7 @@ fn without_the_feature_gpu_only_the_cpu_exists() {
         assert!(matches!(error, Error::Render(RenderError::NoDevice(_))), "{error:?}");
         let message = error.to_string();
         assert!(
-            message.starts_with(asked) && message.contains("feature \"gpu\""),
+            message.starts_with(start) && message.contains("feature \"gpu\""),
             "{message}"
         );
     }
@@ -374,7 +374,7 @@ fn the_program_without_the_feature_gpu_renders_on_the_cpu() {
     };
     let silent = (Some(0), String::new(), String::new());
     assert_eq!(run(&["render", "s.toml", "-o", "s.exr", "-q"]), silent);
-    let picture = wgray::render(&scene(), &on_cpu()).unwrap();
+    let picture = wgray::render(&scene(), &cpu_options()).unwrap();
     assert_eq!(read_exr(&folder.path().join("s.exr")).unwrap(), picture.pixels());
     let (code, _, stderr) = run(&["render", "s.toml", "-o", "gpu.exr", "--device", "gpu"]);
     assert_eq!(code, Some(4), "{stderr}");
@@ -386,8 +386,8 @@ fn the_program_without_the_feature_gpu_renders_on_the_cpu() {
         listed.contains("auto selects: cpu") && listed.contains("feature \"gpu\""),
         "{listed}"
     );
-    let (code, good, stderr) = run(&["check", "s.toml"]);
+    let (code, stdout, stderr) = run(&["check", "s.toml"]);
     assert_eq!((code, stderr.as_str()), (Some(0), ""));
-    assert!(good.starts_with("s.toml: ok: 24 x 16 pixels"), "{good}");
+    assert!(stdout.starts_with("s.toml: ok: 24 x 16 pixels"), "{stdout}");
     assert_eq!(run(&["dev", "s.toml"]).0, Some(2));
 }

@@ -1,5 +1,5 @@
 //! Detection of truncated loops. The software Vulkan of Mesa 22.3 silently ends all loops of an invocation after a
-//! total of 65,535 iterations; `shaders/completion.wgsl` detects it. The tests also pass on other drivers.
+//! total of 65,535 iterations; `shaders/completion.wgsl` detects the truncation. The tests also pass on other drivers.
 
 use wgray::error::RenderError;
 use wgray::scene::{AdaptiveDescription, Description, Pattern, PlaneDescription, ShapeDescription, SphereDescription};
@@ -26,10 +26,15 @@ fn spheres(count: u32) -> Description {
         panic!("a scene without materials")
     };
     d.shapes.extend((0..count).map(|i| {
-        let at = |k: u32| f64::from(i.wrapping_mul(k) % 1009) / 1009.0;
+        let coordinate = |k: u32| f64::from(i.wrapping_mul(k) % 1009) / 1009.0;
         ShapeDescription::Sphere(SphereDescription {
             material: material.clone(),
-            center: [1.8 * at(7) - 0.9, 1.8 * at(31) - 0.9, 1.8 * at(131) + 0.1].into(),
+            center: [
+                1.8 * coordinate(7) - 0.9,
+                1.8 * coordinate(31) - 0.9,
+                1.8 * coordinate(131) + 0.1,
+            ]
+            .into(),
             radius: 0.003,
         })
     }));
@@ -54,10 +59,10 @@ fn planes(count: u32) -> Description {
     d
 }
 
-fn attempt(packed: &Packed, mode: RenderMode, shaders: &Shaders) -> Result<Film, RenderError> {
+fn try_render(packed: &Packed, mode: RenderMode, shaders: &Shaders) -> Result<Film, RenderError> {
     let mut backend = backend_with(packed, mode, shaders);
     let mut film = Film::new(whole(packed));
-    let mut take = |rendered| {
+    let mut output = |rendered| {
         film = rendered;
         Ok(())
     };
@@ -67,7 +72,7 @@ fn attempt(packed: &Packed, mode: RenderMode, shaders: &Shaders) -> Result<Film,
         packed.sampling.pixel_samples,
         &WorkSplit::default(),
         &mut |_| true,
-        &mut take,
+        &mut output,
     )?;
     Ok(film)
 }
@@ -90,16 +95,16 @@ fn looping(rounds: u32) -> Shaders {
 
 /// Returns true if a film of one sample equals `plain` plus the iterations.
 fn has_rounds(film: &Film, plain: &Film, rounds: u32) -> bool {
-    let right = |(a, b): (&glam::Vec4, &glam::Vec4)| a.x == b.x + rounds as f32 && a.y == b.y;
-    film.sums.iter().zip(&plain.sums).all(right)
+    let matches = |(a, b): (&glam::Vec4, &glam::Vec4)| a.x == b.x + rounds as f32 && a.y == b.y;
+    film.sums.iter().zip(&plain.sums).all(matches)
 }
 
-/// Returns true if the driver truncates loops without the check.
-fn driver_cuts_loops() -> bool {
+/// Returns true if the driver truncates loops, tested with shaders without the check.
+fn driver_truncates_loops() -> bool {
     const ROUNDS: u32 = 1_000_000;
     let packed = scenes::packed(&small("cornell.toml", (2, 2), 1, 1));
-    let unwatched = without_check(&looping(ROUNDS));
-    let film = attempt(&packed, RenderMode::Buffers, &unwatched).expect("nothing that watches");
+    let unchecked = without_check(&looping(ROUNDS));
+    let film = try_render(&packed, RenderMode::Buffers, &unchecked).expect("a film without the check");
     !has_rounds(&film, &reference(&packed), ROUNDS)
 }
 
@@ -153,7 +158,7 @@ fn too_long_samples_are_errors_or_correct() {
     if adapter::device().is_none() {
         return;
     }
-    let cuts = driver_cuts_loops();
+    let truncates = driver_truncates_loops();
     for (name, description, mode) in [
         (
             "light samples",
@@ -168,13 +173,13 @@ fn too_long_samples_are_errors_or_correct() {
         ("planes", planes(70_000), RenderMode::Buffers),
     ] {
         let packed = scenes::packed(&description);
-        match attempt(&packed, mode, sources::shaders()) {
+        match try_render(&packed, mode, sources::shaders()) {
             Ok(film) => {
-                assert!(!cuts, "{name}, {mode:?}: the driver truncates a loop");
+                assert!(!truncates, "{name}, {mode:?}: the driver truncates a loop");
                 assert_eq!(differing(&film, &reference(&packed)), 0, "{name}, {mode:?}");
             }
             Err(RenderError::LoopTruncated { .. }) => assert!(
-                cuts,
+                truncates,
                 "{name}, {mode:?}: truncation reported by a driver that does not truncate"
             ),
             Err(error) => panic!("{name}, {mode:?}: {error}"),
@@ -184,14 +189,20 @@ fn too_long_samples_are_errors_or_correct() {
     let mut backend = backend_with(&packed, RenderMode::Buffers, sources::shaders());
     match job::first_hits(&mut *backend, whole(&packed)) {
         Ok(hits) => {
-            assert!(!cuts, "the driver truncates the loop over the planes of the first hits");
+            assert!(
+                !truncates,
+                "the driver truncates the loop over the planes of the first hits"
+            );
             let cpu = crate::pictures::first_hits(&packed, RenderMode::Cpu);
             assert_eq!(
                 bytemuck::cast_slice::<_, u8>(&hits),
                 bytemuck::cast_slice::<_, u8>(&cpu)
             );
         }
-        Err(error) => assert!(cuts && matches!(error, RenderError::LoopTruncated { .. }), "{error}"),
+        Err(error) => assert!(
+            truncates && matches!(error, RenderError::LoopTruncated { .. }),
+            "{error}"
+        ),
     }
 }
 
@@ -202,39 +213,40 @@ fn long_loops_of_edited_shaders_are_errors_or_correct() {
     }
     let packed = scenes::packed(&small("cornell.toml", (3, 2), 1, 1));
     let plain = reference(&packed);
-    let cuts = driver_cuts_loops();
+    let truncates = driver_truncates_loops();
     for (rounds, too_long) in [(4, false), (60_000, false), (66_000, true), (1_000_000, true)] {
-        match attempt(&packed, RenderMode::Buffers, &looping(rounds)) {
+        match try_render(&packed, RenderMode::Buffers, &looping(rounds)) {
             Ok(film) => {
-                assert!(!(cuts && too_long), "{rounds} rounds: truncation not detected");
+                assert!(!(truncates && too_long), "{rounds} rounds: truncation not detected");
                 assert!(has_rounds(&film, &plain, rounds), "{rounds} rounds: wrong image");
             }
             Err(RenderError::LoopTruncated { .. }) => {
-                assert!(cuts && too_long, "{rounds} rounds: truncation reported without need")
+                assert!(
+                    truncates && too_long,
+                    "{rounds} rounds: truncation reported for complete loops"
+                )
             }
             Err(error) => panic!("{rounds} rounds: {error}"),
         }
     }
-    // Rejected on every driver.
-    let unsigned = edited_shaders("completion.wgsl", "atomicAdd(&completion.groups_done, 1u);", "");
+    // Shaders that do not report completion are rejected on every driver.
+    let unreported = edited_shaders("completion.wgsl", "atomicAdd(&completion.groups_done, 1u);", "");
     let device = adapter::device().expect("a device");
     let options = wgray_render::gpu::Options {
         exact: None,
         baked: false,
     };
-    let refused = wgray_render::gpu::Gpu::new(device, &packed, &unsigned, options).err();
-    assert!(
-        matches!(refused, Some(RenderError::LoopTruncated { .. })),
-        "{refused:?}"
-    );
+    let error = wgray_render::gpu::Gpu::new(device, &packed, &unreported, options).err();
+    assert!(matches!(error, Some(RenderError::LoopTruncated { .. })), "{error:?}");
 }
 
 #[test]
 fn without_the_check_truncated_images_are_wrong() {
-    if adapter::device().is_none() || !driver_cuts_loops() {
+    if adapter::device().is_none() || !driver_truncates_loops() {
         return;
     }
     let packed = scenes::packed(&small("cornell.toml", (2, 2), 1, 65_536));
-    let film = attempt(&packed, RenderMode::Baked, &without_check(sources::shaders())).expect("nothing that watches");
+    let film =
+        try_render(&packed, RenderMode::Baked, &without_check(sources::shaders())).expect("a film without the check");
     assert!(differing(&film, &reference(&packed)) > 0);
 }

@@ -48,6 +48,7 @@ mod rounding;
 mod sampling;
 mod scenes;
 mod schema;
+mod sessions;
 mod sources;
 mod statistics;
 mod structure;

@@ -1,4 +1,4 @@
-//! A small glTF model: a box, and a smaller one on top that rises in an animation, is gold in a variant, and is absent
+//! A small glTF model: a box, and a smaller box on top that rises in an animation, is gold in a variant, and is absent
 //! from the second scene. Two cameras are optional.
 
 use std::fs;
@@ -85,12 +85,12 @@ impl Model {
         }
         if self.cameras {
             let side = 0.5_f64.sqrt();
-            let more = json!([
+            let camera_nodes = json!([
                 { "name": "front camera", "camera": 0, "translation": [0, 1, 6] },
                 { "name": "side camera", "camera": 1, "translation": [6, 1, 0], "rotation": [0, side, 0, side] },
             ]);
             let nodes = json["nodes"].as_array_mut().expect("a list");
-            nodes.extend(more.as_array().into_iter().flatten().cloned());
+            nodes.extend(camera_nodes.as_array().into_iter().flatten().cloned());
             json["scenes"][0]["nodes"] = json!([0, 1, 2, 3]);
             json["cameras"] = json!([
                 { "type": "perspective", "perspective": { "yfov": 0.7, "aspectRatio": 1.5, "znear": 0.1 } },
@@ -106,14 +106,14 @@ impl Model {
         json["buffers"] = json!([{ "byteLength": bytes.len() }]);
         let mut text = json.to_string().into_bytes();
         text.resize(text.len().next_multiple_of(4), b' ');
-        let length = |count: usize| (count as u32).to_le_bytes();
-        let head = [&b"glTF"[..], &length(2), &length(12 + 8 + text.len() + 8 + bytes.len())].concat();
+        let word = |count: usize| (count as u32).to_le_bytes();
+        let header = [&b"glTF"[..], &word(2), &word(12 + 8 + text.len() + 8 + bytes.len())].concat();
         [
-            &head,
-            &length(text.len())[..],
+            &header,
+            &word(text.len())[..],
             b"JSON",
             &text,
-            &length(bytes.len()),
+            &word(bytes.len()),
             b"BIN\0",
             &bytes,
         ]

@@ -1,5 +1,5 @@
-//! The mutations of `scripts/mutation/twins.toml` are applicable: each text to be replaced occurs in its shader or
-//! twin.
+//! The mutations of `scripts/mutation/twins.toml` are applicable: every text that a mutation replaces occurs in the
+//! shader or twin.
 
 use std::fs;
 
@@ -16,14 +16,14 @@ fn words(text: &str) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
-/// Returns the missing texts, and the number of all.
+/// Returns the missing texts, and the number of all texts.
 fn missing(table: &toml::Table, read: impl Fn(&str) -> String) -> (Vec<String>, usize) {
     let (mut missing, mut count) = (Vec::new(), 0);
-    for (file, mistakes) in table {
+    for (file, mutations) in table {
         let sources = ["wgsl", "rust"].map(|language| (language, code(&read(&format!("{file}.{language}")))));
-        for mistake in mistakes.as_array().unwrap() {
+        for mutation in mutations.as_array().unwrap() {
             for (language, source) in &sources {
-                let replacement = mistake.get(language).or_else(|| mistake.get("both")).unwrap();
+                let replacement = mutation.get(language).or_else(|| mutation.get("both")).unwrap();
                 let text = replacement[0].as_str().unwrap();
                 count += 1;
                 if !source.contains(&words(text)) {
@@ -59,9 +59,9 @@ fn a_missing_text_is_found() {
     let table = "[[a]]\nboth = ['x + y', 'x - y']\n[[a]]\nwgsl = ['p', 'q']\nrust = ['r', 's']"
         .parse()
         .unwrap();
-    let all = missing(&table, |name| match name {
+    let result = missing(&table, |name| match name {
         "a.wgsl" => "x +\n    y // p\np".to_owned(),
         _ => "x * y // x + y\nr #[cfg(test)] x + y".to_owned(),
     });
-    assert_eq!(all, (vec!["a.rust: x + y".to_owned()], 4));
+    assert_eq!(result, (vec!["a.rust: x + y".to_owned()], 4));
 }

@@ -1,34 +1,35 @@
-//! Image tolerances where identical bits are not guaranteed: relative pixel error, share of outliers on edges, and
-//! mean.
+//! Tolerances of images without guaranteed bits: relative error of pixels, fraction of outliers at edges, and error of
+//! the mean.
 
 use std::fmt;
 
 use wgray_render::film::Film;
 use wgray_render::records::Packed;
 
-/// Maximum error of a pixel, relative to its largest channel: in dark channels, patterns subtract nearly equal
-/// integrals.
+/// Maximum error of a pixel, relative to the largest channel of the pixel, because patterns subtract nearly equal
+/// integrals in dark channels.
 const RELATIVE: f64 = 1e-4;
 /// `RELATIVE` for scenes with textures on devices other than software Vulkan: a change of a coordinate by one ulp may
 /// span many texels.
 const TEXTURED: f64 = 1e-3;
-/// Maximum share of outliers, which occur at edges where a comparison flips.
+/// Maximum fraction of outliers, which occur at edges where a comparison flips.
 pub const EDGES: f64 = 1e-3;
-/// Image side in pixels below which `EDGES` is scaled up on such devices, because the number of pixels on edges is
-/// proportional to the side.
+/// Image side in pixels below which `EDGES` is scaled up on devices other than software Vulkan, because the number of
+/// pixels on edges is proportional to the side.
 const SIDE: f64 = 400.0;
-/// Maximum relative error of the mean. On such devices, images below `SIDE` ignore outliers.
+/// Maximum relative error of the mean. On devices other than software Vulkan, the mean of images below `SIDE` ignores
+/// outliers.
 const MEAN: f64 = 1e-5;
 
 /// Accumulated differences of GPU and CPU films.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Nearly {
     /// Non-finite pixels; must be 0.
-    no_numbers: usize,
-    /// Outliers, and their limit.
-    edges: usize,
-    budget: f64,
-    /// Sums of the compared pixels: GPU, CPU.
+    non_finite: usize,
+    /// The number of outliers, and the limit.
+    outliers: usize,
+    max_outliers: f64,
+    /// Sums of the compared pixels on the GPU and on the CPU.
     sums: [f64; 2],
 }
 
@@ -48,39 +49,42 @@ impl Nearly {
         Nearly::within(relative, SIDE, gpu, cpu)
     }
 
-    fn within(relative: f64, least_side: f64, gpu: &Film, cpu: &Film) -> Nearly {
+    fn within(relative: f64, min_side: f64, gpu: &Film, cpu: &Film) -> Nearly {
         let side = (cpu.sums.len() as f64).sqrt();
-        let mut all = Nearly {
-            budget: EDGES * side * side.max(least_side),
+        let mut result = Nearly {
+            max_outliers: EDGES * side * side.max(min_side),
             ..Nearly::default()
         };
         for (gpu, cpu) in gpu.sums.iter().zip(&cpu.sums) {
             let [a, b] = [gpu, cpu].map(|v| v.truncate().as_dvec3() / f64::from(v.w));
             let near = (a - b).abs().max_element() <= b.abs().max_element() * relative;
-            all.no_numbers += usize::from(!a.is_finite());
-            all.edges += usize::from(!near);
-            if near || side >= least_side {
-                all.sums[0] += a.element_sum();
-                all.sums[1] += b.element_sum();
+            result.non_finite += usize::from(!a.is_finite());
+            result.outliers += usize::from(!near);
+            if near || side >= min_side {
+                result.sums[0] += a.element_sum();
+                result.sums[1] += b.element_sum();
             }
         }
-        all
+        result
     }
 
     pub fn add(&mut self, other: Nearly) {
-        self.no_numbers += other.no_numbers;
-        self.edges += other.edges;
-        self.budget += other.budget;
+        self.non_finite += other.non_finite;
+        self.outliers += other.outliers;
+        self.max_outliers += other.max_outliers;
         self.sums[0] += other.sums[0];
         self.sums[1] += other.sums[1];
     }
 
     pub fn judge(&self) -> Result<(), String> {
-        if self.no_numbers > 0 {
-            return Err(format!("{} pixels are NaN or infinite", self.no_numbers));
+        if self.non_finite > 0 {
+            return Err(format!("{} pixels are NaN or infinite", self.non_finite));
         }
-        if self.edges as f64 > self.budget {
-            return Err(format!("{} pixels differ; the limit is {:.0}", self.edges, self.budget));
+        if self.outliers as f64 > self.max_outliers {
+            return Err(format!(
+                "{} pixels differ; the limit is {:.0}",
+                self.outliers, self.max_outliers
+            ));
         }
         if !(self.drift() <= MEAN) {
             return Err(format!("the mean differs by {:.1e}", self.drift()));
@@ -96,10 +100,10 @@ impl Nearly {
 
 impl fmt::Display for Nearly {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (edges, budget, drift) = (self.edges, self.budget, self.drift());
+        let (outliers, max_outliers, drift) = (self.outliers, self.max_outliers, self.drift());
         write!(
             f,
-            "{edges} pixels are outliers, the limit is {budget:.0}; the mean differs by {drift:.1e}"
+            "{outliers} pixels are outliers, the limit is {max_outliers:.0}; the mean differs by {drift:.1e}"
         )
     }
 }

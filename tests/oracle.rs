@@ -1,6 +1,6 @@
-//! Reference renderer in f64 from the scene description. It shares no code and no formula with the twins, so that it
-//! cannot share their errors: ellipsoids are quadrics, rectangles bounded planes, meshes triangle lists loaded here,
-//! and Phong is the formula of `docs/scene-format.md` with unit vectors.
+//! Reference renderer in f64 from the scene description. The oracle shares no code and no formula with the twins, and
+//! therefore none of their errors: ellipsoids are quadrics, rectangles bounded planes, meshes triangle lists loaded
+//! here, and Phong is the formula of `docs/scene-format.md` with unit vectors.
 
 use std::collections::HashMap;
 
@@ -19,21 +19,21 @@ use crate::sources;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Flaw {
     None,
-    /// Diffuse term without n.l.
+    /// The diffuse term lacks n.l.
     MissingCosine,
     SwappedAxes,
     ShiftedPixel,
-    /// Samples at the corners of their cells.
+    /// Samples are at the corners of their cells.
     CornerSamples,
     NoShadows,
-    /// Too low by one.
+    /// The specular exponent is too low by 1.
     Exponent,
-    /// Indices of refraction swapped.
+    /// The indices of refraction are swapped.
     InvertedIndex,
     TransposedTexture,
-    /// Flat-shaded meshes.
-    Facets,
-    /// Without the inverse transpose.
+    /// Meshes are flat-shaded.
+    FlatShading,
+    /// Normals of meshes are transformed without the inverse transpose.
     StretchedNormals,
 }
 
@@ -67,7 +67,8 @@ enum Form {
     },
     /// Blocks of 32 triangles with their bounding boxes.
     Mesh(Vec<(DVec3, DVec3, Vec<Facet>)>),
-    /// `half`: the half extents; `None` for an infinite plane. If `round`, a disk of radius `half.x`.
+    /// A rectangle with half extents `half`, an infinite plane if `half` is `None`, or, if `round`, a disk of radius
+    /// `half.x`.
     Flat {
         center: DVec3,
         tangent: DVec3,
@@ -82,23 +83,23 @@ enum Form {
 struct Facet {
     corners: [DVec3; 3],
     uvs: [DVec2; 3],
-    /// At the vertices.
+    /// Vertex normals; `None` for flat shading.
     normals: Option<[DVec3; 3]>,
-    /// Outward.
+    /// The outward geometric normal.
     normal: DVec3,
 }
 
-pub struct Meeting {
+pub struct Intersection {
     pub t: f64,
     pub shape: usize,
-    /// Outward.
+    /// The outward geometric normal.
     pub normal: DVec3,
     pub uv: DVec2,
-    /// Outward.
-    pub shading: DVec3,
-    /// Shadow-terminator offsets outside and inside.
-    bulges: [DVec3; 2],
-    /// The mesh triangle.
+    /// The outward shading normal.
+    pub shading_normal: DVec3,
+    /// Shadow-terminator offsets on the outside and on the inside.
+    terminator_offsets: [DVec3; 2],
+    /// The corners of the triangle on a mesh.
     corners: Option<[DVec3; 3]>,
     solid: usize,
 }
@@ -141,7 +142,7 @@ impl<'a> Oracle<'a> {
         Oracle { scene, solids, flaw }
     }
 
-    /// Renders all pixels with samples at the cell centers of square grids, whatever the pattern.
+    /// Renders all pixels. For every pattern, samples are at the cell centers of square grids.
     pub fn picture(&self) -> Vec<[f64; 3]> {
         let pixels = self.scene.image.width * self.scene.image.height;
         (0..pixels).into_par_iter().map(|i| self.pixel(i)).collect()
@@ -150,17 +151,17 @@ impl<'a> Oracle<'a> {
     /// Renders pixel `i` in row-major order, top row first.
     pub fn pixel(&self, i: u32) -> [f64; 3] {
         let width = self.scene.image.width;
-        let places = self.grid(self.scene.render.pixel_samples.count);
+        let samples = self.grid(self.scene.render.pixel_samples.count);
         let corner = DVec2::new(f64::from(i % width), f64::from(i / width));
-        let sum: DVec3 = places
+        let sum: DVec3 = samples
             .iter()
-            .map(|place| self.radiance(self.camera_ray(corner + *place), 0))
+            .map(|offset| self.radiance(self.camera_ray(corner + *offset), 0))
             .sum();
-        (sum / places.len() as f64).to_array()
+        (sum / samples.len() as f64).to_array()
     }
 
     /// Returns the hits through the pixel centers.
-    pub fn meetings(&self) -> Vec<Option<Meeting>> {
+    pub fn intersections(&self) -> Vec<Option<Intersection>> {
         let (width, height) = (self.scene.image.width, self.scene.image.height);
         let pixel = |i: u32| {
             let center = DVec2::new(f64::from(i % width) + 0.5, f64::from(i / width) + 0.5);
@@ -174,12 +175,12 @@ impl<'a> Oracle<'a> {
         let side = f64::from(count).sqrt().round() as u32;
         assert_eq!(side * side, count, "the oracle only supports square sample grids");
         let offset = if self.flaw == Flaw::CornerSamples { 0.0 } else { 0.5 };
-        let place = |i: u32| (DVec2::new(f64::from(i % side), f64::from(i / side)) + offset) / f64::from(side);
-        (0..count).map(place).collect()
+        let cell_point = |i: u32| (DVec2::new(f64::from(i % side), f64::from(i / side)) + offset) / f64::from(side);
+        (0..count).map(cell_point).collect()
     }
 
     /// Returns the ray through a point in pixels, relative to the top-left corner. The image plane is at distance 1.
-    fn camera_ray(&self, at: DVec2) -> (DVec3, DVec3) {
+    fn camera_ray(&self, point: DVec2) -> (DVec3, DVec3) {
         let (width, height) = (f64::from(self.scene.image.width), f64::from(self.scene.image.height));
         let basis = |position: DVec3, look_at: DVec3, up: DVec3| {
             let forward = (look_at - position).normalize();
@@ -187,30 +188,33 @@ impl<'a> Oracle<'a> {
             (forward, right, right.cross(forward))
         };
         let column = if self.flaw == Flaw::ShiftedPixel {
-            at.x - 1.0
+            point.x - 1.0
         } else {
-            at.x
+            point.x
         };
-        let (to_right, to_top) = (column - width / 2.0, height / 2.0 - at.y);
+        let (right_offset, top_offset) = (column - width / 2.0, height / 2.0 - point.y);
         match &self.scene.camera {
             CameraDescription::Perspective(c) => {
                 let (forward, right, up) = basis(c.position, c.look_at, c.up);
                 let pixel = 2.0 * (c.fov.to_radians() / 2.0).tan() / height;
                 (
                     c.position,
-                    (forward + right * (to_right * pixel) + up * (to_top * pixel)).normalize(),
+                    (forward + right * (right_offset * pixel) + up * (top_offset * pixel)).normalize(),
                 )
             }
             CameraDescription::Orthographic(c) => {
                 let (forward, right, up) = basis(c.position, c.look_at, c.up);
                 let pixel = c.height / height;
-                (c.position + right * (to_right * pixel) + up * (to_top * pixel), forward)
+                (
+                    c.position + right * (right_offset * pixel) + up * (top_offset * pixel),
+                    forward,
+                )
             }
             other => panic!("the oracle does not support the camera {other:?}"),
         }
     }
 
-    fn nearest(&self, origin: DVec3, direction: DVec3) -> Option<Meeting> {
+    fn nearest(&self, origin: DVec3, direction: DVec3) -> Option<Intersection> {
         let mut nearest: Option<(f64, usize, Option<&Facet>)> = None;
         for (i, solid) in self.solids.iter().enumerate() {
             for (t, facet) in crossings(&solid.form, origin, direction) {
@@ -223,21 +227,21 @@ impl<'a> Oracle<'a> {
         let shape = self.solids[i].shape;
         let point = origin + direction * t;
         if let Some(facet) = facet {
-            return Some(Meeting {
+            return Some(Intersection {
                 t,
                 shape,
                 solid: i,
-                ..facet.meeting(point, self.flaw)
+                ..facet.intersection(point, self.flaw)
             });
         }
-        let (normal, uv) = facing(&self.solids[i].form, point);
-        Some(Meeting {
+        let (normal, uv) = normal_and_uv(&self.solids[i].form, point);
+        Some(Intersection {
             t,
             shape,
             normal,
             uv,
-            shading: normal,
-            bulges: [DVec3::ZERO; 2],
+            shading_normal: normal,
+            terminator_offsets: [DVec3::ZERO; 2],
             corners: None,
             solid: i,
         })
@@ -246,84 +250,94 @@ impl<'a> Oracle<'a> {
     /// Returns the radiance along a ray after `bounces` specular bounces.
     fn radiance(&self, (origin, direction): (DVec3, DVec3), bounces: u32) -> DVec3 {
         let render = &self.scene.render;
-        let Some(meeting) = self.nearest(origin, direction) else {
+        let Some(intersection) = self.nearest(origin, direction) else {
             return render.background;
         };
-        let Some(material) = &self.solids[meeting.solid].material else {
+        let Some(material) = &self.solids[intersection.solid].material else {
             let shapes = self.scene.shapes.len() + self.scene.instances.len();
-            return light_color(&self.scene.lights[meeting.shape - shapes]);
+            return light_color(&self.scene.lights[intersection.shape - shapes]);
         };
-        let point = origin + direction * meeting.t;
-        let facing = meeting.normal.dot(direction) < 0.0;
-        let normal = if facing { meeting.normal } else { -meeting.normal };
-        let shading = if facing { meeting.shading } else { -meeting.shading };
+        let point = origin + direction * intersection.t;
+        let is_front = intersection.normal.dot(direction) < 0.0;
+        let normal = if is_front {
+            intersection.normal
+        } else {
+            -intersection.normal
+        };
+        let shading_normal = if is_front {
+            intersection.shading_normal
+        } else {
+            -intersection.shading_normal
+        };
         // Minimum offset of ray origins, relative to the largest coordinate; 1e-9 suffices in f64.
-        let offset = normal * (render.shadow_epsilon.max(1e-9) * point.abs().max_element().max(meeting.t));
+        let offset = normal * (render.shadow_epsilon.max(1e-9) * point.abs().max_element().max(intersection.t));
         let follow = |origin: DVec3, direction: DVec3| self.radiance((origin, direction), bounces + 1);
         match &self.scene.materials[material] {
             MaterialDescription::Phong(phong) => {
-                let above = point + offset + meeting.bulges[usize::from(!facing)];
-                self.direct(phong, &meeting, shading, point, above, -direction)
+                let shadow_origin = point + offset + intersection.terminator_offsets[usize::from(!is_front)];
+                self.direct(phong, &intersection, shading_normal, point, shadow_origin, -direction)
             }
             _ if bounces == render.max_depth => render.background,
             MaterialDescription::Mirror(mirror) => {
                 assert!(mirror.normal_map.is_none(), "the oracle does not support normal maps");
-                // For a reflection below the surface.
-                let mirrored = direction.reflect(shading);
-                let is_usable = mirrored.dot(normal) > 0.0 && shading.dot(direction) < 0.0;
+                // A reflection below the surface uses the geometric normal.
+                let mirrored = direction.reflect(shading_normal);
+                let is_usable = mirrored.dot(normal) > 0.0 && shading_normal.dot(direction) < 0.0;
                 let mirrored = if is_usable { mirrored } else { direction.reflect(normal) };
-                self.color(&mirror.tint, meeting.uv) * follow(point + offset, mirrored)
+                self.color(&mirror.tint, intersection.uv) * follow(point + offset, mirrored)
             }
             MaterialDescription::Glass(glass) => {
                 assert!(glass.normal_map.is_none(), "the oracle does not support normal maps");
-                let outside_in = facing != (self.flaw == Flaw::InvertedIndex);
+                let outside_in = is_front != (self.flaw == Flaw::InvertedIndex);
                 let (n1, n2) = if outside_in { (1.0, glass.ior) } else { (glass.ior, 1.0) };
                 let reflected = follow(point + offset, direction.reflect(normal));
-                // Snell's law by sines, in the plane of incidence
-                let along = direction - normal * direction.dot(normal);
-                let sine = along.length() * n1 / n2;
+                // Snell's law in sines, in the plane of incidence
+                let tangential = direction - normal * direction.dot(normal);
+                let sine = tangential.length() * n1 / n2;
                 if sine >= 1.0 {
                     return reflected;
                 }
                 let (cosine1, cosine2) = (-direction.dot(normal), (1.0 - sine * sine).sqrt());
-                let refracted = along * (n1 / n2) - normal * cosine2;
+                let refracted = tangential * (n1 / n2) - normal * cosine2;
                 // Fresnel's equations with both indices: Hecht, "Optics", 4.6.2
                 let perpendicular = (n1 * cosine1 - n2 * cosine2) / (n1 * cosine1 + n2 * cosine2);
                 let parallel = (n2 * cosine1 - n1 * cosine2) / (n2 * cosine1 + n1 * cosine2);
                 let share = (perpendicular.powi(2) + parallel.powi(2)) / 2.0;
-                let through = self.color(&glass.tint, meeting.uv) * follow(point - offset, refracted);
-                reflected * share + through * (1.0 - share)
+                let transmitted = self.color(&glass.tint, intersection.uv) * follow(point - offset, refracted);
+                reflected * share + transmitted * (1.0 - share)
             }
             other => panic!("the oracle does not support the material {other:?}"),
         }
     }
 
-    /// Returns direct and ambient light; `above` is the origin of the shadow rays.
+    /// Returns direct and ambient light; `shadow_origin` is the origin of the shadow rays.
     fn direct(
         &self,
         phong: &PhongDescription,
-        meeting: &Meeting,
-        shading: DVec3,
+        intersection: &Intersection,
+        shading_normal: DVec3,
         point: DVec3,
-        above: DVec3,
+        shadow_origin: DVec3,
         viewer: DVec3,
     ) -> DVec3 {
         assert!(phong.normal_map.is_none(), "the oracle does not support normal maps");
-        let factor = |own: &Option<ColorDescription>| {
-            let color = own.as_ref().or(phong.color.as_ref()).expect("a checked material");
-            self.color(color, meeting.uv)
+        let factor = |specific: &Option<ColorDescription>| {
+            let color = specific.as_ref().or(phong.color.as_ref()).expect("a valid material");
+            self.color(color, intersection.uv)
         };
         let (diffuse, specular) = (factor(&phong.diffuse), factor(&phong.specular));
         let mut sum = self.scene.render.ambient * factor(&phong.ambient);
         for light in &self.scene.lights {
             let samples = self.samples(light, point);
             for (to_light, distance) in &samples {
-                // Above the triangle but below the shading horizon.
-                if shading.dot(*to_light) <= 0.0 {
+                // The light may be above the triangle but below the shading horizon.
+                if shading_normal.dot(*to_light) <= 0.0 {
                     continue;
                 }
-                let reflected = self.reflected(diffuse, specular, phong.shininess, shading, viewer, *to_light);
-                if self.flaw == Flaw::NoShadows || !self.hidden(above, *to_light, *distance, meeting.corners) {
+                let reflected = self.reflected(diffuse, specular, phong.shininess, shading_normal, viewer, *to_light);
+                if self.flaw == Flaw::NoShadows
+                    || !self.is_occluded(shadow_origin, *to_light, *distance, intersection.corners)
+                {
                     sum += light_color(light) * reflected / samples.len() as f64;
                 }
             }
@@ -342,20 +356,20 @@ impl<'a> Oracle<'a> {
         } else {
             uv
         };
-        let place = |scale: [f64; 2], rotate: f64, offset: [f64; 2]| {
-            let turned = DVec2::from_angle(rotate.to_radians()).rotate(DVec2::from_array(scale) * uv);
-            turned + DVec2::from_array(offset)
+        let texture_point = |scale: [f64; 2], rotate: f64, offset: [f64; 2]| {
+            let rotated = DVec2::from_angle(rotate.to_radians()).rotate(DVec2::from_array(scale) * uv);
+            rotated + DVec2::from_array(offset)
         };
         match &self.scene.textures[name] {
             TextureDescription::Constant(texture) => texture.color,
             TextureDescription::Checker(texture) => {
-                let square = place(texture.scale, texture.rotate, texture.offset).floor();
+                let square = texture_point(texture.scale, texture.rotate, texture.offset).floor();
                 let even = (square.x + square.y).rem_euclid(2.0) == 0.0;
                 if even { texture.even } else { texture.odd }
             }
             TextureDescription::Lines(texture) => {
-                let at = place(texture.scale, texture.rotate, texture.offset);
-                let on_line = (at - at.round()).abs().min_element() < texture.line_width / 2.0;
+                let point = texture_point(texture.scale, texture.rotate, texture.offset);
+                let on_line = (point - point.round()).abs().min_element() < texture.line_width / 2.0;
                 if on_line { texture.line } else { texture.cell }
             }
             other => panic!("the oracle does not support the texture {other:?}"),
@@ -386,40 +400,45 @@ impl<'a> Oracle<'a> {
         diffuse * if self.flaw == Flaw::MissingCosine { 1.0 } else { cosine } + specular * highlight
     }
 
-    fn samples(&self, light: &LightDescription, from: DVec3) -> Vec<(DVec3, f64)> {
-        let way = |to: DVec3| ((to - from).normalize(), (to - from).length());
+    fn samples(&self, light: &LightDescription, point: DVec3) -> Vec<(DVec3, f64)> {
+        let direction_and_distance = |target: DVec3| ((target - point).normalize(), (target - point).length());
         match light {
             LightDescription::Rectangle(light) => {
                 let (tangent, bitangent) = frame(light.normal, tangent(light.normal, light.tangent));
                 let [width, height] = sizes(light.size, self.flaw);
-                let place =
-                    |at: DVec2| light.center + tangent * (width * (at.x - 0.5)) + bitangent * (height * (at.y - 0.5));
+                let light_point = |square_point: DVec2| {
+                    light.center
+                        + tangent * (width * (square_point.x - 0.5))
+                        + bitangent * (height * (square_point.y - 0.5))
+                };
                 self.grid(self.scene.render.light_samples.count)
                     .into_iter()
-                    .map(|at| way(place(at)))
+                    .map(|square_point| direction_and_distance(light_point(square_point)))
                     .collect()
             }
-            LightDescription::Point(light) => vec![way(light.position)],
+            LightDescription::Point(light) => vec![direction_and_distance(light.position)],
             LightDescription::Directional(light) => vec![(-light.direction.normalize(), f64::INFINITY)],
             other => panic!("the oracle does not support the light {other:?}"),
         }
     }
 
-    /// Returns true if a shape except the triangle `own` occludes; lights do not.
-    fn hidden(&self, from: DVec3, direction: DVec3, distance: f64, own: Option<[DVec3; 3]>) -> bool {
-        let end = distance * (1.0 - self.scene.render.shadow_epsilon.max(1e-5));
+    /// Returns true if a shape other than the mesh triangle `excluded` occludes the ray. Lights do not occlude.
+    fn is_occluded(&self, origin: DVec3, direction: DVec3, distance: f64, excluded: Option<[DVec3; 3]>) -> bool {
+        let max_t = distance * (1.0 - self.scene.render.shadow_epsilon.max(1e-5));
         let transparent = self.scene.render.shadows == Shadows::Transparent;
         let glass = |name: &String| matches!(self.scene.materials[name], MaterialDescription::Glass(_));
-        let blocks = |solid: &&Solid| {
+        let occludes = |solid: &&Solid| {
             solid
                 .material
                 .as_ref()
                 .is_some_and(|name| !(transparent && glass(name)))
         };
-        let shapes = self.solids.iter().filter(blocks);
+        let shapes = self.solids.iter().filter(occludes);
         shapes
-            .flat_map(|solid| crossings(&solid.form, from, direction))
-            .any(|(t, facet)| t > 0.0 && t < end && (own.is_none() || own != facet.map(|facet| facet.corners)))
+            .flat_map(|solid| crossings(&solid.form, origin, direction))
+            .any(|(t, facet)| {
+                t > 0.0 && t < max_t && (excluded.is_none() || excluded != facet.map(|facet| facet.corners))
+            })
     }
 }
 
@@ -458,10 +477,10 @@ fn flat(center: DVec3, normal: DVec3, tangent: DVec3, size: Option<[f64; 2]>, fl
     }
 }
 
-/// Returns the direction of u: `own`, else x, or y if x is nearly the normal.
-fn tangent(normal: DVec3, own: Option<DVec3>) -> DVec3 {
-    let across = normal.normalize().x.abs() >= 0.9;
-    own.unwrap_or(if across { DVec3::Y } else { DVec3::X })
+/// Returns the direction of u: `explicit` if set, else x, or y if x is nearly parallel to the normal.
+fn tangent(normal: DVec3, explicit: Option<DVec3>) -> DVec3 {
+    let x_is_normal = normal.normalize().x.abs() >= 0.9;
+    explicit.unwrap_or(if x_is_normal { DVec3::Y } else { DVec3::X })
 }
 
 fn disk(d: &DiskDescription) -> Form {
@@ -545,7 +564,7 @@ fn forms(shape: &ShapeDescription, flaw: Flaw) -> (String, Vec<Form>) {
 fn mesh(i: &InstanceDescription, file: &MeshFileDescription, flaw: Flaw) -> Form {
     assert!(
         i.matrix.is_none() && i.materials.is_empty() && file.up == Up::Z,
-        "the oracle does not support such meshes"
+        "the oracle supports only meshes with z up, without matrix and without materials of groups"
     );
     let scale = match i.scale {
         None => DVec3::ONE,
@@ -553,17 +572,17 @@ fn mesh(i: &InstanceDescription, file: &MeshFileDescription, flaw: Flaw) -> Form
         Some(Scale::Each(s)) => s,
     };
     // Rodrigues' rotation formula.
-    let turned = |v: DVec3, axis: DVec3, degrees: f64| {
+    let rotate = |v: DVec3, axis: DVec3, degrees: f64| {
         let (sine, cosine) = degrees.to_radians().sin_cos();
         v * cosine + axis.cross(v) * sine + axis * (axis.dot(v) * (1.0 - cosine))
     };
     let rotated = |v: DVec3| match &i.rotate {
         None => v,
-        Some(Rotation::Angles(a)) => turned(turned(turned(v, DVec3::X, a.x), DVec3::Y, a.y), DVec3::Z, a.z),
-        Some(Rotation::About(about)) => turned(v, about.axis.normalize(), about.degrees),
+        Some(Rotation::Angles(a)) => rotate(rotate(rotate(v, DVec3::X, a.x), DVec3::Y, a.y), DVec3::Z, a.z),
+        Some(Rotation::About(about)) => rotate(v, about.axis.normalize(), about.degrees),
     };
-    let place = |p: DVec3| rotated(p * scale) + i.translate.unwrap_or_default();
-    let upright = |n: DVec3| match flaw {
+    let to_world = |p: DVec3| rotated(p * scale) + i.translate.unwrap_or_default();
+    let normal_to_world = |n: DVec3| match flaw {
         Flaw::StretchedNormals => rotated(n * scale).normalize(),
         _ => rotated(n / scale).normalize(),
     };
@@ -587,13 +606,16 @@ fn mesh(i: &InstanceDescription, file: &MeshFileDescription, flaw: Flaw) -> Form
                 let corners = [polygon[0], polygon[i - 1], polygon[i]];
                 let [p, t, n] =
                     [0, 1, 2].map(|part| corners.map(|corner| lists[["v", "vt", "vn"][part]][corner[part] - 1]));
-                let at = p.map(place);
+                let positions = p.map(to_world);
                 let mirrored = (scale.x * scale.y * scale.z).signum();
                 facets.push(Facet {
-                    corners: at,
+                    corners: positions,
                     uvs: t.map(|uv| uv.truncate()),
-                    normals: (file.normals != Some(Normals::Flat)).then(|| n.map(upright)),
-                    normal: (at[1] - at[0]).cross(at[2] - at[1]).normalize() * mirrored,
+                    normals: (file.normals != Some(Normals::Flat)).then(|| n.map(normal_to_world)),
+                    normal: (positions[1] - positions[0])
+                        .cross(positions[2] - positions[1])
+                        .normalize()
+                        * mirrored,
                 });
             }
         } else if ["v", "vt", "vn"].contains(&tag) {
@@ -605,30 +627,30 @@ fn mesh(i: &InstanceDescription, file: &MeshFileDescription, flaw: Flaw) -> Form
                 .push(DVec3::new(numbers[0], numbers[1], third));
         }
     }
-    let around = |facets: &[Facet]| {
+    let with_bounds = |facets: &[Facet]| {
         let points = || facets.iter().flat_map(|facet| facet.corners);
         let low = points().fold(DVec3::INFINITY, DVec3::min);
         (low, points().fold(DVec3::NEG_INFINITY, DVec3::max), facets.to_vec())
     };
-    Form::Mesh(facets.chunks(32).map(around).collect())
+    Form::Mesh(facets.chunks(32).map(with_bounds).collect())
 }
 
 impl Facet {
     /// Returns the hit at a point; the caller sets `t`, `shape` and `solid`.
-    fn meeting(&self, point: DVec3, flaw: Flaw) -> Meeting {
+    fn intersection(&self, point: DVec3, flaw: Flaw) -> Intersection {
         let [a, b, c] = self.corners;
         // Barycentric coordinates as area ratios.
-        let across = (b - a).cross(c - a);
-        let area = |p: DVec3, q: DVec3| (p - point).cross(q - point).dot(across) / across.length_squared();
+        let normal = (b - a).cross(c - a);
+        let area = |p: DVec3, q: DVec3| (p - point).cross(q - point).dot(normal) / normal.length_squared();
         let weights = [area(b, c), area(c, a), area(a, b)];
         let uv = (0..3).map(|i| self.uvs[i] * weights[i]).sum();
-        let (mut shading, mut bulges) = (self.normal, [DVec3::ZERO; 2]);
-        if let Some(normals) = self.normals.filter(|_| flaw != Flaw::Facets) {
+        let (mut shading_normal, mut terminator_offsets) = (self.normal, [DVec3::ZERO; 2]);
+        if let Some(normals) = self.normals.filter(|_| flaw != Flaw::FlatShading) {
             let smooth: DVec3 = (0..3).map(|i| normals[i] * weights[i]).sum();
-            shading = smooth.normalize() * smooth.dot(self.normal).signum();
+            shading_normal = smooth.normalize() * smooth.dot(self.normal).signum();
             // Offset to the tangent planes of the vertices above the triangle: Hanika, "Hacking the Shadow Terminator",
             // 2021.
-            bulges = [1.0, -1.0].map(|side| {
+            terminator_offsets = [1.0, -1.0].map(|side| {
                 let lifted = |i: usize| {
                     let n = normals[i] * side;
                     point - n * (point - self.corners[i]).dot(n).min(0.0)
@@ -636,20 +658,20 @@ impl Facet {
                 (0..3).map(|i| lifted(i) * weights[i]).sum::<DVec3>() - point
             });
         }
-        Meeting {
+        Intersection {
             t: 0.0,
             shape: 0,
             normal: self.normal,
             uv,
-            shading,
-            bulges,
+            shading_normal,
+            terminator_offsets,
             corners: Some(self.corners),
             solid: 0,
         }
     }
 }
 
-fn passes(low: DVec3, high: DVec3, origin: DVec3, direction: DVec3) -> bool {
+fn hits_box(low: DVec3, high: DVec3, origin: DVec3, direction: DVec3) -> bool {
     let (a, b) = ((low - origin) / direction, (high - origin) / direction);
     let (near, far) = (a.min(b).max_element(), a.max(b).min_element());
     let margin = 1e-9 * (1.0 + near.abs());
@@ -657,16 +679,16 @@ fn passes(low: DVec3, high: DVec3, origin: DVec3, direction: DVec3) -> bool {
     !(near > far + margin || far < -margin)
 }
 
-/// Returns the distances of all crossings, and the mesh triangles.
+/// Returns the distance of each crossing, with the triangle if the form is a mesh.
 fn crossings(form: &Form, origin: DVec3, direction: DVec3) -> Vec<(f64, Option<&Facet>)> {
     if let Form::Mesh(parts) = form {
         let parts = parts
             .iter()
-            .filter(|(low, high, _)| passes(*low, *high, origin, direction));
+            .filter(|(low, high, _)| hits_box(*low, *high, origin, direction));
         let facets = parts.flat_map(|(.., facets)| facets);
-        let met =
+        let hits =
             facets.filter_map(|facet| triangle_crossing(&facet.corners, origin, direction).map(|t| (t, Some(facet))));
-        return met.collect();
+        return hits.collect();
     }
     distances(form, origin, direction)
         .into_iter()
@@ -703,16 +725,17 @@ fn distances(form: &Form, origin: DVec3, direction: DVec3) -> Vec<f64> {
         Form::Side {
             start, axis, radius, ..
         } => {
-            // A quadratic equation for the distance from the axis.
+            // The quadratic equation of the distance from the axis.
             let unit = axis.normalize();
-            let across = |v: DVec3| v - unit * v.dot(unit);
-            let (o, d) = (across(origin - *start), across(direction));
+            let perpendicular = |v: DVec3| v - unit * v.dot(unit);
+            let (o, d) = (perpendicular(origin - *start), perpendicular(direction));
             let (a, b, c) = (d.dot(d), 2.0 * d.dot(o), o.dot(o) - radius * radius);
             let root = (b * b - 4.0 * a * c).sqrt();
-            let along = |t: f64| (origin + direction * t - *start).dot(unit);
-            let both = [(-b - root) / (2.0 * a), (-b + root) / (2.0 * a)];
-            both.into_iter()
-                .filter(|t| (0.0..=axis.length()).contains(&along(*t)))
+            let axial = |t: f64| (origin + direction * t - *start).dot(unit);
+            let roots = [(-b - root) / (2.0 * a), (-b + root) / (2.0 * a)];
+            roots
+                .into_iter()
+                .filter(|t| (0.0..=axis.length()).contains(&axial(*t)))
                 .collect()
         }
         Form::Triangle(corners) => triangle_crossing(corners, origin, direction).into_iter().collect(),
@@ -725,19 +748,19 @@ fn distances(form: &Form, origin: DVec3, direction: DVec3) -> Vec<f64> {
         } => {
             let normal = tangent.cross(*bitangent);
             let t = (*center - origin).dot(normal) / direction.dot(normal);
-            let place = origin + direction * t - *center;
+            let offset = origin + direction * t - *center;
             let inside = half.is_none_or(|half| match round {
-                true => place.length() <= half.x,
-                false => place.dot(*tangent).abs() <= half.x && place.dot(*bitangent).abs() <= half.y,
+                true => offset.length() <= half.x,
+                false => offset.dot(*tangent).abs() <= half.x && offset.dot(*bitangent).abs() <= half.y,
             });
             if inside && t.is_finite() { vec![t] } else { Vec::new() }
         }
     }
 }
 
-fn facing(form: &Form, point: DVec3) -> (DVec3, DVec2) {
+fn normal_and_uv(form: &Form, point: DVec3) -> (DVec3, DVec2) {
     match form {
-        Form::Mesh(_) => unreachable!("a mesh's triangle knows what it is like"),
+        Form::Mesh(_) => unreachable!("mesh triangles have their own function"),
         Form::Quadric { q, from_local } => {
             let gradient = *q * point.extend(1.0);
             let local = from_local.inverse().transform_point3(point);
@@ -761,10 +784,10 @@ fn facing(form: &Form, point: DVec3) -> (DVec3, DVec2) {
         Form::Triangle([v0, v1, v2]) => {
             let normal = (*v1 - *v0).cross(*v2 - *v1);
             let area = |a: DVec3, b: DVec3, c: DVec3| (b - a).cross(c - b).dot(normal);
-            let whole = area(*v0, *v1, *v2);
+            let total_area = area(*v0, *v1, *v2);
             (
                 normal.normalize(),
-                DVec2::new(area(*v0, point, *v2), area(*v0, *v1, point)) / whole,
+                DVec2::new(area(*v0, point, *v2), area(*v0, *v1, point)) / total_area,
             )
         }
         Form::Flat {
@@ -774,8 +797,8 @@ fn facing(form: &Form, point: DVec3) -> (DVec3, DVec2) {
             half,
             ..
         } => {
-            let place = DVec2::new((point - *center).dot(*tangent), (point - *center).dot(*bitangent));
-            let uv = half.map_or(place, |half| place / (2.0 * half) + 0.5);
+            let offset = DVec2::new((point - *center).dot(*tangent), (point - *center).dot(*bitangent));
+            let uv = half.map_or(offset, |half| offset / (2.0 * half) + 0.5);
             (tangent.cross(*bitangent), uv)
         }
     }

@@ -39,7 +39,7 @@ fn spheres(directions: &[DVec3], radius: f64) -> Packed {
     ))
 }
 
-/// Returns a direction; degrees to the right and above the horizon.
+/// Returns the direction `east` degrees to the right of the view direction and `north` degrees above the horizon.
 fn direction(east: f64, north: f64) -> DVec3 {
     let (east, north) = (east.to_radians(), north.to_radians());
     DVec3::new(east.sin() * north.cos(), east.cos() * north.cos(), north.sin())
@@ -49,7 +49,7 @@ fn direction(east: f64, north: f64) -> DVec3 {
 fn directions_match_the_mapping() {
     let packed = spheres(&[], 1.0);
     let (w, h) = (WIDTH as f32, HEIGHT as f32);
-    for (at, expected) in [
+    for (point, expected) in [
         ((0.5, 0.5), Vec3::Y),
         ((0.0, 0.5), Vec3::NEG_Y),
         ((1.0, 0.5), Vec3::NEG_Y),
@@ -59,12 +59,12 @@ fn directions_match_the_mapping() {
         ((0.1, 0.0), Vec3::Z),
         ((0.5, 1.0), Vec3::NEG_Z),
         ((0.5, 0.25), Vec3::new(0.0, 0.5_f32.sqrt(), 0.5_f32.sqrt())),
-        ((0.5, -0.25), Vec3::new(0.0, -(0.5_f32.sqrt()), 0.5_f32.sqrt())), // a filter extends beyond the pole
-        ((1.25, 0.5), Vec3::NEG_X),                                        // and beyond the seam
+        ((0.5, -0.25), Vec3::new(0.0, -(0.5_f32.sqrt()), 0.5_f32.sqrt())), // filter support beyond the pole
+        ((1.25, 0.5), Vec3::NEG_X),                                        // filter support beyond the seam
     ] {
-        let ray = panorama_ray(&packed.camera, Vec2::new(at.0 * w, at.1 * h));
+        let ray = panorama_ray(&packed.camera, Vec2::new(point.0 * w, point.1 * h));
         assert_eq!(ray.origin, packed.camera.position);
-        assert!(ray.direction.distance(expected) < 1e-6, "{at:?}: {}", ray.direction);
+        assert!(ray.direction.distance(expected) < 1e-6, "{point:?}: {}", ray.direction);
         assert!((ray.direction.length() - 1.0).abs() < 1e-6);
     }
 }
@@ -73,37 +73,46 @@ fn directions_match_the_mapping() {
 fn spheres_appear_at_their_direction_with_their_solid_angle() {
     // Center, seam, general position, pole, near the pole.
     for (east, north) in [(0.0, 0.0), (180.0, 0.0), (77.0, -31.0), (0.0, 90.0), (33.0, -86.0)] {
-        let to = direction(east, north);
-        let packed = spheres(&[to], 3.0);
-        for way in both() {
-            let hits = first_hits(&packed, way);
-            let picture = means(&render(&packed, way));
-            let mut found = 0.0;
+        let sphere_direction = direction(east, north);
+        let packed = spheres(&[sphere_direction], 3.0);
+        for mode in both() {
+            let hits = first_hits(&packed, mode);
+            let picture = means(&render(&packed, mode));
+            let mut solid_angle = 0.0;
             for (i, (hit, mean)) in hits.iter().zip(&picture).enumerate() {
                 let (x, y) = (i as u32 % WIDTH, i as u32 / WIDTH);
                 let center = direction(
                     (f64::from(x) + 0.5) * 360.0 / f64::from(WIDTH) - 180.0,
                     90.0 - (f64::from(y) + 0.5) * 180.0 / f64::from(HEIGHT),
                 );
-                let sine = center.cross(to).length();
+                let sine = center.cross(sphere_direction).length();
                 if (sine - 0.3).abs() > 1e-5 {
-                    let seen = sine < 0.3 && center.dot(to) > 0.0;
-                    assert_eq!(hit.shape != NO_INDEX, seen, "{way:?} {east} {north}: pixel {x}, {y}");
+                    let is_covered = sine < 0.3 && center.dot(sphere_direction) > 0.0;
+                    assert_eq!(
+                        hit.shape != NO_INDEX,
+                        is_covered,
+                        "{mode:?} {east} {north}: pixel {x}, {y}"
+                    );
                 }
                 if hit.shape != NO_INDEX {
-                    // Depth along the ray, to the nearer side.
-                    let along = 10.0 * (center.dot(to) - (center.dot(to).powi(2) - 1.0 + 0.09).sqrt());
-                    assert!((f64::from(hit.depth) - along).abs() < 1e-3, "{} {along}", hit.depth);
+                    // The depth is the distance along the ray to the nearer side.
+                    let distance = 10.0
+                        * (center.dot(sphere_direction) - (center.dot(sphere_direction).powi(2) - 1.0 + 0.09).sqrt());
+                    assert!(
+                        (f64::from(hit.depth) - distance).abs() < 1e-3,
+                        "{} {distance}",
+                        hit.depth
+                    );
                 }
                 let turn = std::f64::consts::TAU / f64::from(WIDTH);
-                let edge = |row: u32| (f64::from(row) * std::f64::consts::PI / f64::from(HEIGHT)).cos();
-                found += mean[0] * turn * (edge(y) - edge(y + 1));
+                let row_cosine = |row: u32| (f64::from(row) * std::f64::consts::PI / f64::from(HEIGHT)).cos();
+                solid_angle += mean[0] * turn * (row_cosine(y) - row_cosine(y + 1));
             }
-            let angle = std::f64::consts::TAU * (1.0 - (1.0 - 0.09_f64).sqrt());
-            // Includes the variation within rows near a pole.
+            let expected = std::f64::consts::TAU * (1.0 - (1.0 - 0.09_f64).sqrt());
+            // The tolerance includes the variation within rows near a pole.
             assert!(
-                (found / angle - 1.0).abs() < 0.015,
-                "{way:?} {east} {north}: {found} {angle}"
+                (solid_angle / expected - 1.0).abs() < 0.015,
+                "{mode:?} {east} {north}: {solid_angle} {expected}"
             );
         }
     }
@@ -136,18 +145,18 @@ fn differentials_match_adjacent_rays() {
 }
 
 #[test]
-fn a_crop_has_the_pixels_of_the_whole() {
+fn a_crop_has_the_pixels_of_the_full_image() {
     let packed = spheres(&[direction(10.0, 20.0), direction(180.0, 0.0)], 3.0);
-    let whole = render(&packed, both()[0]);
+    let full = render(&packed, both()[0]);
     let part = Region {
         x0: 0,
         y0: 5,
         x1: 90,
         y1: 17,
     };
-    for way in both() {
-        let found = film(&mut *backend(&packed, way), &packed, part, &WorkSplit::default());
-        assert_eq!(differing(&found, &crop(&whole, part)), 0, "{way:?}");
+    for mode in both() {
+        let found = film(&mut *backend(&packed, mode), &packed, part, &WorkSplit::default());
+        assert_eq!(differing(&found, &crop(&full, part)), 0, "{mode:?}");
     }
 }
 
@@ -156,7 +165,7 @@ fn inapplicable_camera_keys_are_rejected() {
     let camera =
         "image = { width = 4, height = 2 }\n[camera]\ntype = 'panorama'\nposition = [0, 0, 0]\nlook_at = [0, 1, 0]\n";
     Scene::parse(camera, "s.toml").unwrap();
-    for (added, message) in [
+    for (keys, message) in [
         ("fov = 40", "camera.fov: unknown key"),
         ("aperture = 1", "camera.aperture: unknown key"),
         (
@@ -172,10 +181,10 @@ fn inapplicable_camera_keys_are_rejected() {
             "camera.path.keys[0]: must have \"position\", \"look_at\" or \"up\"",
         ),
     ] {
-        let error = Scene::parse(&format!("{camera}{added}\n"), "s.toml")
-            .expect_err(added)
+        let error = Scene::parse(&format!("{camera}{keys}\n"), "s.toml")
+            .expect_err(keys)
             .to_string();
-        assert!(error.contains(message), "{added}: {error}");
+        assert!(error.contains(message), "{keys}: {error}");
     }
     let moving =
         format!("{camera}path.keys = [{{ frame = 1, position = [0, 0, 1] }}, {{ frame = 3, position = [0, 0, 3] }}]\n");

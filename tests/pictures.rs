@@ -70,14 +70,14 @@ pub fn whole(packed: &Packed) -> Region {
 }
 
 /// Renders a region and joins its bands.
-pub fn film(backend: &mut dyn Backend, packed: &Packed, region: Region, cut: &WorkSplit) -> Film {
-    let mut all = Film {
+pub fn film(backend: &mut dyn Backend, packed: &Packed, region: Region, split: &WorkSplit) -> Film {
+    let mut joined = Film {
         sums: Vec::new(),
         ..Film::new(region)
     };
     let mut output = |band: Film| {
-        for (list, of_band) in all.lists_mut().zip(band.lists()) {
-            list.extend(of_band);
+        for (list, band_list) in joined.lists_mut().zip(band.lists()) {
+            list.extend(band_list);
         }
         Ok(())
     };
@@ -85,17 +85,17 @@ pub fn film(backend: &mut dyn Backend, packed: &Packed, region: Region, cut: &Wo
         backend,
         region,
         packed.sampling.pixel_samples,
-        cut,
+        split,
         &mut |_| true,
         &mut output,
     );
     result.unwrap_or_else(|error| panic!("{error}"));
     assert_eq!(
-        all.sums.len() as u64,
+        joined.sums.len() as u64,
         region.pixels(),
-        "the bands do not make up the region"
+        "the bands do not cover the region"
     );
-    all
+    joined
 }
 
 pub fn render(packed: &Packed, mode: RenderMode) -> Film {
@@ -127,15 +127,15 @@ pub fn first_hits(packed: &Packed, mode: RenderMode) -> Vec<FirstHit> {
 
 /// Counts the records that are not bit-identical: pixels, moments and layers.
 pub fn differing(a: &Film, b: &Film) -> usize {
-    let form = |film: &Film| (film.region, film.sums.len(), film.moments.len(), film.has_layers());
-    assert_eq!(form(a), form(b), "films of different regions or forms");
+    let layout = |film: &Film| (film.region, film.sums.len(), film.moments.len(), film.has_layers());
+    assert_eq!(layout(a), layout(b), "films of different regions or layouts");
     let bits = |sum: &Vec4| sum.to_array().map(f32::to_bits);
-    let records = of_pictures(a).zip(of_pictures(b));
+    let records = image_records(a).zip(image_records(b));
     records.filter(|(a, b)| bits(a) != bits(b)).count()
 }
 
-/// Iterates over all records except those used only by scheduling.
-fn of_pictures(film: &Film) -> impl Iterator<Item = &Vec4> {
+/// Iterates over all records except those that only scheduling uses.
+fn image_records(film: &Film) -> impl Iterator<Item = &Vec4> {
     [&film.sums, &film.moments].into_iter().chain(&film.layers).flatten()
 }
 

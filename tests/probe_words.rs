@@ -1,4 +1,4 @@
-//! Values as 32-bit words for kernels: one per scalar, in field order.
+//! Values as 32-bit words for kernels: one word per scalar, in field order.
 
 use glam::{IVec2, UVec2, UVec3, UVec4, Vec2, Vec3, Vec4};
 use wgray_render::cpu::dielectric::DielectricSample;
@@ -33,7 +33,7 @@ macro_rules! scalars {
     ($($ty:ty: |$bits:ident| $from:expr, |$value:ident| $to:expr;)*) => {$(
         impl ProbeWords for $ty {
             fn read(words: &mut &[u32]) -> Self {
-                let ($bits, rest) = words.split_first().expect("as many words as the type has");
+                let ($bits, rest) = words.split_first().expect("a word for each scalar of the type");
                 *words = rest;
                 $from
             }
@@ -51,14 +51,14 @@ scalars! {
     bool: |bits| *bits != 0, |x| u32::from(x);
 }
 
-/// Plain data, uploaded as is.
+/// Plain data, which is uploaded as is.
 macro_rules! pod {
     ($($ty:ty),* $(,)?) => {$(
         impl ProbeWords for $ty {
             fn read(words: &mut &[u32]) -> Self {
-                let (own, rest) = words.split_at(size_of::<$ty>() / 4);
+                let (value_words, rest) = words.split_at(size_of::<$ty>() / 4);
                 *words = rest;
-                bytemuck::pod_read_unaligned(bytemuck::cast_slice(own))
+                bytemuck::pod_read_unaligned(bytemuck::cast_slice(value_words))
             }
             fn write(&self, words: &mut Vec<u32>) {
                 words.extend(bytemuck::bytes_of(self).chunks_exact(4).map(bytemuck::pod_read_unaligned::<u32>));
@@ -81,7 +81,7 @@ pod![
     Instance
 ];
 
-/// Records of `crates/render/src/cpu/`; a missing field does not compile.
+/// Records of `crates/render/src/cpu/`. If a field is missing here, the code does not compile.
 macro_rules! records {
     ($($ty:ident { $($field:ident),* $(,)? })*) => {$(
         impl ProbeWords for $ty {
@@ -111,7 +111,7 @@ records! {
     CylinderPoint { to, normal }
     Path { ray, differential, throughput, depth, branch, origin_prim, inside_prim }
     SpecularSplit { primary, secondary, splits }
-    DielectricSample { path, passes, eta }
+    DielectricSample { path, is_transmitted, eta }
     Angles { wi, wo, between }
     LobeSample { wi, weight, pdf, eta }
     PrincipledLobes {
@@ -122,7 +122,7 @@ records! {
     LightSegments { towards, u, v }
     Lobes { diffuse, specular }
     SampleBlock { pattern, side, first, count, group, key }
-    ShadowFrustum { apex, to, length2, inverse_depth }
+    ShadowFrustum { apex, segments, length2, inverse_depth }
     Slabs { low_origin, high_origin, inverse }
     RayInterval { low_origin, high_origin, near_low, near_high, far_low, far_high }
     Shear { axis, slope, scale }

@@ -17,11 +17,11 @@ use wgray_render::cpu::cylinder::{
 };
 use wgray_render::cpu::dielectric::{DielectricSample, dielectric_sample, eta_of, refracts_inwards, transmittance};
 use wgray_render::cpu::differential::{
-    Derivative, Differential, HitDifferential, arrival, normal_derivative, reflected_derivative,
+    Derivative, Differential, HitDifferential, normal_derivative, primitive_hit_differential, reflected_derivative,
     reflected_differential, refracted_derivative, refracted_differential, transferred,
 };
 use wgray_render::cpu::diffuse::{
-    Angles, angles_at, diffuse_eval, diffuse_pdf, diffuse_sample, rough_diffuse_eval, rough_share,
+    Angles, albedo_growth, angles_at, diffuse_eval, diffuse_pdf, diffuse_sample, rough_diffuse_eval,
 };
 use wgray_render::cpu::disk::{disk_occludes, intersect_disk};
 use wgray_render::cpu::ellipsoid::{
@@ -41,7 +41,7 @@ use wgray_render::cpu::lens::{circle_point, lens_ray, lens_sample, polygon_sampl
 use wgray_render::cpu::light::{LightSegments, segment, segments_to_light, segments_to_local, spot_falloff};
 use wgray_render::cpu::light_sample::{
     CylinderPart, CylinderPoint, cylinder_height_ratio, cylinder_part, cylinder_sample, cylinder_share, ellipsoid_area,
-    ellipsoid_cap, ellipsoid_pdf, ellipsoid_sample, power_heuristic, solid_angle_pdf, whole_below,
+    ellipsoid_cap, ellipsoid_pdf, ellipsoid_sample, power_heuristic, solid_angle_pdf, uniform_below,
 };
 use wgray_render::cpu::light_tree::{light_child, light_importances, light_shares, mean_above};
 use wgray_render::cpu::lobe::{
@@ -81,7 +81,7 @@ use wgray_render::cpu::principled::{
     to_frame_around, transmits_straight,
 };
 use wgray_render::cpu::procedural::{
-    along_edge, around_footprint, far_product, nearest_step, phase, procedural_share, sine_ratio, wave_integral,
+    edge_integral, far_product, nearest_step, phase, procedural_share, product_integral, sine_ratio, wave_integral,
     wave_integral_2, wave_mean, wave_value, widened_edge,
 };
 use wgray_render::cpu::ray::{
@@ -129,9 +129,10 @@ use crate::probe_words::{Argument, ProbeWords};
 use crate::random::Random;
 use crate::sources::{parse, shared_source};
 
-/// Variable that names the only function to compare.
+/// Environment variable with the name of the only function to compare.
 const FUNCTION: &str = "WGRAY_TEST_FUNCTION";
 
+/// Number of calls of each function.
 const CALLS: usize = 8192;
 
 /// A twin with arguments and results as words.
@@ -143,7 +144,7 @@ pub struct Probe {
 
 macro_rules! probes {
     ($($name:ident($($argument:ident: $ty:ty),* $(,)?) -> $result:ty;)*) => {
-        /// The twins. A shared function without an entry fails the test.
+        /// The twins. A test fails for a shared function without an entry.
         pub const PROBES: &[Probe] = &[$(Probe {
             name: stringify!($name),
             arguments: &[$(stringify!($argument)),*],
@@ -187,7 +188,7 @@ probes! {
     frame_around(n: Vec3) -> Tangents;
     vector_around(n: Vec3, v: Vec3) -> Vec3;
     hemisphere_sample(n: Vec3, u: Vec2) -> Vec3;
-    cap_sample(p: Vec2, most: f32) -> Vec3;
+    cap_sample(p: Vec2, cap_height: f32) -> Vec3;
     sobol_reversed(i: u32) -> u32;
     scramble(digits: u32, seed: u32) -> u32;
     shuffled_index(index: u32, seed: u32) -> u32;
@@ -199,7 +200,7 @@ probes! {
     squared_deviation(sum: Vec4, sample: Vec4) -> Vec3;
     pilot_add(pilot: Vec4, sum: Vec4, sample: Vec4) -> Vec4;
     pilot_finish(pilot: Vec4, sum: Vec4, moments: Vec4) -> Vec4;
-    samples_wanted(pilot_sum: Vec4, first: u32, squared_error: f32, most: u32) -> u32;
+    samples_wanted(pilot_sum: Vec4, pilot_samples: u32, squared_error: f32, max_samples: u32) -> u32;
     mean_of(sum: Vec4) -> Vec3;
     variance_of_mean(sum: Vec4, moments: Vec4) -> Vec3;
     display_variance(sum: Vec4, moments: Vec4) -> f32;
@@ -217,11 +218,11 @@ probes! {
     intersect_triangle(q: &Primitive, ray: Ray, limit: f32) -> f32;
     triangle_occludes(o: Vec3, d: Vec3, t_max: f32) -> bool;
     ellipsoid_level(q: &Primitive, from_anchor: Vec3) -> f32;
-    ellipsoid_discriminant(o: Vec3, d: Vec3, start: f32) -> f32;
+    ellipsoid_discriminant(o: Vec3, d: Vec3, start_level: f32) -> f32;
     intersect_ellipsoid(q: &Primitive, from_inside: bool, ray: Ray, limit: f32) -> f32;
-    ellipsoid_occludes(o: Vec3, d: Vec3, start: f32, t_max: f32) -> bool;
+    ellipsoid_occludes(o: Vec3, d: Vec3, start_level: f32, t_max: f32) -> bool;
     longitude(local: Vec3) -> f32;
-    levels_on_surface(levels: Vec2, on: f32) -> Vec2;
+    levels_on_surface(levels: Vec2, surface_level: f32) -> Vec2;
     nearest_end(interval: Vec2, limit: f32) -> f32;
     interval_occludes(interval: Vec2, t_max: f32) -> bool;
     cylinder_levels(q: &Primitive, from_anchor: Vec3) -> Vec2;
@@ -239,7 +240,7 @@ probes! {
     cylinder_bitangent(local: Vec3) -> Vec3;
     intersect_plane(q: &Primitive, ray: Ray, limit: f32) -> f32;
     plane_occludes(o: Vec3, d: Vec3, t_max: f32) -> bool;
-    camera_ray(camera: &Camera, at: Vec2) -> Ray;
+    camera_ray(camera: &Camera, raster: Vec2) -> Ray;
     primitive_gradient(q: &Primitive, local: Vec3) -> Vec3;
     primitive_normal(q: &Primitive, local: Vec3) -> Vec3;
     largest(v: Vec3) -> f32;
@@ -251,17 +252,17 @@ probes! {
     primitive_uv(q: &Primitive, local: Vec3) -> Vec2;
     first_hit(q: &Primitive, ray: Ray, t: f32) -> FirstHit;
     segments_to_light(light: &Light, p: Vec3) -> LightSegments;
-    spot_falloff(light: &Light, to: Vec3) -> f32;
+    spot_falloff(light: &Light, to_light: Vec3) -> f32;
     max4(a: Vec4, b: Vec4) -> Vec4;
     mean_above(m: Vec4, r: Vec4) -> Vec4;
     light_importances(node: &LightNode, p: Vec3, n: Vec3) -> Vec4;
     light_shares(importances: Vec4) -> Vec4;
     light_child(shares: Vec4, random: f32) -> u32;
-    segments_to_local(q: &Primitive, to: LightSegments) -> LightSegments;
-    segment(to: LightSegments, at: Vec2) -> Vec3;
+    segments_to_local(q: &Primitive, segments: LightSegments) -> LightSegments;
+    segment(segments: LightSegments, at: Vec2) -> Vec3;
     occlusion_mask(kind: u32, q: &Primitive, p: Vec3, from_inside: bool, light: &Light, block: SampleBlock) -> u32;
     block_sample(block: SampleBlock, i: u32) -> Vec2;
-    occludes_segment(kind: u32, q: &Primitive, p: Vec3, from_inside: bool, to: Vec3, t_max: f32) -> bool;
+    occludes_segment(kind: u32, q: &Primitive, p: Vec3, from_inside: bool, to_light: Vec3, t_max: f32) -> bool;
     occludes(kind: u32, o: Vec3, d: Vec3, levels: Vec2, t_max: f32) -> bool;
     solid_levels(kind: u32, q: &Primitive, from_anchor: Vec3, from_inside: bool) -> Vec2;
     solid_gradient(kind: u32, local: Vec3) -> Vec3;
@@ -269,46 +270,46 @@ probes! {
     primitive_height(q: &Primitive, from_anchor: Vec3) -> f32;
     light_frustum(light: &Light, p: Vec3) -> ShadowFrustum;
     may_block(sphere: &Sphere, frustum: &ShadowFrustum) -> bool;
-    phong_lobes(surface: &Surface, material: &Material, to: Vec3, exponent_bits: u32) -> Lobes;
+    phong_lobes(surface: &Surface, material: &Material, to_light: Vec3, exponent_bits: u32) -> Lobes;
     phong_power(x: f32, material: &Material, exponent_bits: u32) -> f32;
-    is_lit(surface: &Surface, to: Vec3) -> bool;
-    unlit_mask(prim: &HitPrimitive, surface: &Surface, to: LightSegments, block: SampleBlock) -> u32;
-    phong_block(surface: &Surface, material: &Material, to: LightSegments, block: SampleBlock, occluded: u32, exponent_bits: u32,
+    is_lit(surface: &Surface, direction: Vec3) -> bool;
+    unlit_mask(prim: &HitPrimitive, surface: &Surface, segments: LightSegments, block: SampleBlock) -> u32;
+    phong_block(surface: &Surface, material: &Material, segments: LightSegments, block: SampleBlock, occluded: u32, exponent_bits: u32,
                 sum: Lobes) -> Lobes;
-    camera_differential(camera: &Camera, at: Vec2, spacing: f32) -> Differential;
-    camera_derivative(camera: &Camera, at: Vec2, step: Vec3) -> Derivative;
+    camera_differential(camera: &Camera, raster: Vec2, spacing: f32) -> Differential;
+    camera_derivative(camera: &Camera, raster: Vec2, step: Vec3) -> Derivative;
     image_plane_offset(camera: &Camera, at: Vec2) -> Vec3;
-    lens_ray(camera: &Camera, at: Vec2, p: Vec2) -> Ray;
+    lens_ray(camera: &Camera, raster: Vec2, p: Vec2) -> Ray;
     lens_sample(blades: u32, u: Vec2) -> Vec2;
     polygon_sample(corners: u32, u: Vec2) -> Vec2;
     circle_point(angle: f32) -> Vec2;
-    panorama_ray(camera: &Camera, at: Vec2) -> Ray;
-    panorama_differential(camera: &Camera, at: Vec2, spacing: f32) -> Differential;
-    panorama_angles(camera: &Camera, at: Vec2) -> Vec2;
+    panorama_ray(camera: &Camera, raster: Vec2) -> Ray;
+    panorama_differential(camera: &Camera, raster: Vec2, spacing: f32) -> Differential;
+    panorama_angles(camera: &Camera, raster: Vec2) -> Vec2;
     transferred(derivative: Derivative, ray: Ray, t: f32, normal: Vec3) -> Derivative;
     normal_derivative(q: &Primitive, local: Vec3, dp: Vec3) -> Vec3;
     reflected_derivative(derivative: Derivative, d: Vec3, n: Vec3, dn: Vec3) -> Derivative;
     refracted_derivative(derivative: Derivative, d: Vec3, n: Vec3, dn: Vec3, eta: f32, cosine: f32) -> Derivative;
-    arrival(q: &Primitive, differential: Differential, ray: Ray, t: f32, surface: Surface) -> HitDifferential;
-    reflected_differential(at: HitDifferential, d: Vec3, n: Vec3) -> Differential;
-    refracted_differential(at: HitDifferential, d: Vec3, n: Vec3, eta: f32, cosine: f32) -> Differential;
+    primitive_hit_differential(q: &Primitive, differential: Differential, ray: Ray, t: f32, surface: Surface) -> HitDifferential;
+    reflected_differential(hit_diff: HitDifferential, d: Vec3, n: Vec3) -> Differential;
+    refracted_differential(hit_diff: HitDifferential, d: Vec3, n: Vec3, eta: f32, cosine: f32) -> Differential;
     reflected_direction(d: Vec3, n: Vec3) -> Vec3;
     refracted_direction(d: Vec3, n: Vec3, eta: f32, cosine_i: f32, cosine_t: f32) -> Vec3;
     refracted_cosine(cosine_i: f32, eta: f32) -> f32;
     fresnel(cosine_i: f32, cosine_t: f32, eta: f32) -> f32;
-    pass_through_path(path: Path, surface: Surface, at: HitDifferential) -> Path;
-    mirrored_path(path: Path, surface: Surface, at: HitDifferential, material: &Material) -> SpecularSplit;
+    pass_through_path(path: Path, surface: Surface, hit_diff: HitDifferential) -> Path;
+    mirrored_path(path: Path, surface: Surface, hit_diff: HitDifferential, material: &Material) -> SpecularSplit;
     usable_normal(surface: Surface, normal: Vec3) -> Vec3;
     is_usable(surface: Surface, normal: Vec3) -> bool;
-    glass_path(path: Path, surface: Surface, at: HitDifferential, material: &Material, random: f32) -> SpecularSplit;
-    reflected_path(path: Path, surface: Surface, at: HitDifferential, throughput: Vec3) -> Path;
-    refracted_path(path: Path, surface: Surface, at: HitDifferential, throughput: Vec3, eta: f32, cosine_i: f32,
+    glass_path(path: Path, surface: Surface, hit_diff: HitDifferential, material: &Material, random: f32) -> SpecularSplit;
+    reflected_path(path: Path, surface: Surface, hit_diff: HitDifferential, throughput: Vec3) -> Path;
+    refracted_path(path: Path, surface: Surface, hit_diff: HitDifferential, throughput: Vec3, eta: f32, cosine_i: f32,
                    cosine_t: f32) -> Path;
     is_specular(material: &Material) -> bool;
     angles_at(normal: Vec3, wo: Vec3, wi: Vec3) -> Angles;
     diffuse_eval(material: &Material, angles: Angles) -> Vec3;
     rough_diffuse_eval(material: &Material, angles: Angles) -> Vec3;
-    rough_share(cosine: f32) -> f32;
+    albedo_growth(cosine: f32) -> f32;
     diffuse_pdf(angles: Angles) -> f32;
     diffuse_sample(normal: Vec3, u: Vec2) -> Vec3;
     phong_factors(material: &Material) -> PhongFactors;
@@ -319,7 +320,7 @@ probes! {
     transmittance(absorption: Vec3, distance: f32) -> Vec3;
     eta_of(surface: &Surface, material: &Material) -> f32;
     refracts_inwards(surface: &Surface, material: &Material, normal: Vec3) -> bool;
-    dielectric_sample(path: Path, surface: Surface, at: HitDifferential, material: &Material, random: f32) -> DielectricSample;
+    dielectric_sample(path: Path, surface: Surface, hit_diff: HitDifferential, material: &Material, random: f32) -> DielectricSample;
     principled_mixture(
         material: &Material, wo: Vec3, outside: bool, coat_normal: Vec3, lobes: u32, energy: Vec3,
     ) -> PrincipledLobes;
@@ -383,7 +384,7 @@ probes! {
     thin_eval(material: &Material, wo: Vec3, wi: Vec3) -> Vec3;
     thin_pdf(material: &Material, wo: Vec3, wi: Vec3) -> f32;
     thin_sample(material: &Material, wo: Vec3, u: Vec2, random: f32) -> LobeSample;
-    solid_angle_pdf(density: f32, to: Vec3, normal: Vec3) -> f32;
+    solid_angle_pdf(density: f32, to_light: Vec3, normal: Vec3) -> f32;
     ellipsoid_area(q: &Primitive) -> f32;
     ellipsoid_cap(level: f32) -> f32;
     ellipsoid_sample(q: &Primitive, p: Vec3, u: Vec2) -> Vec3;
@@ -392,8 +393,8 @@ probes! {
     cylinder_height_ratio(q: &Primitive) -> f32;
     cylinder_sample(q: &Primitive, p: Vec3, u: Vec2) -> CylinderPoint;
     cylinder_share(q: &Primitive, p: Vec3) -> f32;
-    power_heuristic(own: f32, other: f32) -> f32;
-    whole_below(bits: u32, count: u32) -> u32;
+    power_heuristic(pdf: f32, other_pdf: f32) -> f32;
+    uniform_below(bits: u32, count: u32) -> u32;
     cell_towards(d: Vec3, width: u32, height: u32) -> EnvironmentCell;
     column_after(column: u32, width: u32) -> u32;
     cap_above(row: u32, height: u32) -> f32;
@@ -408,15 +409,15 @@ probes! {
     procedural_share(kind: u32, line_width: f32, f: Footprint) -> f32;
     phase(x: f32) -> f32;
     widened_edge(long: Vec2, short: Vec2) -> Vec2;
-    nearest_step(x: f32, on: f32) -> f32;
-    wave_value(x: f32, on: f32, near: bool) -> f32;
-    wave_integral(x: f32, on: f32, near: bool) -> f32;
-    wave_integral_2(x: f32, on: f32, near: bool) -> f32;
-    wave_mean(x: f32, a: f32, b: f32, on: f32, near: bool) -> f32;
-    around_footprint(at: Vec2, a: Vec2, b: Vec2, on: f32, near: bool) -> f32;
-    far_product(at: Vec2, long: Vec2, short: Vec2, on: f32) -> f32;
+    nearest_step(x: f32, duty: f32) -> f32;
+    wave_value(x: f32, duty: f32, near: bool) -> f32;
+    wave_integral(x: f32, duty: f32, near: bool) -> f32;
+    wave_integral_2(x: f32, duty: f32, near: bool) -> f32;
+    wave_mean(x: f32, a: f32, b: f32, duty: f32, near: bool) -> f32;
+    product_integral(center: Vec2, a: Vec2, b: Vec2, duty: f32, near: bool) -> f32;
+    far_product(center: Vec2, long: Vec2, short: Vec2, duty: f32) -> f32;
     sine_ratio(x: f32) -> f32;
-    along_edge(tail: Vec2, head: Vec2, on: f32, near: bool) -> f32;
+    edge_integral(tail: Vec2, head: Vec2, duty: f32, near: bool) -> f32;
     near_coordinate(u: f32, wrap: u32) -> f32;
     wrapped_index(i: i32, size: u32, wrap: u32) -> u32;
     level_size(size: u32, level: u32) -> u32;
@@ -433,8 +434,8 @@ probes! {
     inverse_of(x: f32) -> f32;
     box_interval(low: Vec3, high: Vec3, s: Slabs) -> Vec2;
     interval_hits(interval: Vec2, limit: f32) -> bool;
-    ray_interval(origin: Vec3, least: Vec3, most: Vec3, pad: f32) -> RayInterval;
-    ray_interval_box(low: Vec3, high: Vec3, f: RayInterval) -> Vec2;
+    ray_interval(origin: Vec3, min_direction: Vec3, max_direction: Vec3, pad: f32) -> RayInterval;
+    ray_interval_box(low: Vec3, high: Vec3, rays: RayInterval) -> Vec2;
     steps(word: u32) -> Vec4;
     step_length(node: &Node, axis: u32) -> f32;
     larger(a: Vec4, b: Vec4) -> Vec4;
@@ -442,8 +443,8 @@ probes! {
     hit_bits(near: Vec4, far: Vec4, limit: f32) -> u32;
     children_hit(node: &Node, s: Slabs, limit: f32) -> u32;
     four_hit(node: &Node, low: UVec3, high: UVec3, s: Slabs, limit: f32) -> u32;
-    children_in_interval(node: &Node, f: RayInterval, limit: f32) -> u32;
-    four_in_interval(node: &Node, low: UVec3, high: UVec3, f: RayInterval, limit: f32) -> u32;
+    children_in_interval(node: &Node, rays: RayInterval, limit: f32) -> u32;
+    four_in_interval(node: &Node, low: UVec3, high: UVec3, rays: RayInterval, limit: f32) -> u32;
     far_side(low: Vec4, high: Vec4, far_low: f32, far_high: f32) -> Vec4;
     in_order(bits: u32, octant: u32) -> u32;
     octant_of(direction: Vec3) -> u32;
@@ -461,7 +462,7 @@ probes! {
     mesh_pad(i: &Instance, origin: Vec3) -> f32;
     standalone_hit_primitive(q: &Primitive) -> HitPrimitive;
     face_primitive(i: &Instance, v0: Vec3, edge_1: Vec3, edge_2: Vec3, material: u32) -> Primitive;
-    face_direction_allowed(face: &HitPrimitive, surface: &Surface, to: Vec3) -> bool;
+    face_direction_allowed(face: &HitPrimitive, surface: &Surface, direction: Vec3) -> bool;
     flipped_to(v: Vec3, side: Vec3) -> Vec3;
     face_surface(face: &HitPrimitive, prim_id: UVec2, b: Vec2, d: Vec3, epsilon: f32) -> Surface;
     face_uv(face: &HitPrimitive, b: Vec2) -> Vec2;
@@ -479,7 +480,7 @@ probes! {
 }
 
 /// Shared functions without a probe, with reasons.
-const EXCEPTIONS: &[(&str, &str)] = &[("no_hit", "it has no arguments"), ("no_sample", "it has no arguments")];
+const EXCEPTIONS: &[(&str, &str)] = &[("no_hit", "has no arguments"), ("no_sample", "has no arguments")];
 
 pub fn twin(name: &str) -> &'static Probe {
     PROBES
@@ -494,12 +495,12 @@ impl Probe {
         let mut words = words;
         let mut out = Vec::new();
         while !words.is_empty() {
-            let before = out.len();
+            let start = out.len();
             (self.run)(&mut words, &mut out);
             assert_eq!(
-                out.len() - before,
+                out.len() - start,
                 words_out,
-                "{}: the twin's result has other words",
+                "{}: the twin's result has a different number of words",
                 self.name
             );
         }
@@ -507,10 +508,10 @@ impl Probe {
     }
 
     /// Returns true if an operand or any intermediate result is denormal.
-    fn meets_denormals(&self, words: &[u32], words_out: usize) -> bool {
-        processor::clear_denormals_met();
+    fn involves_denormals(&self, words: &[u32], words_out: usize) -> bool {
+        processor::clear_denormal_flags();
         let results = self.results(words, words_out);
-        processor::denormals_met() || results.iter().any(|word| f32::from_bits(*word).is_subnormal())
+        processor::denormals_occurred() || results.iter().any(|word| f32::from_bits(*word).is_subnormal())
     }
 }
 
@@ -520,7 +521,7 @@ mod processor {
     use std::arch::asm;
 
     /// MXCSR: denormal operand and underflow.
-    const MET: u32 = 1 << 1 | 1 << 4;
+    const DENORMAL_FLAGS: u32 = 1 << 1 | 1 << 4;
 
     fn flags() -> u32 {
         let mut flags = 0u32;
@@ -529,28 +530,28 @@ mod processor {
         flags
     }
 
-    pub fn clear_denormals_met() {
-        let cleared = flags() & !MET;
+    pub fn clear_denormal_flags() {
+        let cleared = flags() & !DENORMAL_FLAGS;
         // SAFETY: changes only exception flags of MXCSR, which inline assembly may change.
         unsafe { asm!("ldmxcsr [{}]", in(reg) &raw const cleared) };
     }
 
-    pub fn denormals_met() -> bool {
-        flags() & MET != 0
+    pub fn denormals_occurred() -> bool {
+        flags() & DENORMAL_FLAGS != 0
     }
 }
 
-/// Elsewhere no difference is attributed to denormals.
+/// On other processors, no difference is attributed to denormal numbers.
 #[cfg(not(target_arch = "x86_64"))]
 mod processor {
-    pub fn clear_denormals_met() {}
+    pub fn clear_denormal_flags() {}
 
-    pub fn denormals_met() -> bool {
+    pub fn denormals_occurred() -> bool {
         false
     }
 }
 
-/// Returns true for equal bits or two NaN, whose bits no device guarantees.
+/// Returns true for equal bits, or for two NaN, since no device guarantees the bits of NaN.
 fn same(kind: ScalarKind, a: u32, b: u32) -> bool {
     a == b || kind == ScalarKind::Float && f32::from_bits(a).is_nan() && f32::from_bits(b).is_nan()
 }
@@ -572,8 +573,8 @@ fn show(kinds: &[ScalarKind], words: &[u32]) -> String {
 
 const DENORMALS: &str = "denormal numbers";
 
-/// Compares a function with its twin. On devices with a known difference for denormal numbers, calls with such numbers
-/// may differ; returns the number of these calls.
+/// Compares a function with its twin, and returns the number of skipped calls. On devices with a known difference for
+/// denormal numbers, calls with such numbers may differ and are skipped.
 fn compare(device: &Device, function: &Function) -> Result<usize, String> {
     let (name, kinds) = (function.name(), function.words_out());
     let words = inputs(function, CALLS, name.bytes().map(u64::from).sum());
@@ -581,32 +582,32 @@ fn compare(device: &Device, function: &Function) -> Result<usize, String> {
     let info = &device.info;
     let call_words = |call: usize| &words[call * function.words_in()..(call + 1) * function.words_in()];
     let denormals_differ = allowed(adapter::KNOWN_DIFFERENCES, &info.name, &info.driver, DENORMALS).is_some();
-    let (left_out, differ): (Vec<usize>, Vec<usize>) = differing(&kinds, &gpu, &cpu)
+    let (skipped, differ): (Vec<usize>, Vec<usize>) = differing(&kinds, &gpu, &cpu)
         .into_iter()
-        .partition(|call| denormals_differ && twin(name).meets_denormals(call_words(*call), kinds.len()));
-    let known = allowed(adapter::KNOWN_DIFFERENCES, &info.name, &info.driver, name);
+        .partition(|call| denormals_differ && twin(name).involves_denormals(call_words(*call), kinds.len()));
+    let known_difference = allowed(adapter::KNOWN_DIFFERENCES, &info.name, &info.driver, name);
     let arguments = function.arguments().into_iter();
     let kinds_in: Vec<ScalarKind> = arguments.flat_map(|(_, ty)| scalars(function.module, ty)).collect();
     let is_large = |(word, kind): (&u32, &ScalarKind)| *kind == ScalarKind::Uint && *word >= 1 << 31;
     let has_large = |call: &usize| call_words(*call).iter().zip(&kinds_in).any(is_large);
     // `sample_square` calls `jittered_sample`, which computes large integers from small ones.
     let converts_arguments = !matches!(name, "jittered_sample" | "sample_square");
-    let is_rounded_twice = known.is_some_and(|known| known.reason == ROUNDED_TWICE);
+    let is_rounded_twice = known_difference.is_some_and(|known_difference| known_difference.reason == ROUNDED_TWICE);
     if is_rounded_twice && converts_arguments && !differ.iter().all(has_large) {
         return Err(format!("{name}: calls without {ROUNDED_TWICE} differ"));
     }
-    judge(known, name, differ.len() as f64 / CALLS as f64).map_err(|message| {
+    judge(known_difference, name, differ.len() as f64 / CALLS as f64).map_err(|message| {
         let Some(&call) = differ.first() else { return message };
-        let at = call * kinds.len();
+        let result_start = call * kinds.len();
         let arguments = call_words(call);
         format!(
             "{message}, first call {call}:\n  arguments {}\n  GPU {}\n  CPU {}",
             show(&kinds_in, arguments),
-            show(&kinds, &gpu[at..]),
-            show(&kinds, &cpu[at..])
+            show(&kinds, &gpu[result_start..]),
+            show(&kinds, &cpu[result_start..])
         )
     })?;
-    Ok(left_out.len())
+    Ok(skipped.len())
 }
 
 #[test]
@@ -649,38 +650,41 @@ fn functions_give_the_same_bits_on_gpu_and_cpu() {
     let source = shared_source();
     let module = parse(&source);
     let functions = functions(&module, &source);
-    let only = std::env::var(FUNCTION).ok();
-    let wanted = |name: &str| only.as_ref().is_none_or(|only| only == name);
+    let selected = std::env::var(FUNCTION).ok();
+    let is_selected = |name: &str| selected.as_ref().is_none_or(|selected| selected == name);
     let probed: Vec<_> = functions
         .iter()
-        .filter(|(_, f)| wanted(f.name()) && !EXCEPTIONS.iter().any(|(exception, _)| *exception == f.name()))
+        .filter(|(_, f)| is_selected(f.name()) && !EXCEPTIONS.iter().any(|(exception, _)| *exception == f.name()))
         .collect();
-    assert!(!probed.is_empty(), "{FUNCTION}: no shared function is called {only:?}");
-    let (mut problems, mut left_out) = (Vec::new(), 0);
+    assert!(
+        !probed.is_empty(),
+        "{FUNCTION}: no shared function is called {selected:?}"
+    );
+    let (mut problems, mut skipped) = (Vec::new(), 0);
     for (file, f) in &probed {
         match compare(device, f) {
-            Ok(calls) => left_out += calls,
+            Ok(calls) => skipped += calls,
             Err(message) => problems.push(format!("{file}: {message}")),
         }
     }
-    if only.is_none() {
-        let known = allowed(
+    if selected.is_none() {
+        let known_difference = allowed(
             adapter::KNOWN_DIFFERENCES,
             &device.info.name,
             &device.info.driver,
             DENORMALS,
         );
-        let share = left_out as f64 / (probed.len() * CALLS) as f64;
-        problems.extend(judge(known, DENORMALS, share).err());
+        let share = skipped as f64 / (probed.len() * CALLS) as f64;
+        problems.extend(judge(known_difference, DENORMALS, share).err());
     }
     assert!(problems.is_empty(), "{}", problems.join("\n"));
     println!(
-        "{} functions, {CALLS} calls each: the same bits; {left_out} calls with denormal numbers skipped",
+        "{} functions, {CALLS} calls each: the same bits; {skipped} calls with denormal numbers skipped",
         probed.len()
     );
 }
 
-/// Intersection functions have both hits and misses.
+/// Predicates are true for some inputs and false for others, and intersection functions have both hits and misses.
 #[test]
 fn inputs_cover_both_outcomes_of_predicates() {
     let source = shared_source();
@@ -692,19 +696,20 @@ fn inputs_cover_both_outcomes_of_predicates() {
         };
         let words = inputs(&function, CALLS, 1);
         let results = probe.results(&words, kinds.len());
-        let share = |wanted: &dyn Fn(u32) -> bool| {
-            results.iter().filter(|word| wanted(**word)).count() as f64 / results.len() as f64
+        let share = |predicate: &dyn Fn(u32) -> bool| {
+            results.iter().filter(|word| predicate(**word)).count() as f64 / results.len() as f64
         };
         if kinds[0] == ScalarKind::Bool {
-            let yes = results.iter().step_by(kinds.len()).filter(|word| **word != 0).count() as f64 / CALLS as f64;
+            let true_share =
+                results.iter().step_by(kinds.len()).filter(|word| **word != 0).count() as f64 / CALLS as f64;
             assert!(
-                (0.05..0.95).contains(&yes),
-                "{file}: {name} is true for {yes} of the inputs; it must be 0.05 to 0.95: see tests/inputs.rs"
+                (0.05..0.95).contains(&true_share),
+                "{file}: {name} is true for a fraction {true_share} of the inputs, which must be from 0.05 to 0.95: see tests/inputs.rs"
             );
         }
         if name.starts_with("intersect_") {
-            let per = function.words_in();
-            let limits = words.chunks_exact(per).map(|call| call[per - 1]);
+            let words_per_call = function.words_in();
+            let limits = words.chunks_exact(words_per_call).map(|call| call[words_per_call - 1]);
             let hits = results
                 .iter()
                 .zip(limits)
@@ -713,13 +718,13 @@ fn inputs_cover_both_outcomes_of_predicates() {
             let hits = hits as f64 / CALLS as f64;
             assert!(
                 (0.1..0.9).contains(&hits),
-                "{file}: {name} hits for {hits} of the inputs; it must be 0.1 to 0.9: see `local_point` in tests/inputs.rs"
+                "{file}: {name} hits for a fraction {hits} of the inputs, which must be from 0.1 to 0.9: see `local_point` in tests/inputs.rs"
             );
         }
         let nan = share(&|word| f32::from_bits(word).is_nan());
         assert!(
             kinds[0] != ScalarKind::Float || nan < 0.5,
-            "{file}: {name} is NaN for {nan} of the inputs"
+            "{file}: {name} is NaN for a fraction {nan} of the inputs"
         );
     }
 }
@@ -776,10 +781,10 @@ fn nan_does_not_propagate() {
         // A ray with NaN hits nothing.
         if function.name().starts_with("intersect_") {
             let mut words = inputs(&function, 500, random.bits());
-            let per = function.words_in();
-            for call in words.chunks_exact_mut(per) {
-                call[per - 1 - 6 + random.below(6) as usize] = f32::NAN.to_bits();
-                call[per - 1] = 100f32.to_bits();
+            let words_per_call = function.words_in();
+            for call in words.chunks_exact_mut(words_per_call) {
+                call[words_per_call - 1 - 6 + random.below(6) as usize] = f32::NAN.to_bits();
+                call[words_per_call - 1] = 100f32.to_bits();
             }
             let results = twin(function.name()).results(&words, 1);
             assert!(results.iter().all(|r| *r == 100f32.to_bits()), "{}", function.name());
@@ -787,20 +792,20 @@ fn nan_does_not_propagate() {
     }
 }
 
-/// Denormal numbers are reported for an operand, a result or an intermediate result, and in no other case.
+/// Denormal numbers are reported if an operand, a result or an intermediate result is denormal, and in no other case.
 #[test]
 #[cfg(target_arch = "x86_64")]
 fn denormal_numbers_in_twins_are_detected() {
-    let least = f32::MIN_POSITIVE;
-    for (a, b, meets) in [
+    let smallest = f32::MIN_POSITIVE;
+    for (a, b, expected) in [
         ([1.0, 2.0, 3.0], [4.0, 5.0, 6.0], false),
-        ([least, 0.0, -0.0], [1.0, 1e-45, 0.0], true), // an operand
-        ([least, 0.0, 0.0], [0.3, 0.0, 0.0], true),    // a result
-        ([least, 1.0, 0.0], [0.3, 1.0, 0.0], true),    // an intermediate result
-        ([least, 1.0, 0.0], [1.0, 1.0, 0.0], false),
+        ([smallest, 0.0, -0.0], [1.0, 1e-45, 0.0], true), // an operand
+        ([smallest, 0.0, 0.0], [0.3, 0.0, 0.0], true),    // a result
+        ([smallest, 1.0, 0.0], [0.3, 1.0, 0.0], true),    // an intermediate result
+        ([smallest, 1.0, 0.0], [1.0, 1.0, 0.0], false),
         ([f32::MAX, 1.0, 0.0], [f32::MAX, 1.0, f32::NAN], false),
     ] {
         let words: Vec<u32> = a.iter().chain(&b).map(|x: &f32| x.to_bits()).collect();
-        assert_eq!(twin("dot").meets_denormals(&words, 1), meets, "{a:?} {b:?}");
+        assert_eq!(twin("dot").involves_denormals(&words, 1), expected, "{a:?} {b:?}");
     }
 }

@@ -7,10 +7,10 @@ use crate::pictures::{both, render};
 use crate::scenes::parse;
 
 fn films(scene: &Packed) -> Vec<Film> {
-    both().into_iter().map(|way| render(scene, way)).collect()
+    both().into_iter().map(|mode| render(scene, mode)).collect()
 }
 
-/// Looks straight down on the ground; 40 x 30 pixels cover 4 x 3 units.
+/// A camera that looks straight down on the ground; 40 x 30 pixels cover 4 x 3 units.
 const DOWN: &str = r#"
 image = { width = 40, height = 30 }
 camera = { type = "orthographic", position = [0, 0, 5], look_at = [0, 0, 0], up = [0, 1, 0], height = 3 }
@@ -56,31 +56,31 @@ fn largest_error(film: &Film, expected: impl Fn(f64, f64) -> [f64; 3]) -> f64 {
     largest
 }
 
-/// Returns the light of the point light. Seen along the normal, n.l = r.v = h / sqrt(h^2 + d^2).
+/// Returns the reflected light of the point light. For a view along the normal, n.l = r.v = h / sqrt(h^2 + d^2).
 fn point_light(x: f64, y: f64, power: i32) -> [f64; 3] {
     let (h, dx, dy) = (1.5, x - 0.4, y + 0.3);
     let cosine = h / (h * h + dx * dx + dy * dy).sqrt();
     let term = |color: f64, diffuse: f64, specular: f64| color * (diffuse * cosine + specular * cosine.powi(power));
     let ambient = [0.05, 0.1, 0.3];
-    let added = [term(1.0, 0.6, 0.25), term(0.5, 0.4, 0.5), term(2.0, 0.2, 0.75)];
-    [0, 1, 2].map(|i| ambient[i] + added[i])
+    let direct = [term(1.0, 0.6, 0.25), term(0.5, 0.4, 0.5), term(2.0, 0.2, 0.75)];
+    [0, 1, 2].map(|i| ambient[i] + direct[i])
 }
 
 #[test]
 fn a_point_light_over_a_plane() {
-    // Shading is evaluated where shadow rays start; the formula has no offset.
+    // Shading is evaluated at the origin of the shadow rays; the formula has no offset.
     let down = DOWN.replace("[render]", "[render]\nshadow_epsilon = 0");
     let scene = parse(&format!("{down}{GROUND}{LIGHT}"));
     for film in films(&scene) {
         let error = largest_error(&film, |x, y| point_light(x, y, 6));
         assert!(error < 2e-6, "{error}");
-        let without_cosine = largest_error(&film, |x, y| point_light(x, y, 5));
-        assert!(without_cosine > 0.01, "the wrong formula passes");
+        let wrong_power = largest_error(&film, |x, y| point_light(x, y, 5));
+        assert!(wrong_power > 0.01, "the wrong formula passes");
     }
 }
 
 #[test]
-fn ambient_light_alone() {
+fn ambient_light_only() {
     let scene = parse(&format!("{DOWN}{GROUND}"));
     for film in films(&scene) {
         let (expected, wrong) = ([0.1f32 * 0.5, 0.2 * 0.5, 0.3 * 1.0], [0.1f32, 0.2, 0.3]);
@@ -120,7 +120,7 @@ fn a_sphere_under_directional_light_casts_a_disk() {
     let scene = DOWN.replace("position = [0, 0, 5]", "position = [0, 0, 0.25]");
     let sphere = "[[shapes]]\ntype = 'sphere'\nmaterial = 'ground'\ncenter = [0.2, 0.1, 1]\nradius = 0.5\n";
     let light = "[[lights]]\ntype = 'directional'\ndirection = [0, 0, -2]\ncolor = [1, 1, 1]\n";
-    let disc = |radius: f64| {
+    let disk = |radius: f64| {
         move |x: f64, y: f64| {
             let lit = (x - 0.2).hypot(y - 0.1) > radius;
             let color = [0.6 + 0.25, 0.4 + 0.5, 0.2 + 0.75];
@@ -128,14 +128,14 @@ fn a_sphere_under_directional_light_casts_a_disk() {
         }
     };
     for film in films(&parse(&format!("{scene}{GROUND}{sphere}{light}"))) {
-        let error = largest_error(&film, disc(0.5));
+        let error = largest_error(&film, disk(0.5));
         assert!(error < 1e-6, "{error}");
-        assert!(largest_error(&film, disc(0.6)) > 0.5, "a larger disk passes");
+        assert!(largest_error(&film, disk(0.6)) > 0.5, "a larger disk passes");
     }
 }
 
-/// Returns large shapes of every kind. `dark_or_lit` adds a small shape above, because a shape with no other shapes on
-/// one side casts no shadow.
+/// Returns large shapes of every kind. `dark_or_lit` adds a small shape above them, because a shape with no other
+/// shapes on one side casts no shadow.
 fn covers(heights: [f64; 4]) -> [String; 4] {
     let [a, b, c, d] = heights;
     [
@@ -153,12 +153,12 @@ fn dark_or_lit(light: &str, covers: &str) -> (bool, bool) {
     let above = "[[shapes]]\ntype = 'sphere'\nmaterial = 'ground'\ncenter = [90, 90, 5]\nradius = 0.5\n";
     let films = films(&parse(&format!("{scene}{GROUND}{light}{above}{covers}")));
     let ambient = [0.1f32 * 0.5, 0.2 * 0.5, 0.3];
-    let all = |dark: bool| {
+    let all_pixels_are = |dark: bool| {
         films
             .iter()
             .all(|film| film.means().all(|color| (color == ambient) == dark))
     };
-    (all(true), all(false))
+    (all_pixels_are(true), all_pixels_are(false))
 }
 
 const DARK: (bool, bool) = (true, false);
@@ -175,14 +175,14 @@ fn two_primitives_occlude() {
             assert_eq!(dark_or_lit(light, &format!("{first}{second}")), DARK, "{first}{second}");
         }
     }
-    assert_eq!(dark_or_lit(light, ""), LIT, "covers that are absent occlude the light");
+    assert_eq!(dark_or_lit(light, ""), LIT, "the light is occluded without covers");
 }
 
 /// A shape just in front of a light occludes the light; a shape behind the light does not.
 #[test]
 fn shapes_behind_a_light_do_not_occlude_it() {
-    for (before, behind) in covers([1.45; 4]).iter().zip(&covers([1.55; 4])) {
-        assert_eq!(dark_or_lit(LIGHT, before), DARK, "{before}");
+    for (in_front, behind) in covers([1.45; 4]).iter().zip(&covers([1.55; 4])) {
+        assert_eq!(dark_or_lit(LIGHT, in_front), DARK, "{in_front}");
         assert_eq!(dark_or_lit(LIGHT, behind), LIT, "{behind}");
     }
 }

@@ -42,7 +42,7 @@ impl Random {
         10f64.powf(self.between(low, high))
     }
 
-    pub fn pick<T: Copy>(&self, from: &[T]) -> T {
-        from[self.below(from.len() as u32) as usize]
+    pub fn pick<T: Copy>(&self, values: &[T]) -> T {
+        values[self.below(values.len() as u32) as usize]
     }
 }

@@ -1,5 +1,5 @@
-//! GPU and CPU images agree for all scenes, configurations, sizes, seeds and sample patterns, however the work is
-//! split.
+//! GPU and CPU images agree for all scenes, configurations, sizes, seeds and sample patterns, and for
+//! every split of the work.
 
 use std::ops::Range;
 
@@ -29,8 +29,8 @@ pub fn compare(mode: RenderMode, packed: &Packed, gpu: &Film, cpu: &Film) -> Res
     if mode == RenderMode::Plain {
         return Nearly::by_plain_wgsl(gpu, cpu).judge();
     }
-    let known = allowed(KNOWN_DIFFERENCES, &device.info.name, &device.info.driver, "picture");
-    judge(known, "picture", differing(gpu, cpu) as f64 / cpu.sums.len() as f64)
+    let entry = allowed(KNOWN_DIFFERENCES, &device.info.name, &device.info.driver, "picture");
+    judge(entry, "picture", differing(gpu, cpu) as f64 / cpu.sums.len() as f64)
 }
 
 /// Compares first hits. On devices other than software Vulkan, compares only the shape and material indices, and
@@ -45,8 +45,8 @@ pub fn compare_hits(gpu: &[FirstHit], cpu: &[FirstHit]) -> Result<(), String> {
     };
     let share = gpu.iter().zip(cpu).filter(|(a, b)| !same(a, b)).count() as f64 / gpu.len() as f64;
     if bit_exact(device) {
-        let known = allowed(KNOWN_DIFFERENCES, &device.info.name, &device.info.driver, "first hits");
-        return judge(known, "first hits", share);
+        let entry = allowed(KNOWN_DIFFERENCES, &device.info.name, &device.info.driver, "first hits");
+        return judge(entry, "first hits", share);
     }
     if share > EDGES {
         Err(format!("{share} of the first hits differ"))
@@ -55,7 +55,13 @@ pub fn compare_hits(gpu: &[FirstHit], cpu: &[FirstHit]) -> Result<(), String> {
     }
 }
 
-fn with(description: &Description, size: (u32, u32), seed: u32, pattern: Pattern, counts: (u32, u32)) -> Description {
+fn configured(
+    description: &Description,
+    size: (u32, u32),
+    seed: u32,
+    pattern: Pattern,
+    counts: (u32, u32),
+) -> Description {
     let mut d = description.clone();
     (d.image.width, d.image.height) = size;
     d.render.seed = seed;
@@ -78,7 +84,8 @@ pub fn small_scenes() -> Vec<(String, Packed)> {
 /// Returns each scene and pattern at least once, with varied sizes, seeds and sample counts.
 pub fn variations() -> Vec<(String, Packed)> {
     let (mut scenes, patterns) = (scenes::descriptions(), patterns::all());
-    scenes.sort_by_key(|(_, d)| d.integrator() == Integrator::Path); // last: keeps the indices of the others
+    // Path-traced scenes are last, so that the other scenes keep their indices.
+    scenes.sort_by_key(|(_, d)| d.integrator() == Integrator::Path);
     let vary = |i: usize| {
         let (name, d) = &scenes[i % scenes.len()];
         let (size, counts) = (
@@ -88,7 +95,7 @@ pub fn variations() -> Vec<(String, Packed)> {
         let seed = [0, 1, u32::MAX][i % 3];
         let (pattern_name, pattern) = &patterns[i % patterns.len()];
         let name = format!("{name}, {pattern_name}, seed {seed}, {size:?}, {counts:?} samples");
-        (name, scenes::packed(&with(d, size, seed, *pattern, counts)))
+        (name, scenes::packed(&configured(d, size, seed, *pattern, counts)))
     };
     (0..scenes.len().max(patterns.len())).map(vary).collect()
 }
@@ -107,7 +114,7 @@ fn pictures_of_all_scenes_are_the_same() {
     let varied = variations()
         .into_iter()
         .map(|scene| (scene, [RenderMode::Baked, RenderMode::Buffers].as_slice()));
-    // In parallel: a driver compiles a kernel on one thread.
+    // Scenes are rendered in parallel, because a driver compiles a kernel on one thread.
     let scenes: Vec<_> = small.chain(varied).collect();
     let compared = scenes.par_iter().map(|((name, packed), modes)| {
         let cpu = reference(packed);
@@ -125,9 +132,9 @@ fn pictures_of_all_scenes_are_the_same() {
         (pixels, images, plain)
     });
     let (mut pixels, mut images, mut plain) = (0, 0, Nearly::default());
-    for of_scene in compared.collect::<Vec<_>>() {
-        (pixels, images) = (pixels + of_scene.0, images + of_scene.1);
-        plain.add(of_scene.2);
+    for result in compared.collect::<Vec<_>>() {
+        (pixels, images) = (pixels + result.0, images + result.1);
+        plain.add(result.2);
     }
     println!("{images} images, {pixels} pixels: within the guarantees; all scenes with plain WGSL: {plain}");
 }
@@ -174,31 +181,31 @@ fn a_different_image_is_found() {
                 "'{to}' in place of '{from}'"
             );
         }
-        // Still within the tolerances.
+        // The image is still within the tolerances.
         assert!(nearly(&film).is_ok(), "'{to}' in place of '{from}'");
     }
-    let mut other = cpu.clone();
-    other.sums[77].y = f32::from_bits(other.sums[77].y.to_bits() + 1);
+    let mut changed = cpu.clone();
+    changed.sums[77].y = f32::from_bits(changed.sums[77].y.to_bits() + 1);
     assert!(
-        !bit_exact(device) || compare(RenderMode::Baked, &packed, &other, &cpu).is_err(),
+        !bit_exact(device) || compare(RenderMode::Baked, &packed, &changed, &cpu).is_err(),
         "one bit passes"
     );
-    let mut other = cpu.clone();
-    other.sums.rotate_right(1);
-    assert!(nearly(&other).is_err(), "a shifted pixel passes");
-    let mut other = cpu.clone();
-    other
+    let mut changed = cpu.clone();
+    changed.sums.rotate_right(1);
+    assert!(nearly(&changed).is_err(), "a shifted pixel passes");
+    let mut changed = cpu.clone();
+    changed
         .sums
         .iter_mut()
         .for_each(|sum| *sum *= Vec4::new(1.00002, 1.00002, 1.00002, 1.0));
-    assert!(nearly(&other).is_err(), "a brighter image passes");
-    let mut other = cpu.clone();
-    other.sums[5].x = f32::NAN;
-    assert!(nearly(&other).is_err(), "NaN passes");
+    assert!(nearly(&changed).is_err(), "a brighter image passes");
+    let mut changed = cpu.clone();
+    changed.sums[5].x = f32::NAN;
+    assert!(nearly(&changed).is_err(), "NaN passes");
     let hits = first_hits(&packed, RenderMode::Cpu);
-    let mut other = hits.clone();
-    other.iter_mut().take(20).for_each(|hit| hit.shape ^= 1);
-    assert!(compare_hits(&other, &hits).is_err(), "a different shape index passes");
+    let mut changed = hits.clone();
+    changed.iter_mut().take(20).for_each(|hit| hit.shape ^= 1);
+    assert!(compare_hits(&changed, &hits).is_err(), "a different shape index passes");
 }
 
 #[test]
@@ -225,7 +232,7 @@ fn a_larger_image_agrees() {
 }
 
 /// Renders a sequence of tiles, each with a range of samples.
-fn pieces(backend: &mut dyn Backend, region: Region, pieces: &[(Region, Range<u32>)]) -> Film {
+fn render_pieces(backend: &mut dyn Backend, region: Region, pieces: &[(Region, Range<u32>)]) -> Film {
     let mut run = || {
         backend.begin(region)?;
         for (tile, samples) in pieces {
@@ -244,7 +251,7 @@ fn tile(x0: u32, y0: u32, x1: u32, y1: u32) -> Region {
 fn images_do_not_depend_on_the_work_split() {
     let description = scenes::scene("lights.toml");
     for pattern in [Pattern::Grid, Pattern::Random] {
-        let packed = scenes::packed(&with(&description, (45, 37), 3, pattern, (9, 4)));
+        let packed = scenes::packed(&configured(&description, (45, 37), 3, pattern, (9, 4)));
         let expected = reference(&packed);
         for mode in exact_modes() {
             let mut backend = backend(&packed, mode);
@@ -265,31 +272,31 @@ fn images_do_not_depend_on_the_work_split() {
                     "{mode:?}, {split:?}"
                 );
             }
-            // Any shape and order, each interrupted and continued.
+            // Tiles of any shape and in any order, interrupted and resumed.
             let tiles = [
                 tile(13, 20, 45, 37),
                 tile(0, 0, 45, 7),
                 tile(0, 7, 13, 37),
                 tile(13, 7, 45, 20),
             ];
-            let cuts = [0..2, 2..3, 3..9];
+            let ranges = [0..2, 2..3, 3..9];
             let mut order: Vec<_> = tiles
                 .iter()
-                .flat_map(|tile| cuts.clone().map(|range| (*tile, range)))
+                .flat_map(|tile| ranges.clone().map(|range| (*tile, range)))
                 .collect();
             assert_eq!(
-                differing(&pieces(&mut *backend, whole(&packed), &order), &expected),
+                differing(&render_pieces(&mut *backend, whole(&packed), &order), &expected),
                 0,
                 "{mode:?}, tiles"
             );
             order.sort_by_key(|(_, range)| range.start);
             assert_eq!(
-                differing(&pieces(&mut *backend, whole(&packed), &order), &expected),
+                differing(&render_pieces(&mut *backend, whole(&packed), &order), &expected),
                 0,
                 "{mode:?}, samples"
             );
             // Another order of samples rounds differently.
-            let film = pieces(
+            let film = render_pieces(
                 &mut *backend,
                 whole(&packed),
                 &[(whole(&packed), 5..9), (whole(&packed), 0..5)],
@@ -300,8 +307,8 @@ fn images_do_not_depend_on_the_work_split() {
 }
 
 #[test]
-fn a_crop_is_a_part_of_the_whole() {
-    let packed = scenes::packed(&with(
+fn a_crop_is_a_part_of_the_image() {
+    let packed = scenes::packed(&configured(
         &scenes::scene("ellipsoids.toml"),
         (67, 41),
         3,
@@ -335,7 +342,7 @@ fn a_crop_is_a_part_of_the_whole() {
 #[test]
 fn images_do_not_depend_on_the_number_of_threads() {
     let description = scenes::scene("cornell.toml");
-    let packed = scenes::packed(&with(&description, (70, 31), 3, Pattern::Random, (3, 4)));
+    let packed = scenes::packed(&configured(&description, (70, 31), 3, Pattern::Random, (3, 4)));
     let expected = reference(&packed);
     for threads in [1, 2, 3, 7] {
         let pool = rayon::ThreadPoolBuilder::new()
@@ -349,12 +356,12 @@ fn images_do_not_depend_on_the_number_of_threads() {
         );
     }
     // Control: another seed.
-    let other = reference(&scenes::packed(&with(
+    let reseeded = reference(&scenes::packed(&configured(
         &description,
         (70, 31),
         4,
         Pattern::Random,
         (3, 4),
     )));
-    assert!(differing(&other, &expected) > 0, "the comparison cannot fail");
+    assert!(differing(&reseeded, &expected) > 0, "the comparison cannot fail");
 }

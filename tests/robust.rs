@@ -54,58 +54,61 @@ fn cornell() -> Description {
     description
 }
 
-fn beyond(a: &Film, b: &Film, tolerance: f32) -> Vec<usize> {
-    let far = |(a, b): ([f32; 3], [f32; 3])| a.iter().zip(b).any(|(a, b)| !((a - b).abs() <= tolerance));
+fn differing_pixels(a: &Film, b: &Film, tolerance: f32) -> Vec<usize> {
+    let differs = |(a, b): ([f32; 3], [f32; 3])| a.iter().zip(b).any(|(a, b)| !((a - b).abs() <= tolerance));
     let pairs = a.means().zip(b.means()).enumerate();
-    pairs.filter(|(_, pair)| far(*pair)).map(|(pixel, _)| pixel).collect()
+    pairs
+        .filter(|(_, pair)| differs(*pair))
+        .map(|(pixel, _)| pixel)
+        .collect()
 }
 
-/// Returns the visible differences in 40,000 pixels. A shadow edge that moves across a light sample changes a value by
+/// Returns the visibly different pixels, of 40,000. A shadow edge that moves across a light sample changes a value by
 /// 1/16 of the light.
-fn visible(offset: f64, shadow_epsilon: f64) -> Vec<usize> {
+fn visibly_differing_pixels(offset: f64, shadow_epsilon: f64) -> Vec<usize> {
     let expected = reference(&packed(&cornell()));
     let mut description = transformed(&cornell(), 1.0, DVec3::splat(offset));
     description.render.shadow_epsilon = shadow_epsilon;
-    beyond(&reference(&packed(&description)), &expected, 0.01)
+    differing_pixels(&reference(&packed(&description)), &expected, 0.01)
 }
 
 /// Rays start 32 units of 2^-24 above a surface, with an error below 24 units: docs/decisions/shadow-rays.md, step 5.
 /// All coordinates are within 1 of the look-at point.
 const ROUNDING: f64 = 56.0 / 16_777_216.0;
 
-/// Returns true if rounding may change a pixel: in f64, moving camera or light by `ROUNDING` moves an edge across the
-/// camera ray or a light sample.
+/// Returns true if rounding may change a pixel: in f64, moving the camera or the light by `ROUNDING` moves an edge
+/// across the camera ray or a light sample.
 fn near_an_edge(description: &Description, pixel: usize) -> bool {
     let value = |description: &Description| {
         let oracle = Oracle::new(description, Flaw::None);
         DVec3::from_array(oracle.pixel(pixel as u32))
     };
-    let here = value(description);
-    let far = |moved: Description| (value(&moved) - here).abs().max_element() > 1e-3;
+    let expected = value(description);
+    let differs = |moved: Description| (value(&moved) - expected).abs().max_element() > 1e-3;
     let offsets = [DVec3::X, DVec3::Y, DVec3::Z].map(|offset| offset * ROUNDING);
     let moves = offsets.into_iter().chain(offsets.map(|offset| -offset));
     moves
         .into_iter()
-        .any(|offset| far(light_moved(description, offset)) || far(camera_moved(description, offset)))
+        .any(|offset| differs(with_moved_light(description, offset)) || differs(with_moved_camera(description, offset)))
 }
 
-fn light_moved(description: &Description, way: DVec3) -> Description {
+fn with_moved_light(description: &Description, offset: DVec3) -> Description {
     let mut description = description.clone();
     for light in &mut description.lights {
         match light {
-            LightDescription::Rectangle(light) => light.center += way,
+            LightDescription::Rectangle(light) => light.center += offset,
             other => panic!("unexpected variant: {other:?}"),
         }
     }
     description
 }
 
-fn camera_moved(description: &Description, way: DVec3) -> Description {
+fn with_moved_camera(description: &Description, offset: DVec3) -> Description {
     let mut description = description.clone();
     match &mut description.camera {
         CameraDescription::Perspective(camera) => {
-            camera.position += way;
-            camera.look_at += way;
+            camera.position += offset;
+            camera.look_at += offset;
         }
         other => panic!("unexpected variant: {other:?}"),
     }
@@ -119,13 +122,13 @@ fn scaling_changes_pixels_only_near_edges() {
     let (scene, expected) = (cornell(), reference(&packed(&cornell())));
     for scale in [0.001, 0.3, 7.7, 1000.0] {
         let found = reference(&packed(&transformed(&scene, scale, DVec3::ZERO)));
-        for pixel in beyond(&found, &expected, 1e-5) {
+        for pixel in differing_pixels(&found, &expected, 1e-5) {
             assert!(near_an_edge(&scene, pixel), "scaled by {scale}: pixel {pixel}");
         }
     }
-    let somewhere = (0..40_000).step_by(41);
-    let near = somewhere.filter(|pixel| near_an_edge(&scene, *pixel)).count();
-    assert_eq!(near, 0, "pixels near edges among all pixels");
+    let some_pixels = (0..40_000).step_by(41);
+    let near = some_pixels.filter(|pixel| near_an_edge(&scene, *pixel)).count();
+    assert_eq!(near, 0, "some of the sampled pixels are near edges");
 }
 
 /// Offsets reach a million times the size of the scene: coordinates are relative to a point near the look-at point.
@@ -138,17 +141,17 @@ fn translation_does_not_change_the_image() {
     }
     // These offsets are not multiples of the grid of possible origins.
     for offset in [1999.3, -77_777.7] {
-        let found = visible(offset, 0.0);
+        let found = visibly_differing_pixels(offset, 0.0);
         assert!(found.is_empty(), "moved by {offset}: pixels {found:?}");
     }
 }
 
 #[test]
 fn too_large_an_offset_is_found() {
-    let leaks = visible(0.0, 0.05);
-    assert!(leaks.len() > 400, "lost contact shadows: {} pixels", leaks.len());
-    // A small offset is found, too, away from edges.
-    let (scene, moved) = (cornell(), visible(0.0, 1e-3));
-    let far = moved.iter().filter(|pixel| !near_an_edge(&scene, **pixel)).count();
-    assert!(far > 60, "{far} of {} pixels", moved.len());
+    let changed = visibly_differing_pixels(0.0, 0.05);
+    assert!(changed.len() > 400, "lost contact shadows: {} pixels", changed.len());
+    // A small offset also changes pixels far from edges.
+    let (scene, moved) = (cornell(), visibly_differing_pixels(0.0, 1e-3));
+    let far_from_edges = moved.iter().filter(|pixel| !near_an_edge(&scene, **pixel)).count();
+    assert!(far_from_edges > 60, "{far_from_edges} of {} pixels", moved.len());
 }

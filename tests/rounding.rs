@@ -1,5 +1,5 @@
-//! Software quotients and square roots are correctly rounded on any device; with imprecise ones, images stay within the
-//! tolerances.
+//! Software quotients and square roots are correctly rounded on any device. With imprecise operations, images stay
+//! within the tolerances.
 
 use std::sync::OnceLock;
 
@@ -58,8 +58,8 @@ fn imprecise_operations() -> String {
         + NUDGED
 }
 
-/// Returns numbers of all magnitudes, and ends of ranges.
-fn numbers(random: &Random) -> f32 {
+/// Returns a number of any magnitude, or the end of a range.
+fn random_number(random: &Random) -> f32 {
     const EDGES: [u32; 12] = [
         0,
         1,
@@ -115,8 +115,8 @@ const CASES: [Case; 2] = [
     },
 ];
 
-/// Returns how many of a million results differ from IEEE 754, and the first.
-fn wrong(case: &Case, text: &str) -> (usize, Option<String>) {
+/// Returns how many of a million results differ from IEEE 754, and the first of them.
+fn count_wrong(case: &Case, text: &str) -> (usize, Option<String>) {
     let mut source = Source::default();
     source.append("rounding", text);
     let module = parse(&source);
@@ -126,7 +126,7 @@ fn wrong(case: &Case, text: &str) -> (usize, Option<String>) {
         .find(|(_, f)| f.name() == case.name)
         .expect("the function");
     let random = Random::new(5);
-    let arguments: Vec<f32> = (0..case.arguments << 20).map(|_| numbers(&random)).collect();
+    let arguments: Vec<f32> = (0..case.arguments << 20).map(|_| random_number(&random)).collect();
     let device = adapter::device().expect("a device");
     let results = function.run_in(device, &source, bytemuck::cast_slice(&arguments));
     let calls = arguments
@@ -149,33 +149,33 @@ fn quotients_and_square_roots_are_rounded_correctly_on_any_device() {
     for case in &CASES {
         for (device, text) in [
             ("this device", shaders().text(ROUNDING)),
-            ("a poor one", &over_imprecise_operations()),
+            ("an imprecise device", &over_imprecise_operations()),
         ] {
-            let (number, first) = wrong(case, text);
+            let (count, first) = count_wrong(case, text);
             println!(
-                "{} on {device}: {number} of {} are not rounded correctly",
+                "{} on {device}: {count} of {} are not rounded correctly",
                 case.name,
                 1 << 20
             );
-            assert_eq!(number, 0, "on {device}: {first:?}");
+            assert_eq!(count, 0, "on {device}: {first:?}");
         }
-        // Controls.
+        // Negative controls.
         assert!(
-            wrong(case, &imprecise_operations()).0 > 100_000,
-            "{}: a poor device is found out",
+            count_wrong(case, &imprecise_operations()).0 > 100_000,
+            "{}: imprecise operations are not found",
             case.name
         );
         for (from, to) in case.mistakes {
-            let (number, _) = wrong(case, &edited(&over_imprecise_operations(), from, to));
-            assert!(number > 0, "{}: '{to}'", case.name);
+            let (count, _) = count_wrong(case, &edited(&over_imprecise_operations(), from, to));
+            assert!(count > 0, "{}: '{to}'", case.name);
         }
     }
 }
 
 /// Returns imprecise operations for kernels that round in software.
-pub fn poor_shaders() -> &'static Shaders {
-    static POOR: OnceLock<Shaders> = OnceLock::new();
-    POOR.get_or_init(|| shaders_with(ROUNDING, &imprecise_operations()))
+pub fn imprecise_shaders() -> &'static Shaders {
+    static SHADERS: OnceLock<Shaders> = OnceLock::new();
+    SHADERS.get_or_init(|| shaders_with(ROUNDING, &imprecise_operations()))
 }
 
 /// Seeds of the camera for [`selectable_shaders`].
@@ -185,7 +185,7 @@ const IMPRECISE: u32 = 2;
 
 /// Returns shaders in which the camera seed selects how quotients and roots are computed. `DEVICE`: software rounding
 /// over the device's operations; `CORRECTED`: software rounding over deliberately imprecise operations; `IMPRECISE`:
-/// the imprecise operations alone. One kernel per scene covers all three.
+/// only the imprecise operations. One kernel per scene covers all three.
 fn selectable_shaders() -> Shaders {
     let mut text = over_imprecise_operations();
     for (from, to) in [
@@ -215,7 +215,7 @@ fn selectable_shaders() -> Shaders {
 #[test]
 fn images_keep_their_guarantees_on_an_imprecise_device() {
     if !adapter::device().is_some_and(bit_exact) {
-        return; // other tests cover such devices
+        return; // other tests cover devices without guaranteed bits
     }
     let shaders = selectable_shaders();
     for (name, mut packed) in small_scenes() {
@@ -230,15 +230,15 @@ fn images_keep_their_guarantees_on_an_imprecise_device() {
             )
         };
         let (differ, nearly, pixels) = rendered(IMPRECISE);
-        println!("{name} on an imprecise device: {differ} of {pixels} pixels differ by a bit at least; {nearly}");
+        println!("{name} on an imprecise device: {differ} of {pixels} pixels are not bit-identical; {nearly}");
         assert!(differ * 4 > pixels, "{name}: only {differ} pixels differ");
         let verdict = nearly.judge();
         assert!(verdict.is_ok(), "{name}, imprecise device: {}", verdict.unwrap_err());
-        for (device, seed) in [("a corrected one", CORRECTED), ("this one", DEVICE)] {
+        for (device, seed) in [("a corrected imprecise device", CORRECTED), ("this device", DEVICE)] {
             assert_eq!(rendered(seed).0, 0, "{name} on {device}");
         }
     }
-    // The shaders without a selection are bit-identical, too.
+    // Images of the shaders without a selection are bit-identical, too.
     let (name, packed) = small_scenes().swap_remove(0);
     let found = render_with(&packed, RenderMode::Rounded, sources::shaders());
     assert_eq!(differing(&found, &reference(&packed)), 0, "{name}");

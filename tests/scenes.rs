@@ -16,7 +16,7 @@ pub fn descriptions() -> Vec<(String, Description)> {
         if path.extension().is_some_and(|e| e == "toml") {
             let name = path.file_name().expect("a file").to_string_lossy().into_owned();
             let text = fs::read_to_string(&path).expect("a scene");
-            found.push((name.clone(), Description::parse(&text, &name).expect("a sound scene")));
+            found.push((name.clone(), Description::parse(&text, &name).expect("a valid scene")));
         }
     }
     assert!(found.len() >= 4, "the scenes were not found");
@@ -36,12 +36,12 @@ pub fn parse(text: &str) -> Packed {
     packed(&Description::parse(text, "test").unwrap_or_else(|error| panic!("{error}")))
 }
 
-/// Validates and packs.
+/// Validates and packs a scene.
 pub fn packed(description: &Description) -> Packed {
-    let beside = Assets::beside(&sources::path("scenes"));
+    let assets = Assets::beside(&sources::path("scenes"));
     pack(
         &description
-            .validate_with(&beside)
+            .validate_with(&assets)
             .unwrap_or_else(|problem| panic!("{problem}")),
     )
 }

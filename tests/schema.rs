@@ -27,7 +27,7 @@ fn validator() -> &'static Validator {
     VALIDATOR.get_or_init(|| jsonschema::draft202012::new(schema()).expect("a schema of the draft"))
 }
 
-fn fits(scene: &Table) -> bool {
+fn matches_schema(scene: &Table) -> bool {
     validator().is_valid(&serde_json::to_value(scene).expect("JSON"))
 }
 
@@ -39,7 +39,7 @@ fn load(scene: &Table, folder: &Path) -> Result<(), String> {
 }
 
 /// Scenes that together use every key.
-const EVERY: [&str; 4] = [
+const SCENES: [&str; 4] = [
     r#"
 [image]
 width = 8
@@ -365,8 +365,8 @@ integrator = "path"
 "#,
 ];
 
-/// Errors beyond the schema: relations of values, names, file contents.
-const OF_SEVERAL: &[&str] = &[
+/// Messages of errors that the schema cannot express: relations of values, names, and file contents.
+const BEYOND_SCHEMA: &[&str] = &[
     // Names and files.
     "there is no texture",
     "there is no material",
@@ -396,7 +396,7 @@ const OF_SEVERAL: &[&str] = &[
     "must have \"position\"",
     "square number",
     "cannot add samples",
-    "and at least the count",
+    "the count of pixel_samples",
     "from the start",
     "to cone_angle",
     "must not emit light",
@@ -414,29 +414,29 @@ const OF_SEVERAL: &[&str] = &[
     "must be [0, 0, 0, 1]",
 ];
 
-fn places(value: &Value, here: &mut Vec<Step>, all: &mut Vec<Vec<Step>>) {
-    all.push(here.clone());
+fn value_paths(value: &Value, path: &mut Vec<Step>, all: &mut Vec<Vec<Step>>) {
+    all.push(path.clone());
     match value {
         Value::Table(table) => {
             for (key, value) in table {
-                here.push(Step::Key(key.clone()));
-                places(value, here, all);
-                here.pop();
+                path.push(Step::Key(key.clone()));
+                value_paths(value, path, all);
+                path.pop();
             }
         }
-        // One component represents a point or color.
+        // One component represents all components of a point or color.
         Value::Array(list) if list.first().is_some_and(|first| !first.is_table() && !first.is_array()) => {
             if let Some(value) = list.last() {
-                here.push(Step::Index(list.len() - 1));
-                places(value, here, all);
-                here.pop();
+                path.push(Step::Index(list.len() - 1));
+                value_paths(value, path, all);
+                path.pop();
             }
         }
         Value::Array(list) => {
             for (i, value) in list.iter().enumerate() {
-                here.push(Step::Index(i));
-                places(value, here, all);
-                here.pop();
+                path.push(Step::Index(i));
+                value_paths(value, path, all);
+                path.pop();
             }
         }
         _ => {}
@@ -449,18 +449,18 @@ enum Step {
     Index(usize),
 }
 
-fn at<'a>(scene: &'a mut Value, place: &[Step]) -> &'a mut Value {
-    place.iter().fold(scene, |value, step| match step {
+fn value_at<'a>(scene: &'a mut Value, path: &[Step]) -> &'a mut Value {
+    path.iter().fold(scene, |value, step| match step {
         Step::Key(key) => &mut value[key.as_str()],
         Step::Index(i) => &mut value[*i],
     })
 }
 
-fn mutated(scene: &Table, place: &[Step]) -> Vec<Table> {
+fn mutated(scene: &Table, path: &[Step]) -> Vec<Table> {
     let floats = [-1e10, -400.0, -0.5, -1e-12, 0.0, 1e-12, 0.5, 1.5, 1e7, 1e10];
-    let wholes = [-1, 0, 2, 17, 101, 1025, 65_537, 5_000_000_000_i64];
+    let integers = [-1, 0, 2, 17, 101, 1025, 65_537, 5_000_000_000_i64];
     let mut values: Vec<Value> = floats.map(Value::from).into();
-    values.extend(wholes.map(Value::from));
+    values.extend(integers.map(Value::from));
     values.extend([Value::from("?"), Value::from(true), Value::Table(Table::new())]);
     values.extend([Value::Array(Vec::new()), Value::from(vec![1]), Value::from(vec![1, 2])]);
     values.extend([
@@ -468,56 +468,56 @@ fn mutated(scene: &Table, place: &[Step]) -> Vec<Table> {
         Value::from(vec![1, 2, 3, 4]),
         Value::from(vec!["a", "b"]),
     ]);
-    let mut all = Vec::new();
-    let mut put = |change: &dyn Fn(&mut Value)| {
+    let mut scenes = Vec::new();
+    let mut push_changed = |change: &dyn Fn(&mut Value)| {
         let mut scene = Value::Table(scene.clone());
-        change(at(&mut scene, place));
+        change(value_at(&mut scene, path));
         if let Value::Table(scene) = scene {
-            all.push(scene);
+            scenes.push(scene);
         }
     };
-    if !place.is_empty() {
+    if !path.is_empty() {
         for value in values {
-            put(&|old| *old = value.clone());
+            push_changed(&|old| *old = value.clone());
         }
     }
-    put(&|old| match old {
+    push_changed(&|old| match old {
         Value::Table(table) => drop(table.insert("unknown".to_owned(), Value::from(1))),
         Value::Array(list) => list.extend(list.last().cloned()),
         Value::String(text) => text.push('x'),
         Value::Integer(number) => *old = Value::from(*number as f64 + 0.5),
         _ => {}
     });
-    if let Value::Table(table) = at(&mut Value::Table(scene.clone()), place) {
+    if let Value::Table(table) = value_at(&mut Value::Table(scene.clone()), path) {
         for key in table.keys().cloned().collect::<Vec<_>>() {
-            put(&|old| {
+            push_changed(&|old| {
                 if let Value::Table(table) = old {
                     table.remove(&key);
                 }
             });
         }
     }
-    all
+    scenes
 }
 
 fn disagreement(scene: &Table, folder: &Path) -> Option<String> {
-    match (fits(scene), load(scene, folder)) {
+    match (matches_schema(scene), load(scene, folder)) {
         (false, Ok(())) => Some(format!("only the schema rejects {scene}")),
         // JSON Schema treats 1.0 as an integer.
         (true, Err(message))
             if message.contains(".0 must be ")
-                && ["whole number", "a name or a number"]
+                && ["whole number", "a name or an index"]
                     .iter()
                     .any(|rule| message.contains(rule)) =>
         {
             None
         }
-        // Static keys of a camera with a path.
+        // The schema lets a camera with a path omit static keys.
         (true, Err(message)) if message.contains(": camera.") && message.ends_with(" is missing") => {
             let has_path = scene["camera"].get("path").is_some();
-            (!has_path).then(|| format!("the schema accepts a camera without: {message}"))
+            (!has_path).then(|| format!("only the program rejects a camera without a path: {message}"))
         }
-        (true, Err(message)) if !OF_SEVERAL.iter().any(|part| message.contains(part)) => {
+        (true, Err(message)) if !BEYOND_SCHEMA.iter().any(|part| message.contains(part)) => {
             Some(format!("only the program rejects: {message}"))
         }
         _ => None,
@@ -526,44 +526,51 @@ fn disagreement(scene: &Table, folder: &Path) -> Option<String> {
 
 /// Checks every `step`-th change of a value; returns the number of checked changes.
 fn compare(scene: &Table, folder: &Path, step: usize) -> usize {
-    let mut all = Vec::new();
-    places(&Value::Table(scene.clone()), &mut Vec::new(), &mut all);
-    let scenes: Vec<Table> = all
+    let mut paths = Vec::new();
+    value_paths(&Value::Table(scene.clone()), &mut Vec::new(), &mut paths);
+    let scenes: Vec<Table> = paths
         .iter()
-        .flat_map(|place| mutated(scene, place))
+        .flat_map(|path| mutated(scene, path))
         .step_by(step)
         .collect();
-    let wrong: BTreeSet<String> = scenes
+    let disagreements: BTreeSet<String> = scenes
         .par_iter()
         .filter_map(|scene| disagreement(scene, folder))
         .collect();
-    assert!(wrong.is_empty(), "{} of {}: {wrong:#?}", wrong.len(), scenes.len());
+    assert!(
+        disagreements.is_empty(),
+        "{} of {}: {disagreements:#?}",
+        disagreements.len(),
+        scenes.len()
+    );
     scenes.len()
 }
 
 #[test]
 fn schema_and_parser_reject_the_same_changed_values() {
     let folder = any_scene::folder();
-    let scenes = EVERY.map(|text| text.parse::<Table>().unwrap());
-    // Leaves several changes for each value.
+    let scenes = SCENES.map(|text| text.parse::<Table>().unwrap());
+    // Every third change still leaves several changes for each value.
     let count: usize = scenes.iter().map(|scene| compare(scene, folder, 3)).sum();
     assert!(count > 3000, "{count}");
-    let whole = scenes.iter().filter(|scene| load(scene, folder).is_ok() && fits(scene));
-    assert_eq!(whole.count(), 3, "some unchanged scenes are invalid");
+    let valid = scenes
+        .iter()
+        .filter(|scene| load(scene, folder).is_ok() && matches_schema(scene));
+    assert_eq!(valid.count(), 3, "some unchanged scenes are invalid");
 }
 
 #[test]
 fn schema_and_parser_reject_missing_and_unknown_keys() {
     let folder = any_scene::folder();
     let key = |name: &str| Step::Key(name.to_owned());
-    let path = [key("camera"), key("path")];
-    let shape = |number| [key("shapes"), Step::Index(number)];
+    let camera_path = [key("camera"), key("path")];
+    let shape = |index| [key("shapes"), Step::Index(index)];
     let phong = [key("materials"), key("phong")];
-    let turned = [key("instances"), Step::Index(0)];
-    let bare = Table::from_iter([("frame".to_owned(), Value::from(3))]);
-    for (number, table, name, value) in [
-        (0, &path[..], "keys", Value::Array(Vec::new())),
-        (3, &path, "keys", Value::from(vec![bare])),
+    let instance = [key("instances"), Step::Index(0)];
+    let key_frame = Table::from_iter([("frame".to_owned(), Value::from(3))]);
+    for (scene_index, table, name, value) in [
+        (0, &camera_path[..], "keys", Value::Array(Vec::new())),
+        (3, &camera_path, "keys", Value::from(vec![key_frame])),
         (0, &[key("textures"), key("four")], "file", "".into()),
         (0, &[key("meshes"), key("cube")], "file", "".into()),
         (0, &shape(7), "file", "".into()),
@@ -584,7 +591,7 @@ fn schema_and_parser_reject_missing_and_unknown_keys() {
         ),
         (
             0,
-            &path,
+            &camera_path,
             "keys",
             Value::Array(vec![Value::from(vec![1]), Value::from(vec![2])]),
         ),
@@ -592,17 +599,23 @@ fn schema_and_parser_reject_missing_and_unknown_keys() {
         (0, &phong, "normal_map", vec!["five"].into()),
         (
             0,
-            &turned,
+            &instance,
             "rotate",
             Value::Array(vec![vec![0, 0, 1].into(), 20.into()]),
         ),
     ] {
-        let mut scene = Value::Table(EVERY[number].parse().unwrap());
-        assert!(fits(scene.as_table().unwrap()), "the unchanged scene is rejected");
-        let place = at(&mut scene, table).as_table_mut().unwrap();
-        place.insert(name.to_owned(), value);
+        let mut scene = Value::Table(SCENES[scene_index].parse().unwrap());
+        assert!(
+            matches_schema(scene.as_table().unwrap()),
+            "the unchanged scene is rejected"
+        );
+        let parent = value_at(&mut scene, table).as_table_mut().unwrap();
+        parent.insert(name.to_owned(), value);
         let scene = scene.as_table().unwrap();
-        assert!(!fits(scene) && load(scene, folder).is_err(), "{table:?}.{name}");
+        assert!(
+            !matches_schema(scene) && load(scene, folder).is_err(),
+            "{table:?}.{name}"
+        );
     }
 }
 
@@ -613,7 +626,7 @@ fn schema_and_parser_agree_on_random_scenes_and_mutations() {
     for i in 0..60 {
         let scene = strategy.new_tree(&mut runner).expect("a scene").current();
         let scene = Table::try_from(&scene).unwrap();
-        assert!(fits(&scene), "{scene}");
+        assert!(matches_schema(&scene), "{scene}");
         if i < 12 {
             assert!(compare(&scene, folder, 37) > 10);
         }
@@ -627,7 +640,7 @@ fn the_projects_scenes_are_valid() {
         let path = entry.unwrap().path();
         if path.extension().is_some_and(|end| end == "toml") {
             let scene: Table = std::fs::read_to_string(&path).unwrap().parse().unwrap();
-            assert!(fits(&scene), "{}", path.display());
+            assert!(matches_schema(&scene), "{}", path.display());
             count += 1;
         }
     }
@@ -640,7 +653,7 @@ fn the_projects_scenes_are_valid() {
         let scenes: Vec<&str> = scenes.filter(|scene| scene.contains("[camera]")).collect();
         assert!(!scenes.is_empty());
         for scene in scenes {
-            assert!(fits(&scene.parse().unwrap()), "{scene}");
+            assert!(matches_schema(&scene.parse().unwrap()), "{scene}");
         }
     }
 }
@@ -648,7 +661,7 @@ fn the_projects_scenes_are_valid() {
 /// Returns the schema's parts with their headings.
 fn parts() -> Vec<(String, &'static Json)> {
     let defs = schema()["$defs"].as_object().unwrap();
-    let of_types = defs.iter().map(|(name, part)| {
+    let typed_parts = defs.iter().map(|(name, part)| {
         let (shape, tag) = name.split_once('-').unwrap();
         let header = match shape {
             "camera" => "[camera]",
@@ -667,12 +680,12 @@ fn parts() -> Vec<(String, &'static Json)> {
         ("## `[meshes.NAME]`", &top["meshes"]["additionalProperties"]),
         ("## `[[instances]]`", &top["instances"]["items"]),
     ];
-    of_types
+    typed_parts
         .chain(plain.map(|(heading, part)| (heading.to_owned(), part)))
         .collect()
 }
 
-/// Returns default and range of the keys under a heading.
+/// Returns the default and the range of each key under a heading.
 fn rows(heading: &str) -> BTreeMap<&'static str, (String, String)> {
     let (_, rest) = PAGE
         .split_once(&format!("\n{heading}\n"))
@@ -698,41 +711,41 @@ fn the_page_has_the_same_keys_defaults_and_ranges() {
             "{heading}"
         );
         for (key, (default, range)) in rows {
-            let place = format!("{heading} {key}");
-            let said = &keys[key];
+            let location = format!("{heading} {key}");
+            let property = &keys[key];
             // Camera keys are required without a path.
             let required = [&part["required"], &part["anyOf"][0]["required"]].into_iter();
             let is_required = required.flat_map(Json::as_array).flatten().any(|name| name == key);
             // `type` is always required.
-            assert!(is_required == (default == "required") || key == "type", "{place}");
-            if let (Some(said), Ok(default)) = (
-                said.get("default"),
+            assert!(is_required == (default == "required") || key == "type", "{location}");
+            if let (Some(property), Ok(default)) = (
+                property.get("default"),
                 format!("x = {}", default.replace('`', "")).parse::<Table>(),
             ) {
                 assert!(
-                    same(said, &serde_json::to_value(&default["x"]).unwrap()),
-                    "{place}: {said} {default}"
+                    same(property, &serde_json::to_value(&default["x"]).unwrap()),
+                    "{location}: {property} {default}"
                 );
                 defaults += 1;
             }
-            let mut of = said;
-            while let Some(items) = of.get("items") {
-                of = items;
+            let mut item = property;
+            while let Some(items) = item.get("items") {
+                item = items;
             }
-            let wanted = match range.as_str() {
+            let expected = match range.as_str() {
                 "point" | "direction" => Some((-1e9, 1e9)),
                 "length" | "two lengths" => Some((1e-9, 1e9)),
-                "colour" if of.get("minimum").is_some() => Some((0.0, 1e6)),
+                "colour" if item.get("minimum").is_some() => Some((0.0, 1e6)),
                 range => range.split_once(" to ").and_then(|(low, high)| {
                     let high = high.split([',', ' ', ';']).next()?;
                     Some((low.parse::<f64>().ok()?, high.parse::<f64>().ok()?))
                 }),
             };
-            // The documentation states one of several ranges.
-            let is_plain = key != "max_depth" && of.get("anyOf").is_none();
-            if let (Some((low, high)), true) = (wanted, is_plain) {
-                let ends = ["minimum", "maximum"].map(|end| of[end].as_f64());
-                assert_eq!(ends, [Some(low), Some(high)], "{place}");
+            // The page documents only one of several ranges.
+            let is_plain = key != "max_depth" && item.get("anyOf").is_none();
+            if let (Some((low, high)), true) = (expected, is_plain) {
+                let limits = ["minimum", "maximum"].map(|limit| item[limit].as_f64());
+                assert_eq!(limits, [Some(low), Some(high)], "{location}");
                 ranges += 1;
             }
         }
@@ -740,7 +753,7 @@ fn the_page_has_the_same_keys_defaults_and_ranges() {
     assert!(defaults > 60 && ranges > 80, "{defaults} {ranges}");
 }
 
-/// 1 equals 1.0.
+/// Compares two values; 1 equals 1.0.
 fn same(a: &Json, b: &Json) -> bool {
     match (a, b) {
         (Json::Number(a), Json::Number(b)) => a.as_f64() == b.as_f64(),
@@ -752,7 +765,7 @@ fn same(a: &Json, b: &Json) -> bool {
     }
 }
 
-fn each_key(schema: &Json, path: &str, check: &mut impl FnMut(&str, &Json)) {
+fn visit_keys(schema: &Json, path: &str, check: &mut impl FnMut(&str, &Json)) {
     match schema {
         Json::Object(all) => {
             for (key, property) in all.get("properties").and_then(Json::as_object).into_iter().flatten() {
@@ -762,12 +775,12 @@ fn each_key(schema: &Json, path: &str, check: &mut impl FnMut(&str, &Json)) {
                 }
             }
             for (key, inner) in all {
-                each_key(inner, &format!("{path}/{key}"), check);
+                visit_keys(inner, &format!("{path}/{key}"), check);
             }
         }
         Json::Array(all) => {
             for (i, inner) in all.iter().enumerate() {
-                each_key(inner, &format!("{path}/{i}"), check);
+                visit_keys(inner, &format!("{path}/{i}"), check);
             }
         }
         _ => {}
@@ -777,22 +790,22 @@ fn each_key(schema: &Json, path: &str, check: &mut impl FnMut(&str, &Json)) {
 #[test]
 fn every_key_has_a_description_and_every_number_a_range() {
     let mut count = 0;
-    each_key(schema(), "", &mut |path, property| {
+    visit_keys(schema(), "", &mut |path, property| {
         let description = property["description"].as_str().unwrap_or_default();
         assert!(
             description.len() > 5 && description.ends_with('.'),
             "{path}: {description:?}"
         );
-        for bad in ["[`", "Description", "  ", "..", "\n"] {
-            assert!(!description.contains(bad), "{path}: {description:?}");
+        for forbidden in ["[`", "Description", "  ", "..", "\n"] {
+            assert!(!description.contains(forbidden), "{path}: {description:?}");
         }
         let is_number = ["number", "integer"].iter().any(|name| property["type"] == **name);
-        let ends = ["minimum", "exclusiveMinimum", "anyOf"];
+        let limits = ["minimum", "exclusiveMinimum", "anyOf"];
         assert!(
-            !is_number || ends.iter().any(|end| property.get(end).is_some()),
+            !is_number || limits.iter().any(|limit| property.get(limit).is_some()),
             "{path}: {property}"
         );
-        // A texture may replace the number: the key describes the range.
+        // If a texture may replace the number, the description of the key states the range.
         let is_texture = |either: &Json| either["properties"].get("texture").is_some();
         let either = property.get("anyOf").filter(|either| is_texture(&either[1]));
         let mut plain = either.map_or(&Json::Null, |either| &either[0]);
@@ -814,9 +827,10 @@ fn every_key_has_a_description_and_every_number_a_range() {
 
 #[test]
 fn the_tests_cover_every_key() {
-    let mut seen: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
-    let mut see = |name: String, table: &Value| {
-        seen.entry(name)
+    let mut covered: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
+    let mut record_keys = |name: String, table: &Value| {
+        covered
+            .entry(name)
             .or_default()
             .extend(table.as_table().unwrap().keys().cloned());
     };
@@ -827,27 +841,31 @@ fn the_tests_cover_every_key() {
             .unwrap_or("perspective")
             .to_owned()
     };
-    for scene in EVERY {
+    for scene in SCENES {
         let scene: Table = scene.parse().unwrap();
         for (key, value) in &scene {
             let kind = key.trim_end_matches('s');
             match (key.as_str(), value) {
-                ("camera", camera) => see(format!("camera-{}", tag(camera)), camera),
-                ("textures" | "materials", Value::Table(all)) => {
-                    all.values().for_each(|one| see(format!("{kind}-{}", tag(one)), one));
+                ("camera", camera) => record_keys(format!("camera-{}", tag(camera)), camera),
+                ("textures" | "materials", Value::Table(tables)) => {
+                    tables
+                        .values()
+                        .for_each(|entry| record_keys(format!("{kind}-{}", tag(entry)), entry));
                 }
-                ("lights" | "shapes", Value::Array(all)) => {
-                    all.iter().for_each(|one| see(format!("{kind}-{}", tag(one)), one));
+                ("lights" | "shapes", Value::Array(tables)) => {
+                    tables
+                        .iter()
+                        .for_each(|entry| record_keys(format!("{kind}-{}", tag(entry)), entry));
                 }
-                ("meshes", Value::Table(all)) => all.values().for_each(|one| see(key.clone(), one)),
-                ("instances", Value::Array(all)) => all.iter().for_each(|one| see(key.clone(), one)),
-                (_, section) => see(key.clone(), section),
+                ("meshes", Value::Table(tables)) => tables.values().for_each(|entry| record_keys(key.clone(), entry)),
+                ("instances", Value::Array(tables)) => tables.iter().for_each(|entry| record_keys(key.clone(), entry)),
+                (_, section) => record_keys(key.clone(), section),
             }
         }
     }
     let top = &schema()["properties"];
     let plain = ["image", "render", "environment"].map(|name| (name.to_owned(), &top[name]));
-    let others = [
+    let list_items = [
         ("meshes".to_owned(), &top["meshes"]["additionalProperties"]),
         ("instances".to_owned(), &top["instances"]["items"]),
     ];
@@ -856,8 +874,8 @@ fn the_tests_cover_every_key() {
         .unwrap()
         .iter()
         .map(|(name, part)| (name.clone(), part));
-    for (name, part) in defs.chain(plain).chain(others) {
-        let wanted: BTreeSet<String> = part["properties"].as_object().unwrap().keys().cloned().collect();
-        assert_eq!(seen.get(&name), Some(&wanted), "{name}");
+    for (name, part) in defs.chain(plain).chain(list_items) {
+        let expected: BTreeSet<String> = part["properties"].as_object().unwrap().keys().cloned().collect();
+        assert_eq!(covered.get(&name), Some(&expected), "{name}");
     }
 }

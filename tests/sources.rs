@@ -9,7 +9,7 @@ use wgray_render::gpu::compose::{KERNELS, Shaders, Source, built_in};
 use wgray_render::gpu::naga;
 use wgray_render::gpu::naga::{ArraySize, Module, ScalarKind, TypeInner};
 
-/// Folder of shaders to test, from `scripts/mutate`.
+/// Environment variable with the folder of the shaders to test, set by `scripts/mutation/twins.py`.
 const SHADERS: &str = "WGRAY_TEST_SHADERS";
 
 pub fn path(relative: &str) -> PathBuf {
@@ -28,7 +28,7 @@ pub fn edited_shaders(file: &str, from: &str, to: &str) -> Shaders {
     shaders_with(file, &edited(shaders().text(file), from, to))
 }
 
-/// Replaces the first occurrence.
+/// Replaces the first occurrence of `from`.
 pub fn edited(text: &str, from: &str, to: &str) -> String {
     assert!(text.contains(from), "'{from}' not found");
     text.replacen(from, to, 1)
@@ -49,7 +49,7 @@ pub fn with(shaders: &Shaders, file: &str, text: &str) -> Shaders {
     Shaders::read(folder.path()).expect("the copies")
 }
 
-/// Returns the shared files alone; naga accepts them, so they use no binding and no override.
+/// Returns only the shared files. naga accepts these files, so they use no binding and no override.
 pub fn shared_source() -> Source {
     shaders().shared()
 }
@@ -60,15 +60,15 @@ pub fn parse(source: &Source) -> Module {
 }
 
 pub fn file_of(source: &Source, span: naga::Span) -> String {
-    let range = span.to_range().expect("naga has a span for every item");
+    let range = span.to_range().expect("a span for every item");
     source
         .locate(range.start)
-        .expect("the span is inside of the text")
+        .expect("a span inside of the text")
         .0
         .to_string()
 }
 
-/// A name and a WGSL type: `vec3<f32>`, `Primitive`.
+/// A name and a WGSL type, such as `vec3<f32>` or `Primitive`.
 pub type Named = (String, String);
 
 /// A function or a record.
@@ -153,8 +153,8 @@ pub fn rust(relative: &str) -> syn::File {
     syn::parse_file(&text).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
 }
 
-/// Returns the functions outside of tests and `impl`s. One that updates an argument in place has the signature of the
-/// WGSL function that takes and returns it.
+/// Returns the functions outside of tests and `impl`s. A function that updates an argument in place has the signature
+/// of the WGSL function that takes and returns this argument.
 pub fn rust_functions(file: &syn::File) -> Vec<Signature> {
     let updated = |function: &syn::ItemFn| {
         let arguments = function.sig.inputs.iter();
@@ -217,7 +217,7 @@ fn rust_type(ty: &Type) -> String {
                     lit: syn::Lit::Int(length),
                     ..
                 }) => length.base10_digits().to_string(),
-                other => format!("{other:?}"), // matches nothing: a shared array has a literal length
+                other => format!("{other:?}"), // matches no WGSL type: a shared array has a literal length
             };
             format!("array<{}, {length}>", rust_type(&array.elem))
         }
@@ -235,25 +235,25 @@ fn rust_type(ty: &Type) -> String {
                 name
             }
         }
-        other => format!("{other:?}"), // matches nothing
+        other => format!("{other:?}"), // matches no WGSL type
     }
 }
 
 /// Returns readable differences; empty if equal.
-pub fn differences(place: &str, wgsl: &[Signature], rust: &[Signature]) -> Vec<String> {
+pub fn differences(file: &str, wgsl: &[Signature], rust: &[Signature]) -> Vec<String> {
     let mut problems = Vec::new();
     for w in wgsl {
         match rust.iter().find(|r| r.name == w.name) {
-            None => problems.push(format!("{place}: {} is in WGSL, not in Rust", w.name)),
-            Some(r) if r != w => problems.push(format!("{place}: {} differs:\n  WGSL {w:?}\n  Rust {r:?}", w.name)),
+            None => problems.push(format!("{file}: {} is in WGSL, not in Rust", w.name)),
+            Some(r) if r != w => problems.push(format!("{file}: {} differs:\n  WGSL {w:?}\n  Rust {r:?}", w.name)),
             Some(_) => {}
         }
     }
     for r in rust.iter().filter(|r| !wgsl.iter().any(|w| w.name == r.name)) {
-        problems.push(format!("{place}: {} is in Rust, not in WGSL", r.name));
+        problems.push(format!("{file}: {} is in Rust, not in WGSL", r.name));
     }
     if problems.is_empty() && wgsl != rust {
-        problems.push(format!("{place}: the order differs"));
+        problems.push(format!("{file}: the order differs"));
     }
     problems
 }

@@ -1,5 +1,5 @@
-//! Random patterns are uniform, jointly and in projections, and have the same image mean as grids. Deterministic: the
-//! random numbers are fixed.
+//! Random patterns are uniform, jointly and in projections, and have the same image mean as grids. The tests are
+//! deterministic, because the random numbers are fixed.
 
 use glam::Vec2;
 use wgray::scene::Pattern;
@@ -11,24 +11,24 @@ use crate::probes::twin;
 use crate::sources::{parse, shared_source};
 use crate::{adapter, patterns, scenes};
 
-/// Probability of rejecting a uniform pattern; each test makes dozens of checks.
+/// Probability of rejecting a uniform pattern: low, because each test makes dozens of checks.
 const SIGNIFICANCE: f64 = 1e-6;
 
-/// Returns `sets` pixels with `count` positions, from the GPU if available: `tests/probes.rs` shows that the twins
-/// agree.
+/// Returns `count` positions for each of `sets` pixels. The GPU computes them if it is available: `tests/probes.rs`
+/// shows that the twins agree.
 fn positions(pattern: Pattern, count: u32, sets: u32) -> Vec<Vec<Vec2>> {
     let mut description = scenes::scene("cornell.toml");
     description.render.pixel_samples = patterns::samples(pattern, count);
     let packed: Packed = scenes::packed(&description);
     let s = &packed.specialization;
     let keys = evaluate("sample_key", (0..sets).flat_map(|i| [i % 97, i / 97, 5, 0]).collect());
-    let calls = keys.chunks_exact(2).flat_map(|key| {
+    let arguments = keys.chunks_exact(2).flat_map(|key| {
         (0..packed.sampling.pixel_samples).flat_map(|index| [s.pixel_pattern, s.pixel_side, index, 0, key[0], key[1]])
     });
-    let places = evaluate("sample_square", calls.collect());
-    let place = |words: &[u32]| Vec2::new(f32::from_bits(words[0]), f32::from_bits(words[1]));
-    let places: Vec<Vec2> = places.chunks_exact(2).map(place).collect();
-    places
+    let points = evaluate("sample_square", arguments.collect());
+    let point = |words: &[u32]| Vec2::new(f32::from_bits(words[0]), f32::from_bits(words[1]));
+    let points: Vec<Vec2> = points.chunks_exact(2).map(point).collect();
+    points
         .chunks_exact(packed.sampling.pixel_samples as usize)
         .map(<[Vec2]>::to_vec)
         .collect()
@@ -45,16 +45,16 @@ fn evaluate(name: &str, words: Vec<u32>) -> Vec<u32> {
     function.run(device, &words)
 }
 
-fn fixed(pattern: Pattern) -> bool {
+fn is_fixed(pattern: Pattern) -> bool {
     let sets = positions(pattern, 16, 2);
     sets[0] == sets[1]
 }
 
 /// Returns the p-value of a chi-square, by the cube-root approximation of Wilson and Hilferty, "The Distribution of
 /// Chi-Square", 1931.
-fn chance(chi_square: f64, freedom: f64) -> f64 {
-    let spread = 2.0 / (9.0 * freedom);
-    let z = ((chi_square / freedom).cbrt() - (1.0 - spread)) / spread.sqrt();
+fn p_value(chi_square: f64, degrees_of_freedom: f64) -> f64 {
+    let spread = 2.0 / (9.0 * degrees_of_freedom);
+    let z = ((chi_square / degrees_of_freedom).cbrt() - (1.0 - spread)) / spread.sqrt();
     upper_tail(z)
 }
 
@@ -88,8 +88,8 @@ fn chi_square(counts: &[u32]) -> f64 {
 fn nonuniform_projection(positions: &[Vec2]) -> Option<String> {
     const CELLS: usize = 16;
     let cell = |x: f32| ((x * CELLS as f32) as usize).min(CELLS - 1);
-    type TestFolder = fn(Vec2) -> f32;
-    let projections: [(&str, TestFolder); 4] = [
+    type Projection = fn(Vec2) -> f32;
+    let projections: [(&str, Projection); 4] = [
         ("x", |p| p.x),
         ("y", |p| p.y),
         ("x + y modulo 1", |p| (p.x + p.y).fract()),
@@ -100,14 +100,14 @@ fn nonuniform_projection(positions: &[Vec2]) -> Option<String> {
         .iter()
         .for_each(|p| square[cell(p.y) * CELLS + cell(p.x)] += 1);
     let mut tests = vec![("the square", square)];
-    for (name, place) in projections {
+    for (name, projection) in projections {
         let mut line = vec![0; CELLS];
-        positions.iter().for_each(|p| line[cell(place(*p))] += 1);
+        positions.iter().for_each(|p| line[cell(projection(*p))] += 1);
         tests.push((name, line));
     }
     tests.iter().find_map(|(name, counts)| {
-        let chance = chance(chi_square(counts), counts.len() as f64 - 1.0);
-        (chance < SIGNIFICANCE).then(|| format!("{name} is not uniform: a chance of {chance:.1e}"))
+        let p_value = p_value(chi_square(counts), counts.len() as f64 - 1.0);
+        (p_value < SIGNIFICANCE).then(|| format!("{name} is not uniform: the p-value is {p_value:.1e}"))
     })
 }
 
@@ -117,10 +117,12 @@ fn p_values_match_published_tables() {
         assert!((upper_tail(z) - expected).abs() < 1e-6, "{z}");
     }
     // Abramowitz and Stegun, table 26.8.
-    for (chi_square, freedom, expected) in [(24.996, 15.0, 0.05), (37.697, 15.0, 0.001), (124.342, 100.0, 0.05)] {
+    for (chi_square, degrees_of_freedom, expected) in
+        [(24.996, 15.0, 0.05), (37.697, 15.0, 0.001), (124.342, 100.0, 0.05)]
+    {
         assert!(
-            (chance(chi_square, freedom) / expected - 1.0).abs() < 0.05,
-            "{chi_square} {freedom}"
+            (p_value(chi_square, degrees_of_freedom) / expected - 1.0).abs() < 0.05,
+            "{chi_square} {degrees_of_freedom}"
         );
     }
 }
@@ -137,11 +139,11 @@ fn positions_are_on_the_unit_square() {
     }
 }
 
-/// Tests each position, and all positions of a pixel together.
+/// Tests some positions individually, and all positions of a pixel together.
 #[test]
 fn random_patterns_are_uniform_over_pixels() {
-    let mut tested = 0;
-    for (name, pattern) in patterns::all().into_iter().filter(|(_, pattern)| !fixed(*pattern)) {
+    let mut pattern_count = 0;
+    for (name, pattern) in patterns::all().into_iter().filter(|(_, pattern)| !is_fixed(*pattern)) {
         let sets = positions(pattern, 16, 40_000);
         // Some patterns confine a position to a grid cell.
         for (first, last) in [(0, 0), (7, 7), (15, 15), (0, 15)] {
@@ -154,9 +156,9 @@ fn random_patterns_are_uniform_over_pixels() {
             let problem = if confined { None } else { nonuniform_projection(&list) };
             assert!(problem.is_none(), "{name}, positions {first} to {last}: {problem:?}");
         }
-        tested += 1;
+        pattern_count += 1;
     }
-    assert!(tested >= 1, "no pattern is random");
+    assert!(pattern_count >= 1, "no pattern is random");
 }
 
 /// The mean position is the center of the square.
@@ -166,7 +168,7 @@ fn all_patterns_are_centered() {
         let sets = positions(pattern, 16, 10_000);
         let n = (sets.len() * sets[0].len()) as f64;
         let mean = sets.iter().flatten().map(|p| p.as_dvec2()).sum::<glam::DVec2>() / n;
-        // Standard error of independent positions; no pattern is worse.
+        // The standard error of independent positions; no pattern has a larger error.
         let error = (1.0 / 12.0 / n).sqrt();
         assert!(((mean - 0.5) / error).abs().max_element() < 5.0, "{name}: {mean}");
     }
@@ -175,8 +177,8 @@ fn all_patterns_are_centered() {
 #[test]
 fn a_biased_pattern_is_found() {
     let sets = positions(Pattern::Random, 16, 10_000);
-    let sound: Vec<Vec2> = sets.into_iter().flatten().collect();
-    assert_eq!(nonuniform_projection(&sound), None);
+    let unbiased: Vec<Vec2> = sets.into_iter().flatten().collect();
+    assert_eq!(nonuniform_projection(&unbiased), None);
     type Change = fn(usize, Vec2) -> Vec2;
     let changes: [(&str, Change); 6] = [
         ("a little to the left", |_, p| Vec2::new(p.x.powf(1.03), p.y)),
@@ -187,12 +189,12 @@ fn a_biased_pattern_is_found() {
         ("seven bits only", |_, p| (p * 128.0).floor() / 128.0),
     ];
     for (name, change) in changes {
-        let biased: Vec<Vec2> = sound.iter().enumerate().map(|(i, p)| change(i, *p)).collect();
+        let biased: Vec<Vec2> = unbiased.iter().enumerate().map(|(i, p)| change(i, *p)).collect();
         assert!(nonuniform_projection(&biased).is_some(), "{name}");
     }
 }
 
-/// Returns an image so small that edges are everywhere.
+/// Returns a scene with so few pixels that most of them contain edges.
 fn noisy(pattern: Pattern, seed: u32, counts: (u32, u32)) -> Packed {
     let mut d = scenes::scene("cornell.toml");
     (d.image.width, d.image.height) = (20, 20);
@@ -210,7 +212,7 @@ fn deviations(pictures: &[Vec<[f64; 3]>], truth: &[[f64; 3]]) -> Vec<f64> {
         let mean = values.iter().sum::<f64>() / n;
         let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0);
         let expected: f64 = truth[i].iter().sum();
-        // The reference is a fine grid with its own error.
+        // The reference, a fine grid, has its own error.
         (mean - expected) / ((variance / n).sqrt() + 1e-3 * expected)
     };
     (0..truth.len()).map(pixel).collect()
@@ -231,12 +233,12 @@ fn check_unbiased(deviations: &[f64]) -> Result<(), String> {
 #[test]
 fn images_of_random_patterns_have_the_mean_of_grids() {
     let truth = means(&reference(&noisy(Pattern::Grid, 0, (256, 256))));
-    for (name, pattern) in patterns::all().into_iter().filter(|(_, pattern)| !fixed(*pattern)) {
+    for (name, pattern) in patterns::all().into_iter().filter(|(_, pattern)| !is_fixed(*pattern)) {
         let picture = |seed| means(&reference(&noisy(pattern, seed, (4, 4))));
         let pictures: Vec<_> = (0..48).map(picture).collect();
         let result = check_unbiased(&deviations(&pictures, &truth));
         assert!(result.is_ok(), "{name}: {}", result.unwrap_err());
-        // Control: 2% too bright, and another camera.
+        // Controls: a reference that is 2% too bright, and a shifted reference.
         let brighter: Vec<[f64; 3]> = truth.iter().map(|pixel| pixel.map(|v| v * 1.02)).collect();
         assert!(
             check_unbiased(&deviations(&pictures, &brighter)).is_err(),

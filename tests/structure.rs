@@ -1,4 +1,4 @@
-//! The import graph of the modules of each package has no cycles. Cargo ensures the same for the packages.
+//! The import graph of the modules of each package has no cycles. Cargo rejects cycles of packages.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -38,14 +38,14 @@ fn cycles_are_found() {
         };
         cycles(&imports(&texts.iter().map(file).collect::<Vec<_>>(), &[]))
     };
-    let none: Vec<Vec<String>> = Vec::new();
-    assert_eq!(found(&[("a", "use crate::b::B;"), ("b", "pub struct B;")]), none);
-    let both = [strings(&["a", "b"])];
+    let no_cycles: Vec<Vec<String>> = Vec::new();
+    assert_eq!(found(&[("a", "use crate::b::B;"), ("b", "pub struct B;")]), no_cycles);
+    let cycle = [strings(&["a", "b"])];
     assert_eq!(
         found(&[("a", "use crate::b::B;"), ("b", "fn f() { super::a::g() }")]),
-        both
+        cycle
     );
-    // through names that the root exports
+    // Through names that the root exports.
     let root = ("lib", "mod a; mod b; pub use b::B; pub use a::*;");
     assert_eq!(
         found(&[
@@ -53,22 +53,22 @@ fn cycles_are_found() {
             ("a", "use super::{B}; pub struct A;"),
             ("b", "type T = crate::A;")
         ]),
-        both
+        cycle
     );
-    // in a macro, and through a third module
+    // In a macro, and through a third module.
     let third = [
         ("a", "macro_rules! m { () => { crate::b::B } }"),
         ("b", "use crate::c;"),
         ("c", "use crate::a;"),
     ];
     assert_eq!(found(&third), [strings(&["a", "b", "c"])]);
-    // not in tests
+    // Test modules do not count.
     assert_eq!(
         found(&[
             ("a", "use crate::b::B;"),
             ("b", "#[cfg(test)] mod tests { use crate::a; }")
         ]),
-        none
+        no_cycles
     );
 }
 
@@ -83,26 +83,26 @@ fn read(folder: &Path, module: &[String], files: &mut Vec<(Module, File)>) {
     for entry in fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();
         let stem = path.file_stem().unwrap().to_str().unwrap();
-        let below = [module, &strings(&[stem])].concat();
+        let child_module = [module, &strings(&[stem])].concat();
         if path.is_dir() {
-            read(&path, &below, files);
+            read(&path, &child_module, files);
         } else if path.extension().is_some_and(|extension| extension == "rs") {
             let file = syn::parse_file(&fs::read_to_string(&path).unwrap()).unwrap();
             let is_root = matches!(stem, "lib" | "main" | "mod");
-            files.push((if is_root { module.to_vec() } else { below }, file));
+            files.push((if is_root { module.to_vec() } else { child_module }, file));
         }
     }
-    let of_tests: BTreeSet<Module> = (files.iter())
+    let test_modules: BTreeSet<Module> = (files.iter())
         .flat_map(|(module, file)| {
-            tests_of(file)
+            test_module_names(file)
                 .map(|name| [module.as_slice(), &[name]].concat())
                 .collect::<Vec<_>>()
         })
         .collect();
-    files.retain(|(module, _)| !of_tests.iter().any(|tests| module.starts_with(tests)));
+    files.retain(|(module, _)| !test_modules.iter().any(|test_module| module.starts_with(test_module)));
 }
 
-fn tests_of(file: &File) -> impl Iterator<Item = String> {
+fn test_module_names(file: &File) -> impl Iterator<Item = String> {
     file.items.iter().filter_map(|item| match item {
         Item::Mod(module) if is_test(&module.attrs) => Some(module.ident.to_string()),
         _ => None,
@@ -137,8 +137,8 @@ fn imports(files: &[(Module, File)], parent: &[String]) -> BTreeMap<String, BTre
                     true => Some(name),
                     false => exports.get(&name).cloned(),
                 });
-        let others = imported.filter(|imported| *imported != importer);
-        all.entry(importer.clone()).or_default().extend(others);
+        let other_modules = imported.filter(|imported| *imported != importer);
+        all.entry(importer.clone()).or_default().extend(other_modules);
     }
     all
 }
@@ -149,7 +149,7 @@ fn exports(files: &[(Module, File)], parent: &[String], modules: &BTreeSet<Strin
     let roots = files.iter().filter(|(module, _)| module == parent);
     for item in roots.flat_map(|(_, file)| &file.items) {
         let Item::Use(item) = item else { continue };
-        for path in used(&item.tree) {
+        for path in use_paths(&item.tree) {
             let path: Vec<_> = path
                 .into_iter()
                 .filter(|name| name != "self" && name != "crate")
@@ -162,11 +162,11 @@ fn exports(files: &[(Module, File)], parent: &[String], modules: &BTreeSet<Strin
             }
             match last.as_str() {
                 "*" => {
-                    let of_child =
+                    let is_in_child =
                         |module: &Module| module.strip_prefix(parent).is_some_and(|m| m.first() == Some(first));
                     let names = files
                         .iter()
-                        .filter(|(module, _)| of_child(module))
+                        .filter(|(module, _)| is_in_child(module))
                         .flat_map(|(_, file)| public_names(file));
                     exports.extend(names.map(|name| (name, first.clone())));
                 }
@@ -238,7 +238,7 @@ impl Visit<'_> for Paths {
 
     fn visit_item_use(&mut self, item: &ItemUse) {
         if !is_test(&item.attrs) {
-            used(&item.tree).iter().for_each(|path| self.add(path));
+            use_paths(&item.tree).iter().for_each(|path| self.add(path));
         }
     }
 
@@ -257,40 +257,46 @@ impl Visit<'_> for Paths {
     }
 }
 
-fn used(tree: &UseTree) -> Vec<Module> {
+fn use_paths(tree: &UseTree) -> Vec<Module> {
     match tree {
         UseTree::Path(path) => {
             let first = path.ident.to_string();
-            let rest = used(&path.tree).into_iter();
+            let rest = use_paths(&path.tree).into_iter();
             rest.map(|rest| [vec![first.clone()], rest].concat()).collect()
         }
         UseTree::Name(name) => vec![vec![name.ident.to_string()]],
         UseTree::Rename(rename) => vec![vec![rename.ident.to_string()]],
         UseTree::Glob(_) => vec![strings(&["*"])],
-        UseTree::Group(group) => group.items.iter().flat_map(used).collect(),
+        UseTree::Group(group) => group.items.iter().flat_map(use_paths).collect(),
     }
 }
 
 fn cycles(imports: &BTreeMap<String, BTreeSet<String>>) -> Vec<Vec<String>> {
-    let reached = |start: &String| {
-        let mut reached = BTreeSet::new();
-        let mut open = vec![start];
-        while let Some(module) = open.pop() {
+    let reachable = |start: &String| {
+        let mut reachable = BTreeSet::new();
+        let mut pending = vec![start];
+        while let Some(module) = pending.pop() {
             for next in imports.get(module).into_iter().flatten() {
-                if reached.insert(next.clone()) {
-                    open.push(next);
+                if reachable.insert(next.clone()) {
+                    pending.push(next);
                 }
             }
         }
-        reached
+        reachable
     };
-    let all: BTreeMap<&String, BTreeSet<String>> = imports.keys().map(|module| (module, reached(module))).collect();
-    let together = |a: &String, b: &String| all[a].contains(b) && all.get(b).is_some_and(|of_b| of_b.contains(a));
+    let reachable_modules: BTreeMap<&String, BTreeSet<String>> =
+        imports.keys().map(|module| (module, reachable(module))).collect();
+    let in_one_cycle = |a: &String, b: &String| {
+        reachable_modules[a].contains(b)
+            && reachable_modules
+                .get(b)
+                .is_some_and(|reachable_from_b| reachable_from_b.contains(a))
+    };
     let groups: BTreeSet<Vec<String>> = (imports.keys())
         .map(|module| {
             imports
                 .keys()
-                .filter(|other| together(module, other))
+                .filter(|other| in_one_cycle(module, other))
                 .cloned()
                 .collect()
         })

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use tempfile::TempDir;
 
-/// A temporary folder that is deleted on drop. Modules define how the program runs in it.
+/// A temporary folder that is deleted on drop. Test modules define how the program runs in the folder.
 pub struct TestFolder {
     folder: TempDir,
 }
@@ -13,11 +13,11 @@ pub struct TestFolder {
 impl TestFolder {
     /// Creates a folder with one file.
     pub fn with_file(name: &str, text: &str) -> TestFolder {
-        let place = TestFolder {
+        let folder = TestFolder {
             folder: tempfile::tempdir().expect("a temporary folder"),
         };
-        place.write(name, text);
-        place
+        folder.write(name, text);
+        folder
     }
 
     pub fn folder(&self) -> &Path {
@@ -36,11 +36,11 @@ impl TestFolder {
         fs::write(self.path(name), text).expect("a file");
     }
 
-    /// Returns the sorted names of all files, hidden ones included, except those that are `known`.
-    pub fn files_but(&self, known: impl Fn(&str) -> bool) -> Vec<String> {
+    /// Returns the sorted names of all files, hidden ones included, except those for which `is_ignored` returns true.
+    pub fn files_but(&self, is_ignored: impl Fn(&str) -> bool) -> Vec<String> {
         let entries = fs::read_dir(self.folder()).expect("the folder");
         let names = entries.map(|entry| entry.expect("an entry").file_name().to_string_lossy().into_owned());
-        let mut names: Vec<String> = names.filter(|name| !known(name)).collect();
+        let mut names: Vec<String> = names.filter(|name| !is_ignored(name)).collect();
         names.sort();
         names
     }

@@ -12,33 +12,36 @@ use wgray_render::records::Packed;
 use crate::scenes;
 use crate::sources::{self, Signature, differences, parse, rust_functions, rust_records, shared_source};
 
-/// Files without a twin, with reasons.
-const WITHOUT_TWIN: &[(&str, &str)] = &[
-    ("bindings.wgsl", "buffers only"),
-    ("completion.wgsl", "the CPU truncates no loop"),
+/// Shaders without a twin, with reasons.
+const SHADERS_WITHOUT_TWIN: &[(&str, &str)] = &[
+    ("bindings.wgsl", "only declares buffers"),
+    ("completion.wgsl", "no loop is truncated on the CPU"),
     (
         "rounding.wgsl",
-        "Rust's own quotients and square roots are rounded correctly",
+        "quotients and square roots are correctly rounded in Rust",
     ),
-    ("texels.wgsl", "the CPU has all texels in one list"),
-    ("film.wgsl", "the CPU's film has a list for each layer"),
+    ("texels.wgsl", "the CPU path has all texels in one list"),
+    ("film.wgsl", "the film of the CPU path has a list for each layer"),
     (
         "integrators/whole.wgsl",
-        "the CPU renders whole samples in pixel.rs, without lockstep",
+        "the CPU path renders complete samples in pixel.rs, without lockstep",
     ),
     (
         "bvh.wgsl",
-        "the CPU traverses BVHs with kernels of its own (bvh.rs, traversal), to the same hits, as tests/meshes proves",
+        "the CPU path has a different traversal (bvh.rs, traversal) with the same hits, see tests/meshes",
     ),
     (
         "buffers.wgsl",
-        "scene access of kernels; baked kernels have the same functions with constants",
+        "scene access of kernels; in baked kernels, the same functions return constants",
     ),
-    ("meshes.wgsl", "mesh access of kernels; the CPU's is in geometry.rs"),
+    (
+        "meshes.wgsl",
+        "mesh access of kernels; in Rust, mesh access is in geometry.rs",
+    ),
 ];
 
-/// Rust files that are not twins.
-const NO_TWIN: &[&str] = &[
+/// Files in crates/render/src/cpu that are not twins of a shader.
+const RUST_FILES_WITHOUT_SHADER: &[&str] = &[
     "ewa.rs",
     "mod.rs",
     "renderer.rs",
@@ -48,48 +51,48 @@ const NO_TWIN: &[&str] = &[
     "traversal",
 ];
 
-/// Functions and records that exist on one side only or differ: file, name, reason.
+/// Functions and records that exist in only one language or differ: file, name, reason.
 const ONE_SIDED: &[(&str, &str, &str)] = &[
     (
         "linear_primitives.wgsl",
         "closest_primitive",
-        "in WGSL it is in buffers.wgsl, as it reads the scene",
+        "reads the scene: in WGSL, it is in buffers.wgsl",
     ),
     (
         "linear_primitives.wgsl",
         "occluded_by_primitives",
-        "in WGSL it is in buffers.wgsl, as it reads the scene",
+        "reads the scene: in WGSL, it is in buffers.wgsl",
     ),
     (
         "linear_primitives.wgsl",
         "is_occluded_by_primitives",
-        "in WGSL it is in buffers.wgsl, as it reads the scene",
+        "reads the scene: in WGSL, it is in buffers.wgsl",
     ),
     (
         "pixel.wgsl",
         "pixel_radiance",
-        "Rust's own: in WGSL kernels go from sample to sample",
+        "only in Rust: WGSL kernels loop over the samples",
     ),
     (
         "linear_primitives.wgsl",
         "occluded_by",
-        "Rust has a range of indices where WGSL has two numbers",
+        "Rust has a range of indices instead of two numbers",
     ),
-    ("geometry.wgsl", "instance_of", "Rust's own, for a record in a list"),
+    ("geometry.wgsl", "instance_of", "only in Rust, for a record in a list"),
     (
         "geometry.wgsl",
         "group_word",
-        "in WGSL it is in meshes.wgsl, as it reads buffers",
+        "reads buffers: in WGSL, it is in meshes.wgsl",
     ),
     (
         "geometry.wgsl",
         "triangle_casts",
-        "in WGSL it is in meshes.wgsl, as it reads buffers",
+        "reads buffers: in WGSL, it is in meshes.wgsl",
     ),
     (
         "geometry.wgsl",
         "face_of",
-        "in WGSL it is in meshes.wgsl, as it reads buffers",
+        "reads buffers: in WGSL, it is in meshes.wgsl",
     ),
 ];
 
@@ -101,11 +104,11 @@ fn twin_differences(source: &Source, file: &str, twin: &syn::File) -> Vec<String
         .filter(two_sided)
         .collect();
     let mut twins: Vec<_> = rust_functions(twin).into_iter().filter(two_sided).collect();
-    // `before` is updated in place in Rust.
+    // Rust updates the argument `before` in place, as `state`.
     let in_place = |wgsl: &Signature, twin: &Signature| {
-        let names =
+        let has_result_type =
             |s: &Signature, name: &str| s.parts.iter().any(|(n, ty)| n == name && Some(ty) == s.result.as_ref());
-        names(wgsl, "before") && names(twin, "state")
+        has_result_type(wgsl, "before") && has_result_type(twin, "state")
     };
     for twin in &mut twins {
         if functions.iter().any(|f| f.name == twin.name && in_place(f, twin)) {
@@ -142,16 +145,16 @@ fn functions_and_records_match() {
     let kernels = Integrator::ALL.map(|integrator| sources::shaders().compose(&RENDER, integrator, None));
     let mut problems = Vec::new();
     for (file, _) in built_in() {
-        if file.starts_with("kernels/") || WITHOUT_TWIN.iter().any(|(f, _)| *f == file) {
+        if file.starts_with("kernels/") || SHADERS_WITHOUT_TWIN.iter().any(|(f, _)| *f == file) {
             continue;
         }
-        // Files with overrides or bindings are parsed as parts of a kernel. Their twins take the scene as the first
-        // argument.
+        // Files with overrides or bindings are parsed as parts of a kernel. The twins of these files take the scene as
+        // the first argument.
         let kernel = kernels.iter().find(|kernel| kernel.start_of(file).is_some());
         let source = if is_shared(file) {
             &shared
         } else {
-            kernel.expect("a kernel that has it")
+            kernel.expect("a kernel with the file")
         };
         let count = sources::wgsl_functions(&parse(source), source, file).len();
         assert!(count > 0, "{file}: no function was found");
@@ -168,7 +171,7 @@ fn a_changed_twin_is_found() {
         assert!(text.contains(from), "{file}: '{from}' not found");
         syn::parse_file(&text.replacen(from, to, 1)).expect("still Rust")
     };
-    for (what, file, from, to) in [
+    for (change, file, from, to) in [
         (
             "swapped arguments",
             "math.rs",
@@ -195,7 +198,7 @@ fn a_changed_twin_is_found() {
         let twin = changed(file, from, to);
         assert!(
             !twin_differences(&shared, &file.replace(".rs", ".wgsl"), &twin).is_empty(),
-            "{what}"
+            "{change}"
         );
     }
 }
@@ -223,7 +226,7 @@ fn every_rust_file_has_a_shader() {
         let wgsl = name.replace(".rs", ".wgsl");
         let twin = built_in().any(|(file, _)| file == wgsl);
         assert!(
-            twin || NO_TWIN.contains(&name.as_str()),
+            twin || RUST_FILES_WITHOUT_SHADER.contains(&name.as_str()),
             "crates/render/src/cpu/{name} is not the twin of a file"
         );
     }
@@ -253,13 +256,13 @@ mod opcode {
         164..=168,
         170..=179,
         194..=205,
-        228..=228, // atomic store and addition: the completion of a dispatch
+        228..=228, // atomic store and addition, for the completion of a dispatch
         234..=234,
     ];
     /// Floating-point comparisons except `!=`, which naga translates to an ordered comparison (false for NaN).
     pub const COMPARISONS: &[RangeInclusive<u16>] = &[156..=157, 180..=181, 184..=191];
-    /// Must be decorated: negate, add, subtract, multiply, divide, vector times scalar; conversions between floats and
-    /// integers.
+    /// Instructions that must be decorated: negate, add, subtract, multiply, divide, vector times scalar; conversions
+    /// between floats and integers.
     pub const PROTECTED: &[u16] = &[127, 129, 131, 133, 136, 142, 109, 110, 111, 112];
 
     pub const FUNCTION: u16 = 54;
@@ -268,12 +271,12 @@ mod opcode {
     pub const NO_CONTRACTION: u32 = 42;
     /// GLSL.std.450: absolute values, square root, integer minimum, maximum and clamp, first bit.
     pub const EXTENDED_ALLOWED: &[u32] = &[4, 5, 31, 38, 39, 41, 42, 44, 45, 73, 74, 75];
-    /// GLSL.std.450 `FClamp`: naga's before conversion to integers, exact except for NaN.
+    /// GLSL.std.450 `FClamp`, which naga writes before conversions to integers; exact except for NaN.
     pub const FLOAT_CLAMP: u32 = 43;
     pub const FLOAT_TO_INTEGER: &[u16] = &[109, 110];
 }
 
-/// Returns the operations that may depend on the device.
+/// Returns the operations whose result may depend on the device.
 fn violations(module: &[u32]) -> Vec<String> {
     let decorated: BTreeSet<u32> = instructions(module)
         .filter(|(op, words)| *op == opcode::DECORATE && words[2] == opcode::NO_CONTRACTION)
@@ -293,8 +296,8 @@ fn violations(module: &[u32]) -> Vec<String> {
                 problems.push(format!("%{} (opcode {op}) may be contracted", words[2]));
             }
         } else if op == opcode::EXTENDED {
-            let for_integer = words[4] == opcode::FLOAT_CLAMP && only_made_integer(module, words[2]);
-            if !opcode::EXTENDED_ALLOWED.contains(&words[4]) && !for_integer {
+            let is_integer_clamp = words[4] == opcode::FLOAT_CLAMP && only_made_integer(module, words[2]);
+            if !opcode::EXTENDED_ALLOWED.contains(&words[4]) && !is_integer_clamp {
                 problems.push(format!("extended instruction {}", words[4]));
             }
         } else if !groups.iter().any(|group| group.iter().any(|range| range.contains(&op))) {
@@ -304,7 +307,7 @@ fn violations(module: &[u32]) -> Vec<String> {
     problems
 }
 
-/// Returns true if a result is only used by conversions to integers.
+/// Returns true if only conversions to integers use a result.
 fn only_made_integer(module: &[u32], result: u32) -> bool {
     let defines = |op: u16, words: &[u32]| op == opcode::EXTENDED && words[2] == result;
     let functions = instructions(module).skip_while(|(op, _)| *op != opcode::FUNCTION);
@@ -386,10 +389,10 @@ fn an_inexact_operation_is_found() {
 }
 
 fn positions(module: &[u32]) -> impl Iterator<Item = usize> {
-    let mut at = 5; // after the header
+    let mut position = 5; // after the header
     instructions(module).map(move |(_, words)| {
-        let start = at;
-        at += words.len();
+        let start = position;
+        position += words.len();
         start
     })
 }

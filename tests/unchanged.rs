@@ -1,5 +1,6 @@
-//! Image regression test: checksums of the linear images of all scenes and of `tests/unchanged` against
-//! `tests/unchanged.txt`. After an intended change, `WGRAY_TEST_RECORD=1` updates it. Other tests verify correctness.
+//! Image regression test: compares checksums of the linear images of all scenes and of `tests/unchanged` with
+//! `tests/unchanged.txt`. After an intended change, `WGRAY_TEST_RECORD=1` updates the file. Other tests verify
+//! correctness.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -16,25 +17,26 @@ use crate::random_scenes::any_scene;
 use crate::render::{small_scenes, variations};
 use crate::sources;
 
-const KEPT: &str = "tests/unchanged.txt";
-/// Features that the project's scenes lack. Those named `random` were generated and use [`any_scene::folder`].
+const CHECKSUMS: &str = "tests/unchanged.txt";
+/// Scenes with features that the project's scenes lack. The scenes named `random` were generated and use files in
+/// [`any_scene::folder`].
 const FOLDER: &str = "tests/unchanged";
 
 /// Returns normal, depth, texture coordinates, shape and material.
-fn old_words(hit: &FirstHit) -> [u32; 8] {
+fn hit_words(hit: &FirstHit) -> [u32; 8] {
     let [x, y, z] = hit.normal.to_array().map(f32::to_bits);
     let [u, v] = hit.uv.to_array().map(f32::to_bits);
     [x, y, z, hit.depth.to_bits(), u, v, hit.shape, hit.material]
 }
 
-/// Loads [`FOLDER`]. Every other path-traced scene has layers.
+/// Loads the scenes of [`FOLDER`]. Path-traced scenes with an even index have layers.
 fn special_scenes() -> Vec<(String, Packed)> {
     let entries = fs::read_dir(sources::path(FOLDER)).expect("the folder");
     let mut paths: Vec<_> = entries.map(|entry| entry.expect("an entry").path()).collect();
     paths.sort();
-    let packed = |(i, path): (usize, PathBuf)| {
+    let packed = |(index, path): (usize, PathBuf)| {
         let name = path.file_name().expect("a name").to_string_lossy().into_owned();
-        if path.extension().is_some_and(|ending| ending == "glb") {
+        if path.extension().is_some_and(|extension| extension == "glb") {
             let overrides = Overrides {
                 size: Some((24, 16)),
                 pixel_samples: Some(4),
@@ -50,7 +52,7 @@ fn special_scenes() -> Vec<(String, Packed)> {
         let text = fs::read_to_string(&path).expect("a scene");
         let description = Description::parse(&text, &name).unwrap_or_else(|error| panic!("{error}"));
         let packed = any_scene::packed(&description);
-        match i.is_multiple_of(2) && description.integrator() == Integrator::Path {
+        match index.is_multiple_of(2) && description.integrator() == Integrator::Path {
             true => (name, packed.with_layers()),
             false => (name, packed),
         }
@@ -58,8 +60,8 @@ fn special_scenes() -> Vec<(String, Packed)> {
     paths.into_iter().enumerate().map(packed).collect()
 }
 
-/// Returns the checksums of the CPU's film and first hits.
-fn line(name: &str, packed: &Packed) -> String {
+/// Returns a line with the checksums of the film and the first hits on the CPU.
+fn checksum_line(name: &str, packed: &Packed) -> String {
     let Film {
         sums, moments, layers, ..
     } = reference(packed);
@@ -68,7 +70,7 @@ fn line(name: &str, packed: &Packed) -> String {
     let hits = crc32fast::hash(cast_slice(
         &first_hits(packed, RenderMode::Cpu)
             .iter()
-            .map(old_words)
+            .map(hit_words)
             .collect::<Vec<_>>(),
     ));
     format!("{film:08x} {hits:08x} {name}\n")
@@ -77,22 +79,25 @@ fn line(name: &str, packed: &Packed) -> String {
 #[test]
 fn images_have_the_recorded_checksums() {
     let scenes = small_scenes().into_iter().chain(variations()).chain(special_scenes());
-    let found: String = scenes.map(|(name, packed)| line(&name, &packed)).collect();
-    let path = sources::path(KEPT);
+    let found: String = scenes.map(|(name, packed)| checksum_line(&name, &packed)).collect();
+    let path = sources::path(CHECKSUMS);
     if std::env::var_os("WGRAY_TEST_RECORD").is_some_and(|value| value == "1") {
-        fs::write(&path, &found).expect("the file of checksums");
+        fs::write(&path, &found).expect("the checksum file");
     }
-    let kept = fs::read_to_string(&path).expect("the file of checksums");
-    let films: BTreeSet<&str> = kept.lines().filter_map(|line| line.split(' ').next()).collect();
-    assert_eq!(films.len(), kept.lines().count(), "two scenes have one checksum");
-    let changed: Vec<&str> = found.lines().filter(|line| !kept.lines().any(|k| k == *line)).collect();
+    let recorded = fs::read_to_string(&path).expect("the checksum file");
+    let films: BTreeSet<&str> = recorded.lines().filter_map(|line| line.split(' ').next()).collect();
+    assert_eq!(films.len(), recorded.lines().count(), "two scenes have one checksum");
+    let changed: Vec<&str> = found
+        .lines()
+        .filter(|line| !recorded.lines().any(|recorded_line| recorded_line == *line))
+        .collect();
     assert!(
         changed.is_empty(),
-        "images that differ from {KEPT} (film, first hits, scene): {changed:#?}"
+        "images that differ from {CHECKSUMS} (film, first hits, scene): {changed:#?}"
     );
     assert_eq!(
         found.lines().count(),
-        kept.lines().count(),
-        "{KEPT} has scenes that no longer exist"
+        recorded.lines().count(),
+        "{CHECKSUMS} has scenes that no longer exist"
     );
 }

@@ -3,8 +3,8 @@
 #
 #     sh slurm.sh --partition=gpu --gres=gpu:1 --time=60
 #
-# The arguments are options of sbatch. An array of tasks renders the parts of images, and a dependent array merges them.
-# Run the script again to render only what is missing. docs/farm.md describes the details.
+# The arguments are options of sbatch. An array of tasks renders parts of images, and a dependent array merges the parts.
+# Run the script again to render only missing parts. docs/farm.md describes the details.
 #SBATCH --requeue
 #SBATCH --open-mode=append
 
@@ -12,7 +12,7 @@
 job=scene.farm   # folder for parts, checkpoints and logs
 tiles=16         # parts per image
 frames=          # frame numbers, such as "$(seq 1 48)"; empty for a single image
-render() {       # options that shape the image; exec, so that signals reach wgray
+render() {       # options that affect the image; exec, so that signals reach wgray
     exec wgray render --size 3840x2160 --spp 4096 "$@" -- scene.toml
 }
 merge() {        # options of the image files; with frames, names such as image.####.exr
@@ -23,7 +23,7 @@ merge() {        # options of the image files; with frames, names such as image.
 set -eu
 max_restarts=20   # maximum number of times a task is requeued
 
-# Sets the folders of an image, counted from 0, and its frame number.
+# Sets the folders and the frame number of an image; images are counted from 0.
 select_image() {
     frame='' name=image
     if [ -n "$frames" ]; then
@@ -36,7 +36,7 @@ select_image() {
     checkpoints=$job/checkpoints/$name-of-$tiles
 }
 
-# Renders the part with a number, counted from 0 over all images.
+# Renders a part; parts are counted from 0 over all images.
 tile() {
     select_image $(( $1 / tiles ))
     tile=$(( $1 % tiles + 1 ))
@@ -45,28 +45,28 @@ tile() {
     if [ -n "$frame" ]; then
         set -- "$@" --frames="$frame"
     fi
-    # wgray then exits with code 75 after a lost device or a signal, and the task is requeued.
+    # With this option, wgray exits with code 75 after a lost device or a signal, and the task is requeued.
     if [ "${SLURM_RESTART_COUNT:-0}" -lt $max_restarts ]; then
         set -- "$@" --requeue-exit=75
     fi
     render "$@" --progress=plain &
     wgray=$!
     trap 'interrupted=1; kill -TERM $wgray' USR1   # sent a minute before the time limit
-    trap 'interrupted=1; cancelled=1' TERM         # sent by scancel, to wgray too
+    trap 'interrupted=1; cancelled=1' TERM         # sent by scancel, also to wgray
     code=1 interrupted=1 cancelled=''
     while [ -n "$interrupted" ]; do   # a signal ends wait, but not wgray
         interrupted='' status=0
         wait $wgray || status=$?
-        [ $status = 127 ] || code=$status   # 127: the status was already returned
+        [ $status = 127 ] || code=$status   # 127: an earlier wait has returned the status
     done
     # Slurm regards a task that exits with an error code as failed and cancels the merge, even with RequeueExit.
     if [ $code = 75 ] && [ -z "$cancelled" ]; then
-        scontrol requeue "${SLURM_ARRAY_JOB_ID}_$SLURM_ARRAY_TASK_ID" && sleep 60   # Slurm ends this task at once
+        scontrol requeue "${SLURM_ARRAY_JOB_ID}_$SLURM_ARRAY_TASK_ID" && sleep 60   # Slurm ends this task during the sleep
     fi
     exit $code
 }
 
-# Merges the parts of an image, counted from 0. They are kept; delete the job's folder when the image is good.
+# Merges the parts of an image; images are counted from 0. The parts are kept: delete the job's folder after a check.
 merge_image() {
     select_image "$1"
     set -- -- "$parts"
@@ -77,7 +77,7 @@ merge_image() {
     rm -rf -- "$checkpoints"
 }
 
-# Submits tasks of a kind as arrays, as few as the cluster allows, and prints the job IDs, each after a colon.
+# Submits tasks of a kind in as few arrays as the cluster allows, and prints each job ID after a colon.
 arrays() {
     kind=$1 count=$2 first=0
     shift 2

@@ -1,18 +1,18 @@
 #!/usr/bin/env python3
 """Tests all mutations that cargo-mutants generates for crates/render/src/cpu, one at a time.
 
-cargo-mutants would compile the project once per mutation, two thousand times. Here it only lists them; all are compiled
-into one binary, and an environment variable selects one. Mutations that do not compile are skipped, as in
-cargo-mutants.
+cargo-mutants would compile the project once per mutation, two thousand times. This script uses cargo-mutants only to
+list the mutations. It compiles all mutations into one binary, in which an environment variable selects one mutation.
+Mutations that do not compile are skipped, as in cargo-mutants.
 
-    scripts/mutation/operators.py                     all of them (about an hour on two cores)
-    scripts/mutation/operators.py --only ray,shadow   those of some files
-    scripts/mutation/operators.py --sample 10         every tenth
-    scripts/mutation/operators.py --again LOG         those that survived a run with the output LOG
+    scripts/mutation/operators.py                     all mutations (about an hour on two cores)
+    scripts/mutation/operators.py --only ray,shadow   the mutations of some files
+    scripts/mutation/operators.py --sample 10         every tenth mutation
+    scripts/mutation/operators.py --again LOG         the mutations that survived a run with the output LOG
 
-Needs cargo-mutants (`cargo install cargo-mutants`) and the Python packages tree-sitter and tree-sitter-rust. Exit code
-1 if the tests detect fewer than 95 %, if a survivor is not explained in survivors.toml, or if an explained mutation
-does not survive.
+Needs cargo-mutants (`cargo install cargo-mutants`) and the Python packages tree-sitter and tree-sitter-rust. The exit
+code is 1 if the tests detect fewer than 95 % of the mutations, if survivors.toml does not explain a survivor, or if an
+explained mutation does not survive.
 """
 
 import argparse
@@ -45,7 +45,7 @@ class Mutation:
         self.replacement = entry["replacement"]
         start, end = entry["span"]["start"], entry["span"]["end"]
         lines = text.split("\n")
-        offset = lambda at: len("\n".join(lines[: at["line"] - 1] + [lines[at["line"] - 1][: at["column"] - 1]]).encode())
+        offset = lambda point: len("\n".join(lines[: point["line"] - 1] + [lines[point["line"] - 1][: point["column"] - 1]]).encode())
         self.start, self.end = offset(start), offset(end)
         line = lines[start["line"] - 1]
         self.line = line.strip()
@@ -54,11 +54,11 @@ class Mutation:
             self.change = f"{found[1]} to {found[2]}"
         else:
             self.change = re.sub(r"^\S+ ", "", self.name)
-        # A key that does not depend on other lines: the function, the text of the line, the column in it.
+        # A key that does not depend on other lines: the function, the text of the line and the column in this text.
         self.key = f"{self.function}: {self.line} | {self.change} @{start['column'] - (len(line) - len(line.lstrip()))}"
 
     def when(self, mutated, original):
-        """A switch between the mutated and the original expression, with markers that locate compile errors."""
+        """Returns a switch between the mutated and the original expression, with markers that locate compile errors."""
         return f"if crate::mutant({self.number}) {{ /*<{self.number}*/ {mutated} /*{self.number}>*/ }} else {{ {original} }}"
 
 
@@ -74,22 +74,22 @@ class Writer:
     """Rewrites a file with its mutations behind the switch."""
 
     def __init__(self, source, mutations):
-        self.source, self.at = source, defaultdict(list)
+        self.source, self.by_start = source, defaultdict(list)
         for m in mutations:
-            self.at[m.start].append(m)
-        self.done = set()
+            self.by_start[m.start].append(m)
+        self.written = set()
 
     def text(self, node):
-        """The text of a node with its children rewritten."""
-        out, at = "", node.start_byte
+        """Returns the text of a node with rewritten children."""
+        out, end = "", node.start_byte
         for child in node.children:
-            out += self.source[at : child.start_byte].decode() + self.write(child)
-            at = child.end_byte
-        return out + self.source[at : node.end_byte].decode()
+            out += self.source[end : child.start_byte].decode() + self.write(child)
+            end = child.end_byte
+        return out + self.source[end : node.end_byte].decode()
 
     def mutations(self, genre, start):
-        found = [m for m in self.at[start] if m.genre == genre]
-        self.done.update(m.number for m in found)
+        found = [m for m in self.by_start[start] if m.genre == genre]
+        self.written.update(m.number for m in found)
         return found
 
     def write(self, node):
@@ -103,8 +103,8 @@ class Writer:
             found = self.mutations("UnaryOperator", node.start_byte)
             if found:
                 operator, operand = node.children
-                right = f"{operator.text.decode()} a_"
-                return f"({{ let a_ = {self.write(operand)}; {found[0].when('a_', right)} }})"
+                original = f"{operator.text.decode()} a_"
+                return f"({{ let a_ = {self.write(operand)}; {found[0].when('a_', original)} }})"
         if node.type == "match_arm":
             found = self.mutations("MatchArm", node.start_byte)
             if found:
@@ -149,35 +149,35 @@ def write_mutations(mutations, folder):
         of_file = [m for m in mutations if m.file == file]
         writer = Writer(source, of_file)
         (folder / file).write_text(writer.write(parser.parse(source).root_node))
-        missed += [m for m in of_file if m.number not in writer.done]
+        missed += [m for m in of_file if m.number not in writer.written]
     if missed:
         raise SystemExit("cannot locate these mutations:\n" + "\n".join(m.name for m in missed))
 
 
 def unviable(messages, folder):
-    """The numbers of the mutations with compile errors."""
+    """Returns the numbers of the mutations with compile errors."""
     numbers = set()
     for message in messages:
         diagnostic = message.get("message") or {}
         if message.get("reason") != "compiler-message" or diagnostic.get("level") != "error":
             continue
-        here = set()
+        culprits = set()
         for span in diagnostic["spans"]:
             text = (folder / span["file_name"]).read_bytes()[: span["byte_start"]].decode()
             opened = re.findall(r"/\*<(\d+)\*/", text)
             closed = set(re.findall(r"/\*(\d+)>\*/", text))
-            here.update(int(n) for n in opened if n not in closed)
-        if not here and diagnostic["spans"]:
+            culprits.update(int(n) for n in opened if n not in closed)
+        if not culprits and diagnostic["spans"]:
             raise SystemExit(f"compile error outside of the mutations:\n{diagnostic['rendered']}")
-        numbers |= here
+        numbers |= culprits
     return numbers
 
 
 def probed():
-    """The functions that tests/probes.rs tests."""
+    """Returns the names of the functions that tests/probes.rs tests."""
     text = (ROOT / "tests/probes.rs").read_text()
-    listed = text[text.index("probes! {\n") :]
-    return set(re.findall(r"^    (\w+)\(", listed[: listed.index("\n}")], re.M))
+    probes = text[text.index("probes! {\n") :]
+    return set(re.findall(r"^    (\w+)\(", probes[: probes.index("\n}")], re.M))
 
 
 def main():
@@ -186,38 +186,38 @@ def main():
     parser.add_argument("--sample", type=int, default=1, metavar="N", help="test only every N-th mutation")
     parser.add_argument("--again", type=argparse.FileType(), metavar="LOG", help="test only the survivors listed in LOG")
     arguments = parser.parse_args()
-    listed = all_mutations()
-    chosen = [m for m in listed if not arguments.only or m.file.split("cpu/")[-1][:-3] in arguments.only.split(",")][:: arguments.sample]
+    mutations = all_mutations()
+    chosen = [m for m in mutations if not arguments.only or m.file.split("cpu/")[-1][:-3] in arguments.only.split(",")][:: arguments.sample]
     if arguments.again:
         names = {line.removeprefix("survives: ").strip() for line in arguments.again if line.startswith("survives: ")}
         chosen = [m for m in chosen if m.name in names]
     folder = WORK / "operators"
     copy(folder)
-    left_out = []
+    uncompilable = []
     while True:
         write_mutations(chosen, folder)
         code, messages = cargo(folder, "check", "--release", "--lib")
         if code == 0:
             break
         numbers = unviable(messages, folder)
-        left_out += [m for m in chosen if m.number in numbers]
+        uncompilable += [m for m in chosen if m.number in numbers]
         chosen = [m for m in chosen if m.number not in numbers]
-    print(f"{len(chosen)} mutations; {len(left_out)} others do not compile", flush=True)
+    print(f"{len(chosen)} mutations; {len(uncompilable)} more do not compile", flush=True)
     tests, functions = Tests(folder), probed()
 
-    def found(m):
+    def failing_test(m):
         mutant = {"WGRAY_MUTANT": str(m.number)}
         if m.function in functions:
-            found = tests.first_failing(PROBES, WGRAY_TEST_FUNCTION=m.function, **mutant)
-            if found:
-                return found
+            test = tests.first_failing(PROBES, WGRAY_TEST_FUNCTION=m.function, **mutant)
+            if test:
+                return test
         return tests.first_failing(ANSWERS, **WITHOUT_GPU, **mutant) or tests.first_failing(PICTURES + REST, **mutant)
 
     begin = time.monotonic()
-    survivors, by = [], defaultdict(int)
+    survivors, detected_by = [], defaultdict(int)
     with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
-        for done, (m, test) in enumerate(zip(chosen, pool.map(found, chosen)), 1):
-            by[test] += 1
+        for done, (m, test) in enumerate(zip(chosen, pool.map(failing_test, chosen)), 1):
+            detected_by[test] += 1
             if not test:
                 survivors.append(m)
                 print(f"survives: {m.name}\n    {m.key}", flush=True)
@@ -226,11 +226,11 @@ def main():
     reasons = tomllib.loads(REASONS.read_text()) if REASONS.exists() else {}
     unexplained = [m for m in survivors if m.key not in reasons]
     killed = {m.key for m in chosen} - {m.key for m in survivors}
-    stale = [key for key in reasons if key in killed or key not in {m.key for m in listed}]
+    stale = [key for key in reasons if key in killed or key not in {m.key for m in mutations}]
     share = 1 - len(survivors) / len(chosen)
-    print(f"\n{len(chosen) - len(survivors)} of {len(chosen)} detected ({share:.1%}), by")
-    for test, number in sorted(by.items(), key=lambda item: -item[1]):
-        print(f"  {number:5} {test or 'nothing'}")
+    print(f"\n{len(chosen) - len(survivors)} of {len(chosen)} detected ({share:.1%}). Mutations by detecting test:")
+    for test, number in sorted(detected_by.items(), key=lambda item: -item[1]):
+        print(f"  {number:5} {test or 'no test'}")
     for m in unexplained:
         print(f"survives without an explanation: {m.name}\n    {m.key}")
     for key in stale:

@@ -1,4 +1,4 @@
-"""Shared code of both mutation runs: a copy of the project with switchable mutations, and its tests."""
+"""Shared code of the two mutation runs: a copy of the project with switchable mutations, and the tests of the copy."""
 
 import json
 import os
@@ -28,7 +28,7 @@ AGREEMENT = [
     ["main", "render::pictures_of_all_scenes", "render::first_hits_of_all_scenes", "textures::agreement"],
     ["main", "random_scenes::random_scenes_are_the_same"],
 ]
-# Tests against known results, on the CPU only; the comparisons extend them to the GPU.
+# Tests against known results, on the CPU only. The comparisons of GPU and CPU extend these tests to the GPU.
 ANSWERS = [
     ["lib", "cpu::"],
     ["main", "textures::", "against_oracle::", "radiance::", "culling::", "--skip", "is_found", "--skip", "textures::agreement"],
@@ -37,14 +37,14 @@ ANSWERS = [
     ["main", "path::", "lens::", "panorama::", "--skip", "is_found"],
     ["main", "meshes::", "--skip", "is_found", "--skip", "meshes::bad_input", "--skip", "meshes::readers"],
 ]
-# The remaining tests, of the command line and of the division of work.
+# The remaining tests: the command line, and the division of a render into dispatches.
 REST = [["main", "render::", "cli::", "sampling::"], ["lib"]]
 LOOP = "an infinite loop"
 WITHOUT_GPU = {"WGRAY_TEST_WITHOUT_GPU": "1"}
 
 
 def copy(folder):
-    """Copies the project and adds the switch."""
+    """Copies the project, and adds the function that selects a mutation."""
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     for name in ["Cargo.toml", "Cargo.lock", "rustfmt.toml", "src", "crates", "shaders", "scenes", "tests", "examples", "benches", "docs", "README.md"]:
@@ -57,7 +57,7 @@ def copy(folder):
 
 
 def cargo(folder, *arguments):
-    """Runs cargo in a copy; returns its exit code and messages."""
+    """Runs cargo in a copy. Returns the exit code and the messages of cargo."""
     environment = os.environ | {"CARGO_TARGET_DIR": str(WORK / "build"), "RUSTFLAGS": "--cap-lints=allow"}
     run = subprocess.run(
         ["cargo", *arguments, "--message-format=json"], cwd=folder, env=environment, stdout=subprocess.PIPE, text=True
@@ -66,7 +66,7 @@ def cargo(folder, *arguments):
 
 
 def build(folder):
-    """Builds the test binaries of a copy: `lib` of crates/render, and `main` of tests/main.rs."""
+    """Builds the test binaries of a copy: `lib` from crates/render, and `main` from tests/main.rs."""
     code, messages = cargo(folder, "test", "--release", "--no-run", "-p", "wgray", "-p", "wgray-render", "--lib", "--test", "main")
     if code != 0:
         raise SystemExit("the copy of the project does not compile")
@@ -94,7 +94,7 @@ class Tests:
 
     def first_failing(self, stages, **environment):
         """Returns the name of the first failing test of the stages, or None. A stage that takes five times as long as
-        without a mutation counts as an infinite loop, and as a failure."""
+        without a mutation counts as failed, by an infinite loop."""
         for stage in stages:
             binary, *filters = stage
             timeout = 5 * self.seconds[str(stage)] + 5 if str(stage) in self.seconds else None

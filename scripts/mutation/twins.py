@@ -1,16 +1,16 @@
 #!/usr/bin/env python3
-"""Makes the mistakes of twins.toml, one at a time, and asks whether the tests find them.
+"""Applies the mutations of twins.toml, one at a time, and checks that the tests detect them.
 
-Each is made in four ways: in the shader alone and in its twin alone, which the comparisons of GPU and CPU must find; in
-both, which these must not find (else the two mistakes are not the same); and in both again for the tests that know right
-answers, which must find it.  All twins' mistakes are built at once, behind a switch that an environment variable sets;
-shaders are read from a folder.  So nothing is compiled for a mutation but its kernels.
+The comparisons of GPU and CPU must detect a mutation of only the shader, and a mutation of only the Rust twin. They must
+not detect a mutation of both, or else the two mutations are not the same. The tests against known results must detect
+the mutation of both. All mutations of twins are compiled into one binary, in which an environment variable selects one
+mutation; mutated shaders are read from a folder. Thus only the mutated kernels are compiled again.
 
-    scripts/mutation/twins.py                     all of them (ten minutes on two cores)
-    scripts/mutation/twins.py --only ray,shadow   those of some files
-    scripts/mutation/twins.py --list              which there are, and whether each place is found once; runs nothing
+    scripts/mutation/twins.py                     all mutations (ten minutes on two cores)
+    scripts/mutation/twins.py --only ray,shadow   the mutations of some files
+    scripts/mutation/twins.py --list              lists the mutations and checks that their expressions exist; runs no test
 
-Exit code 1 if one is not found, in either way.
+The exit code is 1 if a mutation is not detected.
 """
 
 import argparse
@@ -40,40 +40,41 @@ def mutations():
     return [Mutation(number, file, entry) for number, (file, entry) in enumerate(entries, 1)]
 
 
-def place(text, expression, where):
-    """Where an expression is, whatever the white space; the first time, outside of tests and comments."""
+def locate(text, expression, file):
+    """Returns the span of the first occurrence of an expression outside of tests and comments, with any white space."""
     words = [re.escape(word) for word in expression.split()]
     body = text.split("#[cfg(test)]")[0]
     body = re.sub(r"//[^\n]*", lambda comment: " " * len(comment[0]), body)
     found = re.search(r"\s+".join(words), body)
     if not found:
-        raise SystemExit(f"scripts/mutation/twins.toml: {where} has no '{expression}' any more")
+        raise SystemExit(f"scripts/mutation/twins.toml: '{expression}' is not in {file}")
     return found.span()
 
 
 def make_twins(all_mutations, folder):
-    """A copy of the project whose twins make the mistake of the number in WGRAY_MUTANT."""
+    """Writes a copy of the project, with the twins' mutations. The number in WGRAY_MUTANT selects a mutation."""
     copy(folder)
     for file in sorted({m.file for m in all_mutations}):
         path = folder / f"crates/render/src/cpu/{file}.rs"
         text = path.read_text()
         of_file = [m for m in all_mutations if m.file == file]
-        places = sorted(((place(text, m.rust[0], path), m) for m in of_file), key=lambda p: p[0], reverse=True)
-        for ((start, end), m), (later, _) in zip(places, [((len(text), 0), None)] + places):
+        spans = sorted(((locate(text, m.rust[0], path), m) for m in of_file), key=lambda s: s[0], reverse=True)
+        for ((start, end), m), (later, _) in zip(spans, [((len(text), 0), None)] + spans):
             assert end <= later[0], f"{path}: two mutations overlap at '{m.rust[0]}'"
-            here = text[start:end]
-            text = f"{text[:start]}(if crate::mutant({m.number}) {{ {m.rust[1]} }} else {{ {here} }}){text[end:]}"
+            original = text[start:end]
+            text = f"{text[:start]}(if crate::mutant({m.number}) {{ {m.rust[1]} }} else {{ {original} }}){text[end:]}"
         path.write_text(text)
 
 
-def try_out(tests, m):
-    """Which tests find it: in WGSL alone, in Rust alone; whether the two differ; in both."""
+def run_tests(tests, m):
+    """Returns the first tests that detect a mutation: in WGSL only; in Rust only; comparing WGSL with Rust, in both; and
+    against known results, in both."""
     shaders = WORK / f"shaders-{m.number}"
     shutil.rmtree(shaders, ignore_errors=True)
     shutil.copytree(tests.folder / "shaders", shaders)
     path = shaders / f"{m.file}.wgsl"
     text = path.read_text()
-    start, end = place(text, m.wgsl[0], path)
+    start, end = locate(text, m.wgsl[0], path)
     path.write_text(text[:start] + m.wgsl[1] + text[end:])
     wgsl, rust = {"WGRAY_TEST_SHADERS": str(shaders)}, {"WGRAY_MUTANT": str(m.number)}
     found = (
@@ -93,8 +94,8 @@ def main():
     arguments = parser.parse_args()
     all_mutations = mutations()
     for m in all_mutations:
-        place((ROOT / f"shaders/{m.file}.wgsl").read_text(), m.wgsl[0], f"shaders/{m.file}.wgsl")
-        place((ROOT / f"crates/render/src/cpu/{m.file}.rs").read_text(), m.rust[0], f"crates/render/src/cpu/{m.file}.rs")
+        locate((ROOT / f"shaders/{m.file}.wgsl").read_text(), m.wgsl[0], f"shaders/{m.file}.wgsl")
+        locate((ROOT / f"crates/render/src/cpu/{m.file}.rs").read_text(), m.rust[0], f"crates/render/src/cpu/{m.file}.rs")
     if arguments.list:
         print("\n".join(map(str, all_mutations)))
         return 0
@@ -102,19 +103,19 @@ def main():
     make_twins(all_mutations, twins)
     tests = Tests(twins)
     chosen = [m for m in all_mutations if not arguments.only or m.file in arguments.only.split(",")]
-    survivors = {"apart": [], "together": []}
+    survivors = {"in one language": [], "in both languages": []}
     with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
-        for m, (by_wgsl, by_rust, differ, together) in zip(chosen, pool.map(lambda m: try_out(tests, m), chosen)):
-            print(f"{m}\n    WGSL alone: {by_wgsl}; Rust alone: {by_rust}; together: {together}", flush=True)
+        for m, (by_wgsl, by_rust, differ, by_both) in zip(chosen, pool.map(lambda m: run_tests(tests, m), chosen)):
+            print(f"{m}\n    detected in WGSL by {by_wgsl}; in Rust by {by_rust}; in both by {by_both}", flush=True)
             if differ and differ != LOOP:
-                raise SystemExit(f"{m}\n  the mistakes in WGSL and in Rust are not the same: {differ}")
+                raise SystemExit(f"{m}\n  the mutations in WGSL and in Rust are not the same: {differ}")
             if not (by_wgsl and by_rust):
-                survivors["apart"].append(m)
-            if not together:
-                survivors["together"].append(m)
-    for way, left in survivors.items():
-        print(f"\n{way}: {len(chosen) - len(left)} of {len(chosen)} found")
-        for m in left:
+                survivors["in one language"].append(m)
+            if not by_both:
+                survivors["in both languages"].append(m)
+    for kind, undetected in survivors.items():
+        print(f"\n{kind}: {len(chosen) - len(undetected)} of {len(chosen)} detected")
+        for m in undetected:
             print(f"  {m}")
     return 1 if any(survivors.values()) else 0
 

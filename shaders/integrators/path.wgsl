@@ -6,7 +6,7 @@
 struct PathState {
     path: Path,            // with the next ray
     radiance: vec3f,       // accumulated
-    pdf: f32,              // of the ray's direction, per solid angle; 0 if NEE cannot sample what it hits
+    pdf: f32,              // of the ray's direction, per solid angle; 0 if NEE cannot sample the direction
     eta2: f32,             // product of the squared index ratios in the throughput
     absorption: vec3f,     // of the ray's medium
     sample: u32,           // index in the pixel
@@ -14,9 +14,9 @@ struct PathState {
     ended: bool,
     layers: Layers,        // if enabled
     albedo_recorded: bool,
-    prev_position: vec3f,  // of the last scattering, for a light tree
-    prev_normal: vec3f,    // there, or 0 if light may arrive from both sides; also for an environment map
-    skipped_distance: f32, // from the last bounce to the ray's origin, past skipped surfaces
+    prev_position: vec3f,  // where the ray was scattered, for a light tree
+    prev_normal: vec3f,    // normal there, for light tree and environment map; 0 if light may arrive from both sides
+    skipped_distance: f32, // from the last bounce, past skipped surfaces, to the ray's origin
     skips: u32,            // number of surfaces skipped because of their alpha
 }
 
@@ -32,14 +32,14 @@ fn begin_path(pixel: vec2u, sample: u32) -> PathState {
                      vec3f(0.0), vec3f(0.0), skipped_distance, 0u);
 }
 
-// Advances a path by one surface. Short code also runs for ended paths, and its results are discarded: software Vulkan
-// executes both sides of a branch, and each value kept across it adds cost.
+// Advances a path by one surface. Short code also runs for ended paths, and the results are discarded: software Vulkan
+// executes both sides of a branch, and each value that lives across the branch adds cost.
 fn advance(before: PathState, pixel: vec2u) -> PathState {
     var state = before;
     let path = before.path;
     let hit = closest_hit(path.ray, path.origin_prim, path.inside_prim);
     let is_hit = hit.primitive != NO_INDEX;
-    let shown = ((ALPHA == 0u) & ((ENVIRONMENT_FLAGS & ENVIRONMENT_INVISIBLE) == 0u)) | (path.depth > 0u);
+    let is_environment_visible = ((ALPHA == 0u) & ((ENVIRONMENT_FLAGS & ENVIRONMENT_INVISIBLE) == 0u)) | (path.depth > 0u);
     var environment_light = environment.radiance;
     if (ENVIRONMENT_FLAGS & ENVIRONMENT_MAP) != 0u {
         if !is_hit {
@@ -49,7 +49,7 @@ fn advance(before: PathState, pixel: vec2u) -> PathState {
     if (ENVIRONMENT_FLAGS & BACKGROUND) != 0u {
         environment_light = select(environment_light, environment.background, path.depth == 0u);
     }
-    state = add_radiance(state, path.throughput * environment_light, !is_hit & shown, path.depth);
+    state = add_radiance(state, path.throughput * environment_light, !is_hit & is_environment_visible, path.depth);
     if (TLAS_KINDS != 0u) | (LOOKUPS != 0u) {
         if !is_hit {
             state.ended = true;
@@ -58,15 +58,15 @@ fn advance(before: PathState, pixel: vec2u) -> PathState {
     }
     let prim = fetch_hit_primitive(hit);
     var surface = surface_of(prim, hit, path.ray);
-    let at = hit_differential(prim, hit, surface, path.ray, path.differential);
-    var shading = evaluate_material(prim, hit, material_of(prim), surface, at, LOOKUPS);
+    let hit_diff = hit_differential(prim, hit, surface, path.ray, path.differential);
+    var shading = evaluate_material(prim, hit, material_of(prim), surface, hit_diff, LOOKUPS);
     if VERTEX_COLORS != 0u {
         shading.material = with_vertex_colors(shading.material, hit);
     }
     var material = bounded(shading.material);
     if ALPHA_SURFACES != 0u {
         if is_hit & !alpha_accepts(material, pixel, state.sample, path.depth, RAY_BSDF, hit, surface.side) {
-            return continue_through(state, surface, at, hit.t);
+            return continue_through(state, surface, hit_diff, hit.t);
         }
     }
     if ABSORPTION != 0u {
@@ -97,16 +97,16 @@ fn advance(before: PathState, pixel: vec2u) -> PathState {
     }
     let continues = is_hit & (path.depth < BOUNCES) & (material.kind != EMITTER);
     let key = hash4(vec4u(pixel.x, pixel.y, camera.seed, 1u + 2u * path.depth));
-    let other_key = hash4(vec4u(pixel.x, pixel.y, camera.seed, 2u + 2u * path.depth));
+    let decision_key = hash4(vec4u(pixel.x, pixel.y, camera.seed, 2u + 2u * path.depth));
     var choices = vec2u(0u); // lobe, Russian roulette
     if ((MATERIALS & ~((1u << DIFFUSE) | (1u << EMITTER))) != 0u) | (RR_DEPTH < BOUNCES) {
-        choices = decision_set(other_key.zw, state.sample);
+        choices = decision_set(decision_key.zw, state.sample);
     }
     var specular = false;
     if DELTA_KINDS != 0u {
         specular = is_delta(material);
         if specular {
-            state = sample_delta_bsdf(state, surface, at, material, unit_float(choices.x));
+            state = sample_delta_bsdf(state, surface, hit_diff, material, unit_float(choices.x));
         }
     }
     if (MATERIALS & ~SPECULAR_KINDS) != 0u {
@@ -125,15 +125,15 @@ fn advance(before: PathState, pixel: vec2u) -> PathState {
             if EMITTERS != 0u {
                 var bits = vec2u(0u);
                 if EMITTERS > 1u {
-                    bits = decision_set(other_key.xy, state.sample);
+                    bits = decision_set(decision_key.xy, state.sample);
                 }
-                var chosen = EmitterSelection(select_emitter(bits), 0.0);
+                var selection = EmitterSelection(select_emitter(bits), 0.0);
                 if LIGHT_TREE != 0u {
                     let normal = lit_normal(surface, material);
-                    chosen = light_tree_select(chosen.emitter, surface.ray_origin, normal, other_key.xy, state.sample);
+                    selection = light_tree_select(selection.emitter, surface.ray_origin, normal, decision_key.xy, state.sample);
                 }
                 let u = decision(key.xy, state.sample);
-                state = add_direct_light(state, prim, surface, material, mixture, chosen, u, continues, pixel);
+                state = add_direct_light(state, prim, surface, material, mixture, selection, u, continues, pixel);
             }
             state = sample_bsdf(state, prim, surface, material, mixture, decision(key.zw, state.sample), unit_float(choices.x));
         }
@@ -156,8 +156,8 @@ fn path_layers(state: PathState) -> Layers {
                   layers.normal * weight);
 }
 
-// Returns two 32-bit numbers of a randomized (0,2)-sequence over the pixel's samples, independent per key. Burley,
-// "Practical Hash-based Owen Scrambling", JCGT 9(4), 2020, section 5.
+// Returns two 32-bit numbers of a randomized (0,2)-sequence over the pixel's samples. Sequences of different keys are
+// independent. Burley, "Practical Hash-based Owen Scrambling", JCGT 9(4), 2020, section 5.
 fn decision_set(key: vec2u, sample: u32) -> vec2u {
     if PIXEL_PATTERN == RANDOM {
         return hash4(vec4u(key.x, key.y, sample, 0u)).xy;
@@ -170,12 +170,13 @@ fn decision(key: vec2u, sample: u32) -> vec2f {
     return vec2f(unit_float(bits.x), unit_float(bits.y));
 }
 
-// Adds radiance that arrives after `bounces` bounces, if `taken` is true. Clamps indirect samples.
-fn add_radiance(before: PathState, found: vec3f, taken: bool, bounces: u32) -> PathState {
+// Adds a sample of radiance that arrives after `bounces` bounces, if `is_enabled` is true. Clamps samples after more
+// than one bounce.
+fn add_radiance(before: PathState, contribution: vec3f, is_enabled: bool, bounces: u32) -> PathState {
     var state = before;
-    var radiance = select(vec3f(0.0), found, taken);
+    var radiance = select(vec3f(0.0), contribution, is_enabled);
     if MAX_INDIRECT != 0u {
-        let scale = bitcast<f32>(MAX_INDIRECT) / max(largest(found), 1e-30);
+        let scale = bitcast<f32>(MAX_INDIRECT) / max(largest(contribution), 1e-30);
         radiance *= select(1.0, min(scale, 1.0), bounces > 1u);
     }
     state.radiance += radiance;
@@ -207,10 +208,10 @@ fn add_emission(state: PathState, prim: HitPrimitive, hit: Hit, surface: Surface
     return add_radiance(state, state.path.throughput * material.emission * weight, is_hit & is_emissive, state.path.depth);
 }
 
-// Continues behind a skipped surface.
-fn continue_through(before: PathState, surface: Surface, at: HitDifferential, t: f32) -> PathState {
+// Continues a path behind a surface that does not accept the ray.
+fn continue_through(before: PathState, surface: Surface, hit_diff: HitDifferential, t: f32) -> PathState {
     var state = before;
-    state.path = pass_through_path(before.path, surface, at);
+    state.path = pass_through_path(before.path, surface, hit_diff);
     if CAMERA_INVISIBLE != 0u {
         if before.path.depth == 0u {
             let start = state.path.ray;
@@ -224,7 +225,7 @@ fn continue_through(before: PathState, surface: Surface, at: HitDifferential, t:
     return state;
 }
 
-// Records the first hit's layers, and the first non-specular albedo.
+// Records coverage and normal of the first hit, and the albedo of the first hit that is not specular.
 fn record_first_hit_layers(before: PathState, surface: Surface, material: Material) -> PathState {
     var state = before;
     if state.path.depth == 0u {
@@ -238,10 +239,10 @@ fn record_first_hit_layers(before: PathState, surface: Surface, material: Materi
     return state;
 }
 
-fn sample_delta_bsdf(before: PathState, surface: Surface, at: HitDifferential, material: Material, random: f32) -> PathState {
+fn sample_delta_bsdf(before: PathState, surface: Surface, hit_diff: HitDifferential, material: Material, random: f32) -> PathState {
     var state = before;
     state.pdf = 0.0;
-    var path = mirrored_path(before.path, surface, at, material).primary;
+    var path = mirrored_path(before.path, surface, hit_diff, material).primary;
     if (DELTA_KINDS & (1u << METAL)) != 0u {
         if material.kind == METAL {
             path.throughput = before.path.throughput * metal_fresnel(material, dot(surface.wo, surface.shading_normal));
@@ -252,18 +253,18 @@ fn sample_delta_bsdf(before: PathState, surface: Surface, at: HitDifferential, m
             let cosine = dot(surface.wo, surface.shading_normal);
             path.throughput = before.path.throughput;
             if random >= thin_reflectance(material.ior, cosine) {
-                path = refracted_path(before.path, surface, at, before.path.throughput * material.tint, 1.0, cosine, cosine);
+                path = refracted_path(before.path, surface, hit_diff, before.path.throughput * material.tint, 1.0, cosine, cosine);
             }
         }
     }
     if (DELTA_KINDS & ((1u << GLASS) | (1u << ROUGH_GLASS))) != 0u {
         if (material.kind == GLASS) | (material.kind == ROUGH_GLASS) {
-            let passage = dielectric_sample(before.path, surface, at, material, random);
-            path = passage.path;
-            state.eta2 = before.eta2 * passage.eta * passage.eta;
+            let glass_sample = dielectric_sample(before.path, surface, hit_diff, material, random);
+            path = glass_sample.path;
+            state.eta2 = before.eta2 * glass_sample.eta * glass_sample.eta;
             if ABSORPTION != 0u {
-                let ahead = select(vec3f(0.0), material.absorption, surface.side > 0.0);
-                state.absorption = select(before.absorption, ahead, passage.passes);
+                let next_absorption = select(vec3f(0.0), material.absorption, surface.side > 0.0);
+                state.absorption = select(before.absorption, next_absorption, glass_sample.is_transmitted);
             }
         }
     }
@@ -272,35 +273,35 @@ fn sample_delta_bsdf(before: PathState, surface: Surface, at: HitDifferential, m
     return state;
 }
 
-// Adds an NEE sample, if `wanted` is true.
-fn add_direct_light(state: PathState, prim: HitPrimitive, surface: Surface, material: Material, mixture: PrincipledLobes, chosen: EmitterSelection, u: vec2f,
-              wanted: bool, pixel: vec2u) -> PathState {
-    let light = sample_emitter(chosen, surface.ray_origin, lit_normal(surface, material), u);
+// Adds an NEE sample, if `is_enabled` is true.
+fn add_direct_light(state: PathState, prim: HitPrimitive, surface: Surface, material: Material, mixture: PrincipledLobes, selection: EmitterSelection, u: vec2f,
+              is_enabled: bool, pixel: vec2u) -> PathState {
+    let light = sample_emitter(selection, surface.ray_origin, lit_normal(surface, material), u);
     let reflected = reflection(prim, surface, material, mixture, normalize(light.to));
-    var found = state.path.throughput * reflected.value * light.radiance * (1.0 / light.pdf);
-    var from_side = surface;
-    var to = light.to;
+    var contribution = state.path.throughput * reflected.value * light.radiance * (1.0 / light.pdf);
+    var exit_surface = surface;
+    var to_light = light.to;
     var absorption = state.absorption;
     if ((MATERIALS & TRANSMISSIVE_KINDS) != 0u) | ((LOBES & LOBE_TRANSMISSION) != 0u) {
-        if is_transmissive(material) & (dot(surface.normal, to) < 0.0) {
-            from_side = flipped(surface);
-            to = light.to + select(vec3f(0.0), surface.ray_origin - from_side.ray_origin, light.t_max < 2.0);
+        if is_transmissive(material) & (dot(surface.normal, to_light) < 0.0) {
+            exit_surface = flipped(surface);
+            to_light = light.to + select(vec3f(0.0), surface.ray_origin - exit_surface.ray_origin, light.t_max < 2.0);
             absorption = absorption_after(absorption, surface, material);
         }
     }
     if ABSORPTION != 0u {
-        found *= transmittance(absorption, light.t_max * sqrt(dot(light.to, light.to)));
+        contribution *= transmittance(absorption, light.t_max * sqrt(dot(light.to, light.to)));
     }
-    found *= select(power_heuristic(light.pdf, reflected.pdf), 1.0, light.is_delta);
-    let most = largest(found);
-    let is_dark = !wanted | !(most > 0.0) | !(most < INFINITE_T);
+    contribution *= select(power_heuristic(light.pdf, reflected.pdf), 1.0, light.is_delta);
+    let max_component = largest(contribution);
+    let is_dark = !is_enabled | !(max_component > 0.0) | !(max_component < INFINITE_T);
     if ALPHA_SURFACES != 0u {
         let bounce = state.path.depth + 1u;
-        let occluded = is_occluded_alpha(is_dark, from_side, to, light.t_max, light.primitive, pixel, state.sample, bounce);
-        return add_radiance(state, found, !occluded, bounce);
+        let occluded = is_occluded_alpha(is_dark, exit_surface, to_light, light.t_max, light.primitive, pixel, state.sample, bounce);
+        return add_radiance(state, contribution, !occluded, bounce);
     }
-    let occluded = is_occluded(is_dark, from_side, to, light.t_max, light.primitive);
-    return add_radiance(state, found, !occluded, state.path.depth + 1u);
+    let occluded = is_occluded(is_dark, exit_surface, to_light, light.t_max, light.primitive);
+    return add_radiance(state, contribution, !occluded, state.path.depth + 1u);
 }
 
 fn sample_bsdf(before: PathState, prim: HitPrimitive, surface: Surface, material: Material, mixture: PrincipledLobes, u: vec2f,
@@ -326,8 +327,8 @@ fn sample_bsdf(before: PathState, prim: HitPrimitive, surface: Surface, material
     }
     if (MATERIALS & (1u << PRINCIPLED)) != 0u {
         if material.kind == PRINCIPLED {
-            let found = principled_sample(mixture, local_wo(surface), u, random, LOBES);
-            state = apply_lobe_sample(before, prim, surface, material, found);
+            let lobe_sample = principled_sample(mixture, local_wo(surface), u, random, LOBES);
+            state = apply_lobe_sample(before, prim, surface, material, lobe_sample);
         }
     }
     if LIGHT_TREE != 0u {
@@ -339,23 +340,23 @@ fn sample_bsdf(before: PathState, prim: HitPrimitive, surface: Surface, material
     return state;
 }
 
-// Applies a sample in the surface's frame.
-fn apply_lobe_sample(before: PathState, prim: HitPrimitive, surface: Surface, material: Material, found: LobeSample) -> PathState {
+// Applies a BSDF sample in the surface's frame.
+fn apply_lobe_sample(before: PathState, prim: HitPrimitive, surface: Surface, material: Material, lobe_sample: LobeSample) -> PathState {
     var state = before;
     let frame = Tangents(surface.du, surface.dv);
-    let wi = normalize(vector_from_lobe(frame, surface.shading_normal, found.wi));
-    let weight = select(vec3f(0.0), found.weight, direction_allowed(prim, surface, material, wi));
-    var from_side = surface;
+    let wi = normalize(vector_from_lobe(frame, surface.shading_normal, lobe_sample.wi));
+    let weight = select(vec3f(0.0), lobe_sample.weight, direction_allowed(prim, surface, material, wi));
+    var exit_surface = surface;
     if ((MATERIALS & TRANSMISSIVE_KINDS) != 0u) | ((LOBES & LOBE_TRANSMISSION) != 0u) {
-        if found.wi.z < 0.0 {
-            from_side = flipped(surface);
-            state.eta2 = before.eta2 * found.eta * found.eta;
+        if lobe_sample.wi.z < 0.0 {
+            exit_surface = flipped(surface);
+            state.eta2 = before.eta2 * lobe_sample.eta * lobe_sample.eta;
             state.absorption = absorption_after(before.absorption, surface, material);
         }
     }
-    state.path = Path(Ray(from_side.ray_origin, wi), Differential(), before.path.throughput * weight, before.path.depth + 1u, 0u,
-                      from_side.exclude_front, from_side.exclude_back);
-    state.pdf = found.pdf;
+    state.path = Path(Ray(exit_surface.ray_origin, wi), Differential(), before.path.throughput * weight, before.path.depth + 1u, 0u,
+                      exit_surface.exclude_front, exit_surface.exclude_back);
+    state.pdf = lobe_sample.pdf;
     return state;
 }
 

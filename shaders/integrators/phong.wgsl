@@ -1,7 +1,7 @@
-// The integrator `phong`: direct light by Phong's model, seen directly or through mirrors and glass.
+// The integrator `phong`: direct light by Phong's model on surfaces seen directly, in mirrors or through glass.
 
 // Returns the radiance along a camera ray. Paths branch at glass, traced depth first, with at most MAX_SPLIT_DEPTH
-// pending. A path that hits a mirror or glass after BOUNCES bounces sees the background.
+// pending. A path that hits a mirror or glass after BOUNCES bounces returns the background.
 fn radiance(ray: Ray, differential: Differential, pixel: vec2u, sample: u32) -> vec3f {
     var path = Path(ray, differential, vec3f(1.0), 0u, 0u, NO_PRIMITIVE, NO_PRIMITIVE);
     if CAMERA_INVISIBLE != 0u {
@@ -56,25 +56,25 @@ fn radiance(ray: Ray, differential: Differential, pixel: vec2u, sample: u32) -> 
 
 fn scatter(prim: HitPrimitive, hit: Hit, path: Path, pixel: vec2u, sample: u32) -> SpecularSplit {
     var surface = surface_of(prim, hit, path.ray);
-    let at = hit_differential(prim, hit, surface, path.ray, path.differential);
-    let shading = evaluate_material(prim, hit, material_of(prim), surface, at, SPECULAR_LOOKUPS);
+    let hit_diff = hit_differential(prim, hit, surface, path.ray, path.differential);
+    let shading = evaluate_material(prim, hit, material_of(prim), surface, hit_diff, SPECULAR_LOOKUPS);
     let material = shading.material;
     surface.shading_normal = usable_normal(surface, shading.normal);
     if material.kind == MIRROR {
-        return mirrored_path(path, surface, at, material);
+        return mirrored_path(path, surface, hit_diff, material);
     }
     let bits = decision_bits(pixel, camera.seed, sample, path.depth * MAX_PATH_LEAVES + path.branch, NO_INDEX);
-    return glass_path(path, surface, at, material, unit_float(bits.x));
+    return glass_path(path, surface, hit_diff, material, unit_float(bits.x));
 }
 
 fn radiance_from(prim: HitPrimitive, hit: Hit, path: Path, pixel: vec2u, sample: u32) -> vec3f {
-    let plain = material_of(prim);
-    if plain.kind == EMITTER {
-        return plain.emission;
+    let untextured = material_of(prim);
+    if untextured.kind == EMITTER {
+        return untextured.emission;
     }
     var surface = surface_of(prim, hit, path.ray);
-    let at = hit_differential(prim, hit, surface, path.ray, path.differential);
-    let shading = evaluate_material(prim, hit, plain, surface, at, LOOKUPS);
+    let hit_diff = hit_differential(prim, hit, surface, path.ray, path.differential);
+    let shading = evaluate_material(prim, hit, untextured, surface, hit_diff, LOOKUPS);
     let material = shading.material;
     surface.shading_normal = shading.normal;
     if (TLAS_KINDS & (1u << INSTANCE)) != 0u {
@@ -106,17 +106,17 @@ fn radiance_from(prim: HitPrimitive, hit: Hit, path: Path, pixel: vec2u, sample:
 
 fn lobes_of_light(prim: HitPrimitive, surface: Surface, material: Material, light: Light, pattern: u32, side: u32, count: u32,
                   pixel: vec2u, sample: u32) -> Lobes {
-    let to = segments_to_light(light, surface.position);
+    let segments = segments_to_light(light, surface.position);
     let key = sample_key(pixel, camera.seed, 1u + light.number);
     var lobes = Lobes(0.0, 0.0);
     for (var first = 0u; first < count; first += SAMPLE_BLOCK) {
         let block = SampleBlock(pattern, side, first, select(SAMPLE_BLOCK, count - first, count - first < SAMPLE_BLOCK), sample, key);
         var unlit = 0u;
         if TLAS_KINDS != 0u {
-            unlit = unlit_mask(prim, surface, to, block);
+            unlit = unlit_mask(prim, surface, segments, block);
         }
         let occluded = occluded_samples(surface, light, block, unlit);
-        lobes = phong_block(surface, material, to, block, occluded, EXPONENT_BITS, lobes);
+        lobes = phong_block(surface, material, segments, block, occluded, EXPONENT_BITS, lobes);
     }
     return lobes;
 }

@@ -1,4 +1,4 @@
-// Path interface of `pixel.wgsl` for integrators that evaluate a whole sample by a function `radiance`.
+// Path interface of `pixel.wgsl` for integrators that evaluate a complete sample in one function, `radiance`.
 
 struct PathState {
     value: vec4f,
@@ -12,8 +12,8 @@ fn begin_path(pixel: vec2u, sample: u32) -> PathState {
 
 fn advance(path: PathState, pixel: vec2u) -> PathState {
     let start = camera_sample(pixel, path.sample);
-    let found = radiance(start.ray, start.differential, pixel, path.sample);
-    return PathState(vec4f(found * start.weight, start.weight), path.sample, true);
+    let sample_radiance = radiance(start.ray, start.differential, pixel, path.sample);
+    return PathState(vec4f(sample_radiance * start.weight, start.weight), path.sample, true);
 }
 
 fn path_value(path: PathState) -> vec4f {

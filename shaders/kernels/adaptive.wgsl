@@ -1,7 +1,7 @@
-// Adaptive rendering: like `render.wgsl`, but takes more than the pilot samples only where the neighbors' pilot
-// statistics require it. Two further parts of the film hold moments and pilot statistics. A dispatch renders either
-// pilot samples or later ones, which require all pilot samples of the film. A pixel's own samples do not affect their
-// number: a mean with such a stopping rule is biased.
+// Adaptive rendering: like `render.wgsl`, but takes more than the pilot samples only where the pilot statistics of
+// neighboring pixels require more. Two further parts of the film hold moments and pilot statistics. A dispatch renders
+// either pilot samples or later samples, which require all pilot samples of the film. A pixel's own samples do not
+// affect the pixel's sample count: with such a stopping rule, the mean is biased.
 
 @compute @workgroup_size(8, 8)
 fn adaptive(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_index) local: u32) {
@@ -9,8 +9,8 @@ fn adaptive(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_
         return;
     }
     let pixel = params.origin + id.xy;
-    let place = pixel - params.film_origin;
-    let index = place.y * params.film_size.x + place.x;
+    let film_pixel = pixel - params.film_origin;
+    let index = film_pixel.y * params.film_size.x + film_pixel.x;
     let pixels = params.film_size.x * params.film_size.y;
     var sum = film[index];
     var moments = film[pixels + index];
@@ -18,7 +18,7 @@ fn adaptive(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_
     var end = params.samples.y;
     let is_pilot = params.samples.x < PILOT_SAMPLES;
     if !is_pilot {
-        end = samples_wanted(neighbor_pilot_sum(place), PILOT_SAMPLES, bitcast<f32>(SQUARED_ERROR), end);
+        end = samples_wanted(neighbor_pilot_sum(film_pixel), PILOT_SAMPLES, bitcast<f32>(SQUARED_ERROR), end);
     }
     var layers = Layers();
     if LAYERS != 0u {
@@ -52,20 +52,20 @@ fn adaptive(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_
 }
 
 // Returns the pilot statistics of up to four neighbors.
-fn neighbor_pilot_sum(place: vec2u) -> vec4f {
+fn neighbor_pilot_sum(film_pixel: vec2u) -> vec4f {
     let width = params.film_size.x;
-    let index = 2u * width * params.film_size.y + place.y * width + place.x;
+    let index = 2u * width * params.film_size.y + film_pixel.y * width + film_pixel.x;
     var sum = vec4f(0.0);
-    if place.y > 0u {
+    if film_pixel.y > 0u {
         sum += film[index - width];
     }
-    if place.x > 0u {
+    if film_pixel.x > 0u {
         sum += film[index - 1u];
     }
-    if place.x + 1u < width {
+    if film_pixel.x + 1u < width {
         sum += film[index + 1u];
     }
-    if place.y + 1u < params.film_size.y {
+    if film_pixel.y + 1u < params.film_size.y {
         sum += film[index + width];
     }
     return sum;

@@ -8,7 +8,7 @@ fn first_hits(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocatio
         return;
     }
     let pixel = params.origin + id.xy;
-    let place = pixel - params.film_origin;
-    hits[place.y * params.film_size.x + place.x] = pixel_first_hit(pixel);
+    let film_pixel = pixel - params.film_origin;
+    hits[film_pixel.y * params.film_size.x + film_pixel.x] = pixel_first_hit(pixel);
     report_completion(local);
 }

@@ -1,5 +1,5 @@
-// Renders a range of samples of a rectangle of pixels into the film: rgb sums weighted radiance, a the weights; layers
-// follow. Samples are added one by one, so that any division into dispatches gives the same bits.
+// Renders a range of samples of a rectangle of pixels into the film: rgb is the sum of weighted radiance, a the sum of
+// weights; layers follow. Samples are added one by one, so that any division into dispatches gives the same bits.
 
 @compute @workgroup_size(8, 8)
 fn render(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_index) local: u32) {
@@ -7,8 +7,8 @@ fn render(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_in
         return;
     }
     let pixel = params.origin + id.xy;
-    let place = pixel - params.film_origin;
-    let index = place.y * params.film_size.x + place.x;
+    let film_pixel = pixel - params.film_origin;
+    let index = film_pixel.y * params.film_size.x + film_pixel.x;
     var sum = film[index];
     var layers = Layers();
     if LAYERS != 0u {

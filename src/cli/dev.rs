@@ -266,7 +266,7 @@ impl Terminal {
     fn report(self, report: &Report) {
         match report {
             Report::Problem(problem) => self.problem(problem),
-            Report::Mended => self.line(GREEN, "All errors fixed"),
+            Report::AllFixed => self.line(GREEN, "All errors fixed"),
             Report::Reloaded {
                 seconds,
                 compiled: None,
@@ -289,10 +289,10 @@ impl Terminal {
                      full size"
                 ),
             ),
-            Report::Wrote(what, Ok(())) => self.line(GREEN, &format!("Saved {what} to the scene file")),
-            Report::Wrote(what, Err(error)) => self.line(RED, &format!("Cannot save {what}: {error}")),
-            Report::Turned(what, Ok(())) => self.line(GREEN, what),
-            Report::Turned(what, Err(error)) => self.line(RED, &format!("{what}: failed: {error}")),
+            Report::Saved(what, Ok(())) => self.line(GREEN, &format!("Saved {what} to the scene file")),
+            Report::Saved(what, Err(error)) => self.line(RED, &format!("Cannot save {what}: {error}")),
+            Report::UndoRedo(what, Ok(())) => self.line(GREEN, what),
+            Report::UndoRedo(what, Err(error)) => self.line(RED, &format!("{what}: failed: {error}")),
         }
     }
 

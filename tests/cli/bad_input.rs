@@ -1,19 +1,23 @@
 //! Invalid command lines and scenes: one message, the documented exit code, no output file.
 
-use super::{NO_DRIVER, Ran, SCENE, TestFolder};
+use super::{NO_DRIVER, RunResult, SCENE, TestFolder};
 
 #[track_caller]
-fn assert_failed(place: &TestFolder, ran: &Ran, code: i32, message: &str) {
-    assert_eq!(ran.code, code, "{}", ran.stderr);
-    assert_eq!(ran.stdout, "");
-    assert!(ran.stderr.starts_with("error: "), "{}", ran.stderr);
-    assert!(ran.stderr.contains(message), "'{message}' is not in: {}", ran.stderr);
-    assert!(place.files().is_empty(), "left behind: {:?}", place.files());
+fn assert_failed(folder: &TestFolder, result: &RunResult, code: i32, message: &str) {
+    assert_eq!(result.code, code, "{}", result.stderr);
+    assert_eq!(result.stdout, "");
+    assert!(result.stderr.starts_with("error: "), "{}", result.stderr);
+    assert!(
+        result.stderr.contains(message),
+        "'{message}' is not in: {}",
+        result.stderr
+    );
+    assert!(folder.files().is_empty(), "files left: {:?}", folder.files());
 }
 
 #[test]
 fn wrong_command_lines_exit_with_2() {
-    let place = TestFolder::new();
+    let folder = TestFolder::new();
     let cases: [(&[&str], &str); 37] = [
         (&["--size", "64"], "--size"),
         (&["--size", "64x"], "--size"),
@@ -75,26 +79,26 @@ fn wrong_command_lines_exit_with_2() {
         (&["--unknown"], "--unknown"),
     ];
     for (arguments, message) in cases {
-        let ran = place.run(&[&["render", "small.toml"], arguments].concat());
-        assert_failed(&place, &ran, 2, message);
+        let result = folder.run(&[&["render", "small.toml"], arguments].concat());
+        assert_failed(&folder, &result, 2, message);
     }
     for (arguments, message) in [
         (&["render"][..], "<SCENE>"),
         (&["check"], "<SCENE>..."),
         (&["paint"], "paint"),
     ] {
-        assert_failed(&place, &place.run(arguments), 2, message);
+        assert_failed(&folder, &folder.run(arguments), 2, message);
     }
-    assert_eq!(place.run(&[]).code, 2);
+    assert_eq!(folder.run(&[]).code, 2);
 }
 
 #[test]
-fn a_crop_may_use_the_size_of_the_option() {
-    let place = TestFolder::new();
-    place.quietly(&["render", "small.toml", "--size", "20x20", "--crop", "0,0,11,7"]);
+fn a_crop_is_checked_against_the_size_option() {
+    let folder = TestFolder::new();
+    folder.run_quietly(&["render", "small.toml", "--size", "20x20", "--crop", "0,0,11,7"]);
 }
 
-/// A selection; tests next to the parser cover every rule of scene files.
+/// A selection of rules; the tests next to the parser cover every rule of scene files.
 #[test]
 fn bad_scenes_exit_with_3_and_name_file_line_key_value_and_rule() {
     let cases = [
@@ -138,19 +142,19 @@ fn bad_scenes_exit_with_3_and_name_file_line_key_value_and_rule() {
         ("[render]", "[render", "bad.toml:3:"),
     ];
     for (from, to, message) in cases {
-        let place = TestFolder::new();
+        let folder = TestFolder::new();
         assert!(SCENE.contains(from), "{from}");
-        let bad = place.path("small.toml").with_file_name("bad.toml");
+        let scene = folder.path("small.toml").with_file_name("bad.toml");
         let text = SCENE.replacen(from, to, 1);
         for command in ["render", "check"] {
-            std::fs::write(&bad, &text).unwrap();
-            let ran = place.run(&[command, "bad.toml"]);
-            std::fs::remove_file(&bad).unwrap();
-            assert_failed(&place, &ran, 3, message);
+            std::fs::write(&scene, &text).unwrap();
+            let result = folder.run(&[command, "bad.toml"]);
+            std::fs::remove_file(&scene).unwrap();
+            assert_failed(&folder, &result, 3, message);
             assert!(
-                ran.stderr.starts_with("error: bad.toml"),
+                result.stderr.starts_with("error: bad.toml"),
                 "the message does not start with the file: {}",
-                ran.stderr
+                result.stderr
             );
         }
     }
@@ -159,8 +163,8 @@ fn bad_scenes_exit_with_3_and_name_file_line_key_value_and_rule() {
 /// An error that is caused by the option is reported at the line of the file.
 #[test]
 fn an_integrator_option_validates_the_scene() {
-    let place = TestFolder::new();
-    let scene = place.path("small.toml");
+    let folder = TestFolder::new();
+    let scene = folder.path("small.toml");
     for (from, to, message) in [
         (
             "[render]",
@@ -185,18 +189,18 @@ fn an_integrator_option_validates_the_scene() {
     ] {
         assert!(SCENE.contains(from), "{from}");
         std::fs::write(&scene, SCENE.replacen(from, to, 1)).unwrap();
-        let ran = place.run(&["render", "small.toml", "--integrator", "phong"]);
-        assert_failed(&place, &ran, 3, message);
+        let result = folder.run(&["render", "small.toml", "--integrator", "phong"]);
+        assert_failed(&folder, &result, 3, message);
     }
 }
 
 #[test]
 fn a_missing_scene_exits_with_3() {
-    let place = TestFolder::new();
+    let folder = TestFolder::new();
     for command in ["render", "check"] {
         assert_failed(
-            &place,
-            &place.run(&[command, "none.toml"]),
+            &folder,
+            &folder.run(&[command, "none.toml"]),
             3,
             "none.toml: cannot be read",
         );
@@ -205,24 +209,24 @@ fn a_missing_scene_exits_with_3() {
 
 #[test]
 fn the_check_continues_after_an_invalid_scene() {
-    let place = TestFolder::new();
-    let ran = place.run(&["check", "none.toml", "small.toml"]);
-    assert_eq!(ran.code, 3);
-    assert!(ran.stderr.contains("none.toml") && ran.stdout.starts_with("small.toml: ok"));
+    let folder = TestFolder::new();
+    let result = folder.run(&["check", "none.toml", "small.toml"]);
+    assert_eq!(result.code, 3);
+    assert!(result.stderr.contains("none.toml") && result.stdout.starts_with("small.toml: ok"));
 }
 
 #[test]
 fn a_missing_device_exits_with_4() {
-    let place = TestFolder::new();
-    let ran = place.run(&["render", "small.toml", "--device", "abacus"]);
+    let folder = TestFolder::new();
+    let result = folder.run(&["render", "small.toml", "--device", "abacus"]);
     assert_failed(
-        &place,
-        &ran,
+        &folder,
+        &result,
         4,
         "no adapter's name, driver or type contains 'abacus'; available: cpu, gpu, auto, 1: ",
     );
     for device in ["gpu", "lavapipe"] {
-        let ran = place.run_with(&["render", "small.toml", "--device", device], &NO_DRIVER);
-        assert_failed(&place, &ran, 4, "apt-get install mesa-vulkan-drivers");
+        let result = folder.run_with(&["render", "small.toml", "--device", device], &NO_DRIVER);
+        assert_failed(&folder, &result, 4, "apt-get install mesa-vulkan-drivers");
     }
 }

@@ -5,28 +5,28 @@ use std::fs;
 use exr::prelude::{AnyChannel, AnyChannels, FlatSamples, Layer, LayerAttributes, SmallVec, WritableImage as _, f16};
 use exr::prelude::{Encoding, Image};
 
-use super::{Ran, TestFolder};
+use super::{RunResult, TestFolder};
 
 /// Writes an 8-bit PNG; the number of values determines the color type.
-fn png(place: &TestFolder, name: &str, (width, height): (u32, u32), values: &[u8]) {
+fn png(folder: &TestFolder, name: &str, (width, height): (u32, u32), values: &[u8]) {
     let color = match values.len() / (width * height) as usize {
         1 => png::ColorType::Grayscale,
         2 => png::ColorType::GrayscaleAlpha,
         3 => png::ColorType::Rgb,
         _ => png::ColorType::Rgba,
     };
-    write_png(place, name, (width, height), color, png::BitDepth::Eight, values);
+    write_png(folder, name, (width, height), color, png::BitDepth::Eight, values);
 }
 
 fn write_png(
-    place: &TestFolder,
+    folder: &TestFolder,
     name: &str,
     size: (u32, u32),
     color: png::ColorType,
     depth: png::BitDepth,
     values: &[u8],
 ) {
-    let file = fs::File::create(place.path(name)).unwrap();
+    let file = fs::File::create(folder.path(name)).unwrap();
     let mut encoder = png::Encoder::new(file, size.0, size.1);
     encoder.set_color(color);
     encoder.set_depth(depth);
@@ -36,12 +36,12 @@ fn write_png(
     encoder.write_header().unwrap().write_image_data(values).unwrap();
 }
 
-fn exr(place: &TestFolder, name: &str, size: (usize, usize), channels: Vec<(&str, FlatSamples)>) {
-    exr_parts(place, name, size, vec![("part", channels)], Encoding::FAST_LOSSLESS);
+fn exr(folder: &TestFolder, name: &str, size: (usize, usize), channels: Vec<(&str, FlatSamples)>) {
+    exr_parts(folder, name, size, vec![("part", channels)], Encoding::FAST_LOSSLESS);
 }
 
 fn exr_parts(
-    place: &TestFolder,
+    folder: &TestFolder,
     name: &str,
     size: (usize, usize),
     parts: Vec<(&str, Vec<(&str, FlatSamples)>)>,
@@ -60,7 +60,7 @@ fn exr_parts(
         attributes,
         layer_data: layers.into_iter().collect::<exr::prelude::Layers<_>>(),
     };
-    image.write().to_file(place.path(name)).unwrap();
+    image.write().to_file(folder.path(name)).unwrap();
 }
 
 fn floats(values: &[f32]) -> FlatSamples {
@@ -71,60 +71,60 @@ fn gray(values: &[f32]) -> Vec<(&'static str, FlatSamples)> {
     ["R", "G", "B"].into_iter().map(|name| (name, floats(values))).collect()
 }
 
-fn write_two_pngs(place: &TestFolder) -> (Vec<u8>, Vec<u8>) {
+fn write_two_pngs(folder: &TestFolder) -> (Vec<u8>, Vec<u8>) {
     let a: Vec<u8> = (0..24).map(|i| i * 9).collect();
     let mut b = a.clone();
     b[16] += 10; // pixel (1, 1), green
-    png(place, "a.png", (4, 2), &a);
-    png(place, "b.png", (4, 2), &b);
+    png(folder, "a.png", (4, 2), &a);
+    png(folder, "b.png", (4, 2), &b);
     (a, b)
 }
 
 #[track_caller]
-fn assert_output(ran: &Ran, code: i32, text: &str) {
-    assert_eq!(ran.code, code, "{}{}", ran.stdout, ran.stderr);
+fn assert_output(result: &RunResult, code: i32, text: &str) {
+    assert_eq!(result.code, code, "{}{}", result.stdout, result.stderr);
     let output = if [0, 5].contains(&code) {
-        &ran.stdout
+        &result.stdout
     } else {
-        &ran.stderr
+        &result.stderr
     };
     assert!(output.contains(text), "'{text}' is not in: {output}");
 }
 
-fn json(ran: &Ran) -> serde_json::Value {
-    assert_eq!(ran.stderr, "");
-    serde_json::from_str(&ran.stdout).unwrap_or_else(|error| panic!("{error}: {}", ran.stdout))
+fn json(result: &RunResult) -> serde_json::Value {
+    assert_eq!(result.stderr, "");
+    serde_json::from_str(&result.stdout).unwrap_or_else(|error| panic!("{error}: {}", result.stdout))
 }
 
 #[test]
 fn identical_files_pass_and_a_single_differing_bit_fails() {
-    let place = TestFolder::new();
-    let (a, _) = write_two_pngs(&place);
-    png(&place, "copy.png", (4, 2), &a);
+    let folder = TestFolder::new();
+    let (a, _) = write_two_pngs(&folder);
+    png(&folder, "copy.png", (4, 2), &a);
     for other in ["a.png", "copy.png"] {
-        let ran = place.run(&["diff", "a.png", other]);
-        assert_output(&ran, 0, "color R G B: identical\nidentical\n");
+        let result = folder.run(&["diff", "a.png", other]);
+        assert_output(&result, 0, "color R G B: identical\nidentical\n");
     }
-    let ran = place.run(&["diff", "a.png", "b.png"]);
-    assert_output(&ran, 5, "fails: color: 1 pixel differs\n");
-    assert_output(&ran, 5, "  different  1 of 8 pixels, the first at (1, 1)\n");
+    let result = folder.run(&["diff", "a.png", "b.png"]);
+    assert_output(&result, 5, "fails: color: 1 pixel differs\n");
+    assert_output(&result, 5, "  different  1 of 8 pixels, the first at (1, 1)\n");
     assert_output(
-        &ran,
+        &result,
         5,
         "  largest    0.0392157 in G at (1, 1): 0.564706 instead of 0.603922\n",
     );
     // (10 / 255)² / 24 values
-    assert_output(&ran, 5, "  rmse       0.00800487\n");
-    assert_eq!((ran.stderr.as_str(), place.files().len()), ("", 3));
+    assert_output(&result, 5, "  rmse       0.00800487\n");
+    assert_eq!((result.stderr.as_str(), folder.files().len()), ("", 3));
 }
 
 #[test]
 fn json_uses_the_names_of_the_text_output() {
-    let place = TestFolder::new();
-    write_two_pngs(&place);
-    let ran = place.run(&["diff", "a.png", "b.png", "--json"]);
-    assert_eq!(ran.code, 5);
-    let found = json(&ran);
+    let folder = TestFolder::new();
+    write_two_pngs(&folder);
+    let result = folder.run(&["diff", "a.png", "b.png", "--json"]);
+    assert_eq!(result.code, 5);
+    let found = json(&result);
     assert_eq!(found["passes"], false);
     assert_eq!(found["size_a"], serde_json::json!([4, 2]));
     let layer = &found["layers"][0];
@@ -132,7 +132,7 @@ fn json_uses_the_names_of_the_text_output() {
     assert_eq!(layer["channels"], serde_json::json!(["R", "G", "B"]));
     assert_eq!(layer["first"], serde_json::json!({"x": 1, "y": 1}));
     assert_eq!(layer["largest_at"]["channel"], "G");
-    let text = place.run(&["diff", "a.png", "b.png"]).stdout;
+    let text = folder.run(&["diff", "a.png", "b.png"]).stdout;
     for metric in [
         "different",
         "largest",
@@ -147,7 +147,7 @@ fn json_uses_the_names_of_the_text_output() {
         assert!(text.contains(&format!("\n  {metric:<9}  ")), "{metric}");
     }
     // infinity, which JSON cannot represent
-    let same = json(&place.run(&["diff", "a.png", "a.png", "--json"]));
+    let same = json(&folder.run(&["diff", "a.png", "a.png", "--json"]));
     assert_eq!(
         (&same["passes"], &same["layers"][0]["psnr"]),
         (&true.into(), &"inf".into())
@@ -160,15 +160,15 @@ fn json_uses_the_names_of_the_text_output() {
 
 #[test]
 fn limits_decide_the_exit_code() {
-    let place = TestFolder::new();
-    write_two_pngs(&place);
+    let folder = TestFolder::new();
+    write_two_pngs(&folder);
     let passes = |limits: &[&str]| {
         let options: Vec<&str> = limits.iter().flat_map(|limit| ["--fail", limit]).collect();
-        let ran = place.run(&[&["diff", "a.png", "b.png"], &options[..]].concat());
-        assert!([0, 5].contains(&ran.code), "{}", ran.stderr);
-        (ran.code == 0, ran.stdout)
+        let result = folder.run(&[&["diff", "a.png", "b.png"], &options[..]].concat());
+        assert!([0, 5].contains(&result.code), "{}", result.stderr);
+        (result.code == 0, result.stdout)
     };
-    for (good, bad) in [
+    for (satisfied, violated) in [
         ("different=1", "different=0"),
         ("largest=0.0393", "largest=0.0392"),
         ("share=0.125", "share=0.12"),
@@ -178,9 +178,9 @@ fn limits_decide_the_exit_code() {
         ("ssim=0.9", "ssim=1"),
         ("flip=0.2", "flip=0"),
     ] {
-        assert!(passes(&[good]).0, "{good}");
-        let (passed, text) = passes(&[bad]);
-        let (metric, limit) = bad.split_once('=').unwrap();
+        assert!(passes(&[satisfied]).0, "{satisfied}");
+        let (passed, text) = passes(&[violated]);
+        let (metric, limit) = violated.split_once('=').unwrap();
         let word = if ["psnr", "ssim"].contains(&metric) {
             "below"
         } else {
@@ -189,16 +189,19 @@ fn limits_decide_the_exit_code() {
         assert!(!passed && text.contains(&format!("fails: color: {metric} ")), "{text}");
         assert!(text.contains(&format!(" is {word} {limit}\n")), "{text}");
         // one satisfied limit does not make up for a violated one
-        assert!(!passes(&[good, bad]).0 && !passes(&[bad, good]).0, "{bad}");
+        assert!(
+            !passes(&[satisfied, violated]).0 && !passes(&[violated, satisfied]).0,
+            "{violated}"
+        );
     }
     assert!(passes(&["rmse=0.1", "psnr=20", "flip=0.5"]).0);
 }
 
 #[test]
 fn wrong_command_lines_exit_with_2() {
-    let place = TestFolder::new();
-    write_two_pngs(&place);
-    exr(&place, "depth.exr", (2, 1), vec![("depth.Z", floats(&[1.0, 2.0]))]);
+    let folder = TestFolder::new();
+    write_two_pngs(&folder);
+    exr(&folder, "depth.exr", (2, 1), vec![("depth.Z", floats(&[1.0, 2.0]))]);
     let metrics = "different, largest, share, rmse, rel_mse, psnr, ssim, flip";
     let cases: [(&[&str], &str); 17] = [
         (&["a.png"], "<B>"),
@@ -241,34 +244,34 @@ fn wrong_command_lines_exit_with_2() {
         ),
     ];
     for (arguments, message) in cases {
-        let ran = place.run(&[&["diff"], arguments].concat());
-        assert_output(&ran, 2, message);
-        assert_eq!(ran.stdout, "", "{arguments:?}");
+        let result = folder.run(&[&["diff"], arguments].concat());
+        assert_output(&result, 2, message);
+        assert_eq!(result.stdout, "", "{arguments:?}");
     }
-    assert_eq!(place.files(), ["a.png", "b.png", "depth.exr"]);
+    assert_eq!(folder.files(), ["a.png", "b.png", "depth.exr"]);
 }
 
 #[test]
 fn files_that_are_not_images_exit_with_1() {
-    let place = TestFolder::new();
-    let (a, _) = write_two_pngs(&place);
-    let whole = place.read("a.png");
+    let folder = TestFolder::new();
+    let (a, _) = write_two_pngs(&folder);
+    let complete = folder.read("a.png");
     for (name, bytes) in [
         ("empty.png", &[][..]),
         ("text.png", b"not a PNG!"),
-        ("short.png", &whole[..whole.len() / 2]),
-        ("endless.png", &whole[..whole.len() - 12]),
+        ("short.png", &complete[..complete.len() / 2]),
+        ("endless.png", &complete[..complete.len() - 12]),
     ] {
-        fs::write(place.path(name), bytes).unwrap();
+        fs::write(folder.path(name), bytes).unwrap();
     }
-    let mut flipped = whole.clone();
+    let mut flipped = complete.clone();
     flipped[50] ^= 1;
-    fs::write(place.path("flipped.png"), flipped).unwrap();
-    exr(&place, "whole.exr", (4, 2), gray(&[0.5; 8]));
-    let whole = place.read("whole.exr");
-    fs::write(place.path("short.exr"), &whole[..whole.len() - 40]).unwrap();
-    exr(&place, "depth.exr", (4, 2), vec![("depth.Z", floats(&[1.0; 8]))]);
-    fs::create_dir(place.path("folder")).unwrap();
+    fs::write(folder.path("flipped.png"), flipped).unwrap();
+    exr(&folder, "whole.exr", (4, 2), gray(&[0.5; 8]));
+    let complete = folder.read("whole.exr");
+    fs::write(folder.path("short.exr"), &complete[..complete.len() - 40]).unwrap();
+    exr(&folder, "depth.exr", (4, 2), vec![("depth.Z", floats(&[1.0; 8]))]);
+    fs::create_dir(folder.path("folder")).unwrap();
     for (name, message) in [
         ("absent.png", "cannot be read: "),
         ("folder", "is a directory"),
@@ -282,101 +285,101 @@ fn files_that_are_not_images_exit_with_1() {
         ("depth.exr", "has no color channels"),
     ] {
         for arguments in [["diff", name, "a.png"], ["diff", "a.png", name]] {
-            let ran = place.run(&arguments);
-            assert_output(&ran, 1, &format!("error: {name}: {message}"));
-            assert_eq!(ran.stdout, "", "{name}");
+            let result = folder.run(&arguments);
+            assert_output(&result, 1, &format!("error: {name}: {message}"));
+            assert_eq!(result.stdout, "", "{name}");
         }
     }
     // the cause is printed only once
     for arguments in [["diff", "absent.png", "a.png"], ["diff", "a.png", "absent.png"]] {
         let message = "error: absent.png: cannot be read: No such file or directory (os error 2)\n";
-        assert_eq!(place.run(&arguments).stderr, message);
+        assert_eq!(folder.run(&arguments).stderr, message);
     }
     // the format comes from the content, not from the extension
-    png(&place, "a.exr", (4, 2), &a);
-    assert_output(&place.run(&["diff", "a.exr", "a.png"]), 0, "identical\n");
+    png(&folder, "a.exr", (4, 2), &a);
+    assert_output(&folder.run(&["diff", "a.exr", "a.png"]), 0, "identical\n");
 }
 
 #[test]
 fn different_sizes_and_positions_differ() {
-    let place = TestFolder::new();
-    write_two_pngs(&place);
-    png(&place, "wide.png", (8, 1), &[0; 24]);
-    let ran = place.run(&["diff", "a.png", "wide.png", "--fail", "rmse=1", "--out", "out.png"]);
-    assert_output(&ran, 5, "fails: A has 4 x 2 pixels, B 8 x 1\n");
-    assert_output(&ran, 5, "note: out.png: not written");
-    assert!(!place.path("out.png").exists());
+    let folder = TestFolder::new();
+    write_two_pngs(&folder);
+    png(&folder, "wide.png", (8, 1), &[0; 24]);
+    let result = folder.run(&["diff", "a.png", "wide.png", "--fail", "rmse=1", "--out", "out.png"]);
+    assert_output(&result, 5, "fails: A has 4 x 2 pixels, B 8 x 1\n");
+    assert_output(&result, 5, "note: out.png: not written");
+    assert!(!folder.path("out.png").exists());
     // two crops of one image, equal in size
     for (name, crop) in [("left.exr", "0,0,2,2"), ("right.exr", "2,0,4,2")] {
-        place.quietly(&["render", "small.toml", "--device", "cpu", "-o", name, "--crop", crop]);
+        folder.run_quietly(&["render", "small.toml", "--device", "cpu", "-o", name, "--crop", crop]);
     }
     assert_output(
-        &place.run(&["diff", "left.exr", "right.exr"]),
+        &folder.run(&["diff", "left.exr", "right.exr"]),
         5,
         "fails: A starts at pixel (0, 0) of the whole image, B at (2, 0)\n",
     );
-    assert_output(&place.run(&["diff", "left.exr", "left.exr"]), 0, "identical\n");
+    assert_output(&folder.run(&["diff", "left.exr", "left.exr"]), 0, "identical\n");
 }
 
 #[test]
 fn missing_channels_differ_unless_excluded() {
-    let place = TestFolder::new();
+    let folder = TestFolder::new();
     let colors = || gray(&[0.25, 0.5]);
     let depth = |z: f32| vec![("depth.Z", floats(&[1.0, z]))];
-    exr(&place, "both.exr", (2, 1), [colors(), depth(2.0)].concat());
-    exr(&place, "deeper.exr", (2, 1), [colors(), depth(2.5)].concat());
-    exr(&place, "colors.exr", (2, 1), colors());
-    let missing = place.run(&["diff", "both.exr", "colors.exr", "--fail", "rmse=9"]);
+    exr(&folder, "both.exr", (2, 1), [colors(), depth(2.0)].concat());
+    exr(&folder, "deeper.exr", (2, 1), [colors(), depth(2.5)].concat());
+    exr(&folder, "colors.exr", (2, 1), colors());
+    let missing = folder.run(&["diff", "both.exr", "colors.exr", "--fail", "rmse=9"]);
     assert_output(&missing, 5, "fails: B lacks depth.Z, which A has\n");
     assert_output(
-        &place.run(&["diff", "colors.exr", "both.exr"]),
+        &folder.run(&["diff", "colors.exr", "both.exr"]),
         5,
         "fails: A lacks depth.Z, which B has\n",
     );
     assert_output(
-        &place.run(&["diff", "colors.exr", "both.exr", "--layers", "color"]),
+        &folder.run(&["diff", "colors.exr", "both.exr", "--layers", "color"]),
         0,
         "identical\n",
     );
     // differing layers are listed, and identical ones are reported as such
-    let ran = place.run(&["diff", "both.exr", "deeper.exr"]);
-    assert_output(&ran, 5, "color R G B: identical\ndepth depth.Z\n");
-    assert_output(&ran, 5, "  largest    0.5 in depth.Z at (1, 0): 2 instead of 2.5\n");
-    assert_output(&ran, 5, "fails: depth: 1 pixel differs\n");
+    let result = folder.run(&["diff", "both.exr", "deeper.exr"]);
+    assert_output(&result, 5, "color R G B: identical\ndepth depth.Z\n");
+    assert_output(&result, 5, "  largest    0.5 in depth.Z at (1, 0): 2 instead of 2.5\n");
+    assert_output(&result, 5, "fails: depth: 1 pixel differs\n");
     assert_output(
-        &place.run(&["diff", "both.exr", "deeper.exr", "--layers", "color"]),
+        &folder.run(&["diff", "both.exr", "deeper.exr", "--layers", "color"]),
         0,
         "identical\n",
     );
     assert_output(
-        &place.run(&["diff", "both.exr", "deeper.exr", "--fail", "rmse=0.3"]),
+        &folder.run(&["diff", "both.exr", "deeper.exr", "--fail", "rmse=0.3"]),
         5,
         "fails: depth: rmse 0.353553 is above 0.3\n",
     );
-    let ran = place.run(&["diff", "both.exr", "deeper.exr", "--out", "out.png"]);
-    assert_output(&ran, 5, "note: out.png: shows layer depth\n");
-    assert!(place.path("out.png").exists());
+    let result = folder.run(&["diff", "both.exr", "deeper.exr", "--out", "out.png"]);
+    assert_output(&result, 5, "note: out.png: shows layer depth\n");
+    assert!(folder.path("out.png").exists());
 }
 
 #[test]
 fn non_finite_values_are_counted_and_fail() {
-    let place = TestFolder::new();
+    let folder = TestFolder::new();
     let (nan, inf) = (f32::NAN, f32::INFINITY);
     let red = |values: &[f32]| {
         let mut channels = gray(&[0.5; 4]);
         channels[0].1 = floats(values);
         channels
     };
-    exr(&place, "odd.exr", (4, 1), red(&[0.5, nan, inf, -inf]));
-    exr(&place, "even.exr", (4, 1), red(&[0.5; 4]));
+    exr(&folder, "odd.exr", (4, 1), red(&[0.5, nan, inf, -inf]));
+    exr(&folder, "even.exr", (4, 1), red(&[0.5; 4]));
     let text = "color: 1 NaN and 2 infinite values in A, 1 and 2 in B, the first at (1, 0)";
     // identical files fail, too, regardless of the limits
     let same = ["diff", "odd.exr", "odd.exr"];
-    assert_output(&place.run(&same), 5, text);
-    assert_output(&place.run(&[&same[..], &["--fail", "rmse=9"]].concat()), 5, text);
-    let ran = place.run(&["diff", "odd.exr", "even.exr", "--json", "--fail", "share=1"]);
-    assert_eq!(ran.code, 5);
-    let layer = &json(&ran)["layers"][0];
+    assert_output(&folder.run(&same), 5, text);
+    assert_output(&folder.run(&[&same[..], &["--fail", "rmse=9"]].concat()), 5, text);
+    let result = folder.run(&["diff", "odd.exr", "even.exr", "--json", "--fail", "share=1"]);
+    assert_eq!(result.code, 5);
+    let layer = &json(&result)["layers"][0];
     assert_eq!(
         layer["not_finite"],
         serde_json::json!({"nan_a": 1, "nan_b": 0, "infinite_a": 2, "infinite_b": 0, "first": {"x": 1, "y": 0}})
@@ -390,14 +393,14 @@ fn non_finite_values_are_counted_and_fail() {
 
 #[test]
 fn signed_zeros_differ_by_zero() {
-    let place = TestFolder::new();
-    exr(&place, "plus.exr", (1, 1), gray(&[0.0]));
-    exr(&place, "minus.exr", (1, 1), gray(&[-0.0]));
-    let ran = place.run(&["diff", "plus.exr", "minus.exr"]);
-    assert_output(&ran, 5, "fails: color: 1 pixel differs\n");
-    assert_output(&ran, 5, "  largest    0\n");
+    let folder = TestFolder::new();
+    exr(&folder, "plus.exr", (1, 1), gray(&[0.0]));
+    exr(&folder, "minus.exr", (1, 1), gray(&[-0.0]));
+    let result = folder.run(&["diff", "plus.exr", "minus.exr"]);
+    assert_output(&result, 5, "fails: color: 1 pixel differs\n");
+    assert_output(&result, 5, "  largest    0\n");
     assert_output(
-        &place.run(&["diff", "plus.exr", "minus.exr", "--fail", "largest=0"]),
+        &folder.run(&["diff", "plus.exr", "minus.exr", "--fail", "largest=0"]),
         0,
         "passes\n",
     );
@@ -405,26 +408,26 @@ fn signed_zeros_differ_by_zero() {
 
 #[test]
 fn the_share_counts_differences_above_the_threshold() {
-    let place = TestFolder::new();
-    let (a, mut b) = write_two_pngs(&place);
+    let folder = TestFolder::new();
+    let (a, mut b) = write_two_pngs(&folder);
     b[0] += 1;
-    png(&place, "b.png", (4, 2), &b);
-    png(&place, "a.png", (4, 2), &a);
+    png(&folder, "b.png", (4, 2), &b);
+    png(&folder, "a.png", (4, 2), &a);
     let share = |threshold: &str| {
-        let ran = place.run(&["diff", "a.png", "b.png", "--json", "--threshold", threshold]);
-        json(&ran)["layers"][0]["share"].as_f64().unwrap()
+        let result = folder.run(&["diff", "a.png", "b.png", "--json", "--threshold", threshold]);
+        json(&result)["layers"][0]["share"].as_f64().unwrap()
     };
     // 1 / 255 is 0.0039, 10 / 255 is 0.0392
     assert_eq!((share("0"), share("0.01"), share("0.04")), (0.25, 0.125, 0.0));
-    let ran = place.run(&["diff", "a.png", "b.png", "--threshold", "0.01", "--fail", "share=0.1"]);
-    assert_output(&ran, 5, "fails: color: share over 0.01 0.125 is above 0.1\n");
+    let result = folder.run(&["diff", "a.png", "b.png", "--threshold", "0.01", "--fail", "share=0.1"]);
+    assert_output(&result, 5, "fails: color: share over 0.01 0.125 is above 0.1\n");
 }
 
 #[test]
 fn only_requested_metrics_are_computed() {
-    let place = TestFolder::new();
-    write_two_pngs(&place);
-    let ran = place.run(&[
+    let folder = TestFolder::new();
+    write_two_pngs(&folder);
+    let result = folder.run(&[
         "diff",
         "a.png",
         "b.png",
@@ -434,20 +437,20 @@ fn only_requested_metrics_are_computed() {
         "--fail",
         "share=1",
     ]);
-    assert_eq!(ran.code, 0);
-    let layer = &json(&ran)["layers"][0];
-    for (metric, is_there) in [
+    assert_eq!(result.code, 0);
+    let layer = &json(&result)["layers"][0];
+    for (metric, is_present) in [
         ("rmse", true),
         ("psnr", true),
         ("share", true),
         ("ssim", false),
         ("flip", false),
     ] {
-        assert_eq!(layer.get(metric).is_some(), is_there, "{metric}");
+        assert_eq!(layer.get(metric).is_some(), is_present, "{metric}");
     }
     let flip = |ppd: &str| {
-        let ran = place.run(&["diff", "a.png", "b.png", "--json", "--ppd", ppd]);
-        json(&ran)["layers"][0]["flip"].as_f64().unwrap()
+        let result = folder.run(&["diff", "a.png", "b.png", "--json", "--ppd", ppd]);
+        json(&result)["layers"][0]["flip"].as_f64().unwrap()
     };
     assert!(flip("20") > flip("200"));
 }
@@ -455,14 +458,14 @@ fn only_requested_metrics_are_computed() {
 #[test]
 fn encodings_of_equal_values_are_equal() {
     use png::{BitDepth, ColorType};
-    let place = TestFolder::new();
+    let folder = TestFolder::new();
     let colors = [
         10, 20, 30, 200, 100, 0, 10, 20, 30, 10, 20, 30, 200, 100, 0, 200, 100, 0, 10, 20, 30, 10, 20, 30,
     ];
-    png(&place, "rgb.png", (4, 2), &colors);
+    png(&folder, "rgb.png", (4, 2), &colors);
     // palette indices 0 1 0 0 / 1 1 0 0
     write_png(
-        &place,
+        &folder,
         "palette.png",
         (4, 2),
         ColorType::Indexed,
@@ -470,61 +473,61 @@ fn encodings_of_equal_values_are_equal() {
         &[0x40, 0xc0],
     );
     let deep: Vec<u8> = colors.iter().flat_map(|value| [*value, *value]).collect();
-    write_png(&place, "deep.png", (4, 2), ColorType::Rgb, BitDepth::Sixteen, &deep);
+    write_png(&folder, "deep.png", (4, 2), ColorType::Rgb, BitDepth::Sixteen, &deep);
     let opaque: Vec<u8> = colors.chunks(3).flat_map(|pixel| [pixel, &[255]].concat()).collect();
-    png(&place, "opaque.png", (4, 2), &opaque);
+    png(&folder, "opaque.png", (4, 2), &opaque);
     for name in ["palette.png", "deep.png", "opaque.png"] {
-        assert_output(&place.run(&["diff", name, "rgb.png"]), 0, "identical\n");
-        assert_output(&place.run(&["diff", "rgb.png", name]), 0, "identical\n");
+        assert_output(&folder.run(&["diff", name, "rgb.png"]), 0, "identical\n");
+        assert_output(&folder.run(&["diff", "rgb.png", name]), 0, "identical\n");
     }
     let mut deeper = deep;
     deeper[1] += 1;
-    write_png(&place, "deep.png", (4, 2), ColorType::Rgb, BitDepth::Sixteen, &deeper);
+    write_png(&folder, "deep.png", (4, 2), ColorType::Rgb, BitDepth::Sixteen, &deeper);
     assert_output(
-        &place.run(&["diff", "deep.png", "rgb.png"]),
+        &folder.run(&["diff", "deep.png", "rgb.png"]),
         5,
         "1 of 8 pixels, the first at (0, 0)\n",
     );
     let mut glass = opaque;
     glass[7] = 254;
-    png(&place, "glass.png", (4, 2), &glass);
+    png(&folder, "glass.png", (4, 2), &glass);
     assert_output(
-        &place.run(&["diff", "glass.png", "rgb.png"]),
+        &folder.run(&["diff", "glass.png", "rgb.png"]),
         5,
         " in A at (1, 0): 0.996078 instead of 1\n",
     );
-    png(&place, "gray.png", (2, 1), &[7, 9]);
-    png(&place, "grays.png", (2, 1), &[7, 7, 7, 9, 9, 9]);
-    assert_output(&place.run(&["diff", "gray.png", "grays.png"]), 0, "identical\n");
+    png(&folder, "gray.png", (2, 1), &[7, 9]);
+    png(&folder, "grays.png", (2, 1), &[7, 7, 7, 9, 9, 9]);
+    assert_output(&folder.run(&["diff", "gray.png", "grays.png"]), 0, "identical\n");
     // EXR: half and float, compressed and not, tiles and scan lines, integers
     let values = [0.5_f32, 1.0, 1.5, 65504.0];
     let halves = FlatSamples::F16(values.map(f16::from_f32).to_vec());
     let half = ["R", "G", "B"].map(|name| (name, halves.clone())).to_vec();
-    exr(&place, "float.exr", (4, 1), gray(&values));
+    exr(&folder, "float.exr", (4, 1), gray(&values));
     let encodings = [
         Encoding::UNCOMPRESSED,
         Encoding::SMALL_LOSSLESS,
         Encoding::SMALL_FAST_LOSSLESS,
     ];
     for encoding in encodings {
-        exr_parts(&place, "half.exr", (4, 1), vec![("", half.clone())], encoding);
-        assert_output(&place.run(&["diff", "half.exr", "float.exr"]), 0, "identical\n");
+        exr_parts(&folder, "half.exr", (4, 1), vec![("", half.clone())], encoding);
+        assert_output(&folder.run(&["diff", "half.exr", "float.exr"]), 0, "identical\n");
     }
-    let mut other = values;
-    other[2] = 1.5_f32.next_up();
-    exr(&place, "other.exr", (4, 1), gray(&other));
+    let mut changed = values;
+    changed[2] = 1.5_f32.next_up();
+    exr(&folder, "other.exr", (4, 1), gray(&changed));
     assert_output(
-        &place.run(&["diff", "half.exr", "other.exr"]),
+        &folder.run(&["diff", "half.exr", "other.exr"]),
         5,
         "1 of 4 pixels, the first at (2, 0)\n",
     );
     let numbers = |last: u32| vec![("primitive.ID", FlatSamples::U32(vec![0, last]))];
-    exr(&place, "id.exr", (2, 1), numbers(u32::MAX));
-    exr(&place, "next.exr", (2, 1), numbers(u32::MAX - 1));
-    assert_output(&place.run(&["diff", "id.exr", "id.exr"]), 0, "identical\n");
+    exr(&folder, "id.exr", (2, 1), numbers(u32::MAX));
+    exr(&folder, "next.exr", (2, 1), numbers(u32::MAX - 1));
+    assert_output(&folder.run(&["diff", "id.exr", "id.exr"]), 0, "identical\n");
     // equal if converted to f32
     assert_output(
-        &place.run(&["diff", "id.exr", "next.exr"]),
+        &folder.run(&["diff", "id.exr", "next.exr"]),
         5,
         "1 of 2 pixels, the first at (1, 0)\n",
     );
@@ -532,21 +535,21 @@ fn encodings_of_equal_values_are_equal() {
 
 #[test]
 fn jpegs_and_interlaced_pngs_are_read() {
-    let place = TestFolder::new();
+    let folder = TestFolder::new();
     let jpeg = |name: &str, value: u8| {
         let pixels = vec![value; 16 * 8 * 3];
-        image::save_buffer(place.path(name), &pixels, 16, 8, image::ColorType::Rgb8).unwrap();
+        image::save_buffer(folder.path(name), &pixels, 16, 8, image::ColorType::Rgb8).unwrap();
     };
     jpeg("a.jpg", 90);
     jpeg("b.jpg", 99);
     png(
-        &place,
+        &folder,
         "decoded.png",
         (16, 8),
-        image::open(place.path("a.jpg")).unwrap().as_bytes(),
+        image::open(folder.path("a.jpg")).unwrap().as_bytes(),
     );
-    assert_output(&place.run(&["diff", "a.jpg", "decoded.png"]), 0, "identical\n");
-    assert_output(&place.run(&["diff", "a.jpg", "b.jpg"]), 5, "128 of 128 pixels");
+    assert_output(&folder.run(&["diff", "a.jpg", "decoded.png"]), 0, "identical\n");
+    assert_output(&folder.run(&["diff", "a.jpg", "b.jpg"]), 5, "128 of 128 pixels");
     // two pixels in a row: in pass 1 and in pass 6 of 7, each row with filter 0
     let chunk = |kind: &[u8; 4], data: &[u8]| {
         let body = [kind.as_slice(), data].concat();
@@ -565,39 +568,39 @@ fn jpegs_and_interlaced_pngs_are_read() {
         chunk(b"IDAT", &packed),
         chunk(b"IEND", &[]),
     ];
-    fs::write(place.path("interlaced.png"), file.concat()).unwrap();
-    png(&place, "plain.png", (2, 1), &[10, 20, 30, 40, 50, 60]);
-    assert_output(&place.run(&["diff", "interlaced.png", "plain.png"]), 0, "identical\n");
+    fs::write(folder.path("interlaced.png"), file.concat()).unwrap();
+    png(&folder, "plain.png", (2, 1), &[10, 20, 30, 40, 50, 60]);
+    assert_output(&folder.run(&["diff", "interlaced.png", "plain.png"]), 0, "identical\n");
 }
 
 #[test]
 fn parts_of_an_exr_are_layers() {
-    let place = TestFolder::new();
+    let folder = TestFolder::new();
     let parts = |x: f32| vec![("beauty", gray(&[0.5])), ("normal", vec![("X", floats(&[x]))])];
-    exr_parts(&place, "a.exr", (1, 1), parts(0.0), Encoding::FAST_LOSSLESS);
-    exr_parts(&place, "b.exr", (1, 1), parts(1.0), Encoding::FAST_LOSSLESS);
-    let ran = place.run(&["diff", "a.exr", "b.exr"]);
-    assert_output(&ran, 5, "beauty.R");
-    assert_output(&ran, 5, "fails: normal: 1 pixel differs\n");
-    assert_output(&place.run(&["diff", "a.exr", "a.exr"]), 0, "identical\n");
+    exr_parts(&folder, "a.exr", (1, 1), parts(0.0), Encoding::FAST_LOSSLESS);
+    exr_parts(&folder, "b.exr", (1, 1), parts(1.0), Encoding::FAST_LOSSLESS);
+    let result = folder.run(&["diff", "a.exr", "b.exr"]);
+    assert_output(&result, 5, "beauty.R");
+    assert_output(&result, 5, "fails: normal: 1 pixel differs\n");
+    assert_output(&folder.run(&["diff", "a.exr", "a.exr"]), 0, "identical\n");
 }
 
 #[test]
 fn an_exr_is_compared_with_a_png_as_it_would_be_written() {
-    let place = TestFolder::new();
+    let folder = TestFolder::new();
     for name in ["out.png", "out.exr"] {
-        place.quietly(&["render", "small.toml", "--device", "cpu", "-o", name]);
+        folder.run_quietly(&["render", "small.toml", "--device", "cpu", "-o", name]);
     }
     for arguments in [["diff", "out.png", "out.exr"], ["diff", "out.exr", "out.png"]] {
-        let ran = place.run(&arguments);
+        let result = folder.run(&arguments);
         assert_output(
-            &ran,
+            &result,
             0,
             "note: out.exr: linear; converted to a PNG with 8 bits and gamma22 for the comparison\n",
         );
-        assert_output(&ran, 0, "identical\n");
+        assert_output(&result, 0, "identical\n");
     }
-    place.quietly(&[
+    folder.run_quietly(&[
         "render",
         "small.toml",
         "--device",
@@ -607,30 +610,30 @@ fn an_exr_is_compared_with_a_png_as_it_would_be_written() {
         "--seed",
         "1",
     ]);
-    assert_output(&place.run(&["diff", "other.png", "out.exr"]), 5, "fails: color");
+    assert_output(&folder.run(&["diff", "other.png", "out.exr"]), 5, "fails: color");
 }
 
 #[test]
 fn standard_input_and_pipes_are_read() {
-    let place = TestFolder::new();
-    write_two_pngs(&place);
+    let folder = TestFolder::new();
+    write_two_pngs(&folder);
     let lines: [(&str, i32); 3] = [
         ("cat a.png | \"$0\" diff - a.png", 0),
         ("cat b.png | \"$0\" diff a.png -", 5),
         ("\"$0\" diff /dev/stdin a.png < a.png", 0),
     ];
     for (line, code) in lines {
-        let ran = place.shell("sh", line);
-        assert_eq!(ran.code, code, "{line}: {}{}", ran.stdout, ran.stderr);
+        let result = folder.shell("sh", line);
+        assert_eq!(result.code, code, "{line}: {}{}", result.stdout, result.stderr);
     }
     assert_output(
-        &place.shell("sh", "printf x | \"$0\" diff - a.png"),
+        &folder.shell("sh", "printf x | \"$0\" diff - a.png"),
         1,
         "error: standard input: is not an image",
     );
     // a full standard output is an error, a closed pipe is not
     assert_output(
-        &place.shell("sh", "\"$0\" diff a.png a.png > /dev/full"),
+        &folder.shell("sh", "\"$0\" diff a.png a.png > /dev/full"),
         8,
         "standard output: cannot be written",
     );
@@ -638,27 +641,28 @@ fn standard_input_and_pipes_are_read() {
 
 #[test]
 fn the_difference_image_shows_the_location() {
-    let place = TestFolder::new();
+    let folder = TestFolder::new();
     // one bit of one pixel in half a million
     let (width, height) = (1000, 500);
     let mut values = vec![60; width * height * 3];
-    png(&place, "a.png", (width as u32, height as u32), &values);
+    png(&folder, "a.png", (width as u32, height as u32), &values);
     values[3 * (123 * width + 456)] ^= 1;
-    png(&place, "b.png", (width as u32, height as u32), &values);
-    let ran = place.run(&["diff", "a.png", "b.png", "--out", "out.png"]);
-    assert_output(&ran, 5, "the first at (456, 123)\n");
-    let (across, _, bytes) = super::read_png(&place.path("out.png"));
+    png(&folder, "b.png", (width as u32, height as u32), &values);
+    let result = folder.run(&["diff", "a.png", "b.png", "--out", "out.png"]);
+    assert_output(&result, 5, "the first at (456, 123)\n");
+    let (out_width, _, bytes) = super::read_png(&folder.path("out.png"));
     let line: Vec<(usize, usize)> = (bytes.chunks(3).enumerate())
         .filter(|(_, pixel)| pixel == &[0, 220, 220])
-        .map(|(i, _)| (i % across as usize, i / across as usize))
+        .map(|(i, _)| (i % out_width as usize, i / out_width as usize))
         .collect();
-    let ends = |of: fn(&(usize, usize)) -> usize| {
-        let (low, high) = (line.iter().map(of).min().unwrap(), line.iter().map(of).max().unwrap());
+    let center = |coordinate: fn(&(usize, usize)) -> usize| {
+        let values = || line.iter().map(coordinate);
+        let (low, high) = (values().min().unwrap(), values().max().unwrap());
         assert!(high - low < 40, "{low} {high}");
         (low + high) / 2
     };
     // the map is to the right of both images, below a label of 20 rows and a gap of 8
-    let middle = (ends(|place| place.0), ends(|place| place.1));
+    let middle = (center(|pixel| pixel.0), center(|pixel| pixel.1));
     let expected = (8 + 2 * (width + 8) + 456, 8 + 20 + 123);
     assert!(
         middle.0.abs_diff(expected.0) < 20 && middle.1.abs_diff(expected.1) < 20,
@@ -666,53 +670,53 @@ fn the_difference_image_shows_the_location() {
     );
     // identical images have no marker
     assert_output(
-        &place.run(&["diff", "a.png", "a.png", "--out", "out.png"]),
+        &folder.run(&["diff", "a.png", "a.png", "--out", "out.png"]),
         0,
         "identical\n",
     );
-    let (_, _, bytes) = super::read_png(&place.path("out.png"));
+    let (_, _, bytes) = super::read_png(&folder.path("out.png"));
     assert!(!bytes.chunks(3).any(|pixel| pixel == [0, 220, 220]));
 }
 
 #[test]
 fn an_unwritable_difference_image_exits_with_8() {
-    let place = TestFolder::new();
-    write_two_pngs(&place);
-    let before = place.read("a.png");
-    fs::create_dir(place.path("folder.png")).unwrap();
-    fs::write(place.path("fixed.png"), "old").unwrap();
-    let mut mode = fs::metadata(place.path("fixed.png")).unwrap().permissions();
+    let folder = TestFolder::new();
+    write_two_pngs(&folder);
+    let before = folder.read("a.png");
+    fs::create_dir(folder.path("folder.png")).unwrap();
+    fs::write(folder.path("fixed.png"), "old").unwrap();
+    let mut mode = fs::metadata(folder.path("fixed.png")).unwrap().permissions();
     mode.set_readonly(true);
-    fs::set_permissions(place.path("fixed.png"), mode).unwrap();
+    fs::set_permissions(folder.path("fixed.png"), mode).unwrap();
     for out in ["absent/out.png", "folder.png", "fixed.png", "/dev/full"] {
-        let ran = place.run(&["diff", "a.png", "b.png", "--out", out]);
-        assert_output(&ran, 8, &format!("error: {out}: cannot be written"));
+        let result = folder.run(&["diff", "a.png", "b.png", "--out", out]);
+        assert_output(&result, 8, &format!("error: {out}: cannot be written"));
     }
     #[cfg(unix)]
     {
-        std::os::unix::fs::symlink("a.png", place.path("link.png")).unwrap();
+        std::os::unix::fs::symlink("a.png", folder.path("link.png")).unwrap();
         assert_output(
-            &place.run(&["diff", "a.png", "b.png", "--out", "link.png"]),
+            &folder.run(&["diff", "a.png", "b.png", "--out", "link.png"]),
             2,
             "--out: link.png: is the input a.png",
         );
     }
     assert_eq!(
-        (place.read("a.png"), place.read("fixed.png")),
+        (folder.read("a.png"), folder.read("fixed.png")),
         (before, b"old".to_vec())
     );
 }
 
 #[test]
 fn all_metrics_exist_for_extreme_sizes() {
-    let place = TestFolder::new();
+    let folder = TestFolder::new();
     for (width, height) in [(1, 1), (65536, 1), (1, 65536), (10, 11), (11, 10)] {
         let count = (width * height * 3) as usize;
-        png(&place, "a.png", (width, height), &vec![50; count]);
-        png(&place, "b.png", (width, height), &vec![80; count]);
-        let ran = place.run(&["diff", "a.png", "b.png", "--json", "--out", "out.png"]);
-        assert_eq!(ran.code, 5, "{width} x {height}: {}", ran.stderr);
-        let layer = &json(&ran)["layers"][0];
+        png(&folder, "a.png", (width, height), &vec![50; count]);
+        png(&folder, "b.png", (width, height), &vec![80; count]);
+        let result = folder.run(&["diff", "a.png", "b.png", "--json", "--out", "out.png"]);
+        assert_eq!(result.code, 5, "{width} x {height}: {}", result.stderr);
+        let layer = &json(&result)["layers"][0];
         let figure = |name: &str| layer[name].as_f64().unwrap();
         assert!((figure("rmse") - 30.0 / 255.0).abs() < 1e-12);
         // SSIM of two constant images: (2 a b + C1) / (a² + b² + C1)
@@ -720,6 +724,6 @@ fn all_metrics_exist_for_extreme_sizes() {
         let expected = (2.0 * a * b + 1e-4) / (a * a + b * b + 1e-4);
         assert!((figure("ssim") - expected).abs() < 1e-9, "{width} x {height}");
         assert!(figure("flip") > 0.05 && figure("flip") < 0.5, "{}", figure("flip"));
-        image::open(place.path("out.png")).unwrap();
+        image::open(folder.path("out.png")).unwrap();
     }
 }

@@ -1,22 +1,22 @@
 //! The tasks of the templates in `examples/farm` render the same image as a single `wgray render`. `scripts/farms` runs
-//! the templates on the farm engines.
+//! the templates on the schedulers.
 #![cfg(unix)]
 
 use std::fs;
 use std::os::unix::fs::PermissionsExt as _;
 
-use super::{Ran, TestFolder, program, project};
+use super::{RunResult, TestFolder, program, project};
 
 /// A file name with special characters of shells, YAML and Open Job Description.
-const ODD: &str = "it's $HOME \"{{a}}\" #1 é.toml";
-const ODD_QUOTED: &str = "'it'\\''s $HOME \"{{a}}\" #1 é.toml'";
+const SPECIAL_NAME: &str = "it's $HOME \"{{a}}\" #1 é.toml";
+const QUOTED_SPECIAL_NAME: &str = "'it'\\''s $HOME \"{{a}}\" #1 é.toml'";
 const OPTIONS: &str = "--size 20x12 --spp 4 -D 'materials.gray.color=[0.1, 0.5, 0.3]' --aov normal --device cpu";
 
 fn template(name: &str) -> String {
     fs::read_to_string(project("examples/farm").join(name)).expect("a template")
 }
 
-fn write_slurm(place: &TestFolder, variables: &str, scene: &str, options: &str, output: &str) {
+fn write_slurm(folder: &TestFolder, variables: &str, scene: &str, options: &str, output: &str) {
     let text = template("slurm.sh");
     let (head, rest) = text.split_once("# Settings.").expect("the settings");
     let (_, rest) = rest
@@ -27,18 +27,18 @@ fn write_slurm(place: &TestFolder, variables: &str, scene: &str, options: &str, 
         "{variables}\nrender() {{ exec '{program}' render {options} \"$@\" -- {scene}; }}\n\
          merge() {{ exec '{program}' merge --reproducible --output={output} \"$@\"; }}\n"
     );
-    place.write("slurm.sh", &(head.to_owned() + &settings + rest));
+    folder.write("slurm.sh", &(head.to_owned() + &settings + rest));
 }
 
 /// Runs a shell script in a folder that does not contain the scene.
-fn run(words: &[&str], variables: &[(&str, &str)]) -> Ran {
+fn run(words: &[&str], variables: &[(&str, &str)]) -> RunResult {
     let mut command = assert_cmd::Command::new("sh");
     command.current_dir("/").args(words).envs(variables.iter().copied());
     let output = command
         .timeout(std::time::Duration::from_secs(60))
         .output()
         .expect("a shell");
-    Ran::new(
+    RunResult::new(
         output.status.code(),
         String::from_utf8_lossy(&output.stdout).into_owned(),
         &String::from_utf8_lossy(&output.stderr),
@@ -46,70 +46,70 @@ fn run(words: &[&str], variables: &[(&str, &str)]) -> Ran {
     )
 }
 
-fn task(place: &TestFolder, kind: &str, first: &str, index: &str) -> Ran {
-    let script = place.path("slurm.sh").display().to_string();
-    let folder = place.folder().display().to_string();
-    run(&[&script, kind, &folder, first], &[("SLURM_ARRAY_TASK_ID", index)])
+fn task(folder: &TestFolder, kind: &str, first: &str, index: &str) -> RunResult {
+    let script = folder.path("slurm.sh").display().to_string();
+    let folder_path = folder.folder().display().to_string();
+    run(&[&script, kind, &folder_path, first], &[("SLURM_ARRAY_TASK_ID", index)])
 }
 
-/// Returns the image of the scene named [`ODD`], and its image with another seed.
-fn whole(place: &TestFolder) -> [Vec<u8>; 2] {
-    fs::copy(place.path("small.toml"), place.path(ODD)).expect("a copy");
-    ["", "--seed 5"].map(|more| {
-        let line = format!("$0 render {ODD_QUOTED} {OPTIONS} {more} --reproducible -o whole.exr");
-        assert_eq!(place.shell("sh", &line).code, 0);
-        place.read("whole.exr")
+/// Returns the image of the scene named [`SPECIAL_NAME`], and the image with another seed.
+fn render_full_image(folder: &TestFolder) -> [Vec<u8>; 2] {
+    fs::copy(folder.path("small.toml"), folder.path(SPECIAL_NAME)).expect("a copy");
+    ["", "--seed 5"].map(|extra| {
+        let line = format!("$0 render {QUOTED_SPECIAL_NAME} {OPTIONS} {extra} --reproducible -o whole.exr");
+        assert_eq!(folder.shell("sh", &line).code, 0);
+        folder.read("whole.exr")
     })
 }
 
 #[test]
 fn tasks_of_slurm_render_the_image() {
-    let place = TestFolder::new();
-    let [expected, other_seed] = whole(&place);
+    let folder = TestFolder::new();
+    let [expected, other_seed] = render_full_image(&folder);
     assert!(expected != other_seed, "another seed gives the same image");
     write_slurm(
-        &place,
+        &folder,
         "job='my job' tiles=3 frames=",
-        ODD_QUOTED,
+        QUOTED_SPECIAL_NAME,
         OPTIONS,
         "'- {{}} .exr'",
     );
     for (first, index) in [("0", "0"), ("0", "1"), ("2", "0")] {
-        let ran = task(&place, "tile", first, index);
-        assert_eq!(ran.code, 0, "{}", ran.stderr);
+        let result = task(&folder, "tile", first, index);
+        assert_eq!(result.code, 0, "{}", result.stderr);
     }
-    let again = task(&place, "tile", "2", "0");
+    let second_run = task(&folder, "tile", "2", "0");
     assert!(
-        again.code == 0 && again.stderr.contains("skipped 1 of 1"),
+        second_run.code == 0 && second_run.stderr.contains("skipped 1 of 1"),
         "{}",
-        again.stderr
+        second_run.stderr
     );
-    let parts = place.path("my job/parts/image-of-3");
+    let parts = folder.path("my job/parts/image-of-3");
     assert_eq!(fs::read_dir(&parts).expect("a folder").count(), 3);
-    let ran = task(&place, "merge", "0", "0");
-    assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
-    assert!(place.read("- {{}} .exr") == expected);
-    assert!(!place.path("my job/checkpoints/image-of-3").exists());
-    // A missing part fails the merge and leaves the other files.
+    let result = task(&folder, "merge", "0", "0");
+    assert_eq!((result.code, result.stderr.as_str()), (0, ""));
+    assert!(folder.read("- {{}} .exr") == expected);
+    assert!(!folder.path("my job/checkpoints/image-of-3").exists());
+    // Without a part, the merge fails and keeps the other files.
     fs::remove_file(parts.join("2.part")).expect("a part");
-    fs::remove_file(place.path("- {{}} .exr")).expect("the image");
-    let ran = task(&place, "merge", "0", "0");
+    fs::remove_file(folder.path("- {{}} .exr")).expect("the image");
+    let result = task(&folder, "merge", "0", "0");
     assert_eq!(
-        (ran.code, place.path("- {{}} .exr").exists()),
+        (result.code, folder.path("- {{}} .exr").exists()),
         (1, false),
         "{}",
-        ran.stderr
+        result.stderr
     );
     assert!(parts.join("1.part").exists());
 }
 
 #[test]
 fn tasks_of_slurm_render_frames() {
-    let place = TestFolder::new();
-    fs::copy(project("scenes/turntable.toml"), place.path("turn.toml")).expect("a copy");
+    let folder = TestFolder::new();
+    fs::copy(project("scenes/turntable.toml"), folder.path("turn.toml")).expect("a copy");
     let options = "--size 8x6 --spp 1 --device cpu";
     assert_eq!(
-        place
+        folder
             .shell(
                 "sh",
                 &format!("$0 render turn.toml {options} --frames 3,8 --reproducible -o whole.#.png")
@@ -118,65 +118,71 @@ fn tasks_of_slurm_render_frames() {
         0
     );
     write_slurm(
-        &place,
+        &folder,
         "job=job tiles=2 frames=\"$(seq 3 5 8)\"",
         "turn.toml",
         options,
         "'out.#.png'",
     );
     for index in ["0", "1", "2", "3"] {
-        assert_eq!(task(&place, "tile", "0", index).code, 0);
+        assert_eq!(task(&folder, "tile", "0", index).code, 0);
     }
     for index in ["0", "1"] {
-        assert_eq!(task(&place, "merge", "0", index).code, 0);
+        assert_eq!(task(&folder, "merge", "0", index).code, 0);
     }
-    assert!(place.read("out.3.png") == place.read("whole.3.png"));
-    assert!(place.read("out.8.png") == place.read("whole.8.png"));
+    assert!(folder.read("out.3.png") == folder.read("whole.3.png"));
+    assert!(folder.read("out.8.png") == folder.read("whole.8.png"));
     assert!(
-        place.read("out.3.png") != place.read("out.8.png"),
+        folder.read("out.3.png") != folder.read("out.8.png"),
         "frames 3 and 8 are equal"
     );
 }
 
-fn write_program(place: &TestFolder, name: &str, script: &str) {
-    let path = place.path("bin").join(name);
-    fs::create_dir_all(place.path("bin")).expect("a folder");
+fn write_program(folder: &TestFolder, name: &str, script: &str) {
+    let path = folder.path("bin").join(name);
+    fs::create_dir_all(folder.path("bin")).expect("a folder");
     fs::write(&path, format!("#!/bin/sh\n{script}\n")).expect("a program");
     fs::set_permissions(&path, fs::Permissions::from_mode(0o755)).expect("a program");
 }
 
-fn path_with_bin(place: &TestFolder) -> String {
+fn path_with_bin(folder: &TestFolder) -> String {
     format!(
         "{}:{}",
-        place.path("bin").display(),
+        folder.path("bin").display(),
         std::env::var("PATH").unwrap_or_default()
     )
 }
 
-/// Slurm signals tasks before the time limit. They are requeued unless they were cancelled or requeued too often.
+/// Slurm signals tasks before the time limit. Signaled tasks are requeued unless they were cancelled or requeued too
+/// often.
 #[test]
 fn signaled_tasks_of_slurm_are_requeued() {
-    let place = TestFolder::new();
+    let folder = TestFolder::new();
     write_slurm(
-        &place,
+        &folder,
         "job=job tiles=1 frames=",
         "small.toml",
         "--size 100x100 --spp 65536 --device cpu --checkpoint-interval 0.1",
         "out.exr",
     );
-    write_program(&place, "scontrol", "echo \"$*\" >>\"$LOG\"; exit 1");
-    let script = place.path("slurm.sh");
-    let folder = place.folder();
+    write_program(&folder, "scontrol", "echo \"$*\" >>\"$LOG\"; exit 1");
+    let script = folder.path("slurm.sh");
+    let folder_path = folder.folder();
     for (signals, restarts, code, requeues) in [
         (&["-USR1"][..], "0", 75, 1),
         (&["-USR1"], "20", 143, 0),
         (&["-TERM", "-USR1"], "0", 75, 0),
     ] {
-        let log = place.path("log");
+        let log = folder.path("log");
         let _ = fs::remove_file(&log);
         let mut child = std::process::Command::new("sh")
-            .args([script.as_os_str(), "tile".as_ref(), folder.as_os_str(), "0".as_ref()])
-            .env("PATH", path_with_bin(&place))
+            .args([
+                script.as_os_str(),
+                "tile".as_ref(),
+                folder_path.as_os_str(),
+                "0".as_ref(),
+            ])
+            .env("PATH", path_with_bin(&folder))
             .env("LOG", &log)
             .envs([
                 ("SLURM_ARRAY_TASK_ID", "0"),
@@ -186,7 +192,7 @@ fn signaled_tasks_of_slurm_are_requeued() {
             .stderr(std::process::Stdio::null())
             .spawn()
             .expect("a shell");
-        let checkpoints = place.path("job/checkpoints/image-of-1/1");
+        let checkpoints = folder.path("job/checkpoints/image-of-1/1");
         while fs::read_dir(&checkpoints).map_or(0, Iterator::count) == 0 {
             assert!(
                 child.try_wait().expect("a process").is_none(),
@@ -209,50 +215,54 @@ fn signaled_tasks_of_slurm_are_requeued() {
         );
         let logged = fs::read_to_string(&log).unwrap_or_default();
         assert_eq!(logged, "requeue 7_0\n".repeat(requeues), "{signals:?} {restarts}");
-        fs::remove_dir_all(place.path("job")).expect("a folder");
+        fs::remove_dir_all(folder.path("job")).expect("a folder");
     }
 }
 
 #[test]
 fn slurm_arrays_have_the_maximum_size_of_the_cluster() {
-    let place = TestFolder::new();
+    let folder = TestFolder::new();
     write_slurm(
-        &place,
+        &folder,
         "job=job tiles=2 frames='1 2 3 4 5 6'",
         "small.toml",
         "",
         "'#.png'",
     );
-    write_program(&place, "scontrol", "echo 'MaxArraySize            = 5'");
+    write_program(&folder, "scontrol", "echo 'MaxArraySize            = 5'");
     write_program(
-        &place,
+        &folder,
         "sbatch",
-        "echo \"$*\" >>\"$LOG\"\nnumber=$(wc -l <\"$LOG\")\n[ \"$number\" -eq \"$BROKEN\" ] && exit 1\necho \"$((number));cluster\"",
+        "echo \"$*\" >>\"$LOG\"\nnumber=$(wc -l <\"$LOG\")\n[ \"$number\" -eq \"$FAILING_CALL\" ] && exit 1\necho \"$((number));cluster\"",
     );
-    write_program(&place, "scancel", "echo \"cancelled $*\" >>\"$LOG\"");
-    let script = place.path("slurm.sh").display().to_string();
-    let path = path_with_bin(&place);
-    let submit = |broken: &str| {
-        let log = place.path("log").display().to_string();
+    write_program(&folder, "scancel", "echo \"cancelled $*\" >>\"$LOG\"");
+    let script = folder.path("slurm.sh").display().to_string();
+    let path = path_with_bin(&folder);
+    let submit = |failing_call: &str| {
+        let log = folder.path("log").display().to_string();
         let _ = fs::remove_file(&log);
-        let variables = [("PATH", path.as_str()), ("BROKEN", broken), ("LOG", log.as_str())];
-        let ran = run(&[&script, "--gres=gpu:1"], &variables);
+        let variables = [
+            ("PATH", path.as_str()),
+            ("FAILING_CALL", failing_call),
+            ("LOG", log.as_str()),
+        ];
+        let result = run(&[&script, "--gres=gpu:1"], &variables);
         let logged = fs::read_to_string(&log).expect("a log");
-        (ran, logged.lines().map(str::to_owned).collect::<Vec<String>>())
+        (result, logged.lines().map(str::to_owned).collect::<Vec<String>>())
     };
-    let (ran, logged) = submit("0");
+    let (result, logged) = submit("0");
     assert_eq!(
-        (ran.code, ran.stdout.as_str(), ran.stderr.as_str()),
+        (result.code, result.stdout.as_str(), result.stderr.as_str()),
         (0, "tiles 1 2 3, merge 4 5\n", "")
     );
-    let folder = fs::canonicalize(place.folder())
+    let folder_path = fs::canonicalize(folder.folder())
         .expect("a folder")
         .display()
         .to_string();
     let array = |kind: &str, last: u32, options: &str, first: u32| {
         format!(
-            "--parsable --job-name=wgray-{kind} --array=0-{last} --chdir={folder}/job/logs --output=%x-%A_%a.txt {options} \
-             {folder}/slurm.sh {kind} {folder} {first}"
+            "--parsable --job-name=wgray-{kind} --array=0-{last} --chdir={folder_path}/job/logs --output=%x-%A_%a.txt {options} \
+             {folder_path}/slurm.sh {kind} {folder_path} {first}"
         )
     };
     let (tile, merge) = (
@@ -269,16 +279,16 @@ fn slurm_arrays_have_the_maximum_size_of_the_cluster() {
             array("merge", 0, merge, 5),
         ]
     );
-    for (broken, cancelled) in [
+    for (failing_call, cancelled) in [
         ("1", None),
         ("3", Some("1 2")),
         ("4", Some("1 2 3")),
         ("5", Some("1 2 3 4")),
     ] {
-        let (ran, logged) = submit(broken);
-        assert_eq!(ran.code, 1, "{broken}");
+        let (result, logged) = submit(failing_call);
+        assert_eq!(result.code, 1, "{failing_call}");
         let found = logged.last().and_then(|line| line.strip_prefix("cancelled "));
-        assert_eq!(found, cancelled, "{broken}");
+        assert_eq!(found, cancelled, "{failing_call}");
     }
 }
 
@@ -293,28 +303,28 @@ fn scripts(template: &str) -> Vec<String> {
 
 #[test]
 fn scripts_of_open_job_description_render_the_image() {
-    let place = TestFolder::new();
-    let [expected, other_seed] = whole(&place);
+    let folder = TestFolder::new();
+    let [expected, other_seed] = render_full_image(&folder);
     assert!(expected != other_seed, "another seed gives the same image");
     let scripts = scripts(&template("wgray.openjd.yaml"));
     let [render, merge] = scripts.as_slice() else {
         panic!("{scripts:?}")
     };
-    // Engines would expand braces.
+    // Schedulers would expand the braces.
     assert!(!render.contains("{{") && !merge.contains("{{"));
-    let [scene, output] = [ODD, "- {{}} .exr"].map(|name| place.path(name).display().to_string());
+    let [scene, output] = [SPECIAL_NAME, "- {{}} .exr"].map(|name| folder.path(name).display().to_string());
     let program = program().display().to_string();
     for tile in ["1", "2"] {
-        let ran = run(
+        let result = run(
             &[
                 "-c", render, "render", &program, &scene, &output, OPTIONS, "2", "-1", tile,
             ],
             &[],
         );
-        assert_eq!(ran.code, 0, "{}", ran.stderr);
-        assert!(ran.stderr.ends_with("openjd_progress: 100\n"), "{}", ran.stderr);
+        assert_eq!(result.code, 0, "{}", result.stderr);
+        assert!(result.stderr.ends_with("openjd_progress: 100\n"), "{}", result.stderr);
     }
-    let ran = run(
+    let result = run(
         &[
             "-c",
             merge,
@@ -328,21 +338,21 @@ fn scripts_of_open_job_description_render_the_image() {
         ],
         &[],
     );
-    assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
-    assert!(place.read("- {{}} .exr") == expected);
-    assert!(!place.path("- {{}} .exr.farm/checkpoints/image-of-2").exists());
+    assert_eq!((result.code, result.stderr.as_str()), (0, ""));
+    assert!(folder.read("- {{}} .exr") == expected);
+    assert!(!folder.path("- {{}} .exr.farm/checkpoints/image-of-2").exists());
     // An attempt with other options does not reuse the parts of the first attempt.
     let options = OPTIONS.to_owned() + " --seed 5";
     for tile in ["1", "2"] {
-        let ran = run(
+        let result = run(
             &[
                 "-c", render, "render", &program, &scene, &output, &options, "2", "-1", tile,
             ],
             &[],
         );
-        assert_eq!(ran.code, 0, "{}", ran.stderr);
+        assert_eq!(result.code, 0, "{}", result.stderr);
     }
-    let ran = run(
+    let result = run(
         &[
             "-c",
             merge,
@@ -356,6 +366,6 @@ fn scripts_of_open_job_description_render_the_image() {
         ],
         &[],
     );
-    assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
-    assert!(place.read("- {{}} .exr") == other_seed);
+    assert_eq!((result.code, result.stderr.as_str()), (0, ""));
+    assert!(folder.read("- {{}} .exr") == other_seed);
 }

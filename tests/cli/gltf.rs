@@ -7,11 +7,11 @@ use crate::model::Model;
 
 const QUICK: [&str; 6] = ["--size", "24x16", "--spp", "2", "--device", "cpu"];
 
-fn place(model: &Model) -> TestFolder {
-    let place = TestFolder::with_file("small.toml", SCENE);
-    model.write_glb(place.folder(), "box.glb");
-    model.write_gltf(place.folder(), "box");
-    place
+fn folder_with_model(model: &Model) -> TestFolder {
+    let folder = TestFolder::with_file("small.toml", SCENE);
+    model.write_glb(folder.folder(), "box.glb");
+    model.write_gltf(folder.folder(), "box");
+    folder
 }
 
 fn with_cameras() -> Model {
@@ -21,39 +21,43 @@ fn with_cameras() -> Model {
     }
 }
 
-fn quietly(place: &TestFolder, arguments: &[&str]) {
-    place.quietly(&[&["render"], arguments, &QUICK].concat());
+fn render_quietly(folder: &TestFolder, arguments: &[&str]) {
+    folder.run_quietly(&[&["render"], arguments, &QUICK].concat());
 }
 
-fn bits(place: &TestFolder, arguments: &[&str]) -> Vec<u32> {
-    quietly(place, &[arguments, &["-o", "bits.exr"]].concat());
-    pixels(place, "bits.exr")
+fn bits(folder: &TestFolder, arguments: &[&str]) -> Vec<u32> {
+    render_quietly(folder, &[arguments, &["-o", "bits.exr"]].concat());
+    pixels(folder, "bits.exr")
 }
 
-fn pixels(place: &TestFolder, name: &str) -> Vec<u32> {
-    let picture = image::open(place.path(name)).unwrap_or_else(|error| panic!("{name}: {error}"));
+fn pixels(folder: &TestFolder, name: &str) -> Vec<u32> {
+    let picture = image::open(folder.path(name)).unwrap_or_else(|error| panic!("{name}: {error}"));
     picture.into_rgb32f().into_raw().into_iter().map(f32::to_bits).collect()
 }
 
-fn refused(place: &TestFolder, arguments: &[&str], code: i32, message: &str) {
-    let before = place.files();
-    let ran = place.run(arguments);
+fn assert_rejected(folder: &TestFolder, arguments: &[&str], code: i32, message: &str) {
+    let before = folder.files();
+    let result = folder.run(arguments);
     assert_eq!(
-        (ran.code, ran.stdout.as_str()),
+        (result.code, result.stdout.as_str()),
         (code, ""),
         "{arguments:?}: {}",
-        ran.stderr
+        result.stderr
     );
-    assert!(ran.stderr.contains(message), "{arguments:?}: {}\n{message}", ran.stderr);
-    assert_eq!(place.files(), before, "{arguments:?}");
+    assert!(
+        result.stderr.contains(message),
+        "{arguments:?}: {}\n{message}",
+        result.stderr
+    );
+    assert_eq!(folder.files(), before, "{arguments:?}");
 }
 
 #[test]
 fn a_model_renders_without_a_scene() {
-    let place = place(&Model::default());
-    let ran = place.run(&["check", "box.glb", "box.gltf"]);
-    assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
-    for line in ran.stdout.lines() {
+    let folder = folder_with_model(&Model::default());
+    let result = folder.run(&["check", "box.glb", "box.gltf"]);
+    assert_eq!((result.code, result.stderr.as_str()), (0, ""));
+    for line in result.stdout.lines() {
         assert!(line.contains(": ok: 720 x 720 pixels, 32 samples per pixel"), "{line}");
         assert!(
             line.contains("2 shapes, including 2 instances of 2 meshes (24 triangles"),
@@ -61,23 +65,23 @@ fn a_model_renders_without_a_scene() {
         );
     }
     // The margin of 5 % around the model is less than a pixel.
-    quietly(
-        &place,
+    render_quietly(
+        &folder,
         &["box.glb", "--background", "none", "-o", "box.png", "-o", "box.exr"],
     );
     assert_eq!(
-        pixels(&place, "box.exr"),
-        bits(&place, &["box.gltf", "--background", "none"])
+        pixels(&folder, "box.exr"),
+        bits(&folder, &["box.gltf", "--background", "none"])
     );
-    let picture = image::open(place.path("box.png")).unwrap().into_rgba8();
+    let picture = image::open(folder.path("box.png")).unwrap().into_rgba8();
     let covered: Vec<(u32, u32)> = picture
         .enumerate_pixels()
         .filter(|(_, _, p)| p.0[3] > 0)
         .map(|(x, y, _)| (x, y))
         .collect();
-    let ends = |values: &mut dyn Iterator<Item = u32>| values.fold((u32::MAX, 0), |(a, b), x| (a.min(x), b.max(x)));
-    let (left, right) = ends(&mut covered.iter().map(|(x, _)| *x));
-    let (top, bottom) = ends(&mut covered.iter().map(|(_, y)| *y));
+    let range = |values: &mut dyn Iterator<Item = u32>| values.fold((u32::MAX, 0), |(a, b), x| (a.min(x), b.max(x)));
+    let (left, right) = range(&mut covered.iter().map(|(x, _)| *x));
+    let (top, bottom) = range(&mut covered.iter().map(|(_, y)| *y));
     assert!(
         left + right == 23 || top + bottom == 15,
         "{left} {right} {top} {bottom}"
@@ -91,30 +95,30 @@ fn a_model_renders_without_a_scene() {
         middle[0] > middle[2],
         "the box does not have the color of clay: {middle:?}"
     );
-    quietly(&place, &["box.gltf"]);
-    assert_eq!(read_png(&place.path("box.png")).0, 24);
+    render_quietly(&folder, &["box.gltf"]);
+    assert_eq!(read_png(&folder.path("box.png")).0, 24);
 }
 
 #[test]
 fn options_select_parts_by_name_or_index() {
-    let place = place(&with_cameras());
-    let plain = bits(&place, &["box.glb"]);
+    let folder = folder_with_model(&with_cameras());
+    let plain = bits(&folder, &["box.glb"]);
     let mut seen = vec![plain.clone()];
-    let other = |options: &[&[&str]], seen: &mut Vec<Vec<u32>>| {
-        let of = |options: &&[&str]| bits(&place, &[&["box.glb"], *options].concat());
-        let all: Vec<_> = options.iter().map(of).collect();
+    let assert_new_image = |options: &[&[&str]], seen: &mut Vec<Vec<u32>>| {
+        let render = |options: &&[&str]| bits(&folder, &[&["box.glb"], *options].concat());
+        let images: Vec<_> = options.iter().map(render).collect();
         assert!(
-            all.iter().all(|bits| *bits == all[0]),
-            "{options:?} give the same image"
+            images.iter().all(|bits| *bits == images[0]),
+            "{options:?}: the images differ"
         );
-        assert!(!seen.contains(&all[0]), "{options:?} give different images");
-        seen.push(all[0].clone());
+        assert!(!seen.contains(&images[0]), "{options:?}: the options have no effect");
+        seen.push(images[0].clone());
     };
-    other(&[&["--camera", "side camera"], &["--camera", "1"]], &mut seen);
-    other(&[&["--view", "front"]], &mut seen);
-    other(&[&["--view", "corner"]], &mut seen);
-    other(&[&["--gltf-scene", "one"], &["--gltf-scene", "1"]], &mut seen);
-    other(
+    assert_new_image(&[&["--camera", "side camera"], &["--camera", "1"]], &mut seen);
+    assert_new_image(&[&["--view", "front"]], &mut seen);
+    assert_new_image(&[&["--view", "corner"]], &mut seen);
+    assert_new_image(&[&["--gltf-scene", "one"], &["--gltf-scene", "1"]], &mut seen);
+    assert_new_image(
         &[
             &["--time", "0.5"],
             &["--time", "0.5", "--animation", "rise"],
@@ -122,8 +126,8 @@ fn options_select_parts_by_name_or_index() {
         ],
         &mut seen,
     );
-    other(&[&["--variant", "golden"], &["--variant", "0"]], &mut seen);
-    other(&[&["--environment", "sky"]], &mut seen);
+    assert_new_image(&[&["--variant", "golden"], &["--variant", "0"]], &mut seen);
+    assert_new_image(&[&["--environment", "sky"]], &mut seen);
     for options in [
         ["--camera", "front camera"],
         ["--camera", "0"],
@@ -131,67 +135,72 @@ fn options_select_parts_by_name_or_index() {
         ["--time", "0"],
     ] {
         assert_eq!(
-            bits(&place, &[&["box.glb"], &options[..]].concat()),
+            bits(&folder, &[&["box.glb"], &options[..]].concat()),
             plain,
             "{options:?}"
         );
     }
-    // The aspect ratio is the camera's, unless a size is given.
+    // Without `--size`, the camera determines the aspect ratio.
     for (options, size) in [
         (&["--camera", "0"][..], "720 x 480"),
         (&["--camera", "1"], "720 x 720"),
         (&["--view", "iso"], "720 x 720"),
     ] {
-        let ran = place.run(&[&["check", "box.glb"], options].concat());
-        assert!(ran.stdout.contains(size), "{options:?}: {}{}", ran.stdout, ran.stderr);
+        let result = folder.run(&[&["check", "box.glb"], options].concat());
+        assert!(
+            result.stdout.contains(size),
+            "{options:?}: {}{}",
+            result.stdout,
+            result.stderr
+        );
     }
 }
 
 #[test]
 fn unknown_gltf_selections_list_the_available_ones() {
-    let place = place(&with_cameras());
+    let folder = folder_with_model(&with_cameras());
     for (option, value, message) in [
         (
             "--camera",
             "above",
-            "--camera: the file has no camera \"above\"; it has 2: 0 (\"front camera\"), 1 (\"side camera\")",
+            "--camera: the file has no camera \"above\"; available: 0 (\"front camera\"), 1 (\"side camera\")",
         ),
         (
             "--camera",
             "2",
-            "--camera: the file has no camera 2; it has 2: 0 (\"front",
+            "--camera: the file has no camera 2; available: 0 (\"front",
         ),
         (
             "--gltf-scene",
             "two",
-            "--gltf-scene: the file has no scene \"two\"; it has 2: 0 (\"all\"), 1 (\"one\")",
+            "--gltf-scene: the file has no scene \"two\"; available: 0 (\"all\"), 1 (\"one\")",
         ),
         (
             "--animation",
             "fall",
-            "--animation: the file has no animation \"fall\"; it has 1: 0 (\"rise\")",
+            "--animation: the file has no animation \"fall\"; available: 0 (\"rise\")",
         ),
         (
             "--variant",
             "red",
-            "--variant: the file has no variant \"red\"; it has 1: 0 (\"golden\")",
+            "--variant: the file has no variant \"red\"; available: 0 (\"golden\")",
         ),
         ("--time", "-1", "--time: -1 must be from 0 to 1e9 seconds"),
         ("--time", "nan", "--time: NaN must be from 0 to 1e9 seconds"),
         ("--view", "above", "invalid value 'above' for '--view"),
     ] {
         for command in ["render", "check"] {
-            refused(&place, &[command, "box.glb", option, value], 2, message);
+            assert_rejected(&folder, &[command, "box.glb", option, value], 2, message);
         }
-        refused(
-            &place,
+        assert_rejected(
+            &folder,
             &["convert", "box.glb", "-o", "box.toml", "--force", option, value],
             2,
             message,
         );
     }
-    refused(
-        &place,
+    assert_rejected(
+        &folder,
         &["render", "box.glb", "--camera", "0", "--view", "top"],
         2,
         "cannot be used with",
@@ -208,61 +217,61 @@ fn unknown_gltf_selections_list_the_available_ones() {
         ("--up", "z"),
     ] {
         let message = format!("error: {option}: only applies to model files, and small.toml is a scene file");
-        refused(&place, &["render", "small.toml", option, value], 2, &message);
+        assert_rejected(&folder, &["render", "small.toml", option, value], 2, &message);
     }
     let still = Model {
         animated: false,
         ..Model::default()
     };
-    still.write_glb(place.folder(), "still.glb");
-    refused(
-        &place,
+    still.write_glb(folder.folder(), "still.glb");
+    assert_rejected(
+        &folder,
         &["render", "still.glb", "--time", "1"],
         2,
         "--time: the file has no animations",
     );
-    refused(
-        &place,
+    assert_rejected(
+        &folder,
         &["render", "still.glb", "--frames", "1-2", "--fps", "10"],
         2,
         "--fps: only applies to glTF files with animations",
     );
-    refused(
-        &place,
+    assert_rejected(
+        &folder,
         &["render", "box.glb", "--fps", "10"],
         2,
         "--fps: needs --frames or --turntable",
     );
-    refused(
-        &place,
+    assert_rejected(
+        &folder,
         &["render", "box.glb", "--frames", "1-2", "--fps", "10", "--time", "1"],
         2,
         "cannot be used with",
     );
     let empty = r#"{ "asset": { "version": "2.0" }, "scenes": [{ "nodes": [0] }], "nodes": [{}] }"#;
-    fs::write(place.path("empty.gltf"), empty).unwrap();
-    refused(&place, &["render", "empty.gltf"], 3, "has no triangles");
-    fs::write(place.path("bad.glb"), "no model").unwrap();
-    refused(&place, &["render", "bad.glb"], 3, "bad.glb:1:2: ");
-    refused(&place, &["render", "none.glb"], 3, "none.glb: cannot be read");
+    fs::write(folder.path("empty.gltf"), empty).unwrap();
+    assert_rejected(&folder, &["render", "empty.gltf"], 3, "has no triangles");
+    fs::write(folder.path("bad.glb"), "no model").unwrap();
+    assert_rejected(&folder, &["render", "bad.glb"], 3, "bad.glb:1:2: ");
+    assert_rejected(&folder, &["render", "none.glb"], 3, "none.glb: cannot be read");
 }
 
 #[test]
 fn frames_select_times_of_the_animation() {
-    let place = place(&with_cameras());
-    quietly(&place, &["box.glb", "--frames", "0-12:6", "-o", "f.##.exr"]);
-    quietly(&place, &["box.glb", "--frames", "5", "--fps", "10", "-o", "fps.exr"]);
+    let folder = folder_with_model(&with_cameras());
+    render_quietly(&folder, &["box.glb", "--frames", "0-12:6", "-o", "f.##.exr"]);
+    render_quietly(&folder, &["box.glb", "--frames", "5", "--fps", "10", "-o", "fps.exr"]);
     for (frame, time) in [
         ("f.00.exr", "0"),
         ("f.06.exr", "0.25"),
         ("f.12.exr", "0.5"),
         ("fps.exr", "0.5"),
     ] {
-        assert_eq!(pixels(&place, frame), moment(&place, time), "{frame}");
+        assert_eq!(pixels(&folder, frame), render_at_time(&folder, time), "{frame}");
     }
-    assert_ne!(pixels(&place, "f.00.exr"), pixels(&place, "f.12.exr"));
+    assert_ne!(pixels(&folder, "f.00.exr"), pixels(&folder, "f.12.exr"));
     // `--time` takes precedence over the frame.
-    let ran = place.run(
+    let result = folder.run(
         &[
             &[
                 "render",
@@ -278,28 +287,28 @@ fn frames_select_times_of_the_animation() {
         ]
         .concat(),
     );
-    assert_eq!(ran.code, 0);
-    assert!(ran.stderr.contains("all frames are equal"), "{}", ran.stderr);
-    assert_eq!(pixels(&place, "named.exr"), moment(&place, "0.25"));
+    assert_eq!(result.code, 0);
+    assert!(result.stderr.contains("all frames are equal"), "{}", result.stderr);
+    assert_eq!(pixels(&folder, "named.exr"), render_at_time(&folder, "0.25"));
     // A generated camera does not move: a rising part does not change the framing.
-    Model::default().write_glb(place.folder(), "box.glb");
-    quietly(&place, &["box.glb", "--frames", "0-18:6", "-o", "s##.exr"]);
-    quietly(&place, &["box.glb", "--frames", "18", "-o", "alone.exr"]);
-    assert_eq!(pixels(&place, "s00.exr"), bits(&place, &["box.glb"]));
-    assert_eq!(pixels(&place, "s18.exr"), pixels(&place, "alone.exr"));
-    assert_ne!(pixels(&place, "s18.exr"), moment(&place, "0.75"));
-    assert_ne!(pixels(&place, "s18.exr"), pixels(&place, "s12.exr"));
+    Model::default().write_glb(folder.folder(), "box.glb");
+    render_quietly(&folder, &["box.glb", "--frames", "0-18:6", "-o", "s##.exr"]);
+    render_quietly(&folder, &["box.glb", "--frames", "18", "-o", "alone.exr"]);
+    assert_eq!(pixels(&folder, "s00.exr"), bits(&folder, &["box.glb"]));
+    assert_eq!(pixels(&folder, "s18.exr"), pixels(&folder, "alone.exr"));
+    assert_ne!(pixels(&folder, "s18.exr"), render_at_time(&folder, "0.75"));
+    assert_ne!(pixels(&folder, "s18.exr"), pixels(&folder, "s12.exr"));
 }
 
-fn moment(place: &TestFolder, time: &str) -> Vec<u32> {
-    bits(place, &["box.glb", "--time", time])
+fn render_at_time(folder: &TestFolder, time: &str) -> Vec<u32> {
+    bits(folder, &["box.glb", "--time", time])
 }
 
 #[test]
 fn a_converted_scene_has_the_same_bits() {
-    let place = place(&with_cameras());
-    fs::create_dir_all(place.path("scenes/models")).unwrap();
-    fs::copy(place.path("box.glb"), place.path("scenes/models/a box.glb")).unwrap();
+    let folder = folder_with_model(&with_cameras());
+    fs::create_dir_all(folder.path("scenes/models")).unwrap();
+    fs::copy(folder.path("box.glb"), folder.path("scenes/models/a box.glb")).unwrap();
     let model = "scenes/models/a box.glb";
     let mut seen = Vec::new();
     for options in [
@@ -314,7 +323,7 @@ fn a_converted_scene_has_the_same_bits() {
         &["--ground"],
         &["--orbit", "200,40", "--fov", "50", "--up", "x"],
     ] {
-        place.quietly(
+        folder.run_quietly(
             &[
                 &[
                     "convert",
@@ -331,34 +340,34 @@ fn a_converted_scene_has_the_same_bits() {
             ]
             .concat(),
         );
-        let wanted = bits(&place, &[&[model], options].concat());
-        place.quietly(&["render", "scenes/box.toml", "-o", "bits.exr", "--device", "cpu"]);
-        assert_eq!(pixels(&place, "bits.exr"), wanted, "{options:?}");
-        assert!(!seen.contains(&wanted), "{options:?}: the comparison cannot fail");
-        seen.push(wanted);
-        let text = String::from_utf8(place.read("scenes/box.toml")).unwrap();
+        let expected = bits(&folder, &[&[model], options].concat());
+        folder.run_quietly(&["render", "scenes/box.toml", "-o", "bits.exr", "--device", "cpu"]);
+        assert_eq!(pixels(&folder, "bits.exr"), expected, "{options:?}");
+        assert!(!seen.contains(&expected), "{options:?}: the comparison cannot fail");
+        seen.push(expected);
+        let text = String::from_utf8(folder.read("scenes/box.toml")).unwrap();
         assert!(text.starts_with("# a box.glb, as a scene."), "{text}");
         assert!(text.contains("file = \"models/a box.glb\""), "{text}");
         assert!(text.lines().count() < 45, "{text}");
     }
-    let ran = place.run(&["check", "scenes/box.toml"]);
-    assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
+    let result = folder.run(&["check", "scenes/box.toml"]);
+    assert_eq!((result.code, result.stderr.as_str()), (0, ""));
 }
 
 #[test]
 fn a_conversion_keeps_its_input_and_uses_relative_paths() {
-    let place = place(&Model::default());
+    let folder = folder_with_model(&Model::default());
     let same = ["convert", "small.toml", "-o", "./small.toml"];
-    refused(&place, &same, 2, "is an input of the scene");
-    refused(
-        &place,
+    assert_rejected(&folder, &same, 2, "is an input of the scene");
+    assert_rejected(
+        &folder,
         &["convert", "box.glb", "-o", "box.json"],
         2,
         "--output: box.json: must end in .toml",
     );
-    refused(&place, &["convert", "box.glb", "-o", "none/box.toml"], 8, "none");
-    fs::create_dir(place.path("sub")).unwrap();
-    let ran = place.run(&[
+    assert_rejected(&folder, &["convert", "box.glb", "-o", "none/box.toml"], 8, "none");
+    fs::create_dir(folder.path("sub")).unwrap();
+    let result = folder.run(&[
         "convert",
         "box.gltf",
         "-o",
@@ -368,16 +377,17 @@ fn a_conversion_keeps_its_input_and_uses_relative_paths() {
         "--spp",
         "2",
     ]);
-    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    assert_eq!(result.code, 0, "{}", result.stderr);
     assert!(
-        ran.stderr
+        result
+            .stderr
             .starts_with("note: sub/box.toml: refers to files outside of ")
-            && ran.stderr.ends_with("/sub; pass --asset-root . to render it\n"),
+            && result.stderr.ends_with("/sub; pass --asset-root . to render it\n"),
         "{}",
-        ran.stderr
+        result.stderr
     );
-    let wanted = bits(&place, &["box.gltf"]);
-    place.quietly(&[
+    let expected = bits(&folder, &["box.gltf"]);
+    folder.run_quietly(&[
         "render",
         "sub/box.toml",
         "--asset-root",
@@ -387,24 +397,24 @@ fn a_conversion_keeps_its_input_and_uses_relative_paths() {
         "--device",
         "cpu",
     ]);
-    assert_eq!(pixels(&place, "bits.exr"), wanted);
-    refused(
-        &place,
+    assert_eq!(pixels(&folder, "bits.exr"), expected);
+    assert_rejected(
+        &folder,
         &["render", "sub/box.toml"],
         3,
         "lies outside of the scene's folder",
     );
-    place.quietly(&["convert", "small.toml", "-o", "other.toml"]);
-    place.quietly(&["render", "small.toml", "-o", "a.exr", "--device", "cpu"]);
-    place.quietly(&["render", "other.toml", "-o", "b.exr", "--device", "cpu"]);
-    assert_eq!(pixels(&place, "a.exr"), pixels(&place, "b.exr"));
+    folder.run_quietly(&["convert", "small.toml", "-o", "other.toml"]);
+    folder.run_quietly(&["render", "small.toml", "-o", "a.exr", "--device", "cpu"]);
+    folder.run_quietly(&["render", "other.toml", "-o", "b.exr", "--device", "cpu"]);
+    assert_eq!(pixels(&folder, "a.exr"), pixels(&folder, "b.exr"));
 }
 
 #[test]
-fn info_lists_what_options_select() {
-    let place = place(&with_cameras());
-    let ran = place.run(&["info", "box.glb", "--device", "cpu"]);
-    assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
+fn info_lists_the_names_that_options_accept() {
+    let folder = folder_with_model(&with_cameras());
+    let result = folder.run(&["info", "box.glb", "--device", "cpu"]);
+    assert_eq!((result.code, result.stderr.as_str()), (0, ""));
     for row in [
         "    glTF file   box.glb\n",
         "                cameras    2: 0 ",
@@ -413,10 +423,10 @@ fn info_lists_what_options_select() {
         "                variants   1: 0 \"golden\"\n",
         "                materials  3: 0 ",
     ] {
-        assert!(ran.stdout.contains(row), "{row}: {}", ran.stdout);
+        assert!(result.stdout.contains(row), "{row}: {}", result.stdout);
     }
-    let ran = place.run(&["info", "box.glb", "--json"]);
-    let info: serde_json::Value = serde_json::from_str(&ran.stdout).unwrap();
+    let result = folder.run(&["info", "box.glb", "--json"]);
+    let info: serde_json::Value = serde_json::from_str(&result.stdout).unwrap();
     let model = &info["models"][0];
     assert_eq!(
         (&model["file"], &model["variants"]),
@@ -432,66 +442,66 @@ fn info_lists_what_options_select() {
         let names = model[list].as_array().unwrap();
         assert!(!names.is_empty(), "{list}: {model}");
         for (i, name) in names.iter().enumerate() {
-            for wanted in [Some(i.to_string().as_str()), name.as_str()].into_iter().flatten() {
-                let ran = place.run(&["check", "box.glb", option, wanted]);
-                assert_eq!(ran.code, 0, "{option} {wanted}: {}", ran.stderr);
+            for selector in [Some(i.to_string().as_str()), name.as_str()].into_iter().flatten() {
+                let result = folder.run(&["check", "box.glb", option, selector]);
+                assert_eq!(result.code, 0, "{option} {selector}: {}", result.stderr);
             }
         }
-        let beyond = names.len().to_string();
+        let invalid_index = names.len().to_string();
         assert_eq!(
-            place.run(&["check", "box.glb", option, &beyond]).code,
+            folder.run(&["check", "box.glb", option, &invalid_index]).code,
             2,
-            "{option} {beyond}"
+            "{option} {invalid_index}"
         );
     }
 }
 
 #[test]
-fn a_conversion_overwrites_a_file_only_by_force() {
-    let place = place(&Model::default());
-    place.write("mine.toml", "# a scene of many hours\n");
+fn a_conversion_overwrites_a_file_only_with_force() {
+    let folder = folder_with_model(&Model::default());
+    folder.write("mine.toml", "# a scene of many hours\n");
     let convert = ["convert", "box.glb", "-o", "mine.toml"];
-    refused(
-        &place,
+    assert_rejected(
+        &folder,
         &convert,
         2,
         "--output: mine.toml: already exists; pass --force to overwrite it",
     );
-    assert_eq!(place.read("mine.toml"), b"# a scene of many hours\n");
-    place.quietly(&[&convert[..], &["--force"]].concat());
-    assert!(place.read("mine.toml").starts_with(b"# box.glb, as a scene. "));
-    refused(&place, &convert, 2, "already exists");
+    assert_eq!(folder.read("mine.toml"), b"# a scene of many hours\n");
+    folder.run_quietly(&[&convert[..], &["--force"]].concat());
+    assert!(folder.read("mine.toml").starts_with(b"# box.glb, as a scene. "));
+    assert_rejected(&folder, &convert, 2, "already exists");
     let same = ["convert", "mine.toml", "-o", "./mine.toml", "--force"];
-    refused(&place, &same, 2, "is an input of the scene");
+    assert_rejected(&folder, &same, 2, "is an input of the scene");
 }
 
 #[test]
 fn a_conversion_prints_the_asset_root_to_pass() {
-    let place = place(&Model::default());
-    fs::create_dir_all(place.path("a dir/models")).unwrap();
-    fs::create_dir_all(place.path("a dir/scenes/new")).unwrap();
-    fs::rename(place.path("box.glb"), place.path("a dir/models/box.glb")).unwrap();
-    let ran = place.run(&["convert", "a dir/models/box.glb", "-o", "a dir/scenes/new/box.toml"]);
-    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    let folder = folder_with_model(&Model::default());
+    fs::create_dir_all(folder.path("a dir/models")).unwrap();
+    fs::create_dir_all(folder.path("a dir/scenes/new")).unwrap();
+    fs::rename(folder.path("box.glb"), folder.path("a dir/models/box.glb")).unwrap();
+    let result = folder.run(&["convert", "a dir/models/box.glb", "-o", "a dir/scenes/new/box.toml"]);
+    assert_eq!(result.code, 0, "{}", result.stderr);
     assert!(
-        ran.stderr.ends_with("pass --asset-root 'a dir' to render it\n"),
+        result.stderr.ends_with("pass --asset-root 'a dir' to render it\n"),
         "{}",
-        ran.stderr
+        result.stderr
     );
     let check = ["check", "a dir/scenes/new/box.toml"];
-    refused(&place, &check, 3, "pass --asset-root with a folder that contains both");
-    let ran = place.run(&[&check[..], &["--asset-root", "a dir"]].concat());
-    assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
-    let ran = place.run(&["convert", "a dir/models/box.glb", "-o", "a dir/models/box.toml"]);
-    assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
+    assert_rejected(&folder, &check, 3, "pass --asset-root with a folder that contains both");
+    let result = folder.run(&[&check[..], &["--asset-root", "a dir"]].concat());
+    assert_eq!((result.code, result.stderr.as_str()), (0, ""));
+    let result = folder.run(&["convert", "a dir/models/box.glb", "-o", "a dir/models/box.toml"]);
+    assert_eq!((result.code, result.stderr.as_str()), (0, ""));
 }
 
 #[test]
 fn a_turntable_frames_the_model() {
-    let place = place(&Model::default());
+    let folder = folder_with_model(&Model::default());
     // The margin of 5 % is at least two pixels.
-    let small = ["--size", "60x40", "--spp", "1", "--device", "cpu"];
-    let around = [
+    let quick = ["--size", "60x40", "--spp", "1", "--device", "cpu"];
+    let turntable = [
         "render",
         "box.glb",
         "--turntable",
@@ -501,22 +511,22 @@ fn a_turntable_frames_the_model() {
         "-o",
         "t#.png",
     ];
-    place.quietly(&[&around[..], &small].concat());
+    folder.run_quietly(&[&turntable[..], &quick].concat());
     let mut seen = Vec::new();
     for frame in 1..=5 {
-        let picture = image::open(place.path(&format!("t{frame}.png"))).unwrap().into_rgba8();
-        let edge = |x: u32, y: u32| x == 0 || y == 0 || x == 59 || y == 39;
+        let picture = image::open(folder.path(&format!("t{frame}.png"))).unwrap().into_rgba8();
+        let is_at_edge = |x: u32, y: u32| x == 0 || y == 0 || x == 59 || y == 39;
         let covered = |at_edge: bool| {
             picture
                 .enumerate_pixels()
-                .any(|(x, y, p)| edge(x, y) == at_edge && p.0[3] > 0)
+                .any(|(x, y, p)| is_at_edge(x, y) == at_edge && p.0[3] > 0)
         };
         assert!(
             covered(false) && !covered(true),
-            "frame {frame} does not show the whole model"
+            "frame {frame} does not show the full model"
         );
         let bytes = picture.into_raw();
-        assert!(!seen.contains(&bytes), "frame {frame} equals another");
+        assert!(!seen.contains(&bytes), "frame {frame} equals an earlier frame");
         seen.push(bytes);
     }
 }

@@ -4,7 +4,7 @@
 use std::fs;
 use std::process::Command;
 
-use super::{Ran, program};
+use super::{RunResult, program};
 use crate::sources::path as project;
 
 struct Example {
@@ -14,11 +14,11 @@ struct Example {
 impl Example {
     fn new() -> Example {
         let folder = tempfile::tempdir().unwrap();
-        let from = project("examples/golden");
-        fs::copy(from.join("check"), folder.path().join("check")).unwrap();
+        let source = project("examples/golden");
+        fs::copy(source.join("check"), folder.path().join("check")).unwrap();
         for part in ["scenes", "golden"] {
             fs::create_dir(folder.path().join(part)).unwrap();
-            for entry in fs::read_dir(from.join(part)).unwrap() {
+            for entry in fs::read_dir(source.join(part)).unwrap() {
                 let entry = entry.unwrap();
                 fs::copy(entry.path(), folder.path().join(part).join(entry.file_name())).unwrap();
             }
@@ -26,14 +26,14 @@ impl Example {
         Example { folder }
     }
 
-    fn check(&self, arguments: &[&str]) -> Ran {
+    fn check(&self, arguments: &[&str]) -> RunResult {
         let output = Command::new(self.folder.path().join("check"))
             .args(arguments)
             .env("WGRAY", program())
             .env_remove("OUT")
             .output()
             .unwrap();
-        Ran::new(
+        RunResult::new(
             output.status.code(),
             String::from_utf8_lossy(&output.stdout).into_owned(),
             &String::from_utf8_lossy(&output.stderr),
@@ -41,7 +41,7 @@ impl Example {
         )
     }
 
-    fn change(&self) {
+    fn change_scene(&self) {
         let scene = self.folder.path().join("scenes/ball.toml");
         let text = fs::read_to_string(&scene).unwrap();
         assert!(text.contains("radius = 0.7\n"));
@@ -56,36 +56,39 @@ fn page() -> String {
 #[test]
 fn the_golden_images_match() {
     let example = Example::new();
-    let ran = example.check(&[]);
+    let result = example.check(&[]);
     let hint = "after an intended change of an image, run examples/golden/check update";
-    assert_eq!(ran.code, 0, "{hint}\n{}{}", ran.stdout, ran.stderr);
-    assert_eq!(ran.stdout.matches("color R G B: identical").count(), 2);
+    assert_eq!(result.code, 0, "{hint}\n{}{}", result.stdout, result.stderr);
+    assert_eq!(result.stdout.matches("color R G B: identical").count(), 2);
 }
 
 #[test]
 fn a_changed_scene_fails_until_updated() {
     let example = Example::new();
-    example.change();
-    let ran = example.check(&[]);
-    assert_eq!(ran.code, 5, "{}{}", ran.stdout, ran.stderr);
+    example.change_scene();
+    let result = example.check(&[]);
+    assert_eq!(result.code, 5, "{}{}", result.stdout, result.stderr);
     let page = page();
     let report = page.split("```text\n").nth(1).and_then(|text| text.split("```").next());
     let report = report.expect("the page shows the report");
-    assert!(ran.stdout.contains(report), "{}is not\n{report}", ran.stdout);
+    assert!(result.stdout.contains(report), "{}is not\n{report}", result.stdout);
     assert!(
-        ran.stdout.contains("out/balls.png against golden/balls.png"),
+        result.stdout.contains("out/balls.png against golden/balls.png"),
         "an image is not checked"
     );
-    let made = image::open(example.folder.path().join("out/ball.diff.png")).unwrap();
+    let found = image::open(example.folder.path().join("out/ball.diff.png")).unwrap();
     assert_eq!(
-        made,
+        found,
         image::open(project("docs/golden-pictures/ball.diff.png")).unwrap()
     );
 
-    let other = fs::read(example.folder.path().join("golden/balls.png")).unwrap();
-    let ran = example.check(&["update"]);
-    assert_eq!((ran.code, ran.stdout.as_str()), (0, "golden/ball.exr is new\n"));
-    assert_eq!(other, fs::read(example.folder.path().join("golden/balls.png")).unwrap());
+    let unchanged = fs::read(example.folder.path().join("golden/balls.png")).unwrap();
+    let result = example.check(&["update"]);
+    assert_eq!((result.code, result.stdout.as_str()), (0, "golden/ball.exr is new\n"));
+    assert_eq!(
+        unchanged,
+        fs::read(example.folder.path().join("golden/balls.png")).unwrap()
+    );
     assert_eq!(example.check(&[]).code, 0);
 }
 
@@ -94,9 +97,13 @@ fn a_scene_without_a_golden_image_fails() {
     let example = Example::new();
     let scenes = example.folder.path().join("scenes");
     fs::copy(scenes.join("ball.toml"), scenes.join("new.toml")).unwrap();
-    let ran = example.check(&[]);
-    assert_eq!(ran.code, 1);
-    assert!(ran.stderr.contains("golden/new.exr: cannot be read"), "{}", ran.stderr);
+    let result = example.check(&[]);
+    assert_eq!(result.code, 1);
+    assert!(
+        result.stderr.contains("golden/new.exr: cannot be read"),
+        "{}",
+        result.stderr
+    );
     assert_eq!(example.check(&["update"]).stdout, "golden/new.exr is new\n");
     assert_eq!(example.check(&[]).code, 0);
     // a scene that cannot be rendered keeps its own exit code

@@ -1,8 +1,8 @@
 //! The help of all commands.
 
-use super::{Ran, TestFolder};
+use super::{RunResult, TestFolder};
 
-fn listed(help: &str) -> Vec<String> {
+fn command_names(help: &str) -> Vec<String> {
     let list = help.split("Commands:\n").nth(1).unwrap_or_default();
     let lines = list.lines().take_while(|line| !line.is_empty());
     let names = lines.filter(|line| !line.starts_with("   ")); // continuation lines of a description are indented
@@ -10,29 +10,29 @@ fn listed(help: &str) -> Vec<String> {
     names.filter(|name| *name != "help").map(str::to_owned).collect()
 }
 
-/// Calls `each` with the words of every command.
-fn for_each_command(place: &TestFolder, words: &[&str], each: &mut dyn FnMut(&[&str])) {
-    each(words);
-    let help = place.run(&[words, &["-h"]].concat()).stdout;
-    for name in listed(&help) {
-        for_each_command(place, &[words, &[&name]].concat(), each);
+/// Calls `visit` with the words of each command.
+fn for_each_command(folder: &TestFolder, words: &[&str], visit: &mut dyn FnMut(&[&str])) {
+    visit(words);
+    let help = folder.run(&[words, &["-h"]].concat()).stdout;
+    for name in command_names(&help) {
+        for_each_command(folder, &[words, &[&name]].concat(), visit);
     }
 }
 
 #[test]
 fn help_is_short() {
-    let place = TestFolder::new();
+    let folder = TestFolder::new();
     let mut commands = 0;
-    for_each_command(&place, &[], &mut |words| {
+    for_each_command(&folder, &[], &mut |words| {
         commands += 1;
-        for (option, most) in [("-h", 60), ("--help", 120)] {
-            let Ran {
+        for (option, max_lines) in [("-h", 60), ("--help", 120)] {
+            let RunResult {
                 code, stdout, stderr, ..
-            } = place.run(&[words, &[option]].concat());
+            } = folder.run(&[words, &[option]].concat());
             assert_eq!((code, stderr.as_str()), (0, ""), "{words:?} {option}");
             let lines = stdout.lines().count();
             assert!(
-                (5..=most).contains(&lines),
+                (5..=max_lines).contains(&lines),
                 "{words:?} {option}: {lines} lines\n{stdout}"
             );
             let widest = stdout.lines().map(|line| line.chars().count()).max().unwrap_or(0);
@@ -45,13 +45,13 @@ fn help_is_short() {
 /// `-h` omits rarely used options.
 #[test]
 fn the_long_help_lists_all_options() {
-    let place = TestFolder::new();
-    let short = place.run(&["render", "-h"]).stdout;
-    let long = place.run(&["render", "--help"]).stdout;
+    let folder = TestFolder::new();
+    let short = folder.run(&["render", "-h"]).stdout;
+    let long = folder.run(&["render", "--help"]).stdout;
     assert!(!short.contains("--exr-compression") && short.contains("(see more with '--help')"));
     assert!(long.contains("--exr-compression") && long.contains("--checkpoint-interval"));
-    assert_eq!(place.run(&["help", "render"]).stdout, long);
-    let page = place.run(&["man", "render"]).stdout;
+    assert_eq!(folder.run(&["help", "render"]).stdout, long);
+    let page = folder.run(&["man", "render"]).stdout;
     for line in long.lines().filter_map(|line| line.trim_start().split_once("--")) {
         let option = line.1.split([' ', ',']).next().unwrap_or_default();
         assert!(page.contains(&option.replace('-', "\\-")), "{option}");
@@ -60,10 +60,10 @@ fn the_long_help_lists_all_options() {
 
 #[test]
 fn the_most_used_options_come_first() {
-    let place = TestFolder::new();
-    let help = place.run(&["render", "-h"]).stdout;
-    let place_of = |option: &str| help.find(option).unwrap_or_else(|| panic!("{option}: {help}"));
-    let first = [
+    let folder = TestFolder::new();
+    let help = folder.run(&["render", "-h"]).stdout;
+    let position = |option: &str| help.find(option).unwrap_or_else(|| panic!("{option}: {help}"));
+    let options = [
         "--output",
         "--size",
         "--spp",
@@ -72,12 +72,12 @@ fn the_most_used_options_come_first() {
         "--environment",
         "--frames",
     ];
-    assert!(first.map(place_of).is_sorted(), "{help}");
+    assert!(options.map(position).is_sorted(), "{help}");
 }
 
 #[test]
 fn common_mistakes_have_hints() {
-    let place = TestFolder::new();
+    let folder = TestFolder::new();
     for (arguments, message, hint) in [
         (
             &["render", "small.toml", "--width", "64"][..],
@@ -174,23 +174,23 @@ fn common_mistakes_have_hints() {
             "white",
         ),
     ] {
-        let ran = place.run(arguments);
+        let result = folder.run(arguments);
         assert_eq!(
-            (ran.code, ran.stdout.as_str()),
+            (result.code, result.stdout.as_str()),
             (2, ""),
             "{arguments:?}: {}",
-            ran.stderr
+            result.stderr
         );
         assert!(
-            ran.stderr.contains(message) && ran.stderr.contains(hint),
+            result.stderr.contains(message) && result.stderr.contains(hint),
             "{arguments:?}: {}",
-            ran.stderr
+            result.stderr
         );
     }
-    let ran = place.run(&["box.glb", "--log-format", "json"]);
-    assert!(ran.stderr.contains("wgray render box.glb"), "{}", ran.stderr);
+    let result = folder.run(&["box.glb", "--log-format", "json"]);
+    assert!(result.stderr.contains("wgray render box.glb"), "{}", result.stderr);
     for option in ["--spp", "--samples", "--pixel-samples"] {
-        place.quietly(&["render", "small.toml", option, "2", "-o", "few.png"]);
-        place.quietly(&["render", "small.toml", "--background", "white", "-o", "white.png"]);
+        folder.run_quietly(&["render", "small.toml", option, "2", "-o", "few.png"]);
+        folder.run_quietly(&["render", "small.toml", "--background", "white", "-o", "white.png"]);
     }
 }

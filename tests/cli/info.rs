@@ -4,17 +4,17 @@ use serde_json::Value;
 
 use super::{NO_DRIVER, SCENE, TestFolder, project_scene};
 
-fn info(place: &TestFolder, arguments: &[&str]) -> Value {
-    let all = [&["info", "--json"], arguments].concat();
-    let ran = place.run(&all);
-    assert_eq!((ran.code, ran.stderr.as_str()), (0, ""), "{arguments:?}");
-    serde_json::from_str(&ran.stdout).expect("JSON")
+fn info(folder: &TestFolder, arguments: &[&str]) -> Value {
+    let command = [&["info", "--json"], arguments].concat();
+    let result = folder.run(&command);
+    assert_eq!((result.code, result.stderr.as_str()), (0, ""), "{arguments:?}");
+    serde_json::from_str(&result.stdout).expect("JSON")
 }
 
 #[test]
 fn info_counts_shapes_memory_and_samples() {
-    let place = TestFolder::new();
-    let small = info(&place, &["small.toml", "--device", "cpu"]);
+    let folder = TestFolder::new();
+    let small = info(&folder, &["small.toml", "--device", "cpu"]);
     assert_eq!(
         (&small["picture"]["width"], &small["picture"]["light_samples"]),
         (&10.into(), &4.into())
@@ -47,7 +47,7 @@ fn info_counts_shapes_memory_and_samples() {
         (&960.into(), &1.into())
     );
     let large = info(
-        &place,
+        &folder,
         &[
             "small.toml",
             "--device",
@@ -60,7 +60,7 @@ fn info_counts_shapes_memory_and_samples() {
     );
     assert!(large["memory"]["bands"].as_u64() > Some(100), "{large}");
     assert_eq!(large["picture"]["seed"], 3);
-    let tube = info(&place, &[&project_scene("twisted-tube.toml"), "--device", "cpu"]);
+    let tube = info(&folder, &[&project_scene("twisted-tube.toml"), "--device", "cpu"]);
     let shapes = &tube["shapes"];
     assert!(
         shapes["triangles"].as_u64() > shapes["mesh_triangles"].as_u64(),
@@ -82,8 +82,8 @@ fn info_counts_shapes_memory_and_samples() {
             .map(|(scene, film)| scene + film)
     );
     // Four triangles, five rectangles, an ellipsoid and a light.
-    let box_of_all = info(&place, &[&project_scene("cornell.toml"), "--device", "cpu"]);
-    let shapes = &box_of_all["shapes"];
+    let cornell_info = info(&folder, &[&project_scene("cornell.toml"), "--device", "cpu"]);
+    let shapes = &cornell_info["shapes"];
     assert_eq!(
         ["triangles", "mesh_triangles", "instanced_triangles", "primitives"].map(|key| shapes[key].as_u64()),
         [Some(4), Some(0), Some(0), Some(11)]
@@ -95,8 +95,8 @@ fn info_counts_shapes_memory_and_samples() {
         "    kernel      none",
         "    sampling    pattern ",
     ];
-    let brief = place.run(&cornell).stdout;
-    let verbose = place.run(&[&cornell[..], &["--verbose"]].concat()).stdout;
+    let brief = folder.run(&cornell).stdout;
+    let verbose = folder.run(&[&cornell[..], &["--verbose"]].concat()).stdout;
     for text in details {
         assert!(verbose.contains(text) && !brief.contains(text), "{text}: {verbose}");
     }
@@ -110,16 +110,16 @@ fn info_counts_shapes_memory_and_samples() {
     }
     assert_eq!(tube["textures"][0]["type"], "checker");
     assert!(tube["kernel"]["uses"].as_array().unwrap().contains(&"BVH".into()));
-    assert!(place.files().is_empty(), "a file was written");
+    assert!(folder.files().is_empty(), "a file was written");
 }
 
 #[test]
 fn info_selects_the_same_device_as_a_render() {
-    let place = TestFolder::new();
+    let folder = TestFolder::new();
     let cornell = project_scene("cornell.toml");
     for scene in ["small.toml", &cornell, &project_scene("twisted-tube.toml")] {
-        let planned = info(&place, &[scene]);
-        let ran = place.run(&[
+        let planned = info(&folder, &[scene]);
+        let result = folder.run(&[
             "render",
             scene,
             "--spp",
@@ -132,56 +132,64 @@ fn info_selects_the_same_device_as_a_render() {
             "stats.json",
             "-q",
         ]);
-        assert_eq!(ran.code, 0, "{}", ran.stderr);
-        let stats: Value = serde_json::from_slice(&place.read("stats.json")).unwrap();
+        assert_eq!(result.code, 0, "{}", result.stderr);
+        let stats: Value = serde_json::from_slice(&folder.read("stats.json")).unwrap();
         assert_eq!(planned["device"]["name"], stats["device"], "{scene}");
         assert!(
             planned["device"]["why"].as_str().is_some_and(|why| why.len() > 10),
             "{planned}"
         );
     }
-    let on_gpu = info(&place, &["small.toml", "--device", "gpu"]);
+    let on_gpu = info(&folder, &["small.toml", "--device", "gpu"]);
     assert!(on_gpu["memory"]["scene_on_device"].as_u64() > Some(500), "{on_gpu}");
     assert_eq!(on_gpu["kernel"]["entry"], "render");
-    let ran = place.run_with(&["info", "small.toml"], &NO_DRIVER);
-    assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
-    assert!(ran.stdout.contains("    device      cpu: no Vulkan"), "{}", ran.stdout);
-    let ran = place.run_with(&["info", "small.toml", "--device", "gpu"], &NO_DRIVER);
-    assert_eq!((ran.code, ran.stdout.as_str()), (4, ""));
-    let ran = place.run(&["info", "small.toml", "--device", "nonesuch"]);
-    assert_eq!((ran.code, ran.stdout.as_str()), (4, ""));
+    let result = folder.run_with(&["info", "small.toml"], &NO_DRIVER);
+    assert_eq!((result.code, result.stderr.as_str()), (0, ""));
+    assert!(
+        result.stdout.contains("    device      cpu: no Vulkan"),
+        "{}",
+        result.stdout
+    );
+    let result = folder.run_with(&["info", "small.toml", "--device", "gpu"], &NO_DRIVER);
+    assert_eq!((result.code, result.stdout.as_str()), (4, ""));
+    let result = folder.run(&["info", "small.toml", "--device", "nonesuch"]);
+    assert_eq!((result.code, result.stdout.as_str()), (4, ""));
 }
 
 #[test]
 fn info_describes_empty_and_large_scenes_and_rejects_invalid_ones() {
-    let place = TestFolder::new();
+    let folder = TestFolder::new();
     let head = SCENE.split("[materials.gray]").next().unwrap();
-    place.write("empty.toml", head);
-    let ran = place.run(&["info", "empty.toml"]);
-    assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
+    folder.write("empty.toml", head);
+    let result = folder.run(&["info", "empty.toml"]);
+    assert_eq!((result.code, result.stderr.as_str()), (0, ""));
     assert!(
-        ran.stdout.contains("shapes      0\n")
-            && ran.stdout.contains("bounds      none")
-            && ran
+        result.stdout.contains("shapes      0\n")
+            && result.stdout.contains("bounds      none")
+            && result
                 .stdout
                 .contains("warning     the scene has no shapes; the image shows only the background\n"),
         "{}",
-        ran.stdout
+        result.stdout
     );
-    let mut many = format!("{head}[materials.gray]\ntype = 'phong'\ncolor = [1, 1, 1]\n");
+    let mut text = format!("{head}[materials.gray]\ntype = 'phong'\ncolor = [1, 1, 1]\n");
     for i in 0..100_000 {
         let x = i % 1000;
-        many += &format!("[[shapes]]\ntype = 'sphere'\nmaterial = 'gray'\ncenter = [{x}, {i}, 0]\nradius = 0.4\n");
+        text += &format!("[[shapes]]\ntype = 'sphere'\nmaterial = 'gray'\ncenter = [{x}, {i}, 0]\nradius = 0.4\n");
     }
-    place.write("many.toml", &many);
-    let many = info(&place, &["many.toml", "--device", "cpu"]);
+    folder.write("many.toml", &text);
+    let many = info(&folder, &["many.toml", "--device", "cpu"]);
     assert_eq!(
         (&many["shapes"]["count"], &many["shapes"]["primitives"]),
         (&100_000.into(), &100_000.into())
     );
     assert_eq!(many["bounds"][1], serde_json::json!([999.4, 99_999.4, 0.4]));
-    place.write("bad.toml", &SCENE.replace("radius = 0.8", "radius = -1"));
-    let ran = place.run(&["info", "bad.toml", "--json"]);
-    assert_eq!((ran.code, ran.stdout.as_str()), (3, ""));
-    assert!(ran.stderr.contains("shapes[0].radius: -1 must be"), "{}", ran.stderr);
+    folder.write("bad.toml", &SCENE.replace("radius = 0.8", "radius = -1"));
+    let result = folder.run(&["info", "bad.toml", "--json"]);
+    assert_eq!((result.code, result.stdout.as_str()), (3, ""));
+    assert!(
+        result.stderr.contains("shapes[0].radius: -1 must be"),
+        "{}",
+        result.stderr
+    );
 }

@@ -9,11 +9,11 @@ use serde_json::Value;
 
 #[cfg(unix)]
 use super::program;
-use super::{NO_DRIVER, Ran, SCENE, TestFolder};
+use super::{NO_DRIVER, RunResult, SCENE, TestFolder};
 
 /// Parses standard error and checks the common keys.
-fn lines(ran: &Ran) -> Vec<Value> {
-    let lines = ran.stderr.lines().map(|line| {
+fn lines(result: &RunResult) -> Vec<Value> {
+    let lines = result.stderr.lines().map(|line| {
         let value: Value = serde_json::from_str(line).unwrap_or_else(|error| panic!("{error}: {line}"));
         for key in ["level", "message", "time"] {
             assert!(value.get(key).is_some(), "{key}: {line}");
@@ -23,16 +23,16 @@ fn lines(ran: &Ran) -> Vec<Value> {
     lines.collect()
 }
 
-fn log(place: &TestFolder, arguments: &[&str]) -> (i32, Vec<Value>) {
-    let ran = place.run(&[&["--log-format", "json"], arguments].concat());
-    (ran.code, lines(&ran))
+fn log(folder: &TestFolder, arguments: &[&str]) -> (i32, Vec<Value>) {
+    let result = folder.run(&[&["--log-format", "json"], arguments].concat());
+    (result.code, lines(&result))
 }
 
 #[test]
 fn a_render_logs_progress_and_statistics() {
-    let place = TestFolder::new();
+    let folder = TestFolder::new();
     let (code, lines) = log(
-        &place,
+        &folder,
         &[
             "render",
             "small.toml",
@@ -48,12 +48,12 @@ fn a_render_logs_progress_and_statistics() {
     let (last, progress) = lines.split_last().expect("lines");
     assert!(!progress.is_empty() && progress.len() <= 11, "{progress:?}");
     let shares: Vec<f64> = progress.iter().map(|line| line["share"].as_f64().unwrap()).collect();
-    let begins = |line: &Value| {
+    let starts_with_digit = |line: &Value| {
         line["message"]
             .as_str()
             .is_some_and(|text| text.starts_with(|c: char| c.is_ascii_digit()))
     };
-    assert!(progress.iter().all(begins), "{progress:?}");
+    assert!(progress.iter().all(starts_with_digit), "{progress:?}");
     assert!(shares.is_sorted() && shares.last() == Some(&1.0), "{shares:?}");
     assert!(progress.iter().all(|line| line["level"] == "progress"), "{progress:?}");
     assert_eq!(
@@ -64,79 +64,82 @@ fn a_render_logs_progress_and_statistics() {
         (&last["files"][0], &last["stats"]["width"]),
         (&"a.png".into(), &200.into())
     );
-    let (_, lines) = log(&place, &["render", "small.toml", "-o", "a.png", "--progress", "none"]);
+    let (_, lines) = log(&folder, &["render", "small.toml", "-o", "a.png", "--progress", "none"]);
     assert_eq!(lines.len(), 1, "{lines:?}");
-    let (_, lines) = log(&place, &["render", "small.toml", "-o", "a.png", "--verbose"]);
-    let read = lines
+    let (_, lines) = log(&folder, &["render", "small.toml", "-o", "a.png", "--verbose"]);
+    let scene_read = lines
         .iter()
         .find(|line| line["message"] == "scene read")
         .expect("an event");
-    assert!(read["seconds"].as_f64() > Some(0.0), "{read}");
+    assert!(scene_read["seconds"].as_f64() > Some(0.0), "{scene_read}");
     let done = |line: &&Value| line["message"] == "render done";
     assert_eq!(lines.iter().filter(done).count(), 1, "{lines:?}");
-    let (code, lines) = log(&place, &["render", "small.toml", "-o", "a.png", "--quiet"]);
+    let (code, lines) = log(&folder, &["render", "small.toml", "-o", "a.png", "--quiet"]);
     assert_eq!((code, lines.len()), (0, 0));
-    let (_, lines) = log(&place, &["render", "small.toml", "-o", "#.png", "--frames", "1-2"]);
+    let (_, lines) = log(&folder, &["render", "small.toml", "-o", "#.png", "--frames", "1-2"]);
     assert!(
         lines.iter().any(|line| line["frame"] == 2 && line["share"] == 1.0),
         "{lines:?}"
     );
     assert!(lines.iter().any(|line| line["level"] == "warning"), "{lines:?}");
-    let ran = place.run(&["render", "small.toml", "-o", "a.png", "--log-format", "text"]);
-    assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
+    let result = folder.run(&["render", "small.toml", "-o", "a.png", "--log-format", "text"]);
+    assert_eq!((result.code, result.stderr.as_str()), (0, ""));
 }
 
 #[test]
 fn each_error_of_a_scene_is_a_message() {
-    let place = TestFolder::new();
+    let folder = TestFolder::new();
     let bad = SCENE
         .replace("radius = 0.8", "radius = -1")
         .replace("fov = 40", "fov = 1000");
-    place.write("bad.toml", &bad);
-    let more = "[[lights]]\ntype = \"point\"\n".repeat(30);
-    place.write("many.toml", &format!("{SCENE}{more}"));
+    folder.write("bad.toml", &bad);
+    let lights = "[[lights]]\ntype = \"point\"\n".repeat(30);
+    folder.write("many.toml", &format!("{SCENE}{lights}"));
     for command in ["check", "render", "info"] {
-        let ran = place.run(&[command, "bad.toml"]);
-        let lines: Vec<&str> = ran.stderr.lines().collect();
-        assert_eq!((ran.code, lines.len()), (3, 2), "{}", ran.stderr);
+        let result = folder.run(&[command, "bad.toml"]);
+        let lines: Vec<&str> = result.stderr.lines().collect();
+        assert_eq!((result.code, lines.len()), (3, 2), "{}", result.stderr);
         assert!(lines[0].starts_with("error: bad.toml:") && lines[0].contains(": camera.fov: 1000 must be"));
         assert!(
             lines[1].starts_with("error: bad.toml:22: shapes[0].radius: -1 must be"),
             "{}",
             lines[1]
         );
-        let (code, lines) = log(&place, &[command, "bad.toml"]);
+        let (code, lines) = log(&folder, &[command, "bad.toml"]);
         let keys: Vec<_> = lines
             .iter()
             .map(|line| (&line["key"], &line["exit_code"], &line["file"]))
             .collect();
-        let [three, file] = [3.into(), "bad.toml".into()];
+        let [exit_code, file] = [3.into(), "bad.toml".into()];
         assert_eq!(
             (code, keys),
             (
                 3,
                 vec![
-                    (&"camera.fov".into(), &three, &file),
-                    (&"shapes[0].radius".into(), &three, &file)
+                    (&"camera.fov".into(), &exit_code, &file),
+                    (&"shapes[0].radius".into(), &exit_code, &file)
                 ]
             )
         );
     }
-    let ran = place.run(&["check", "many.toml", "bad.toml"]);
-    let lines: Vec<&str> = ran.stderr.lines().collect();
-    assert_eq!((ran.code, lines.len(), lines[20]), (3, 23, "error: and 10 more errors"));
-    let (_, lines) = log(&place, &["check", "many.toml"]);
+    let result = folder.run(&["check", "many.toml", "bad.toml"]);
+    let lines: Vec<&str> = result.stderr.lines().collect();
+    assert_eq!(
+        (result.code, lines.len(), lines[20]),
+        (3, 23, "error: and 10 more errors")
+    );
+    let (_, lines) = log(&folder, &["check", "many.toml"]);
     assert_eq!((lines.len(), &lines[20]["level"]), (21, &"error".into()));
 }
 
 #[test]
 fn errors_have_location_and_exit_code() {
-    let place = TestFolder::new();
-    place.write("value.toml", &SCENE.replace("radius = 0.8", "radius = -1"));
-    place.write("syntax.toml", "image = [\n[");
-    place.write("broken.gltf", "{ \"asset\": 3 }");
-    let one = |arguments: &[&str]| {
-        let (code, mut lines) = log(&place, arguments);
+    let folder = TestFolder::new();
+    folder.write("value.toml", &SCENE.replace("radius = 0.8", "radius = -1"));
+    folder.write("syntax.toml", "image = [\n[");
+    folder.write("broken.gltf", "{ \"asset\": 3 }");
+    let single_error = |arguments: &[&str]| {
+        let (code, mut lines) = log(&folder, arguments);
         assert_eq!(lines.len(), 1, "{lines:?}");
         let line = lines.remove(0);
         assert_eq!(
@@ -147,22 +150,28 @@ fn errors_have_location_and_exit_code() {
         assert!(!line["message"].as_str().unwrap().starts_with("error"), "{line}");
         line
     };
-    let value = one(&["check", "value.toml"]);
+    let value = single_error(&["check", "value.toml"]);
     assert_eq!((&value["exit_code"], &value["file"]), (&3.into(), &"value.toml".into()));
     assert_eq!(
         (&value["key"], &value["line"]),
         (&"shapes[0].radius".into(), &22.into())
     );
-    let syntax = one(&["render", "syntax.toml"]);
+    let syntax = single_error(&["render", "syntax.toml"]);
     assert!(
         syntax["line"].as_u64() > Some(0) && syntax["column"].as_u64() > Some(0),
         "{syntax}"
     );
-    assert_eq!(one(&["info", "nowhere.toml"])["file"], "nowhere.toml");
-    let model = one(&["check", "broken.gltf"]);
+    assert_eq!(single_error(&["info", "nowhere.toml"])["file"], "nowhere.toml");
+    let model = single_error(&["check", "broken.gltf"]);
     assert!(model["file"].as_str().unwrap().ends_with("broken.gltf"), "{model}");
-    assert_eq!(one(&["render", "small.toml", "--device", "nonesuch"])["exit_code"], 4);
-    assert_eq!(one(&["render", "small.toml", "-o", "small.toml"])["exit_code"], 2);
+    assert_eq!(
+        single_error(&["render", "small.toml", "--device", "nonesuch"])["exit_code"],
+        4
+    );
+    assert_eq!(
+        single_error(&["render", "small.toml", "-o", "small.toml"])["exit_code"],
+        2
+    );
     for arguments in [
         &["render"][..],
         &["render", "--bad"],
@@ -170,24 +179,24 @@ fn errors_have_location_and_exit_code() {
         &["render", "small.toml", "--size", "9"],
         &[],
     ] {
-        let usage = one(arguments);
+        let usage = single_error(arguments);
         assert_eq!(usage["exit_code"], 2, "{usage}");
         assert!(
             !usage["message"].as_str().unwrap().contains('\n') || arguments.is_empty(),
             "{usage}"
         );
     }
-    let (code, lines) = log(&place, &["check", "value.toml", "syntax.toml", "small.toml"]);
+    let (code, lines) = log(&folder, &["check", "value.toml", "syntax.toml", "small.toml"]);
     assert_eq!((code, lines.len()), (3, 2));
     // Control characters in a name do not break the line.
-    let odd = one(&["render", "a\n\"b\".toml"]);
-    assert_eq!(odd["file"], "a\n\"b\".toml");
+    let escaped = single_error(&["render", "a\n\"b\".toml"]);
+    assert_eq!(escaped["file"], "a\n\"b\".toml");
 }
 
 #[test]
 fn warnings_and_notes_have_levels() {
-    let place = TestFolder::new();
-    let ran = place.run_with(
+    let folder = TestFolder::new();
+    let result = folder.run_with(
         &[
             "render",
             "small.toml",
@@ -199,8 +208,8 @@ fn warnings_and_notes_have_levels() {
         ],
         &NO_DRIVER,
     );
-    let lines = lines(&ran);
-    assert_eq!((ran.code, lines.len()), (0, 2), "{lines:?}");
+    let lines = lines(&result);
+    assert_eq!((result.code, lines.len()), (0, 2), "{lines:?}");
     assert_eq!(lines[0]["level"], "warning");
     assert!(
         lines[0]["message"]
@@ -214,12 +223,12 @@ fn warnings_and_notes_have_levels() {
 #[test]
 #[cfg(unix)]
 fn a_signal_is_an_error_with_its_exit_code() {
-    super::heed_interrupts();
-    let place = TestFolder::new();
+    super::restore_signal_defaults();
+    let folder = TestFolder::new();
     let options =
         "render small.toml --size 4000x4000 --spp 1024 --device cpu -o a.png --log-format json --progress none -v";
     let mut child = Command::new(program())
-        .current_dir(place.folder())
+        .current_dir(folder.folder())
         .args(options.split(' '))
         .stderr(Stdio::piped())
         .spawn()
@@ -232,22 +241,22 @@ fn a_signal_is_an_error_with_its_exit_code() {
     // SAFETY: the process is a child that has not been waited for, so that its id is still valid.
     unsafe { libc::kill(child.id() as i32, libc::SIGTERM) };
     let stderr: Vec<String> = stderr_lines.collect();
-    let code = child.wait().expect("its end").code().unwrap_or(-1);
-    let ran = Ran::new(Some(code), String::new(), &stderr.join("\n"), &[]);
-    let lines = lines(&ran);
+    let code = child.wait().expect("an exit status").code().unwrap_or(-1);
+    let result = RunResult::new(Some(code), String::new(), &stderr.join("\n"), &[]);
+    let lines = lines(&result);
     let last = lines.last().expect("a line");
     assert_eq!(
         (code, &last["level"], &last["message"]),
         (143, &"error".into(), &"interrupted by SIGTERM".into())
     );
     assert_eq!(last["exit_code"], 143);
-    assert!(place.files().is_empty());
+    assert!(folder.files().is_empty());
 }
 
 #[test]
-fn lines_for_an_engine_are_not_json() {
-    let place = TestFolder::new();
-    let (code, lines) = log(&place, &["render", "small.toml", "--progress", "openjd"]);
+fn openjd_progress_excludes_a_json_log() {
+    let folder = TestFolder::new();
+    let (code, lines) = log(&folder, &["render", "small.toml", "--progress", "openjd"]);
     let rule = "--progress: openjd cannot be combined with --log-format json";
     assert_eq!((code, &lines[0]["message"]), (2, &rule.into()));
 }
@@ -255,21 +264,21 @@ fn lines_for_an_engine_are_not_json() {
 #[test]
 #[cfg(unix)]
 fn an_unwritable_log_does_not_end_a_render() {
-    let place = TestFolder::new();
-    for nowhere in ["2>/dev/full", "2>&-"] {
-        let ran = place.shell(
+    let folder = TestFolder::new();
+    for redirection in ["2>/dev/full", "2>&-"] {
+        let result = folder.shell(
             "sh",
-            &format!("$0 render small.toml -o a.png --log-format json {nowhere}"),
+            &format!("$0 render small.toml -o a.png --log-format json {redirection}"),
         );
-        assert_eq!(ran.code, 0, "{nowhere}");
+        assert_eq!(result.code, 0, "{redirection}");
     }
-    let ran = place.shell("sh", "$0 info small.toml --log-format json >/dev/full");
-    assert_eq!((ran.code, &lines(&ran)[0]["exit_code"]), (8, &8.into()));
+    let result = folder.shell("sh", "$0 info small.toml --log-format json >/dev/full");
+    assert_eq!((result.code, &lines(&result)[0]["exit_code"]), (8, &8.into()));
     for command in ["schema", "completions zsh", "man", "info small.toml"] {
-        let ran = place.shell("sh", &format!("$0 {command} | true"));
-        assert_eq!((ran.code, ran.stderr.as_str()), (0, ""), "{command}");
+        let result = folder.shell("sh", &format!("$0 {command} | true"));
+        assert_eq!((result.code, result.stderr.as_str()), (0, ""), "{command}");
         assert_eq!(
-            place.shell("sh", &format!("$0 {command} >/dev/full")).code,
+            folder.shell("sh", &format!("$0 {command} >/dev/full")).code,
             8,
             "{command}"
         );

@@ -1,9 +1,9 @@
 //! Manual pages and shell completions.
 
-use super::{Ran, TestFolder};
+use super::{RunResult, TestFolder};
 
-fn commands(place: &TestFolder) -> Vec<String> {
-    let help = place.run(&["--help"]).stdout;
+fn commands(folder: &TestFolder) -> Vec<String> {
+    let help = folder.run(&["--help"]).stdout;
     let list = help.split("Commands:\n").nth(1).unwrap().split("\n\n").next().unwrap();
     let names = list
         .lines()
@@ -19,20 +19,20 @@ fn commands(place: &TestFolder) -> Vec<String> {
 
 #[test]
 fn every_command_has_a_page() {
-    let place = TestFolder::new();
-    place.quietly(&["man", "-o", "pages/man1"]);
-    let mut wanted: Vec<String> = commands(&place).iter().map(|name| format!("wgray-{name}.1")).collect();
-    wanted.push("wgray.1".to_owned());
-    wanted.sort();
-    let folder = place.folder().join("pages/man1");
-    let mut found: Vec<String> = std::fs::read_dir(&folder)
+    let folder = TestFolder::new();
+    folder.run_quietly(&["man", "-o", "pages/man1"]);
+    let mut expected: Vec<String> = commands(&folder).iter().map(|name| format!("wgray-{name}.1")).collect();
+    expected.push("wgray.1".to_owned());
+    expected.sort();
+    let pages = folder.folder().join("pages/man1");
+    let mut found: Vec<String> = std::fs::read_dir(&pages)
         .unwrap()
         .map(|entry| entry.unwrap().file_name().into_string().unwrap())
         .collect();
     found.sort();
-    assert_eq!(found, wanted);
+    assert_eq!(found, expected);
     for name in found {
-        let page = std::fs::read_to_string(folder.join(&name)).unwrap();
+        let page = std::fs::read_to_string(pages.join(&name)).unwrap();
         for part in [
             ".TH WGRAY",
             ".SH NAME",
@@ -45,10 +45,10 @@ fn every_command_has_a_page() {
         }
         let command = name.strip_prefix("wgray-").and_then(|name| name.strip_suffix(".1"));
         let arguments: Vec<&str> = std::iter::once("man").chain(command).collect();
-        assert_eq!(place.run(&arguments).stdout, page, "`wgray man` does not print {name}");
+        assert_eq!(folder.run(&arguments).stdout, page, "`wgray man` does not print {name}");
         // The page contains every option of the help in bold, with escaped hyphens.
         let arguments: Vec<&str> = command.into_iter().chain(["--help"]).collect();
-        let help = place.run(&arguments).stdout;
+        let help = folder.run(&arguments).stdout;
         let is_option = |line: &&str| line.starts_with("  -") || line.starts_with("      -");
         let options = help.lines().filter(is_option).filter_map(|line| line.split_once("--"));
         let names = options.map(|(_, rest)| rest.split([' ', ',', '=', '[']).next().unwrap());
@@ -60,9 +60,9 @@ fn every_command_has_a_page() {
             assert!(page.contains(&option), "{name}: {option}");
         }
         assert!(!page.contains("\\fB\\-\\-no\\-such\\-option\\fR"));
-        has_no_warnings(&folder.join(&name));
+        assert_no_groff_warnings(&pages.join(&name));
     }
-    let render = place.run(&["man", "render"]).stdout;
+    let render = folder.run(&["man", "render"]).stdout;
     for part in [
         ".SH ENVIRONMENT",
         "VK_DRIVER_FILES",
@@ -72,40 +72,41 @@ fn every_command_has_a_page() {
     ] {
         assert!(render.contains(part), "{part}");
     }
-    std::fs::write(folder.join("wgray.1"), "old").unwrap();
-    place.quietly(&["man", "-o", "pages/man1"]);
-    assert_ne!(std::fs::read_to_string(folder.join("wgray.1")).unwrap(), "old");
+    std::fs::write(pages.join("wgray.1"), "old").unwrap();
+    folder.run_quietly(&["man", "-o", "pages/man1"]);
+    assert_ne!(std::fs::read_to_string(pages.join("wgray.1")).unwrap(), "old");
 }
 
 #[test]
 fn unknown_pages_are_rejected() {
-    let place = TestFolder::new();
-    let ran = place.run(&["man", "paint"]);
-    assert_eq!((ran.code, ran.stdout.as_str()), (2, ""));
+    let folder = TestFolder::new();
+    let result = folder.run(&["man", "paint"]);
+    assert_eq!((result.code, result.stdout.as_str()), (2, ""));
     assert!(
-        ran.stderr
+        result
+            .stderr
             .starts_with("error: COMMAND: \"paint\" must be one of render, check, "),
         "{}",
-        ran.stderr
+        result.stderr
     );
-    let ran = place.run(&["man", "-o", "small.toml"]);
-    assert_eq!(ran.code, 8);
-    assert!(ran.stderr.contains("small.toml"), "{}", ran.stderr);
-    let ran = place.run(&["man", "render", "-o", "pages"]);
-    assert_eq!(ran.code, 2);
-    assert!(place.files().is_empty());
+    let result = folder.run(&["man", "-o", "small.toml"]);
+    assert_eq!(result.code, 8);
+    assert!(result.stderr.contains("small.toml"), "{}", result.stderr);
+    let result = folder.run(&["man", "render", "-o", "pages"]);
+    assert_eq!(result.code, 2);
+    assert!(folder.files().is_empty());
 }
 
 /// Checks that groff, if installed, prints no warnings.
-fn has_no_warnings(page: &std::path::Path) {
+fn assert_no_groff_warnings(page: &std::path::Path) {
     let groff = std::process::Command::new("groff")
         .args(["-man", "-Tutf8", "-ww", "-z"])
         .arg(page)
         .output();
-    if let Ok(ran) = groff {
-        let warnings = String::from_utf8_lossy(&ran.stderr);
+    if let Ok(result) = groff {
+        let warnings = String::from_utf8_lossy(&result.stderr);
         assert!(
-            ran.status.success() && warnings.is_empty(),
+            result.status.success() && warnings.is_empty(),
             "{}: {warnings}",
             page.display()
         );
@@ -133,33 +134,33 @@ fn exit_codes_are_documented() {
 }
 
 #[test]
-fn every_shell_has_completions_that_know_every_command() {
-    let place = TestFolder::new();
-    let names = commands(&place);
+fn completions_of_every_shell_list_every_command() {
+    let folder = TestFolder::new();
+    let names = commands(&folder);
     for shell in ["bash", "zsh", "fish", "powershell", "elvish"] {
-        let ran = place.run(&["completions", shell]);
-        assert_eq!((ran.code, ran.stderr.as_str()), (0, ""), "{shell}");
+        let result = folder.run(&["completions", shell]);
+        assert_eq!((result.code, result.stderr.as_str()), (0, ""), "{shell}");
         for name in &names {
-            assert!(ran.stdout.contains(name.as_str()), "{shell}: {name}");
+            assert!(result.stdout.contains(name.as_str()), "{shell}: {name}");
         }
     }
-    let ran = place.run(&["completions", "tcsh"]);
-    assert_eq!((ran.code, ran.stdout.as_str()), (2, ""));
-    assert!(ran.stderr.contains("possible values: bash"), "{}", ran.stderr);
+    let result = folder.run(&["completions", "tcsh"]);
+    assert_eq!((result.code, result.stdout.as_str()), (2, ""));
+    assert!(result.stderr.contains("possible values: bash"), "{}", result.stderr);
 }
 
 /// Returns the completions that bash offers for the last of these words.
 #[cfg(unix)]
-fn offered(place: &TestFolder, words: &[&str]) -> Vec<String> {
+fn completions(folder: &TestFolder, words: &[&str]) -> Vec<String> {
     let line = words.join("' '");
     let last = words.len() - 1;
     let script = format!(
         "source <($0 completions bash)\ncompopt() {{ echo \"compopt $*\"; }}\nCOMP_WORDS=('{line}')\nCOMP_CWORD={last}\n_wgray wgray \"${{COMP_WORDS[{last}]}}\" \
          \"${{COMP_WORDS[{last} - 1]}}\"\nprintf '%s\\n' \"${{COMPREPLY[@]}}\""
     );
-    let Ran {
+    let RunResult {
         code, stdout, stderr, ..
-    } = place.shell("bash", &script);
+    } = folder.shell("bash", &script);
     assert_eq!((code, stderr.as_str()), (0, ""), "{words:?}");
     stdout.lines().map(str::to_owned).collect()
 }
@@ -167,31 +168,34 @@ fn offered(place: &TestFolder, words: &[&str]) -> Vec<String> {
 #[test]
 #[cfg(unix)]
 fn bash_completes_commands_options_names_and_files() {
-    let place = TestFolder::new();
-    std::fs::create_dir(place.folder().join("smalls")).unwrap();
-    assert_eq!(offered(&place, &["wgray", "rend"]), ["render"]);
-    assert_eq!(offered(&place, &["wgray", "render", "--pixel-p"]), ["--pixel-pattern"]);
+    let folder = TestFolder::new();
+    std::fs::create_dir(folder.folder().join("smalls")).unwrap();
+    assert_eq!(completions(&folder, &["wgray", "rend"]), ["render"]);
     assert_eq!(
-        offered(&place, &["wgray", "render", "a.toml", "--integrator", "p"]),
+        completions(&folder, &["wgray", "render", "--pixel-p"]),
+        ["--pixel-pattern"]
+    );
+    assert_eq!(
+        completions(&folder, &["wgray", "render", "a.toml", "--integrator", "p"]),
         ["phong", "path"]
     );
-    assert_eq!(offered(&place, &["wgray", "man", "che"]), ["check"]);
+    assert_eq!(completions(&folder, &["wgray", "man", "che"]), ["check"]);
     for command in ["render", "info"] {
-        let devices = offered(&place, &["wgray", command, "a.toml", "--device", ""]);
+        let devices = completions(&folder, &["wgray", command, "a.toml", "--device", ""]);
         assert_eq!(devices, ["auto", "gpu", "cpu"], "{command}");
     }
     assert_eq!(
-        offered(&place, &["wgray", "render", "a.toml", "--spp", "sm"]),
+        completions(&folder, &["wgray", "render", "a.toml", "--spp", "sm"]),
         ["compopt -o nospace", "sm"],
-        "no file"
+        "files are offered"
     );
     let files = |option: &str| {
-        let mut files = offered(&place, &["wgray", "render", "a.toml", option, "sma"]);
+        let mut files = completions(&folder, &["wgray", "render", "a.toml", option, "sma"]);
         files.sort();
         files
     };
     assert_eq!(files("--checkpoint"), ["small.toml", "smalls"]);
     // Bash completes folder names itself.
     assert_eq!(files("--asset-root"), ["", "compopt -o plusdirs"]);
-    assert!(offered(&place, &["wgray", "xyz"]).iter().all(String::is_empty));
+    assert!(completions(&folder, &["wgray", "xyz"]).iter().all(String::is_empty));
 }

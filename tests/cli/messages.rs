@@ -1,13 +1,13 @@
 //! Text messages: a closed or full stream does not fail a render, and each message names a remedy.
 
-use super::{Ran, SCENE, TestFolder};
+use super::{RunResult, SCENE, TestFolder};
 
 #[cfg(unix)]
 mod unix {
     use super::*;
 
-    fn sh(place: &TestFolder, line: &str) -> Ran {
-        place.shell("sh", line)
+    fn sh(folder: &TestFolder, line: &str) -> RunResult {
+        folder.shell("sh", line)
     }
 
     /// Redirections of standard error to full, closed and unread streams.
@@ -19,20 +19,20 @@ mod unix {
             for options in [
                 "--progress plain --size 64x64",
                 "--verbose",
-                // No driver is found, which prints a warning.
+                // Without a driver, a warning is printed.
                 "--device auto",
             ] {
-                let place = TestFolder::new();
+                let folder = TestFolder::new();
                 let driver = "VK_DRIVER_FILES=/nonexistent.json VK_ICD_FILENAMES=/nonexistent.json";
                 let line = format!(
                     "{{ {{ {driver} $0 render small.toml {options}; echo $? > code; }} {redirection}; }} 3>&1; exit $(cat code)"
                 );
-                let ran = sh(&place, &line);
-                assert_eq!(ran.code, 0, "{line}: {}", ran.stderr);
+                let result = sh(&folder, &line);
+                assert_eq!(result.code, 0, "{line}: {}", result.stderr);
                 assert!(
-                    place.files().contains(&"small.png".to_owned()),
+                    folder.files().contains(&"small.png".to_owned()),
                     "{line}: {:?}",
-                    place.files()
+                    folder.files()
                 );
             }
         }
@@ -40,8 +40,8 @@ mod unix {
 
     #[test]
     fn exit_codes_do_not_depend_on_standard_error() {
-        let place = TestFolder::new();
-        place.write("bad.toml", &SCENE.replace("radius = 0.8", "radius = -1"));
+        let folder = TestFolder::new();
+        folder.write("bad.toml", &SCENE.replace("radius = 0.8", "radius = -1"));
         for redirection in UNWRITABLE {
             for (command, code) in [
                 ("check bad.toml", 3),
@@ -53,8 +53,8 @@ mod unix {
                 ("", 2),
             ] {
                 let line = format!("{{ {{ $0 {command}; echo $? > code; }} {redirection}; }} 3>&1; exit $(cat code)");
-                let ran = sh(&place, &line);
-                assert_eq!(ran.code, code, "{line}: {}", ran.stderr);
+                let result = sh(&folder, &line);
+                assert_eq!(result.code, code, "{line}: {}", result.stderr);
             }
         }
     }
@@ -62,15 +62,16 @@ mod unix {
     /// A full disk is an error; a closed pipe is not.
     #[test]
     fn incomplete_output_changes_the_exit_code() {
-        let place = TestFolder::new();
+        let folder = TestFolder::new();
         for command in ["devices", "check small.toml", "--help", "render --help", "--version"] {
-            let full = sh(&place, &format!("$0 {command} > /dev/full"));
-            assert_eq!(full.code, 8, "{command}: {}", full.stderr);
+            let result = sh(&folder, &format!("$0 {command} > /dev/full"));
+            assert_eq!(result.code, 8, "{command}: {}", result.stderr);
             assert!(
-                full.stderr
+                result
+                    .stderr
                     .starts_with("error: standard output: cannot be written: No space left"),
                 "{command}: {}",
-                full.stderr
+                result.stderr
             );
             for (line, code) in [
                 (
@@ -79,31 +80,35 @@ mod unix {
                 ),
                 (format!("$0 {command} >&-"), 0),
             ] {
-                let ran = sh(&place, &line);
-                assert_eq!((ran.code, ran.stderr.as_str()), (code, ""), "{line}");
+                let result = sh(&folder, &line);
+                assert_eq!((result.code, result.stderr.as_str()), (code, ""), "{line}");
             }
         }
-        place.write("bad.toml", "");
-        let ran = sh(
-            &place,
+        folder.write("bad.toml", "");
+        let result = sh(
+            &folder,
             "{ $0 check small.toml small.toml bad.toml small.toml; echo $? > code; } | true; exit $(cat code)",
         );
-        assert_eq!(ran.code, 3, "the check stopped at the closed pipe: {}", ran.stderr);
+        assert_eq!(
+            result.code, 3,
+            "the check stopped at the closed pipe: {}",
+            result.stderr
+        );
     }
 }
 
 fn message_for(from: &str, to: &str) -> String {
-    let place = TestFolder::new();
+    let folder = TestFolder::new();
     assert!(SCENE.contains(from), "{from}");
-    place.write("bad.toml", &SCENE.replacen(from, to, 1));
-    let ran = place.run(&["check", "--strict", "bad.toml"]);
-    assert_eq!((ran.code, ran.stdout.as_str()), (3, ""), "{}", ran.stderr);
-    assert_eq!(ran.stderr.lines().count(), 1, "{}", ran.stderr);
-    ran.stderr.trim_end().to_owned()
+    folder.write("bad.toml", &SCENE.replacen(from, to, 1));
+    let result = folder.run(&["check", "--strict", "bad.toml"]);
+    assert_eq!((result.code, result.stdout.as_str()), (3, ""), "{}", result.stderr);
+    assert_eq!(result.stderr.lines().count(), 1, "{}", result.stderr);
+    result.stderr.trim_end().to_owned()
 }
 
 #[test]
-fn wrong_types_are_reported_with_the_right_type() {
+fn wrong_types_are_reported_with_the_expected_type() {
     let samples = "pixel_samples = { pattern = \"random\", count = 3 }";
     for (from, to, message) in [
         (
@@ -195,47 +200,47 @@ fn integer_ranges_are_consistent() {
 
 #[test]
 fn messages_of_long_keys_and_values_are_short() {
-    let long = "k".repeat(1_000_000);
+    let long_text = "k".repeat(1_000_000);
     for (from, to) in [
-        ("[render]", format!("{long} = 1\n[render]")),
-        ("[render]", format!("[render]\n{long} = 1")),
-        ("[render]", format!("[render]\n{long} = 1\n{long} = 2")),
-        ("[render]", format!("[render]\n{long}")),
-        ("[render]", format!("[render]\nseed = {long}")),
-        ("[render]", format!("[render]\nseed = '{long}'")),
-        ("[render]", format!("[render]\nshadows = '{long}'")),
+        ("[render]", format!("{long_text} = 1\n[render]")),
+        ("[render]", format!("[render]\n{long_text} = 1")),
+        ("[render]", format!("[render]\n{long_text} = 1\n{long_text} = 2")),
+        ("[render]", format!("[render]\n{long_text}")),
+        ("[render]", format!("[render]\nseed = {long_text}")),
+        ("[render]", format!("[render]\nseed = '{long_text}'")),
+        ("[render]", format!("[render]\nshadows = '{long_text}'")),
         ("[render]", format!("[render]\nseed = {}", "9".repeat(1_000_000))),
-        ("material = \"gray\"", format!("material = '{long}'")),
-        ("type = \"phong\"", format!("type = '{long}'")),
+        ("material = \"gray\"", format!("material = '{long_text}'")),
+        ("type = \"phong\"", format!("type = '{long_text}'")),
         (
             "[materials.gray]",
-            format!("[materials.{long}]\ntype = 'phong'\nshininess = 0\n[materials.gray]"),
+            format!("[materials.{long_text}]\ntype = 'phong'\nshininess = 0\n[materials.gray]"),
         ),
         (
             "[materials.gray]",
-            format!("[textures.a]\ntype = 'image'\nfile = '{long}'\n[materials.gray]"),
+            format!("[textures.a]\ntype = 'image'\nfile = '{long_text}'\n[materials.gray]"),
         ),
     ] {
         let message = message_for(from, &to);
         assert!(message.len() < 1500, "{} bytes: {}", message.len(), &message[..200]);
         assert!(message.contains("..."), "{message}");
     }
-    let many: String = (0..2000)
+    let materials: String = (0..2000)
         .map(|i| format!("[materials.m{i}]\ntype = 'mirror'\n"))
         .collect();
     let message = message_for(
         "[[shapes]]\ntype = \"sphere\"\nmaterial = \"gray\"",
-        &format!("{many}[[shapes]]\ntype = \"sphere\"\nmaterial = \"zebra\""),
+        &format!("{materials}[[shapes]]\ntype = \"sphere\"\nmaterial = \"zebra\""),
     );
     assert!(message.len() < 1500 && message.contains(" and 1977 more"), "{message}");
 }
 
 #[test]
 fn wrong_arguments_name_a_remedy() {
-    let place = TestFolder::new();
+    let folder = TestFolder::new();
     let grid = SCENE.replacen("pixel_samples = { pattern = \"random\", count = 3 }\n", "", 1);
-    place.write("grid.toml", &grid);
-    let adaptive = place.run(&["render", "grid.toml", "--adaptive", "0.1"]);
+    folder.write("grid.toml", &grid);
+    let adaptive = folder.run(&["render", "grid.toml", "--adaptive", "0.1"]);
     assert_eq!(adaptive.code, 2);
     assert!(
         adaptive
@@ -247,72 +252,74 @@ fn wrong_arguments_name_a_remedy() {
     );
     for scene in [".", "..", "/"] {
         for command in ["render", "check"] {
-            let ran = place.run(&[command, scene]);
-            assert_eq!(ran.code, 3);
+            let result = folder.run(&[command, scene]);
+            assert_eq!(result.code, 3);
             assert_eq!(
-                ran.stderr,
-                format!("error: {scene}: cannot be read: it is a folder, and a scene is a file\n")
+                result.stderr,
+                format!("error: {scene}: cannot be read: it is a folder, not a scene file\n")
             );
         }
     }
     for device in ["CPU", "Cpu", "GPU", "AUTO"] {
-        place.quietly(&["render", "small.toml", "--device", device]);
+        folder.run_quietly(&["render", "small.toml", "--device", device]);
     }
-    place.quietly(&["render", "small.toml", "--device", "1"]);
-    let dev = place.run(&["dev", "small.toml", "--no-page", "--device", "CPU"]);
+    folder.run_quietly(&["render", "small.toml", "--device", "1"]);
+    let dev = folder.run(&["dev", "small.toml", "--no-page", "--device", "CPU"]);
     assert!(dev.stderr.contains("cpu cannot run shaders"), "{}", dev.stderr);
 }
 
 #[test]
 fn an_image_outside_the_asset_root_is_reported_with_both_paths() {
-    let place = TestFolder::new();
-    image::RgbImage::new(2, 2).save(place.path("tile.png")).unwrap();
-    std::fs::create_dir(place.path("sub")).unwrap();
+    let folder = TestFolder::new();
+    image::RgbImage::new(2, 2).save(folder.path("tile.png")).unwrap();
+    std::fs::create_dir(folder.path("sub")).unwrap();
     let texture = "[textures.a]\ntype = 'image'\nfile = 'tile.png'\n[[lights]]";
-    place.write("tile.toml", &SCENE.replacen("[[lights]]", texture, 1));
-    let ran = place.run(&["check", "tile.toml", "--asset-root", "sub"]);
-    assert_eq!(ran.code, 3);
+    folder.write("tile.toml", &SCENE.replacen("[[lights]]", texture, 1));
+    let result = folder.run(&["check", "tile.toml", "--asset-root", "sub"]);
+    assert_eq!(result.code, 3);
     assert!(
-        ran.stderr
+        result
+            .stderr
             .contains("which lies outside of the asset root, sub; pass another --asset-root"),
         "{}",
-        ran.stderr
+        result.stderr
     );
-    assert!(!ran.stderr.contains("contains both"), "{}", ran.stderr);
-    place.write(
+    assert!(!result.stderr.contains("contains both"), "{}", result.stderr);
+    folder.write(
         "tile.toml",
         &SCENE.replacen("[[lights]]", &texture.replace("tile.png", "../tile.png"), 1),
     );
-    std::fs::rename(place.path("tile.toml"), place.path("sub/tile.toml")).unwrap();
-    let ran = place.run(&["check", "sub/tile.toml"]);
+    std::fs::rename(folder.path("tile.toml"), folder.path("sub/tile.toml")).unwrap();
+    let result = folder.run(&["check", "sub/tile.toml"]);
     assert!(
-        ran.stderr
+        result
+            .stderr
             .contains("lies outside of the scene's folder, sub; pass --asset-root with a folder that contains both"),
         "{}",
-        ran.stderr
+        result.stderr
     );
-    let ran = place.run(&["check", "sub/tile.toml", "--asset-root", "."]);
-    assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
+    let result = folder.run(&["check", "sub/tile.toml", "--asset-root", "."]);
+    assert_eq!((result.code, result.stderr.as_str()), (0, ""));
 }
 
 #[test]
 fn mesh_warnings_appear_once() {
-    let place = TestFolder::new();
-    place.write("odd.obj", "v 0 0 0\nv 1 0 0\nv 0 0 2\nf 1 2 3\nf 1 1 2\n");
+    let folder = TestFolder::new();
+    folder.write("odd.obj", "v 0 0 0\nv 1 0 0\nv 0 0 2\nf 1 2 3\nf 1 1 2\n");
     let shape = "[[shapes]]\ntype = 'mesh'\nfile = 'odd.obj'\nmaterial = 'gray'\n";
-    place.write("odd.toml", &format!("{SCENE}{shape}"));
+    folder.write("odd.toml", &format!("{SCENE}{shape}"));
     let warning = "warning: odd.toml: odd.obj: 1 of 2 triangles has no area (degenerate) and was removed";
     for options in [&[][..], &["-v"]] {
-        let ran = place.run(&[&["render", "odd.toml", "--device", "cpu"], options].concat());
-        assert_eq!(ran.code, 0, "{}", ran.stderr);
-        assert!(ran.stderr.lines().any(|line| line == warning), "{}", ran.stderr);
-        assert_eq!(ran.stderr.matches("degenerate").count(), 1, "{}", ran.stderr);
+        let result = folder.run(&[&["render", "odd.toml", "--device", "cpu"], options].concat());
+        assert_eq!(result.code, 0, "{}", result.stderr);
+        assert!(result.stderr.lines().any(|line| line == warning), "{}", result.stderr);
+        assert_eq!(result.stderr.matches("degenerate").count(), 1, "{}", result.stderr);
     }
 }
 
 #[test]
 fn arguments_in_messages_are_escaped_and_short() {
-    let place = TestFolder::new();
+    let folder = TestFolder::new();
     for (arguments, expected) in [
         (
             &["render", "small.toml", "--size", "\u{1b}[31m\nx"][..],
@@ -324,21 +331,21 @@ fn arguments_in_messages_are_escaped_and_short() {
         ),
         (&["pa\rint"], "error: unrecognized subcommand 'pa\\rint'\n"),
     ] {
-        let ran = place.run(arguments);
-        assert_eq!((ran.code, ran.stdout.as_str()), (2, ""), "{arguments:?}");
-        assert!(ran.stderr.starts_with(expected), "{arguments:?}: {}", ran.stderr);
+        let result = folder.run(arguments);
+        assert_eq!((result.code, result.stdout.as_str()), (2, ""), "{arguments:?}");
+        assert!(result.stderr.starts_with(expected), "{arguments:?}: {}", result.stderr);
     }
-    let ran = place.run(&["rendr"]);
-    assert!(ran.stderr.contains("'render'"), "{}", ran.stderr);
-    let long = "a.".repeat(30_000);
+    let result = folder.run(&["rendr"]);
+    assert!(result.stderr.contains("'render'"), "{}", result.stderr);
+    let long_text = "a.".repeat(30_000);
     for arguments in [
-        &["render", "small.toml", "-D", &long][..],
-        &["render", "small.toml", "-D", &format!("{long}a=1")],
-        &["render", &format!("--{long}")],
-        &[&long],
+        &["render", "small.toml", "-D", &long_text][..],
+        &["render", "small.toml", "-D", &format!("{long_text}a=1")],
+        &["render", &format!("--{long_text}")],
+        &[&long_text],
     ] {
-        let ran = place.run(arguments);
-        assert_eq!(ran.code, 2, "{}", ran.stderr);
-        assert!(ran.stderr.len() < 1000, "{}", ran.stderr);
+        let result = folder.run(arguments);
+        assert_eq!(result.code, 2, "{}", result.stderr);
+        assert!(result.stderr.len() < 1000, "{}", result.stderr);
     }
 }

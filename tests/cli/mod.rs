@@ -34,7 +34,7 @@ use crate::test_folder::TestFolder;
 /// Restores the default actions of signals for child processes: shells ignore SIGINT for background jobs, `nohup`
 /// ignores SIGHUP.
 #[cfg(unix)]
-pub fn heed_interrupts() {
+pub fn restore_signal_defaults() {
     // SAFETY: setting the default action of a signal has no precondition; no handler of this process is lost.
     unsafe {
         libc::signal(libc::SIGINT, libc::SIG_DFL);
@@ -42,7 +42,7 @@ pub fn heed_interrupts() {
     }
 }
 
-struct Ran {
+struct RunResult {
     code: i32,
     stdout: String,
     /// Standard error without the lines of `summary`.
@@ -51,16 +51,16 @@ struct Ran {
     summary: Vec<String>,
 }
 
-impl Ran {
-    fn new(code: Option<i32>, stdout: String, stderr: &str, arguments: &[&str]) -> Ran {
-        let asks_for_progress = arguments.contains(&"--progress");
-        let is_progress = |line: &str| !asks_for_progress && line.contains(" % done after ") && !line.starts_with('{');
-        let (summary, others): (Vec<&str>, Vec<&str>) =
+impl RunResult {
+    fn new(code: Option<i32>, stdout: String, stderr: &str, arguments: &[&str]) -> RunResult {
+        let requests_progress = arguments.contains(&"--progress");
+        let is_progress = |line: &str| !requests_progress && line.contains(" % done after ") && !line.starts_with('{');
+        let (summary, messages): (Vec<&str>, Vec<&str>) =
             (stderr.split_inclusive('\n')).partition(|line| is_summary(line) || is_progress(line));
-        Ran {
+        RunResult {
             code: code.unwrap_or(-1),
             stdout,
-            stderr: others.concat(),
+            stderr: messages.concat(),
             summary: summary.iter().map(|line| line.trim_end().to_owned()).collect(),
         }
     }
@@ -129,11 +129,11 @@ impl TestFolder {
         self.files_but(|name| name == "small.toml")
     }
 
-    fn run(&self, arguments: &[&str]) -> Ran {
+    fn run(&self, arguments: &[&str]) -> RunResult {
         self.run_with(arguments, &[])
     }
 
-    fn run_with(&self, arguments: &[&str], variables: &[(&str, &str)]) -> Ran {
+    fn run_with(&self, arguments: &[&str], variables: &[(&str, &str)]) -> RunResult {
         let mut command = assert_cmd::Command::new(program());
         command
             .current_dir(self.folder())
@@ -145,12 +145,12 @@ impl TestFolder {
             .expect("the program runs");
         let stdout = String::from_utf8(output.stdout).expect("UTF-8");
         let stderr = String::from_utf8(output.stderr).expect("UTF-8");
-        Ran::new(output.status.code(), stdout, &stderr, arguments)
+        RunResult::new(output.status.code(), stdout, &stderr, arguments)
     }
 
     /// Runs a shell command in which `$0` is the program.
     #[cfg(unix)]
-    fn shell(&self, shell: &str, line: &str) -> Ran {
+    fn shell(&self, shell: &str, line: &str) -> RunResult {
         let output = std::process::Command::new(shell)
             .current_dir(self.folder())
             .args(["-c", line])
@@ -160,14 +160,14 @@ impl TestFolder {
         let stdout = String::from_utf8_lossy(&output.stdout).into_owned();
         let stderr = String::from_utf8_lossy(&output.stderr);
         let arguments: Vec<&str> = line.split_whitespace().collect();
-        Ran::new(output.status.code(), stdout, &stderr, &arguments)
+        RunResult::new(output.status.code(), stdout, &stderr, &arguments)
     }
 
     /// Runs the program, which must succeed without messages.
-    fn quietly(&self, arguments: &[&str]) {
-        let ran = self.run(arguments);
+    fn run_quietly(&self, arguments: &[&str]) {
+        let result = self.run(arguments);
         assert_eq!(
-            (ran.code, ran.stdout.as_str(), ran.stderr.as_str()),
+            (result.code, result.stdout.as_str(), result.stderr.as_str()),
             (0, "", ""),
             "{arguments:?}"
         );

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use super::TestFolder;
 
 /// Writes a scene with a mesh of several hundred megabytes.
-fn large(place: &TestFolder) {
+fn write_large_scene(folder: &TestFolder) {
     const SIDE: usize = 300;
     let mut mesh = String::new();
     for y in 0..=SIDE {
@@ -20,8 +20,8 @@ fn large(place: &TestFolder) {
             let _ = writeln!(mesh, "f {a} {} {} {b}", a + 1, b + 1);
         }
     }
-    place.write("mesh.obj", &mesh);
-    place.write(
+    folder.write("mesh.obj", &mesh);
+    folder.write(
         "large.toml",
         "image = { width = 64, height = 64 }\ncamera = { position = [150, -300, 200], look_at = [150, 150, 0], fov = 60 }\n\
          [materials.m]\ntype = \"phong\"\ncolor = [1, 1, 1]\n\
@@ -32,51 +32,55 @@ fn large(place: &TestFolder) {
 /// Whichever allocation fails first, the program prints one line and leaves no file.
 #[test]
 fn failed_allocations_end_a_render_with_code_7() {
-    let place = TestFolder::new();
-    large(&place);
-    let before = place.files();
+    let folder = TestFolder::new();
+    write_large_scene(&folder);
+    let before = folder.files();
     let (mut failed, mut succeeded) = (0, 0);
     for limit in (0..24).map(|i| 24_000 + 5_000 * i) {
         let options = "--spp 1 --device cpu --threads 1 -o out.png --checkpoint c -q";
         let line = format!("ulimit -v {limit}; RUST_BACKTRACE=1 $0 render large.toml {options}");
-        let ran = place.shell("sh", &line);
-        let is_not_loaded = failed == 0 && [127, 139, -1].contains(&ran.code);
+        let result = folder.shell("sh", &line);
+        let is_not_loaded = failed == 0 && [127, 139, -1].contains(&result.code);
         if is_not_loaded {
             continue; // the limit does not even permit the program to be loaded
         }
-        match ran.code {
+        match result.code {
             0 => {
                 succeeded += 1;
-                assert_eq!(ran.stderr, "");
+                assert_eq!(result.stderr, "");
                 for name in ["out.png", "c"] {
-                    std::fs::remove_file(place.path(name)).expect("written");
+                    std::fs::remove_file(folder.path(name)).expect("written");
                 }
             }
             code => {
                 failed += 1;
-                assert_eq!(code, 7, "{limit}: {}", ran.stderr);
-                assert!(ran.stderr.starts_with("error: "), "{limit}: {}", ran.stderr);
-                assert!(ran.stderr.contains("out of memory"), "{limit}: {}", ran.stderr);
-                assert_eq!(ran.stderr.lines().count(), 1, "{limit}: {}", ran.stderr);
-                let _ = std::fs::remove_file(place.path("c")); // the checkpoint remains for --resume
+                assert_eq!(code, 7, "{limit}: {}", result.stderr);
+                assert!(result.stderr.starts_with("error: "), "{limit}: {}", result.stderr);
+                assert!(result.stderr.contains("out of memory"), "{limit}: {}", result.stderr);
+                assert_eq!(result.stderr.lines().count(), 1, "{limit}: {}", result.stderr);
+                let _ = std::fs::remove_file(folder.path("c")); // the checkpoint remains for --resume
             }
         }
-        assert_eq!(place.files(), before, "{limit}");
+        assert_eq!(folder.files(), before, "{limit}");
     }
     assert!(failed > 2 && succeeded > 3, "{failed} failed, {succeeded} succeeded");
 }
 
-/// Memory is too small for all threads.
+/// The limits do not leave enough memory for all threads.
 #[test]
 fn failed_allocations_end_other_commands_with_code_7() {
-    let place = TestFolder::new();
-    large(&place);
+    let folder = TestFolder::new();
+    write_large_scene(&folder);
     let mut failed = 0;
     for limit in (0..24).map(|i| 24_000 + 1_500 * i) {
         for command in ["check large.toml", "info large.toml", "diff mesh.obj large.toml"] {
-            let ran = place.shell("sh", &format!("ulimit -v {limit}; RUST_BACKTRACE=1 $0 {command}"));
-            failed += usize::from(ran.code == 7);
-            assert!(!ran.stderr.contains("panicked"), "{command} {limit}: {}", ran.stderr);
+            let result = folder.shell("sh", &format!("ulimit -v {limit}; RUST_BACKTRACE=1 $0 {command}"));
+            failed += usize::from(result.code == 7);
+            assert!(
+                !result.stderr.contains("panicked"),
+                "{command} {limit}: {}",
+                result.stderr
+            );
         }
     }
     assert!(failed > 2, "{failed}");
@@ -85,13 +89,13 @@ fn failed_allocations_end_other_commands_with_code_7() {
 /// An image that exceeds the memory is reported as an error, not as a failed allocation.
 #[test]
 fn images_that_exceed_the_memory_are_errors() {
-    let place = TestFolder::new();
+    let folder = TestFolder::new();
     let options = "--spp 1 --size 30000x30000 --time-limit 1 --device cpu --threads 1 -o out.png";
-    let ran = place.shell(
+    let result = folder.shell(
         "sh",
         &format!("ulimit -v 2000000; $0 render small.toml --pixel-pattern sobol {options}"),
     );
-    assert_eq!(ran.code, 7, "{}", ran.stderr);
-    assert!(!ran.stderr.contains("cannot allocate"), "{}", ran.stderr);
-    assert!(place.files().is_empty());
+    assert_eq!(result.code, 7, "{}", result.stderr);
+    assert!(!result.stderr.contains("cannot allocate"), "{}", result.stderr);
+    assert!(folder.files().is_empty());
 }

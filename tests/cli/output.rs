@@ -12,45 +12,45 @@ use crate::scenes::{packed, parse};
 
 #[test]
 fn the_default_output_has_the_scenes_name() {
-    let place = TestFolder::new();
-    std::fs::create_dir(place.path("scenes")).unwrap();
-    place.write("scenes/my.scene.toml", SCENE);
-    place.quietly(&["render", "scenes/my.scene.toml"]);
-    assert_eq!(place.files(), ["my.scene.png", "scenes"]);
+    let folder = TestFolder::new();
+    std::fs::create_dir(folder.path("scenes")).unwrap();
+    folder.write("scenes/my.scene.toml", SCENE);
+    folder.run_quietly(&["render", "scenes/my.scene.toml"]);
+    assert_eq!(folder.files(), ["my.scene.png", "scenes"]);
 }
 
 #[test]
 fn a_png_has_display_values_of_the_means() {
-    let place = TestFolder::new();
-    place.quietly(&["render", "small.toml"]);
+    let folder = TestFolder::new();
+    folder.run_quietly(&["render", "small.toml"]);
     let expected: Vec<u8> = reference(&parse(SCENE))
         .means()
         .flat_map(|color| color.map(encode))
         .collect();
     assert!(expected.contains(&255), "no value is clamped");
-    assert_eq!(read_png(&place.path("small.png")), (10, 6, expected));
+    assert_eq!(read_png(&folder.path("small.png")), (10, 6, expected));
 }
 
 #[test]
 fn an_exr_has_the_linear_means() {
-    let place = TestFolder::new();
+    let folder = TestFolder::new();
     for device in ["gpu", "cpu"] {
-        place.quietly(&["render", "small.toml", "-o", "out.EXR", "--device", device]);
-        let found = read_exr(&place.path("out.EXR")).unwrap();
+        folder.run_quietly(&["render", "small.toml", "-o", "out.EXR", "--device", device]);
+        let found = read_exr(&folder.path("out.EXR")).unwrap();
         assert_eq!((found.width, found.height), (10, 6));
         let expected: Vec<[f32; 3]> = reference(&parse(SCENE)).means().collect();
         assert_eq!(found.colors, expected, "{device}");
-        let mut other = found.clone();
-        other.colors[7][1] = other.colors[7][1].next_up();
-        assert_eq!(difference(&found, &other, 0.0).unwrap().unequal, 1);
+        let mut changed = found.clone();
+        changed.colors[7][1] = changed.colors[7][1].next_up();
+        assert_eq!(difference(&found, &changed, 0.0).unwrap().unequal, 1);
     }
 }
 
 #[test]
 fn an_exr_of_a_crop_has_its_data_window() {
-    let place = TestFolder::new();
-    place.quietly(&["render", "small.toml", "-o", "part.exr", "--crop", "2,1,9,5"]);
-    let meta = exr::meta::MetaData::read_from_file(place.path("part.exr"), true).unwrap();
+    let folder = TestFolder::new();
+    folder.run_quietly(&["render", "small.toml", "-o", "part.exr", "--crop", "2,1,9,5"]);
+    let meta = exr::meta::MetaData::read_from_file(folder.path("part.exr"), true).unwrap();
     let header = &meta.headers[0];
     let display = header.shared_attributes.display_window;
     assert_eq!(
@@ -66,8 +66,8 @@ fn an_exr_of_a_crop_has_its_data_window() {
 
 #[test]
 fn aovs_are_layers_of_an_exr() {
-    let place = TestFolder::new();
-    place.quietly(&[
+    let folder = TestFolder::new();
+    folder.run_quietly(&[
         "render",
         "small.toml",
         "-o",
@@ -81,7 +81,7 @@ fn aovs_are_layers_of_an_exr() {
     let means: Vec<[f32; 3]> = film(&mut backend, &scene, whole(&scene), &WorkSplit::default())
         .means()
         .collect();
-    let image = exr::prelude::read_first_flat_layer_from_file(place.path("out.exr")).unwrap();
+    let image = exr::prelude::read_first_flat_layer_from_file(folder.path("out.exr")).unwrap();
     let channels = &image.layer_data.channel_data.list;
     let names: Vec<String> = channels.iter().map(|channel| channel.name.to_string()).collect();
     let expected = [
@@ -125,7 +125,7 @@ fn aovs_are_layers_of_an_exr() {
 
 #[test]
 fn adaptive_sampling_and_its_layers_equal_the_library() {
-    let place = TestFolder::new();
+    let folder = TestFolder::new();
     let options = ["--pixel-pattern", "sobol", "--spp", "8", "--adaptive", "0.02"];
     let files = [
         "-o",
@@ -135,7 +135,7 @@ fn adaptive_sampling_and_its_layers_equal_the_library() {
         "--stats",
         "stats.json",
     ];
-    place.quietly(&[&["render", "small.toml"], &options[..], &files[..]].concat());
+    folder.run_quietly(&[&["render", "small.toml"], &options[..], &files[..]].concat());
     let mut description = wgray::scene::Description::parse(SCENE, "test").unwrap();
     let render = &mut description.render;
     render.pixel_samples = patterns::samples(wgray::scene::Pattern::Sobol, 8);
@@ -150,12 +150,12 @@ fn adaptive_sampling_and_its_layers_equal_the_library() {
         counts.contains(&16) && counts.iter().any(|count| *count > 16),
         "{counts:?}"
     );
-    let stats: serde_json::Value = serde_json::from_slice(&place.read("stats.json")).unwrap();
-    let fewest = counts.iter().min().copied();
+    let stats: serde_json::Value = serde_json::from_slice(&folder.read("stats.json")).unwrap();
+    let min_count = counts.iter().min().copied();
     for key in ["min_samples", "least_samples"] {
-        assert_eq!(stats[key].as_u64(), fewest.map(u64::from), "{key}");
+        assert_eq!(stats[key].as_u64(), min_count.map(u64::from), "{key}");
     }
-    let image = exr::prelude::read_first_flat_layer_from_file(place.path("out.exr")).unwrap();
+    let image = exr::prelude::read_first_flat_layer_from_file(folder.path("out.exr")).unwrap();
     let channels = &image.layer_data.channel_data.list;
     let names: Vec<String> = channels.iter().map(|channel| channel.name.to_string()).collect();
     let expected = [
@@ -177,11 +177,11 @@ fn adaptive_sampling_and_its_layers_equal_the_library() {
             _ => {}
         }
     }
-    let stats: serde_json::Value = serde_json::from_slice(&place.read("stats.json")).unwrap();
+    let stats: serde_json::Value = serde_json::from_slice(&folder.read("stats.json")).unwrap();
     let rays = counts.iter().map(|count| u64::from(*count)).sum::<u64>();
     assert_eq!(stats["camera_rays"].as_u64(), Some(rays));
     // In the PNG, pixels with the maximum number of samples are white.
-    place.quietly(
+    folder.run_quietly(
         &[
             &["render", "small.toml"],
             &options[..],
@@ -189,7 +189,7 @@ fn adaptive_sampling_and_its_layers_equal_the_library() {
         ]
         .concat(),
     );
-    let (_, _, bytes) = read_png(&place.path("out.sample_count.png"));
+    let (_, _, bytes) = read_png(&folder.path("out.sample_count.png"));
     for (pixel, count) in bytes.chunks(3).zip(&counts) {
         let grey = (255.0 * f64::from(*count).ln() / 128f64.ln()).round() as i32;
         assert!(
@@ -213,7 +213,7 @@ fn path_scene(settings: &str) -> String {
 #[test]
 fn path_layers_equal_the_layers_of_the_film() {
     const NAMES: [&str; 5] = ["emission", "direct", "indirect", "albedo", "shading_normal"];
-    let place = TestFolder::new();
+    let folder = TestFolder::new();
     let inner = Region {
         x0: 1,
         y0: 1,
@@ -222,7 +222,7 @@ fn path_layers_equal_the_layers_of_the_film() {
     };
     for (alpha, region) in [(false, Region::whole(10, 6)), (true, inner)] {
         let text = path_scene(if alpha { "alpha = true" } else { "" });
-        place.write("path.toml", &text);
+        folder.write("path.toml", &text);
         let scene = parse(&text).with_layers();
         let film = film(&mut Cpu::new(&scene), &scene, region, &WorkSplit::default());
         let hits = job::first_hits(&mut Cpu::new(&scene), region).unwrap();
@@ -232,8 +232,8 @@ fn path_layers_equal_the_layers_of_the_film() {
             }
             let (names, region) = ([&NAMES[..], &["depth"]].concat().join(","), region.to_string());
             let options = ["-o", "out.exr", "--aov", &names, "--crop", &region, "--device", device];
-            place.quietly(&[&["render", "path.toml"], &options[..]].concat());
-            let image = exr::prelude::read_first_flat_layer_from_file(place.path("out.exr")).unwrap();
+            folder.run_quietly(&[&["render", "path.toml"], &options[..]].concat());
+            let image = exr::prelude::read_first_flat_layer_from_file(folder.path("out.exr")).unwrap();
             let channels = &image.layer_data.channel_data.list;
             assert_eq!(channels.len(), if alpha { 20 } else { 19 });
             let mut seen = Vec::new();
@@ -243,21 +243,23 @@ fn path_layers_equal_the_layers_of_the_film() {
                 };
                 let name = channel.name.to_string();
                 let (layer, part) = name.split_once('.').unwrap_or(("", &name));
-                let i = ["R", "G", "B", "X", "Y", "Z"].iter().position(|known| *known == part);
-                let of = NAMES.iter().position(|known| *known == layer);
+                let channel_index = ["R", "G", "B", "X", "Y", "Z"].iter().position(|name| *name == part);
+                let layer_index = NAMES.iter().position(|name| *name == layer);
                 let expected: Vec<f32> = (0..film.sums.len())
-                    .map(|pixel| match (name.as_str(), of, i) {
+                    .map(|pixel| match (name.as_str(), layer_index, channel_index) {
                         ("A", ..) => film.layers[0][pixel].w / film.sums[pixel].w,
                         ("depth.Z", ..) => hits[pixel].depth,
-                        (_, Some(of), Some(i)) => film.layers[of][pixel][i % 3] / film.sums[pixel].w,
-                        (_, None, Some(i)) => film.sums[pixel][i] / film.sums[pixel].w,
+                        (_, Some(layer_index), Some(channel_index)) => {
+                            film.layers[layer_index][pixel][channel_index % 3] / film.sums[pixel].w
+                        }
+                        (_, None, Some(channel_index)) => film.sums[pixel][channel_index] / film.sums[pixel].w,
                         _ => panic!("{name}: unexpected layer"),
                     })
                     .collect();
                 assert_eq!(found.to_vec(), expected, "{name}, {device}");
                 assert!(
                     !seen.contains(&expected),
-                    "{name} equals another channel: the comparison cannot fail"
+                    "{name} equals another channel, so the comparison cannot fail"
                 );
                 seen.push(expected);
             }
@@ -267,23 +269,23 @@ fn path_layers_equal_the_layers_of_the_film() {
 
 #[test]
 fn path_layers_are_rejected_with_the_phong_integrator() {
-    let place = TestFolder::new();
+    let folder = TestFolder::new();
     for name in ["albedo", "direct", "indirect", "emission"] {
         let names = format!("depth,{name}");
-        let ran = place.run(&["render", "small.toml", "-o", "out.exr", "--aov", &names]);
+        let result = folder.run(&["render", "small.toml", "-o", "out.exr", "--aov", &names]);
         let message = format!("error: --aov {name}: needs integrator = \"path\" (--integrator path)\n");
-        assert_eq!((ran.code, ran.stderr), (2, message));
+        assert_eq!((result.code, result.stderr), (2, message));
     }
-    assert_eq!(place.files(), [""; 0]);
-    place.quietly(&["render", "small.toml", "-o", "out.exr", "--aov", "shading_normal"]);
+    assert_eq!(folder.files(), [""; 0]);
+    folder.run_quietly(&["render", "small.toml", "-o", "out.exr", "--aov", "shading_normal"]);
 }
 
 #[test]
 fn path_layers_are_files_beside_a_png() {
-    let place = TestFolder::new();
+    let folder = TestFolder::new();
     let text = path_scene("alpha = true");
-    place.write("path.toml", &text);
-    place.quietly(&[
+    folder.write("path.toml", &text);
+    folder.run_quietly(&[
         "render",
         "path.toml",
         "-o",
@@ -302,28 +304,28 @@ fn path_layers_are_files_beside_a_png() {
             .flat_map(|(light, sum)| [0, 1, 2].map(|i| encode(light[i] / sum.w)))
             .collect();
         assert_eq!(
-            read_png(&place.path(&format!("out.{name}.png"))),
+            read_png(&folder.path(&format!("out.{name}.png"))),
             (10, 6, expected),
             "{name}"
         );
     }
     // Normals are mapped to colors before averaging; samples that hit nothing are black.
-    let (_, _, normals) = read_png(&place.path("out.shading_normal.png"));
+    let (_, _, normals) = read_png(&folder.path("out.shading_normal.png"));
     for (i, found) in normals.chunks(3).enumerate() {
-        let (sum, share) = (film.layers[4][i] / film.sums[i].w, film.alpha(i));
+        let (normal, alpha) = (film.layers[4][i] / film.sums[i].w, film.alpha(i));
         for (part, found) in found.iter().enumerate() {
-            let expected = (sum[part] * 0.5 + share * 0.5) * 255.0;
+            let expected = (normal[part] * 0.5 + alpha * 0.5) * 255.0;
             assert!(
                 (f32::from(*found) - expected).abs() <= 0.51,
                 "pixel {i}: {found} for {expected}"
             );
         }
     }
-    let picture = image::open(place.path("out.png")).unwrap();
+    let picture = image::open(folder.path("out.png")).unwrap();
     let image::DynamicImage::ImageRgba8(picture) = picture else {
         panic!("no alpha");
     };
-    let (mut none, mut some, mut all) = (0, 0, 0);
+    let (mut transparent, mut partial, mut opaque) = (0, 0, 0);
     for (i, (pixel, sum)) in picture.pixels().zip(&film.sums).enumerate() {
         let (mean, alpha) = (sum.truncate() / sum.w, film.alpha(i));
         let color = |value: f32| if alpha == 0.0 { 0 } else { encode(value / alpha) };
@@ -334,19 +336,22 @@ fn path_layers_are_files_beside_a_png() {
             "pixel {i}"
         );
         match alpha {
-            0.0 => none += 1,
-            1.0 => all += 1,
+            0.0 => transparent += 1,
+            1.0 => opaque += 1,
             // Colors must not be premultiplied.
-            _ => some += usize::from(pixel.0[..3] != [mean.x, mean.y, mean.z].map(encode)),
+            _ => partial += usize::from(pixel.0[..3] != [mean.x, mean.y, mean.z].map(encode)),
         }
     }
-    assert!(none > 5 && some > 3 && all > 5, "{none}, {some}, {all}");
+    assert!(
+        transparent > 5 && partial > 3 && opaque > 5,
+        "{transparent}, {partial}, {opaque}"
+    );
 }
 
 #[test]
 fn aovs_are_files_beside_a_png() {
-    let place = TestFolder::new();
-    place.quietly(&[
+    let folder = TestFolder::new();
+    folder.run_quietly(&[
         "render",
         "small.toml",
         "-o",
@@ -363,20 +368,20 @@ fn aovs_are_files_beside_a_png() {
         "a.b.primitive.png",
         "a.b.uv.png",
     ];
-    assert_eq!(place.files(), names);
+    assert_eq!(folder.files(), names);
     let pixel = |name: &str, x: usize, y: usize| {
-        let (width, height, bytes) = read_png(&place.path(name));
+        let (width, height, bytes) = read_png(&folder.path(name));
         assert_eq!((width, height), (10, 6));
-        let at = 3 * (10 * y + x);
-        [bytes[at], bytes[at + 1], bytes[at + 2]]
+        let offset = 3 * (10 * y + x);
+        [bytes[offset], bytes[offset + 1], bytes[offset + 2]]
     };
     // the sphere in the middle, the floor below, the background above
-    let [facing, ground, sky] = [(5, 3), (0, 5), (0, 0)].map(|(x, y)| pixel("a.b.normal.png", x, y));
-    assert!(facing[1] < 20 && facing[0] > 128, "{facing:?}");
+    let [sphere, ground, sky] = [(5, 3), (0, 5), (0, 0)].map(|(x, y)| pixel("a.b.normal.png", x, y));
+    assert!(sphere[1] < 20 && sphere[0] > 128, "{sphere:?}");
     assert_eq!((ground, sky), ([128, 128, 255], [0, 0, 0]));
-    let [near, far, nothing] = [(5, 3), (0, 4), (0, 0)].map(|(x, y)| pixel("a.b.depth.png", x, y));
+    let [near, far, background] = [(5, 3), (0, 4), (0, 0)].map(|(x, y)| pixel("a.b.depth.png", x, y));
     assert_eq!(
-        (near, nothing),
+        (near, background),
         ([128; 3], [0; 3]),
         "the sphere in the center is not at half brightness"
     );
@@ -396,10 +401,10 @@ fn aovs_are_files_beside_a_png() {
 
 #[test]
 fn stats_have_the_documented_fields() {
-    let place = TestFolder::new();
+    let folder = TestFolder::new();
     let arguments = ["--stats", "stats.json", "--crop", "0,0,5,4", "--light-samples", "9"];
-    place.quietly(&[&["render", "small.toml", "-o", "out.png"], &arguments[..]].concat());
-    let stats: serde_json::Value = serde_json::from_slice(&place.read("stats.json")).unwrap();
+    folder.run_quietly(&[&["render", "small.toml", "-o", "out.png"], &arguments[..]].concat());
+    let stats: serde_json::Value = serde_json::from_slice(&folder.read("stats.json")).unwrap();
     let fields = stats.as_object().unwrap();
     let mut names: Vec<&str> = fields.keys().map(String::as_str).collect();
     let mut expected = [
@@ -454,14 +459,14 @@ fn stats_have_the_documented_fields() {
     }
 }
 
-/// Applies if the driver truncates loops and one sample exceeds the limit. A message reports the use of the CPU.
+/// If the driver truncates loops and one sample exceeds the limit, the CPU renders the image and a warning is printed.
 #[test]
 fn a_sample_too_long_for_the_driver_is_rendered_on_the_cpu() {
     if crate::adapter::device().is_none() {
         return;
     }
-    let place = TestFolder::new();
-    let long = [
+    let folder = TestFolder::new();
+    let options = [
         "render",
         "small.toml",
         "--size",
@@ -472,7 +477,7 @@ fn a_sample_too_long_for_the_driver_is_rendered_on_the_cpu() {
         "65536",
     ];
     let render = |device: &str, out: &str| {
-        let more = [
+        let extra = [
             "--device",
             device,
             "--reproducible",
@@ -485,20 +490,20 @@ fn a_sample_too_long_for_the_driver_is_rendered_on_the_cpu() {
             "--progress",
             "none",
         ];
-        place.run(&[&long[..], &more[..]].concat())
+        folder.run(&[&options[..], &extra[..]].concat())
     };
-    let ran = render("gpu", "gpu.exr");
-    assert_eq!((ran.code, ran.stdout.as_str()), (0, ""), "{}", ran.stderr);
-    let stats: serde_json::Value = serde_json::from_slice(&place.read("s.json")).expect("JSON");
+    let result = render("gpu", "gpu.exr");
+    assert_eq!((result.code, result.stdout.as_str()), (0, ""), "{}", result.stderr);
+    let stats: serde_json::Value = serde_json::from_slice(&folder.read("s.json")).expect("JSON");
     if stats["device"] == "cpu" {
-        let line = ran.stderr.trim_end();
+        let line = result.stderr.trim_end();
         assert!(line.starts_with("warning: rendering on the CPU: "), "{line}");
         assert!(line.contains("ends long loops early") && !line.contains('\n'), "{line}");
     } else {
-        assert_eq!(ran.stderr, "");
+        assert_eq!(result.stderr, "");
     }
     assert_eq!(render("cpu", "cpu.exr").code, 0);
     if crate::adapter::device().is_some_and(crate::adapter::bit_exact) {
-        assert!(place.read("gpu.exr") == place.read("cpu.exr"));
+        assert!(folder.read("gpu.exr") == folder.read("cpu.exr"));
     }
 }

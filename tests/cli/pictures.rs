@@ -7,11 +7,11 @@ use exr::prelude::{FlatSamples, f16};
 use wgray::image::{read_exr, to_8_bits, to_16_bits};
 use wgray::scene::{ViewSettings, ViewTransform};
 
-use super::outputs::refused;
+use super::outputs::assert_rejected;
 use super::{SCENE, TestFolder, read_png};
 
-fn render(place: &TestFolder, arguments: &[&str]) {
-    place.quietly(&[&["render", "small.toml", "--device", "cpu"], arguments].concat());
+fn render(folder: &TestFolder, arguments: &[&str]) {
+    folder.run_quietly(&[&["render", "small.toml", "--device", "cpu"], arguments].concat());
 }
 
 fn png_info(path: &Path) -> png::Info<'static> {
@@ -52,11 +52,11 @@ fn path_scene() -> String {
 #[test]
 fn one_render_writes_several_images() {
     const NAMES: [&str; 6] = ["a.png", "a.exr", "a.jpg", "a.jpeg", "a.webp", "b.PNG"];
-    let place = TestFolder::new();
+    let folder = TestFolder::new();
     let aovs = ["--aov", "depth,primitive"];
     let outputs = NAMES.map(|name| ["-o", name]).concat();
-    render(&place, &[&outputs[..], &aovs].concat());
-    let all = place.files();
+    render(&folder, &[&outputs[..], &aovs].concat());
+    let all = folder.files();
     assert_eq!(
         all,
         [
@@ -72,40 +72,43 @@ fn one_render_writes_several_images() {
             "b.primitive.png"
         ]
     );
-    let together: Vec<Vec<u8>> = all.iter().map(|name| place.read(name)).collect();
+    let from_one_render: Vec<Vec<u8>> = all.iter().map(|name| folder.read(name)).collect();
     for name in NAMES {
         match name {
-            "a.jpg" | "a.jpeg" | "a.webp" => render(&place, &["-o", name]),
-            _ => render(&place, &[&["-o", name], &aovs[..]].concat()),
+            "a.jpg" | "a.jpeg" | "a.webp" => render(&folder, &["-o", name]),
+            _ => render(&folder, &[&["-o", name], &aovs[..]].concat()),
         }
     }
-    assert_eq!(place.files(), all);
-    for (name, together) in all.iter().zip(together) {
-        assert!(place.read(name) == together, "{name} differs if it is the only output");
+    assert_eq!(folder.files(), all);
+    for (name, expected) in all.iter().zip(from_one_render) {
+        assert!(
+            folder.read(name) == expected,
+            "{name} differs if written as the only output"
+        );
     }
-    assert_ne!(place.read("a.png"), place.read("a.depth.png"));
+    assert_ne!(folder.read("a.png"), folder.read("a.depth.png"));
 }
 
 #[test]
 fn transparency_in_a_format_without_alpha_is_reported() {
-    let place = TestFolder::new();
-    place.write("clear.toml", &path_scene());
+    let folder = TestFolder::new();
+    folder.write("clear.toml", &path_scene());
     for (name, is_noted) in [("a.jpg", true), ("a.png", false)] {
-        let ran = place.run(&["render", "clear.toml", "--device", "cpu", "-o", name]);
+        let result = folder.run(&["render", "clear.toml", "--device", "cpu", "-o", name]);
         let note = "a.jpg: JPEG has no alpha; the transparent background is black";
         assert_eq!(
-            (ran.code, ran.stderr.contains(note)),
+            (result.code, result.stderr.contains(note)),
             (0, is_noted),
             "{name}: {}",
-            ran.stderr
+            result.stderr
         );
     }
 }
 
 #[test]
 fn a_failed_output_leaves_no_incomplete_files() {
-    let place = TestFolder::new();
-    let ran = place.run(&[
+    let folder = TestFolder::new();
+    let result = folder.run(&[
         "render",
         "small.toml",
         "--device",
@@ -119,22 +122,26 @@ fn a_failed_output_leaves_no_incomplete_files() {
         "-o",
         "b.png",
     ]);
-    assert_ne!(ran.code, 0);
-    assert!(ran.stderr.contains("/dev/full: cannot be written"), "{}", ran.stderr);
-    // Outputs are renamed one after the other: complete files from before the failure may exist, later files must not.
-    assert!(!place.files().contains(&"b.png".to_owned()), "{:?}", place.files());
+    assert_ne!(result.code, 0);
     assert!(
-        place.files().iter().all(|name| !name.starts_with('.')),
+        result.stderr.contains("/dev/full: cannot be written"),
+        "{}",
+        result.stderr
+    );
+    // Outputs are renamed one after the other: complete files from before the failure may exist, later files must not.
+    assert!(!folder.files().contains(&"b.png".to_owned()), "{:?}", folder.files());
+    assert!(
+        folder.files().iter().all(|name| !name.starts_with('.')),
         "{:?}",
-        place.files()
+        folder.files()
     );
 }
 
 #[test]
 fn pngs_have_8_or_16_bits_and_name_their_curve() {
-    let place = TestFolder::new();
-    render(&place, &["-o", "a.exr"]);
-    let linear = read_exr(&place.path("a.exr")).unwrap().colors;
+    let folder = TestFolder::new();
+    render(&folder, &["-o", "a.exr"]);
+    let linear = read_exr(&folder.path("a.exr")).unwrap().colors;
     for transform in ViewTransform::ALL {
         let settings = ViewSettings {
             transform,
@@ -145,14 +152,14 @@ fn pngs_have_8_or_16_bits_and_name_their_curve() {
             linear.iter().flat_map(|color| settings.display(*color)),
         );
         let options = ["--view-transform", name, "--exposure", "-0.5"];
-        render(&place, &[&["-o", "a.png"], &options[..]].concat());
+        render(&folder, &[&["-o", "a.png"], &options[..]].concat());
         render(
-            &place,
+            &folder,
             &[&["-o", "b.png", "--bit-depth", "16", "--aov", "normal"], &options[..]].concat(),
         );
         let expected: Vec<u8> = shown.clone().map(to_8_bits).collect();
-        assert_eq!(read_png(&place.path("a.png")).2, expected, "{name}");
-        let image::DynamicImage::ImageRgb16(deep) = image::open(place.path("b.png")).unwrap() else {
+        assert_eq!(read_png(&folder.path("a.png")).2, expected, "{name}");
+        let image::DynamicImage::ImageRgb16(deep) = image::open(folder.path("b.png")).unwrap() else {
             panic!("not 16 bits");
         };
         let expected: Vec<u16> = shown.map(to_16_bits).collect();
@@ -161,8 +168,8 @@ fn pngs_have_8_or_16_bits_and_name_their_curve() {
             expected.iter().any(|value| value % 257 != 0),
             "all values fit in 8 bits"
         );
-        assert_eq!(png_info(&place.path("b.normal.png")).bit_depth, png::BitDepth::Sixteen);
-        let info = png_info(&place.path("a.png"));
+        assert_eq!(png_info(&folder.path("b.normal.png")).bit_depth, png::BitDepth::Sixteen);
+        let info = png_info(&folder.path("a.png"));
         let (srgb, gamma) = (info.srgb.is_some(), info.gama_chunk.map(|gamma| gamma.into_scaled()));
         match transform {
             ViewTransform::Gamma22 => assert_eq!((srgb, gamma), (false, Some(45_454))),
@@ -173,47 +180,47 @@ fn pngs_have_8_or_16_bits_and_name_their_curve() {
 
 #[test]
 fn options_override_the_view_of_the_scene() {
-    let place = TestFolder::new();
+    let folder = TestFolder::new();
     let keys = "view_transform = 'khronos-pbr-neutral', exposure = 1.5";
-    place.write(
+    folder.write(
         "shown.toml",
         &SCENE.replacen("height = 6", &format!("height = 6, {keys}"), 1),
     );
     let shown = |options: &[&str]| {
-        place.quietly(&[&["render", "shown.toml", "--device", "cpu", "-o", "s.png"], options].concat());
-        read_png(&place.path("s.png"))
+        folder.run_quietly(&[&["render", "shown.toml", "--device", "cpu", "-o", "s.png"], options].concat());
+        read_png(&folder.path("s.png"))
     };
     let plain = |options: &[&str]| {
-        render(&place, &[&["-o", "p.png"], options].concat());
-        read_png(&place.path("p.png"))
+        render(&folder, &[&["-o", "p.png"], options].concat());
+        read_png(&folder.path("p.png"))
     };
-    let of_scene = shown(&[]);
+    let with_scene_view = shown(&[]);
     assert_eq!(
-        of_scene,
+        with_scene_view,
         plain(&["--view-transform", "khronos-pbr-neutral", "--exposure", "1.5"])
     );
-    assert_ne!(of_scene, plain(&["--view-transform", "khronos-pbr-neutral"]));
-    assert_ne!(of_scene, plain(&["--exposure", "1.5"]));
+    assert_ne!(with_scene_view, plain(&["--view-transform", "khronos-pbr-neutral"]));
+    assert_ne!(with_scene_view, plain(&["--exposure", "1.5"]));
     assert_eq!(shown(&["--view-transform", "gamma22", "--exposure", "0"]), plain(&[]));
     assert_eq!(
         shown(&["--exposure", "-2"]),
         plain(&["--view-transform", "khronos-pbr-neutral", "--exposure", "-2"])
     );
     // An EXR is linear, whatever the view settings. The library writes the same images.
-    place.quietly(&["render", "shown.toml", "--device", "cpu", "-o", "s.exr"]);
-    render(&place, &["-o", "p.exr"]);
-    assert_eq!(place.read("s.exr"), place.read("p.exr"));
-    let scene = wgray::Scene::load(place.path("shown.toml")).unwrap();
+    folder.run_quietly(&["render", "shown.toml", "--device", "cpu", "-o", "s.exr"]);
+    render(&folder, &["-o", "p.exr"]);
+    assert_eq!(folder.read("s.exr"), folder.read("p.exr"));
+    let scene = wgray::Scene::load(folder.path("shown.toml")).unwrap();
     let options = wgray::Options {
         device: wgray::Device::Cpu,
         ..Default::default()
     };
     let picture = wgray::render(&scene, &options).unwrap();
-    assert_eq!(picture.rgb8(), of_scene.2);
-    picture.save(place.path("l.webp")).unwrap();
+    assert_eq!(picture.rgb8(), with_scene_view.2);
+    picture.save(folder.path("l.webp")).unwrap();
     assert_eq!(
-        image::open(place.path("l.webp")).unwrap().into_rgb8().into_raw(),
-        of_scene.2
+        image::open(folder.path("l.webp")).unwrap().into_rgb8().into_raw(),
+        with_scene_view.2
     );
     for (keys, message) in [
         ("exposure = 101", "image.exposure: 101 must be from -100 to 100 stops"),
@@ -221,22 +228,22 @@ fn options_override_the_view_of_the_scene() {
         ("view_transform = 'filmic'", "image.view_transform: "),
         ("view = 'srgb'", "view"),
     ] {
-        place.write(
+        folder.write(
             "bad.toml",
             &SCENE.replacen("height = 6", &format!("height = 6, {keys}"), 1),
         );
-        let ran = place.run(&["check", "bad.toml"]);
-        assert_eq!(ran.code, 3, "{keys}: {}", ran.stderr);
-        assert!(ran.stderr.contains(message), "{keys}: {}", ran.stderr);
+        let result = folder.run(&["check", "bad.toml"]);
+        assert_eq!(result.code, 3, "{keys}: {}", result.stderr);
+        assert!(result.stderr.contains(message), "{keys}: {}", result.stderr);
     }
 }
 
 #[test]
 fn exr_compression_is_lossless() {
-    let place = TestFolder::new();
+    let folder = TestFolder::new();
     let aovs = ["--aov", "depth,primitive", "--size", "75x70"];
-    render(&place, &[&["-o", "zip.exr"], &aovs[..]].concat());
-    let floats = samples(&place.path("zip.exr"));
+    render(&folder, &[&["-o", "zip.exr"], &aovs[..]].concat());
+    let floats = samples(&folder.path("zip.exr"));
     let halves: BTreeMap<String, Vec<u32>> = (floats.iter())
         .map(|(name, bits)| match name.as_str() {
             "primitive.ID" => (name.clone(), bits.clone()),
@@ -250,15 +257,15 @@ fn exr_compression_is_lossless() {
     for method in ["none", "rle", "zips", "zip", "piz"] {
         for (numbers, expected) in [("float", &floats), ("half", &halves)] {
             let options = ["--exr-compression", method, "--exr-type", numbers];
-            render(&place, &[&["-o", "a.exr"], &aovs[..], &options].concat());
-            assert!(samples(&place.path("a.exr")) == *expected, "{method} {numbers}");
-            sizes.insert((method, numbers), place.read("a.exr").len());
+            render(&folder, &[&["-o", "a.exr"], &aovs[..], &options].concat());
+            assert!(samples(&folder.path("a.exr")) == *expected, "{method} {numbers}");
+            sizes.insert((method, numbers), folder.read("a.exr").len());
             // A crop that starts and ends inside a compression block.
             render(
-                &place,
+                &folder,
                 &[&["-o", "c.exr", "--crop", "3,5,70,62"], &aovs[..], &options].concat(),
             );
-            let part = samples(&place.path("c.exr"));
+            let part = samples(&folder.path("c.exr"));
             for (name, whole) in expected {
                 let rows = whole.chunks(75).skip(5).take(57);
                 let cut: Vec<u32> = rows.flat_map(|row| row[3..70].to_vec()).collect();
@@ -276,12 +283,12 @@ fn exr_compression_is_lossless() {
 
 #[test]
 fn half_float_overflows_are_counted() {
-    let place = TestFolder::new();
-    place.write(
+    let folder = TestFolder::new();
+    folder.write(
         "small.toml",
         &SCENE.replace("background = [0.2, 0.3, 2]", "background = [65504, 65519, 70000]"),
     );
-    let ran = place.run(&[
+    let result = folder.run(&[
         "render",
         "small.toml",
         "--device",
@@ -291,18 +298,18 @@ fn half_float_overflows_are_counted() {
         "--exr-type",
         "half",
     ]);
-    assert_eq!(ran.code, 0, "{}", ran.stderr);
-    let found = samples(&place.path("h.exr"));
+    assert_eq!(result.code, 0, "{}", result.stderr);
+    let found = samples(&folder.path("h.exr"));
     let infinite = |name: &str| found[name].iter().filter(|bits| **bits == 0x7c00).count();
-    let of_blue = infinite("B");
-    assert!(of_blue > 5, "{of_blue}");
+    let infinite_blue = infinite("B");
+    assert!(infinite_blue > 5, "{infinite_blue}");
     // Values up to 65520, halfway to the next step, round to 65504.
     assert_eq!((infinite("R"), infinite("G")), (0, 0));
     let warning = format!(
-        "warning: h.exr: {of_blue} values exceed 65504, the maximum of 16 bits, and were written as infinity; use --exr-type float\n"
+        "warning: h.exr: {infinite_blue} values exceed 65504, the maximum of 16 bits, and were written as infinity; use --exr-type float\n"
     );
-    assert_eq!(ran.stderr, warning);
-    place.quietly(&[
+    assert_eq!(result.stderr, warning);
+    folder.run_quietly(&[
         "render",
         "small.toml",
         "--device",
@@ -313,25 +320,25 @@ fn half_float_overflows_are_counted() {
         "half",
         "-q",
     ]);
-    place.quietly(&["render", "small.toml", "--device", "cpu", "-o", "f.exr"]);
+    folder.run_quietly(&["render", "small.toml", "--device", "cpu", "-o", "f.exr"]);
 }
 
 #[test]
 fn jpeg_and_webp_match_the_png() {
-    let place = TestFolder::new();
+    let folder = TestFolder::new();
     let size = ["--size", "160x96"];
     render(
-        &place,
+        &folder,
         &[&["-o", "a.png", "-o", "a.webp", "-o", "a.jpg"], &size[..]].concat(),
     );
-    render(&place, &[&["-o", "b.jpg", "--quality", "20"], &size[..]].concat());
-    let (_, _, exact) = read_png(&place.path("a.png"));
-    let image::DynamicImage::ImageRgb8(webp) = image::open(place.path("a.webp")).unwrap() else {
+    render(&folder, &[&["-o", "b.jpg", "--quality", "20"], &size[..]].concat());
+    let (_, _, exact) = read_png(&folder.path("a.png"));
+    let image::DynamicImage::ImageRgb8(webp) = image::open(folder.path("a.webp")).unwrap() else {
         panic!("no RGB");
     };
     assert_eq!(webp.into_raw(), exact, "WebP is not lossless");
     let error = |name: &str| {
-        let found = image::open(place.path(name)).unwrap().into_rgb8().into_raw();
+        let found = image::open(folder.path(name)).unwrap().into_rgb8().into_raw();
         let squares = found
             .iter()
             .zip(&exact)
@@ -341,15 +348,15 @@ fn jpeg_and_webp_match_the_png() {
     let (fine, coarse) = (error("a.jpg"), error("b.jpg"));
     assert!(fine > 0.0 && fine < 6.0, "{fine}");
     assert!(coarse > fine, "{coarse}, {fine}");
-    assert!(place.read("b.jpg").len() < place.read("a.jpg").len());
+    assert!(folder.read("b.jpg").len() < folder.read("a.jpg").len());
 }
 
 #[test]
 fn alpha_is_in_a_webp_and_black_in_a_jpeg() {
-    let place = TestFolder::new();
-    place.write("small.toml", &path_scene());
+    let folder = TestFolder::new();
+    folder.write("small.toml", &path_scene());
     render(
-        &place,
+        &folder,
         &[
             "-o",
             "a.png",
@@ -364,21 +371,21 @@ fn alpha_is_in_a_webp_and_black_in_a_jpeg() {
             "-q",
         ],
     );
-    let image::DynamicImage::ImageRgba8(png) = image::open(place.path("a.png")).unwrap() else {
+    let image::DynamicImage::ImageRgba8(png) = image::open(folder.path("a.png")).unwrap() else {
         panic!("no alpha in a PNG");
     };
-    let image::DynamicImage::ImageRgba8(webp) = image::open(place.path("a.webp")).unwrap() else {
+    let image::DynamicImage::ImageRgba8(webp) = image::open(folder.path("a.webp")).unwrap() else {
         panic!("no alpha in a WebP");
     };
-    let clear = png.pixels().filter(|pixel| pixel.0[3] == 0).count();
-    let part = png.pixels().filter(|pixel| !matches!(pixel.0[3], 0 | 255)).count();
-    assert!(clear > 5 && part > 3, "{clear}, {part}");
+    let transparent = png.pixels().filter(|pixel| pixel.0[3] == 0).count();
+    let partial = png.pixels().filter(|pixel| !matches!(pixel.0[3], 0 | 255)).count();
+    assert!(transparent > 5 && partial > 3, "{transparent}, {partial}");
     for (a, b) in png.pixels().zip(webp.pixels()) {
         // The color of transparent pixels is undefined.
         assert!(a == b || (a.0[3], b.0[3]) == (0, 0), "{a:?} {b:?}");
     }
-    let jpeg = image::open(place.path("a.jpg")).unwrap().into_rgb8();
-    let over_black = read_exr(&place.path("a.exr")).unwrap().colors;
+    let jpeg = image::open(folder.path("a.jpg")).unwrap().into_rgb8();
+    let over_black = read_exr(&folder.path("a.exr")).unwrap().colors;
     for (found, color) in jpeg.pixels().zip(over_black) {
         let expected = ViewSettings::default().rgb8(color);
         let difference = found.0.iter().zip(expected).map(|(a, b)| a.abs_diff(b)).max();
@@ -389,8 +396,8 @@ fn alpha_is_in_a_webp_and_black_in_a_jpeg() {
 /// Albedo is only sRGB-encoded, and other layers are not transformed.
 #[test]
 fn radiance_layers_use_the_view_of_the_image() {
-    let place = TestFolder::new();
-    place.write("small.toml", &path_scene());
+    let folder = TestFolder::new();
+    folder.write("small.toml", &path_scene());
     let names = ["albedo", "direct", "indirect", "emission"];
     let options = [
         "--view-transform",
@@ -400,15 +407,15 @@ fn radiance_layers_use_the_view_of_the_image() {
         "--aov",
         "normal,albedo,direct,indirect,emission",
     ];
-    render(&place, &[&["-o", "a.png", "-o", "a.exr"], &options[..]].concat());
-    let numbers = samples(&place.path("a.exr"));
+    render(&folder, &[&["-o", "a.png", "-o", "a.exr"], &options[..]].concat());
+    let numbers = samples(&folder.path("a.exr"));
     let settings = ViewSettings {
         transform: ViewTransform::Agx,
         exposure: 2.0,
     };
     let mut differing = 0;
     for name in names {
-        let (_, _, shown) = read_png(&place.path(&format!("a.{name}.png")));
+        let (_, _, shown) = read_png(&folder.path(&format!("a.{name}.png")));
         for (i, found) in shown.chunks(3).enumerate() {
             let color = ["R", "G", "B"].map(|part| f32::from_bits(numbers[&format!("{name}.{part}")][i]));
             let light = settings.rgb8(color);
@@ -418,11 +425,11 @@ fn radiance_layers_use_the_view_of_the_image() {
         }
     }
     assert!(differing > 30, "{differing}");
-    let (_, _, bent) = read_png(&place.path("a.normal.png"));
-    render(&place, &["-o", "b.png", "--aov", "normal"]);
-    assert_eq!(read_png(&place.path("b.normal.png")).2, bent);
-    render(&place, &["-o", "c.png", "--bit-depth", "16"]);
-    let image::DynamicImage::ImageRgba16(deep) = image::open(place.path("c.png")).unwrap() else {
+    let (_, _, normals) = read_png(&folder.path("a.normal.png"));
+    render(&folder, &["-o", "b.png", "--aov", "normal"]);
+    assert_eq!(read_png(&folder.path("b.normal.png")).2, normals);
+    render(&folder, &["-o", "c.png", "--bit-depth", "16"]);
+    let image::DynamicImage::ImageRgba16(deep) = image::open(folder.path("c.png")).unwrap() else {
         panic!("not 16 bits with alpha");
     };
     for (pixel, alpha) in deep.pixels().zip(&numbers["A"]) {
@@ -432,9 +439,9 @@ fn radiance_layers_use_the_view_of_the_image() {
 
 #[test]
 fn images_have_metadata() {
-    let place = TestFolder::new();
+    let folder = TestFolder::new();
     render(
-        &place,
+        &folder,
         &[
             "-o",
             "a.png",
@@ -450,9 +457,9 @@ fn images_have_metadata() {
             "agx",
         ],
     );
-    let png = texts(&place.path("a.png"));
+    let png = texts(&folder.path("a.png"));
     assert_eq!(png["Software"], concat!("wgray ", env!("CARGO_PKG_VERSION")));
-    let known: Vec<(&str, &str)> = [
+    let expected: Vec<(&str, &str)> = [
         ("seed", "7"),
         ("integrator", "phong"),
         ("pixel_samples", "3 random"),
@@ -461,18 +468,18 @@ fn images_have_metadata() {
         ("exposure", "0"),
     ]
     .into();
-    for (name, text) in &known {
+    for (name, text) in &expected {
         assert_eq!(png[*name], *text, "{name}");
     }
     assert_eq!((png["shader_hash"].len(), png["scene_hash"].len()), (64, 64));
-    place.write("other.toml", &SCENE.replacen("0.8", "0.7", 1));
-    place.quietly(&["render", "other.toml", "--device", "cpu", "-o", "b.png", "--seed", "7"]);
-    let other = texts(&place.path("b.png"));
+    folder.write("other.toml", &SCENE.replacen("0.8", "0.7", 1));
+    folder.run_quietly(&["render", "other.toml", "--device", "cpu", "-o", "b.png", "--seed", "7"]);
+    let other = texts(&folder.path("b.png"));
     assert_ne!(other["scene_hash"], png["scene_hash"]);
     assert_eq!(other["shader_hash"], png["shader_hash"]);
     let shown = |name: &str| {
         let data = exif::Reader::new()
-            .read_from_container(&mut std::io::Cursor::new(place.read(name)))
+            .read_from_container(&mut std::io::Cursor::new(folder.read(name)))
             .unwrap();
         let text = |tag| match &data.get_field(tag, exif::In::PRIMARY).unwrap().value {
             exif::Value::Ascii(texts) => String::from_utf8(texts[0].clone()).unwrap(),
@@ -480,26 +487,26 @@ fn images_have_metadata() {
         };
         (text(exif::Tag::Software), text(exif::Tag::ImageDescription))
     };
-    let meta = exr::meta::MetaData::read_from_file(place.path("a.exr"), true).unwrap();
-    let own = &meta.headers[0].own_attributes;
+    let meta = exr::meta::MetaData::read_from_file(folder.path("a.exr"), true).unwrap();
+    let attributes = &meta.headers[0].own_attributes;
     let text = |text: &Option<exr::meta::attribute::Text>| text.as_ref().unwrap().to_string();
     for (name, (software, lines)) in [
         ("a.jpg", shown("a.jpg")),
         ("a.webp", shown("a.webp")),
-        ("a.exr", (text(&own.software_name), text(&own.comments))),
+        ("a.exr", (text(&attributes.software_name), text(&attributes.comments))),
     ] {
         assert_eq!(software, png["Software"], "{name}");
         for (key, value) in &png {
             let is_listed = lines.lines().any(|line| line == format!("{key}: {value}"));
-            let of_display = ["view_transform", "exposure"].contains(&key.as_str()) && name == "a.exr";
-            assert_eq!(is_listed, key != "Software" && !of_display, "{name}: {key}");
+            let depends_on_display = ["view_transform", "exposure"].contains(&key.as_str()) && name == "a.exr";
+            assert_eq!(is_listed, key != "Software" && !depends_on_display, "{name}: {key}");
         }
     }
 }
 
 #[test]
 fn reproducible_images_do_not_depend_on_the_machine() {
-    let place = TestFolder::new();
+    let folder = TestFolder::new();
     let mut files: Vec<(String, Vec<u8>)> = Vec::new();
     const NAMES: [&str; 5] = ["a.png", "a.normal.png", "a.exr", "a.webp", "a.jpg"];
     for device in ["cpu", "gpu"] {
@@ -511,15 +518,15 @@ fn reproducible_images_do_not_depend_on_the_machine() {
                 "-o", "a.png", "-o", "a.exr", "-o", "a.webp", "-o", "a.jpg", "--aov", "normal", "--device", device,
             ];
             let option: &[&str] = if reproducible { &["--reproducible"] } else { &[] };
-            place.quietly(&[&["render", "small.toml"], &outputs[..], option].concat());
+            folder.run_quietly(&[&["render", "small.toml"], &outputs[..], option].concat());
             for name in NAMES {
-                let bytes = place.read(name);
-                let mut others = files.iter().filter(|(other, _)| other == name);
-                let same = others.any(|(_, other)| *other == bytes);
-                assert_eq!(same, reproducible && device == "gpu", "{name} {device}");
+                let bytes = folder.read(name);
+                let mut earlier = files.iter().filter(|(other, _)| other == name);
+                let is_repeated = earlier.any(|(_, other)| *other == bytes);
+                assert_eq!(is_repeated, reproducible && device == "gpu", "{name} {device}");
                 files.push((name.to_owned(), bytes));
             }
-            let metadata = texts(&place.path("a.png"));
+            let metadata = texts(&folder.path("a.png"));
             assert_eq!(metadata.contains_key("device"), !reproducible);
             assert!(metadata.contains_key("shader_hash") && metadata.contains_key("seed"));
         }
@@ -528,7 +535,7 @@ fn reproducible_images_do_not_depend_on_the_machine() {
 
 #[test]
 fn options_without_an_applicable_output_are_rejected() {
-    let place = TestFolder::new();
+    let folder = TestFolder::new();
     for (arguments, message) in [
         (
             &["-o", "a.exr", "--bit-depth", "16"][..],
@@ -572,7 +579,7 @@ fn options_without_an_applicable_output_are_rejected() {
         ),
         (&["--stats", "a.webp"], "--stats: a.webp: must not end in .webp"),
     ] {
-        refused(&place, &[&["small.toml"], arguments].concat(), 2, message);
+        assert_rejected(&folder, &[&["small.toml"], arguments].concat(), 2, message);
     }
     for (option, value, message) in [
         ("--quality", "0", "0"),
@@ -584,16 +591,16 @@ fn options_without_an_applicable_output_are_rejected() {
         ("--exr-compression", "dwaa", "none, rle, zips, zip, piz"),
         ("--view-transform", "filmic", "gamma22, srgb, agx, khronos-pbr-neutral"),
     ] {
-        let ran = place.run(&["render", "small.toml", "-o", "a.jpg", "-o", "a.exr", option, value]);
-        assert_eq!(ran.code, 2, "{option} {value}: {}", ran.stderr);
+        let result = folder.run(&["render", "small.toml", "-o", "a.jpg", "-o", "a.exr", option, value]);
+        assert_eq!(result.code, 2, "{option} {value}: {}", result.stderr);
         assert!(
-            ran.stderr.contains(option) && ran.stderr.contains(message),
+            result.stderr.contains(option) && result.stderr.contains(message),
             "{option} {value}: {}",
-            ran.stderr
+            result.stderr
         );
     }
     render(
-        &place,
+        &folder,
         &[
             "-o",
             "a.jpg",
@@ -607,14 +614,14 @@ fn options_without_an_applicable_output_are_rejected() {
             "-1.5",
         ],
     );
-    assert_eq!(place.files(), ["a.jpg", "b"]);
-    assert!(samples(&place.path("b")).contains_key("R"));
+    assert_eq!(folder.files(), ["a.jpg", "b"]);
+    assert!(samples(&folder.path("b")).contains_key("R"));
 }
 
 /// The error is reported before the render, which would take long.
 #[test]
 fn images_too_large_for_a_format_are_rejected() {
-    let place = TestFolder::new();
+    let folder = TestFolder::new();
     for (name, size, message) in [
         (
             "a.jpg",
@@ -627,8 +634,8 @@ fn images_too_large_for_a_format_are_rejected() {
             "--output: a.webp: 60000 x 16384 pixels are too many for a WebP; the limit is 16383 along a side",
         ),
     ] {
-        refused(
-            &place,
+        assert_rejected(
+            &folder,
             &["small.toml", "--size", size, "-o", "b.png", "-o", name],
             2,
             message,
@@ -643,9 +650,9 @@ fn images_too_large_for_a_format_are_rejected() {
         "--spp",
         "1",
     ];
-    render(&place, &[&crop[..], &["-o", "a.jpg", "-o", "a.webp"]].concat());
+    render(&folder, &[&crop[..], &["-o", "a.jpg", "-o", "a.webp"]].concat());
     render(
-        &place,
+        &folder,
         &[
             "--size",
             "65535x1",
@@ -658,7 +665,7 @@ fn images_too_large_for_a_format_are_rejected() {
         ],
     );
     render(
-        &place,
+        &folder,
         &[
             "--size",
             "1x16383",
@@ -670,6 +677,6 @@ fn images_too_large_for_a_format_are_rejected() {
             "high.webp",
         ],
     );
-    assert_eq!(image::image_dimensions(place.path("wide.jpg")).unwrap(), (65_535, 1));
-    assert_eq!(image::image_dimensions(place.path("high.webp")).unwrap(), (1, 16_383));
+    assert_eq!(image::image_dimensions(folder.path("wide.jpg")).unwrap(), (65_535, 1));
+    assert_eq!(image::image_dimensions(folder.path("high.webp")).unwrap(), (1, 16_383));
 }

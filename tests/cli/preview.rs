@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use wgray::image::read_metadata;
 
-use super::{Ran, TestFolder, heed_interrupts, program, project_scene};
+use super::{RunResult, TestFolder, program, project_scene, restore_signal_defaults};
 
 /// A render that takes minutes, with passes of a few hundredths of a second.
 const LONG: [&str; 8] = [
@@ -21,14 +21,14 @@ const LONG: [&str; 8] = [
     "1",
 ];
 
-fn start(place: &TestFolder, arguments: &[&str]) -> Child {
-    start_in_shell(place, "", arguments)
+fn start(folder: &TestFolder, arguments: &[&str]) -> Child {
+    start_in_shell(folder, "", arguments)
 }
 
-fn start_in_shell(place: &TestFolder, line: &str, arguments: &[&str]) -> Child {
-    heed_interrupts();
+fn start_in_shell(folder: &TestFolder, line: &str, arguments: &[&str]) -> Child {
+    restore_signal_defaults();
     Command::new("sh")
-        .current_dir(place.path("."))
+        .current_dir(folder.path("."))
         .args(["-c", &format!("{line} exec \"$0\" \"$@\"")])
         .arg(program())
         .args(LONG)
@@ -39,16 +39,16 @@ fn start_in_shell(place: &TestFolder, line: &str, arguments: &[&str]) -> Child {
         .expect("the program")
 }
 
-fn wait_until(what: &str, condition: impl Fn() -> bool) {
+fn wait_until(event: &str, condition: impl Fn() -> bool) {
     let start = Instant::now();
     while !condition() {
-        assert!(start.elapsed() < Duration::from_secs(60), "{what}");
+        assert!(start.elapsed() < Duration::from_secs(60), "{event}");
         std::thread::sleep(Duration::from_millis(5));
     }
 }
 
-fn wait_for(place: &TestFolder, file: &str) {
-    wait_until(file, || place.path(file).exists());
+fn wait_for(folder: &TestFolder, file: &str) {
+    wait_until(file, || folder.path(file).exists());
 }
 
 fn send(signal: &str, child: &Child) {
@@ -56,35 +56,35 @@ fn send(signal: &str, child: &Child) {
     assert!(sent.expect("kill").success());
 }
 
-fn ended(child: Child) -> Ran {
-    let output = child.wait_with_output().expect("an end");
+fn wait_for_end(child: Child) -> RunResult {
+    let output = child.wait_with_output().expect("an exit status");
     let stderr = String::from_utf8_lossy(&output.stderr);
-    Ran::new(output.status.code(), String::new(), &stderr, &[])
+    RunResult::new(output.status.code(), String::new(), &stderr, &[])
 }
 
 /// Returns the actual and the requested number of samples of a file that is marked as partial.
 fn partial(path: &Path) -> Option<(u32, u32)> {
     let metadata = read_metadata(path).expect("metadata");
     let text = metadata.get("partial")?.strip_suffix(" samples").expect("samples");
-    let (samples, of) = text.split_once(" of ").expect("two numbers");
-    Some((samples.parse().expect("a number"), of.parse().expect("a number")))
+    let (samples, requested) = text.split_once(" of ").expect("two numbers");
+    Some((samples.parse().expect("a number"), requested.parse().expect("a number")))
 }
 
-fn take_files(place: &TestFolder) -> Vec<(String, Vec<u8>)> {
-    let files = place.files().into_iter();
-    let files: Vec<_> = files.map(|name| (name.clone(), place.read(&name))).collect();
+fn take_files(folder: &TestFolder) -> Vec<(String, Vec<u8>)> {
+    let files = folder.files().into_iter();
+    let files: Vec<_> = files.map(|name| (name.clone(), folder.read(&name))).collect();
     for (name, _) in &files {
-        assert_eq!(partial(&place.path(name)), None, "{name}");
-        fs::remove_file(place.path(name)).expect("a file");
+        assert_eq!(partial(&folder.path(name)), None, "{name}");
+        fs::remove_file(folder.path(name)).expect("a file");
     }
     files
 }
 
 #[test]
 fn the_complete_files_are_the_same_with_and_without_previews() {
-    let place = TestFolder::new();
+    let folder = TestFolder::new();
     let path_scene = project_scene("cornell-path.toml");
-    let both = ["-o", "a.png", "-o", "a.exr"];
+    let png_and_exr = ["-o", "a.png", "-o", "a.exr"];
     let cases: [&[&str]; 8] = [
         &["small.toml", "--size", "33x21", "--spp", "9"],
         &["small.toml", "--size", "1x1", "--spp", "1"],
@@ -115,27 +115,28 @@ fn the_complete_files_are_the_same_with_and_without_previews() {
     ];
     for device in ["cpu", "gpu"] {
         for options in cases {
-            let outputs = if options.contains(&"-o") { &[][..] } else { &both };
-            let render = |more: &[&str]| {
-                let ran = place.run(&[&["render", "--device", device, "--quiet"], options, outputs, more].concat());
-                assert_eq!((ran.code, ran.stderr.as_str()), (0, ""), "{options:?}");
-                take_files(&place)
+            let outputs = if options.contains(&"-o") { &[][..] } else { &png_and_exr };
+            let render = |extra: &[&str]| {
+                let result =
+                    folder.run(&[&["render", "--device", device, "--quiet"], options, outputs, extra].concat());
+                assert_eq!((result.code, result.stderr.as_str()), (0, ""), "{options:?}");
+                take_files(&folder)
             };
-            let (without, with) = (render(&[]), render(&["--preview"]));
-            assert!(without.len() >= 2);
-            assert!(without == with, "{device}: {options:?}");
+            let (plain, previewed) = (render(&[]), render(&["--preview"]));
+            assert!(plain.len() >= 2);
+            assert!(plain == previewed, "{device}: {options:?}");
         }
     }
 }
 
-/// Returns true if the image equals a render with `samples` samples and the options `more`.
-fn has_pixels_of(place: &TestFolder, file: &str, samples: u32, more: &[&str]) -> bool {
+/// Returns true if the image equals a render with `samples` samples and the options `extra`.
+fn has_pixels_of(folder: &TestFolder, file: &str, samples: u32, extra: &[&str]) -> bool {
     let spp = samples.to_string();
     let size = ["render", "small.toml", "--size", "150x100", "--device", "cpu"];
-    place.quietly(&[&size[..], &["--spp", &spp, "-o", "expected.exr"], more].concat());
-    let ran = place.run(&["diff", file, "expected.exr"]);
-    assert!([0, 5].contains(&ran.code), "{}", ran.stderr);
-    ran.code == 0
+    folder.run_quietly(&[&size[..], &["--spp", &spp, "-o", "expected.exr"], extra].concat());
+    let result = folder.run(&["diff", file, "expected.exr"]);
+    assert!([0, 5].contains(&result.code), "{}", result.stderr);
+    result.code == 0
 }
 
 #[test]
@@ -145,34 +146,34 @@ fn a_signal_leaves_the_last_complete_pass() {
         ("-TERM", "SIGTERM", 143, "gpu"),
         ("-HUP", "SIGHUP", 129, "cpu"),
     ] {
-        let place = TestFolder::new();
+        let folder = TestFolder::new();
         let files = ["out.png", "out.normal.png", "out.exr", "out.jpg", "out.webp"];
         let outputs = ["-o", "out.png", "-o", "out.exr", "-o", "out.jpg", "-o", "out.webp"];
-        let more = ["--aov", "normal", "--stats", "stats.json", "--device", device];
-        let child = start(&place, &[&outputs[..], &more].concat());
-        files.iter().for_each(|file| wait_for(&place, file));
-        fs::copy(place.path("out.exr"), place.path("first.exr")).expect("a copy");
-        let (first, of) = partial(&place.path("first.exr")).expect("a mark");
-        assert!(first.is_power_of_two() && of == 65536, "{first} of {of}");
+        let extra = ["--aov", "normal", "--stats", "stats.json", "--device", device];
+        let child = start(&folder, &[&outputs[..], &extra].concat());
+        files.iter().for_each(|file| wait_for(&folder, file));
+        fs::copy(folder.path("out.exr"), folder.path("first.exr")).expect("a copy");
+        let (first, requested) = partial(&folder.path("first.exr")).expect("a mark");
+        assert!(first.is_power_of_two() && requested == 65536, "{first} of {requested}");
         std::thread::sleep(Duration::from_millis(500));
         let sent = Instant::now();
         send(signal, &child);
-        let ran = ended(child);
+        let result = wait_for_end(child);
         assert!(sent.elapsed() < Duration::from_secs(10), "{:?}", sent.elapsed()); // 2 s on an idle machine
-        let (samples, _) = partial(&place.path("out.exr")).expect("a mark");
+        let (samples, _) = partial(&folder.path("out.exr")).expect("a mark");
         let message = format!(
             "note: interrupted: the image has {samples} of 65536 samples per pixel\nerror: interrupted by {name}\n"
         );
-        assert_eq!((ran.code, ran.stderr), (code, message), "{signal}");
-        let [summary] = &ran.summary[..] else {
-            panic!("{:?}", ran.summary)
+        assert_eq!((result.code, result.stderr), (code, message), "{signal}");
+        let [summary] = &result.summary[..] else {
+            panic!("{:?}", result.summary)
         };
         let written = "out.png, out.normal.png, out.exr, out.jpg, out.webp: 150 x 100";
         assert!(summary.starts_with(&format!("{written}, {samples} spp")), "{summary}");
         for file in files {
-            assert_eq!(partial(&place.path(file)), Some((samples, 65536)), "{file}");
+            assert_eq!(partial(&folder.path(file)), Some((samples, 65536)), "{file}");
         }
-        let stats: serde_json::Value = serde_json::from_slice(&place.read("stats.json")).expect("JSON");
+        let stats: serde_json::Value = serde_json::from_slice(&folder.read("stats.json")).expect("JSON");
         assert_eq!(
             (&stats["partial"], &stats["min_samples"]),
             (&true.into(), &samples.into())
@@ -180,36 +181,36 @@ fn a_signal_leaves_the_last_complete_pass() {
         let mut expected = files.to_vec();
         expected.extend(["first.exr", "stats.json"]);
         expected.sort_unstable();
-        assert_eq!(place.files(), expected);
+        assert_eq!(folder.files(), expected);
         assert!(samples > first, "{samples}");
-        assert!(has_pixels_of(&place, "first.exr", first, &more[..2]));
-        assert!(has_pixels_of(&place, "out.exr", samples, &more[..2]));
-        assert!(!has_pixels_of(&place, "out.exr", samples + 1, &more[..2]));
+        assert!(has_pixels_of(&folder, "first.exr", first, &extra[..2]));
+        assert!(has_pixels_of(&folder, "out.exr", samples, &extra[..2]));
+        assert!(!has_pixels_of(&folder, "out.exr", samples + 1, &extra[..2]));
     }
 }
 
 #[test]
 fn a_second_signal_ends_at_once() {
-    let place = TestFolder::new();
-    let child = start(&place, &["-o", "out.exr", "--device", "cpu"]);
-    wait_for(&place, "out.exr");
+    let folder = TestFolder::new();
+    let child = start(&folder, &["-o", "out.exr", "--device", "cpu"]);
+    wait_for(&folder, "out.exr");
     std::thread::sleep(Duration::from_millis(500));
     // SIGSTOP makes all signals pending before the program continues.
     send("-STOP", &child);
     std::thread::sleep(Duration::from_millis(100));
-    let before = place.read("out.exr");
+    let before = folder.read("out.exr");
     for signal in ["-INT", "-TERM", "-HUP", "-CONT"] {
         send(signal, &child);
     }
-    let ran = ended(child);
-    assert!([130, 143, 129].contains(&ran.code), "{}", ran.code);
-    assert_eq!(ran.stderr, "");
-    assert!(place.read("out.exr") == before, "the last pass was written");
+    let result = wait_for_end(child);
+    assert!([130, 143, 129].contains(&result.code), "{}", result.code);
+    assert_eq!(result.stderr, "");
+    assert!(folder.read("out.exr") == before, "the last pass was written");
 }
 
 #[test]
 fn files_with_more_samples_stay() {
-    let place = TestFolder::new();
+    let folder = TestFolder::new();
     let outputs = [
         "-o",
         "a.png",
@@ -223,58 +224,60 @@ fn files_with_more_samples_stay() {
         "other.png",
     ];
     let files = ["a.png", "a.exr", "a.jpg", "a.webp", "other.png"];
-    let render = |more: &[&str]| place.run(&[&["render", "small.toml", "--device", "cpu"], more].concat());
+    let render = |extra: &[&str]| folder.run(&[&["render", "small.toml", "--device", "cpu"], extra].concat());
     assert_eq!(
         render(&[&outputs[..], &["--size", "2x2", "--spp", "60000"]].concat()).code,
         0
     );
-    place.write("other.png", "mine");
-    let before = files.map(|file| place.read(file));
-    let child = start(&place, &[&outputs[..], &["-o", "new.exr", "--device", "cpu"]].concat());
-    wait_for(&place, "new.exr");
+    folder.write("other.png", "mine");
+    let before = files.map(|file| folder.read(file));
+    let child = start(&folder, &[&outputs[..], &["-o", "new.exr", "--device", "cpu"]].concat());
+    wait_for(&folder, "new.exr");
     send("-INT", &child);
-    let ran = ended(child);
-    let (samples, _) = partial(&place.path("new.exr")).expect("a mark");
-    assert!(has_pixels_of(&place, "new.exr", samples, &[]));
-    let more = "has 60000 samples per pixel; a preview with fewer does not replace it";
-    let unknown = "was not written by wgray; a preview does not replace it, but the complete image will";
+    let result = wait_for_end(child);
+    let (samples, _) = partial(&folder.path("new.exr")).expect("a mark");
+    assert!(has_pixels_of(&folder, "new.exr", samples, &[]));
+    let fewer_samples = "has 60000 samples per pixel; a preview with fewer does not replace it";
+    let foreign = "was not written by wgray; a preview does not replace it, but the complete image will";
     let notes = files.map(|file| match file {
-        "other.png" => format!("note: {file}: {unknown}\n"),
-        _ => format!("note: {file}: {more}\n"),
+        "other.png" => format!("note: {file}: {foreign}\n"),
+        _ => format!("note: {file}: {fewer_samples}\n"),
     });
     let interrupted = format!("note: interrupted: the image has {samples} of 65536 samples per pixel\n");
     let error = "error: interrupted by Ctrl+C (SIGINT)\n";
     assert_eq!(
-        (ran.code, ran.stderr),
+        (result.code, result.stderr),
         (130, [&notes.concat(), &*interrupted, error].concat())
     );
-    assert_eq!(files.map(|file| place.read(file)), before);
+    assert_eq!(files.map(|file| folder.read(file)), before);
     // Nothing is written if all files have more samples.
     let child = start(
-        &place,
+        &folder,
         &[&outputs[..8], &["--stats", "stats.json", "--device", "cpu"]].concat(),
     );
     std::thread::sleep(Duration::from_secs(1));
     wait_until("a temporary file", || {
-        place.files().iter().any(|name| name.starts_with(".wgray-"))
+        folder.files().iter().any(|name| name.starts_with(".wgray-"))
     });
     send("-INT", &child);
-    let ran = ended(child);
-    assert_eq!(ran.code, 130, "{}", ran.stderr);
+    let result = wait_for_end(child);
+    assert_eq!(result.code, 130, "{}", result.stderr);
     assert!(
-        ran.stderr.contains("note: the samples taken so far were not written\n"),
+        result
+            .stderr
+            .contains("note: the samples taken so far were not written\n"),
         "{}",
-        ran.stderr
+        result.stderr
     );
-    assert!(ran.summary.is_empty() && !place.path("stats.json").exists());
-    assert_eq!(files.map(|file| place.read(file)), before);
+    assert!(result.summary.is_empty() && !folder.path("stats.json").exists());
+    assert_eq!(files.map(|file| folder.read(file)), before);
     // A preview replaces a file with the same number of samples.
-    let ran = render(&[&outputs[..], &["--preview", "--spp", "2"]].concat());
-    assert_eq!(ran.code, 0, "{}", ran.stderr);
-    assert!(files.iter().all(|file| partial(&place.path(file)).is_none()));
-    let ran = render(&["--preview", "--spp", "1000", "-o", "a.png"]);
+    let result = render(&[&outputs[..], &["--preview", "--spp", "2"]].concat());
+    assert_eq!(result.code, 0, "{}", result.stderr);
+    assert!(files.iter().all(|file| partial(&folder.path(file)).is_none()));
+    let result = render(&["--preview", "--spp", "1000", "-o", "a.png"]);
     assert_eq!(
-        (ran.code, ran.stderr.as_str()),
+        (result.code, result.stderr.as_str()),
         (
             0,
             "note: a.png: has 2 samples per pixel; a preview with fewer does not replace it\n"
@@ -284,15 +287,15 @@ fn files_with_more_samples_stay() {
 
 #[test]
 fn partial_files_do_not_count_as_existing() {
-    let place = TestFolder::new();
+    let folder = TestFolder::new();
     let child = start(
-        &place,
+        &folder,
         &["--frames", "1-3", "-o", "#.png", "-o", "#.exr", "--device", "cpu"],
     );
-    wait_for(&place, "1.exr");
+    wait_for(&folder, "1.exr");
     send("-INT", &child);
-    assert_eq!(ended(child).code, 130);
-    assert_eq!(place.files(), ["1.exr", "1.png"], "another frame was started");
+    assert_eq!(wait_for_end(child).code, 130);
+    assert_eq!(folder.files(), ["1.exr", "1.png"], "another frame was started");
     let run = || {
         let arguments = [
             "render",
@@ -305,27 +308,27 @@ fn partial_files_do_not_count_as_existing() {
             "#.exr",
             "--skip-existing",
         ];
-        place.run(&[&arguments[..], &["--device", "cpu"]].concat())
+        folder.run(&[&arguments[..], &["--device", "cpu"]].concat())
     };
-    assert!(partial(&place.path("1.png")).is_some() && partial(&place.path("1.exr")).is_some());
-    let ran = run();
-    assert!(ran.code == 0 && ran.summary.len() == 1, "{}", ran.stderr);
-    assert!(partial(&place.path("1.png")).is_none() && partial(&place.path("1.exr")).is_none());
-    let ran = run();
+    assert!(partial(&folder.path("1.png")).is_some() && partial(&folder.path("1.exr")).is_some());
+    let result = run();
+    assert!(result.code == 0 && result.summary.len() == 1, "{}", result.stderr);
+    assert!(partial(&folder.path("1.png")).is_none() && partial(&folder.path("1.exr")).is_none());
+    let result = run();
     assert!(
-        ran.code == 0 && ran.stderr.contains("note: skipped 1 of 1"),
+        result.code == 0 && result.stderr.contains("note: skipped 1 of 1"),
         "{}",
-        ran.stderr
+        result.stderr
     );
 }
 
 #[test]
 fn a_signal_writes_the_samples_to_the_checkpoint() {
-    let place = TestFolder::new();
+    let folder = TestFolder::new();
     let options = ["--spp", "2000", "--device", "cpu"];
-    let render = |more: &[&str]| {
-        let ran = place.run(&[&["render", "small.toml", "--size", "150x100"], &options[..], more].concat());
-        assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
+    let render = |extra: &[&str]| {
+        let result = folder.run(&[&["render", "small.toml", "--size", "150x100"], &options[..], extra].concat());
+        assert_eq!((result.code, result.stderr.as_str()), (0, ""));
     };
     render(&["-o", "whole.exr"]);
     let checkpoint = ["--checkpoint", "c", "--resume", "-o", "out.exr"];
@@ -339,27 +342,30 @@ fn a_signal_writes_the_samples_to_the_checkpoint() {
         "1",
     ];
     arguments.extend(options.iter().chain(&checkpoint));
-    heed_interrupts();
+    restore_signal_defaults();
     let child = Command::new(program())
-        .current_dir(place.path("."))
+        .current_dir(folder.path("."))
         .args(&arguments)
         .stderr(Stdio::piped())
         .spawn()
         .expect("the program");
-    wait_for(&place, "out.exr");
+    wait_for(&folder, "out.exr");
     send("-INT", &child);
-    let ran = ended(child);
+    let result = wait_for_end(child);
     let message = "note: progress is saved in c; --resume continues\nerror: interrupted by Ctrl+C (SIGINT)\n";
-    assert_eq!((ran.code, ran.stderr.as_str()), (130, message));
-    let (samples, of) = partial(&place.path("out.exr")).expect("a mark");
-    assert!(samples.is_power_of_two() && of == 2000, "{samples} of {of}");
+    assert_eq!((result.code, result.stderr.as_str()), (130, message));
+    let (samples, requested) = partial(&folder.path("out.exr")).expect("a mark");
+    assert!(
+        samples.is_power_of_two() && requested == 2000,
+        "{samples} of {requested}"
+    );
     render(&[&checkpoint[..], &["--preview"]].concat());
-    assert!(place.read("out.exr") == place.read("whole.exr"));
+    assert!(folder.read("out.exr") == folder.read("whole.exr"));
 }
 
 #[test]
 fn previews_need_passes_and_a_file() {
-    let place = TestFolder::new();
+    let folder = TestFolder::new();
     for (options, rule) in [
         (&["--tile", "1/2", "-o", "x.part"][..], "cannot be used with '--tile"),
         (
@@ -376,26 +382,30 @@ fn previews_need_passes_and_a_file() {
         ),
         (&["-o", "/dev/null"], "--preview: needs an output that is a file"),
     ] {
-        let ran = place.run(&[&["render", "small.toml", "--preview", "--device", "cpu"], options].concat());
-        assert_eq!(ran.code, 2, "{}", ran.stderr);
-        assert!(ran.stderr.contains(rule), "{}", ran.stderr);
-        assert!(place.files().is_empty(), "{:?}", place.files());
+        let result = folder.run(&[&["render", "small.toml", "--preview", "--device", "cpu"], options].concat());
+        assert_eq!(result.code, 2, "{}", result.stderr);
+        assert!(result.stderr.contains(rule), "{}", result.stderr);
+        assert!(folder.files().is_empty(), "{:?}", folder.files());
     }
     // A stream only receives the complete image.
     let line = "\"$0\" render small.toml --preview --device cpu -q -o - -o a.png > b.png";
-    let ran = place.shell("sh", line);
-    assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
-    assert!(place.read("a.png") == place.read("b.png"));
+    let result = folder.shell("sh", line);
+    assert_eq!((result.code, result.stderr.as_str()), (0, ""));
+    assert!(folder.read("a.png") == folder.read("b.png"));
 }
 
 #[test]
 fn a_time_limit_ends_previews() {
-    let place = TestFolder::new();
-    let child = start(&place, &["--time-limit", "1", "-o", "out.exr", "--device", "cpu"]);
-    let ran = ended(child);
-    assert_eq!(ran.code, 0, "{}", ran.stderr);
-    assert!(ran.stderr.starts_with("note: time limit reached: "), "{}", ran.stderr);
-    let metadata = read_metadata(&place.path("out.exr")).expect("metadata");
+    let folder = TestFolder::new();
+    let child = start(&folder, &["--time-limit", "1", "-o", "out.exr", "--device", "cpu"]);
+    let result = wait_for_end(child);
+    assert_eq!(result.code, 0, "{}", result.stderr);
+    assert!(
+        result.stderr.starts_with("note: time limit reached: "),
+        "{}",
+        result.stderr
+    );
+    let metadata = read_metadata(&folder.path("out.exr")).expect("metadata");
     assert_eq!(
         (metadata.get("time_limit"), metadata.get("partial")),
         (Some("1 s"), None)
@@ -406,29 +416,29 @@ fn a_time_limit_ends_previews() {
 #[test]
 fn on_a_full_disk_previews_are_not_written_and_the_older_file_remains() {
     for output in ["out.png", "out.exr"] {
-        let place = TestFolder::new();
+        let folder = TestFolder::new();
         let base = ["render", "small.toml", "--spp", "1", "-o", output, "--device", "cpu"];
-        place.quietly(&[&base[..], &["--size", "2x2"]].concat());
-        let before = place.read(output);
+        folder.run_quietly(&[&base[..], &["--size", "2x2"]].concat());
+        let before = folder.read(output);
         let limit = "trap '' XFSZ; ulimit -f 8;";
         let line =
             format!("{limit} exec \"$0\" render small.toml --spp 3 --size 300x300 --preview -o {output} --device cpu");
-        let ran = place.shell("sh", &line);
+        let result = folder.shell("sh", &line);
         let warning =
             format!("warning: {output}: cannot be written: File too large (os error 27); the preview is not written\n");
-        assert_eq!(ran.code, 8, "{}", ran.stderr);
-        assert!(ran.stderr.starts_with(&warning), "{}", ran.stderr);
-        assert!(ran.stderr.contains("error: "), "{}", ran.stderr);
+        assert_eq!(result.code, 8, "{}", result.stderr);
+        assert!(result.stderr.starts_with(&warning), "{}", result.stderr);
+        assert!(result.stderr.contains("error: "), "{}", result.stderr);
         // A signal that ends the render has the same effect.
-        let child = start_in_shell(&place, limit, &["-o", output, "--device", "cpu"]);
+        let child = start_in_shell(&folder, limit, &["-o", output, "--device", "cpu"]);
         wait_until("a temporary file", || {
-            place.files().iter().any(|name| name.starts_with(".wgray-"))
+            folder.files().iter().any(|name| name.starts_with(".wgray-"))
         });
         std::thread::sleep(Duration::from_secs(1));
         send("-INT", &child);
-        let ran = ended(child);
-        let rest = "note: the samples taken so far were not written\nerror: interrupted by Ctrl+C (SIGINT)\n";
-        assert_eq!((ran.code, ran.stderr), (130, warning + rest), "{output}");
-        assert!(place.read(output) == before && place.files() == [output]);
+        let result = wait_for_end(child);
+        let expected_end = "note: the samples taken so far were not written\nerror: interrupted by Ctrl+C (SIGINT)\n";
+        assert_eq!((result.code, result.stderr), (130, warning + expected_end), "{output}");
+        assert!(folder.read(output) == before && folder.files() == [output]);
     }
 }

@@ -11,26 +11,26 @@ const BALL: &str = "image = { width = 12, height = 8 }\n\
                     materials.m = { type = 'principled', base_color = [0.8, 0.4, 0.2] }\n\
                     shapes = [{ type = 'sphere', material = 'm', center = [0, 0, 0], radius = 1 }]\n";
 
-fn ball() -> TestFolder {
+fn folder_with_ball() -> TestFolder {
     TestFolder::with_file("ball.toml", BALL)
 }
 
-fn quietly(place: &TestFolder, arguments: &[&str]) {
-    place.quietly(&[&["render"], arguments, &["--device", "cpu"]].concat());
+fn render_quietly(folder: &TestFolder, arguments: &[&str]) {
+    folder.run_quietly(&[&["render"], arguments, &["--device", "cpu"]].concat());
 }
 
-fn write_room(place: &TestFolder, name: &str) {
+fn write_room(folder: &TestFolder, name: &str) {
     let room = image::Rgb32FImage::from_fn(4, 2, |x, y| image::Rgb([1.0 + x as f32, 0.5, 0.25 + y as f32]));
-    room.save(place.path(name)).unwrap();
+    room.save(folder.path(name)).unwrap();
 }
 
 #[test]
 fn the_option_overrides_the_environment() {
-    let place = ball();
-    write_room(&place, "room.exr");
-    fs::create_dir(place.path("sub")).unwrap();
-    fs::copy(place.path("ball.toml"), place.path("sub/ball.toml")).unwrap();
-    quietly(&place, &["ball.toml", "-o", "plain.exr"]);
+    let folder = folder_with_ball();
+    write_room(&folder, "room.exr");
+    fs::create_dir(folder.path("sub")).unwrap();
+    fs::copy(folder.path("ball.toml"), folder.path("sub/ball.toml")).unwrap();
+    render_quietly(&folder, &["ball.toml", "-o", "plain.exr"]);
     for (option, key) in [
         ("room.exr", "file = 'room.exr'"),
         ("studio", "name = 'studio'"),
@@ -42,25 +42,25 @@ fn the_option_overrides_the_environment() {
             "environment.color = [0.5, 0.5, 0.5]",
             &format!("environment = {{ {key} }}"),
         );
-        place.write("other.toml", &text);
-        quietly(&place, &["other.toml", "-o", "other.exr"]);
+        folder.write("other.toml", &text);
+        render_quietly(&folder, &["other.toml", "-o", "other.exr"]);
         // The path is relative to the current folder, not to the scene.
         for scene in ["ball.toml", "sub/ball.toml"] {
-            quietly(&place, &[scene, "--environment", option, "-o", "option.exr"]);
-            assert_eq!(place.read("option.exr"), place.read("other.exr"), "{option} {scene}");
+            render_quietly(&folder, &[scene, "--environment", option, "-o", "option.exr"]);
+            assert_eq!(folder.read("option.exr"), folder.read("other.exr"), "{option} {scene}");
         }
-        assert_ne!(place.read("option.exr"), place.read("plain.exr"), "{option}");
-        let checked = place.run(&["check", "sub/ball.toml", "--environment", option]);
+        assert_ne!(folder.read("option.exr"), folder.read("plain.exr"), "{option}");
+        let checked = folder.run(&["check", "sub/ball.toml", "--environment", option]);
         assert_eq!((checked.code, checked.stderr.as_str()), (0, ""), "{option}");
     }
 }
 
 #[test]
 fn a_background_emits_no_light() {
-    let place = ball();
-    quietly(&place, &["ball.toml", "-o", "plain.exr"]);
-    quietly(
-        &place,
+    let folder = folder_with_ball();
+    render_quietly(&folder, &["ball.toml", "-o", "plain.exr"]);
+    render_quietly(
+        &folder,
         &[
             "ball.toml",
             "--background",
@@ -73,46 +73,46 @@ fn a_background_emits_no_light() {
             "a.exr",
         ],
     );
-    let (_, _, bytes) = read_png(&place.path("a.png"));
+    let (_, _, bytes) = read_png(&folder.path("a.png"));
     assert_eq!(bytes[..3], [255, 128, 0]);
-    let pixels = |name: &str| image::open(place.path(name)).unwrap().into_rgb32f();
+    let pixels = |name: &str| image::open(folder.path(name)).unwrap().into_rgb32f();
     let (plain, colored) = (pixels("plain.exr"), pixels("a.exr"));
-    let ball = |x: u32, y: u32| (4..6).contains(&x) && (3..5).contains(&y);
-    let mut seen = 0;
-    for (x, y, pixel) in plain.enumerate_pixels().filter(|(x, y, _)| ball(*x, *y)) {
+    let is_ball = |x: u32, y: u32| (4..6).contains(&x) && (3..5).contains(&y);
+    let mut compared = 0;
+    for (x, y, pixel) in plain.enumerate_pixels().filter(|(x, y, _)| is_ball(*x, *y)) {
         assert_eq!(pixel, colored.get_pixel(x, y), "the background changes the ball");
-        seen += 1;
+        compared += 1;
     }
-    assert_eq!(seen, 4);
+    assert_eq!(compared, 4);
     assert_ne!(plain.get_pixel(0, 0), colored.get_pixel(0, 0));
-    place.write("says.toml", &format!("{BALL}environment.background = [1, 0, 2]\n"));
-    quietly(&place, &["says.toml", "-o", "says.exr"]);
-    quietly(&place, &["ball.toml", "--background", "1,0,2", "-o", "option.exr"]);
-    assert_eq!(place.read("says.exr"), place.read("option.exr"));
-    quietly(&place, &["says.toml", "--background", "none", "-o", "none.png"]);
-    let picture = image::open(place.path("none.png")).unwrap();
+    folder.write("keyed.toml", &format!("{BALL}environment.background = [1, 0, 2]\n"));
+    render_quietly(&folder, &["keyed.toml", "-o", "keyed.exr"]);
+    render_quietly(&folder, &["ball.toml", "--background", "1,0,2", "-o", "option.exr"]);
+    assert_eq!(folder.read("keyed.exr"), folder.read("option.exr"));
+    render_quietly(&folder, &["keyed.toml", "--background", "none", "-o", "none.png"]);
+    let picture = image::open(folder.path("none.png")).unwrap();
     assert!(picture.color().has_alpha());
     let alpha = |x, y| picture.to_rgba8().get_pixel(x, y).0[3];
     assert_eq!((alpha(0, 0), alpha(5, 4)), (0, 255));
     // The direct integrator has its own background key.
-    place.write("small.toml", SCENE);
-    place.write(
+    folder.write("small.toml", SCENE);
+    folder.write(
         "other.toml",
         &SCENE.replace("background = [0.2, 0.3, 2]", "background = [1, 0, 2]"),
     );
-    quietly(&place, &["small.toml", "--background", "1,0,2", "-o", "option.exr"]);
-    quietly(&place, &["other.toml", "-o", "other.exr"]);
-    assert_eq!(place.read("option.exr"), place.read("other.exr"));
+    render_quietly(&folder, &["small.toml", "--background", "1,0,2", "-o", "option.exr"]);
+    render_quietly(&folder, &["other.toml", "-o", "other.exr"]);
+    assert_eq!(folder.read("option.exr"), folder.read("other.exr"));
 }
 
 #[test]
 fn invalid_environment_options_are_rejected() {
-    let place = ball();
-    place.write(
+    let folder = folder_with_ball();
+    folder.write(
         "small.toml",
         &SCENE.replace("[render]", "[render]\nintegrator = 'phong'"),
     );
-    place.write("text.hdr", "no image");
+    folder.write("text.hdr", "no image");
     for (arguments, message) in [
         (["ball.toml", "--environment", "none.hdr"], "--environment: \""),
         (
@@ -129,7 +129,7 @@ fn invalid_environment_options_are_rejected() {
         ),
         (
             ["ball.toml", "--environment", "1,2,-3"],
-            "--environment: -3 must be finite, from 0 to 1e6",
+            "--environment: -3 must be from 0 to 1e6",
         ),
         (
             ["small.toml", "--environment", "sky"],
@@ -145,7 +145,7 @@ fn invalid_environment_options_are_rejected() {
         ),
         (
             ["ball.toml", "--background", "-1,0,0"],
-            "--background: -1 must be finite, from 0 to 1e6",
+            "--background: -1 must be from 0 to 1e6",
         ),
         (
             ["ball.toml", "--turntable", "0"],
@@ -156,65 +156,75 @@ fn invalid_environment_options_are_rejected() {
             "must be a whole number from 1 to 100000",
         ),
     ] {
-        let before = place.files_but(|_| false);
-        let ran = place.run(&[&["render"], &arguments[..]].concat());
+        let before = folder.files_but(|_| false);
+        let result = folder.run(&[&["render"], &arguments[..]].concat());
         assert_eq!(
-            (ran.code, ran.stdout.as_str()),
+            (result.code, result.stdout.as_str()),
             (2, ""),
             "{arguments:?}: {}",
-            ran.stderr
+            result.stderr
         );
-        assert!(ran.stderr.contains(message), "{arguments:?}: {}\n{message}", ran.stderr);
-        assert_eq!(place.files_but(|_| false), before, "{arguments:?}");
+        assert!(
+            result.stderr.contains(message),
+            "{arguments:?}: {}\n{message}",
+            result.stderr
+        );
+        assert_eq!(folder.files_but(|_| false), before, "{arguments:?}");
     }
     let panorama = BALL.replace("fov = 40 }", "type = 'panorama' }");
-    place.write("panorama.toml", &panorama);
-    let ran = place.run(&["render", "panorama.toml", "--turntable", "4"]);
-    assert_eq!(ran.code, 2, "{}", ran.stderr);
+    folder.write("panorama.toml", &panorama);
+    let result = folder.run(&["render", "panorama.toml", "--turntable", "4"]);
+    assert_eq!(result.code, 2, "{}", result.stderr);
     assert!(
-        ran.stderr.contains("--turntable: does not apply to a panorama camera"),
+        result
+            .stderr
+            .contains("--turntable: does not apply to a panorama camera"),
         "{}",
-        ran.stderr
+        result.stderr
     );
 }
 
 #[test]
 fn a_turntable_is_one_full_turn() {
-    let place = ball();
-    quietly(&place, &["ball.toml", "-o", "still.exr"]);
-    quietly(&place, &["ball.toml", "--turntable", "4", "-o", "t.##.exr"]);
-    quietly(
-        &place,
+    let folder = folder_with_ball();
+    render_quietly(&folder, &["ball.toml", "-o", "still.exr"]);
+    render_quietly(&folder, &["ball.toml", "--turntable", "4", "-o", "t.##.exr"]);
+    render_quietly(
+        &folder,
         &["ball.toml", "--turntable", "4", "--frames", "3", "-o", "alone.exr"],
     );
     let names = ["t.01.exr", "t.02.exr", "t.03.exr", "t.04.exr"];
-    let found = place.files_but(|name| !name.starts_with("t."));
+    let found = folder.files_but(|name| !name.starts_with("t."));
     assert_eq!(found, names);
     // The first frame equals the still image. After a quarter turn the camera is at +x of the target, after a half turn
     // at +y.
-    assert_eq!(place.read("t.01.exr"), place.read("still.exr"));
-    assert_eq!(place.read("t.03.exr"), place.read("alone.exr"));
-    let at = |position: &str, name: &str| {
-        place.write(
+    assert_eq!(folder.read("t.01.exr"), folder.read("still.exr"));
+    assert_eq!(folder.read("t.03.exr"), folder.read("alone.exr"));
+    let max_difference = |position: &str, name: &str| {
+        folder.write(
             "at.toml",
             &BALL.replace("position = [0, -4, 1]", &format!("position = {position}")),
         );
-        quietly(&place, &["at.toml", "-o", "at.exr"]);
-        let pixels = |name: &str| image::open(place.path(name)).unwrap().into_rgb32f().into_raw();
+        render_quietly(&folder, &["at.toml", "-o", "at.exr"]);
+        let pixels = |name: &str| image::open(folder.path(name)).unwrap().into_rgb32f().into_raw();
         let differences = pixels("at.exr")
             .into_iter()
             .zip(pixels(name))
             .map(|(a, b)| (a - b).abs());
         differences.fold(0.0, f32::max)
     };
-    assert!(at("[4.5, -0.5, 1]", "t.02.exr") < 1e-3);
-    assert!(at("[1, 4, 1]", "t.03.exr") < 1e-3);
-    assert!(at("[-3.5, 0.5, 1]", "t.04.exr") < 1e-3);
+    assert!(max_difference("[4.5, -0.5, 1]", "t.02.exr") < 1e-3);
+    assert!(max_difference("[1, 4, 1]", "t.03.exr") < 1e-3);
+    assert!(max_difference("[-3.5, 0.5, 1]", "t.04.exr") < 1e-3);
     assert!(
-        at("[-3.5, 0.5, 1]", "t.02.exr") > 0.1,
+        max_difference("[-3.5, 0.5, 1]", "t.02.exr") > 0.1,
         "a different camera gives the same image"
     );
-    let ran = place.run(&["render", "ball.toml", "--turntable", "4", "-o", "t.exr"]);
-    assert_eq!(ran.code, 2);
-    assert!(ran.stderr.contains("needs # for the frame number"), "{}", ran.stderr);
+    let result = folder.run(&["render", "ball.toml", "--turntable", "4", "-o", "t.exr"]);
+    assert_eq!(result.code, 2);
+    assert!(
+        result.stderr.contains("needs # for the frame number"),
+        "{}",
+        result.stderr
+    );
 }

@@ -1,4 +1,4 @@
-//! glTF files in the development mode: shown, and reloaded whenever they are saved.
+//! glTF files in the development mode are shown, and reloaded whenever they are saved.
 
 use std::fs;
 use std::io::Write as _;
@@ -9,7 +9,7 @@ use tempfile::TempDir;
 use wgray::scene::Overrides;
 use wgray_dev::{Command, Move, Sources};
 
-use super::running::Running;
+use super::running::TestSession;
 use crate::model::Model;
 
 fn model(color: [f64; 3]) -> Model {
@@ -23,7 +23,7 @@ const RED: [f64; 3] = [0.8, 0.05, 0.05];
 const GREEN: [f64; 3] = [0.05, 0.8, 0.05];
 const BLUE: [f64; 3] = [0.05, 0.05, 0.8];
 
-fn start(folder: &Path, name: &str) -> Running {
+fn start(folder: &Path, name: &str) -> TestSession {
     let sources = Sources {
         scene: folder.join(name),
         overrides: Overrides {
@@ -33,22 +33,22 @@ fn start(folder: &Path, name: &str) -> Running {
         },
         shaders: None,
     };
-    Running::start(sources, None)
+    TestSession::start(sources, None)
 }
 
-/// Waits for an image in which this channel is the strongest at the center, where the large box is.
-fn wait_for(running: &Running, strongest: [f64; 3]) {
-    let wanted = strongest.map(|value| value > 0.5);
-    running.wait("the image of the file", |running| {
-        let frame = running.frame().filter(|frame| frame.header.done)?;
+/// Waits for an image in which the strongest channel at the center, where the large box is, is the channel of `color`.
+fn wait_for(session: &TestSession, color: [f64; 3]) {
+    let expected = color.map(|value| value > 0.5);
+    session.wait("the image of the file", |session| {
+        let frame = session.frame().filter(|frame| frame.header.done)?;
         let pixels = match &frame.content {
             wgray_dev::Content::Color(pixels) => &pixels.colors,
             _ => return None,
         };
-        let middle = pixels.get(11 * 24 + 12)?;
-        let most = middle.iter().fold(0.0_f32, |most, value| most.max(*value));
-        let is_shown = middle.map(|value| value == most && most > 0.0) == wanted;
-        (is_shown && running.state().problems.is_empty()).then_some(())
+        let center = pixels.get(11 * 24 + 12)?;
+        let max = center.iter().fold(0.0_f32, |max, value| max.max(*value));
+        let is_shown = center.map(|value| value == max && max > 0.0) == expected;
+        (is_shown && session.state().problems.is_empty()).then_some(())
     });
 }
 
@@ -57,20 +57,20 @@ fn saving_a_model_updates_the_image() {
     let folder = TempDir::new().unwrap();
     let write = |color: [f64; 3]| model(color).write_glb(folder.path(), "box.glb");
     write(RED);
-    let running = start(folder.path(), "box.glb");
-    wait_for(&running, RED);
+    let session = start(folder.path(), "box.glb");
+    wait_for(&session, RED);
     // Overwritten in place, as exporters do, then replaced by a rename.
     write(GREEN);
-    wait_for(&running, GREEN);
+    wait_for(&session, GREEN);
     model(BLUE).write_glb(folder.path(), "new~");
     fs::rename(folder.path().join("new~"), folder.path().join("box.glb")).unwrap();
-    wait_for(&running, BLUE);
-    // An incomplete file is an error until the rest is written.
-    let whole = model(RED).glb();
-    fs::write(folder.path().join("box.glb"), &whole[..whole.len() / 2]).unwrap();
-    assert!(running.wait_problem().message.contains("box.glb: "));
-    fs::write(folder.path().join("box.glb"), whole).unwrap();
-    wait_for(&running, RED);
+    wait_for(&session, BLUE);
+    // An incomplete file is an error until its end is written.
+    let complete = model(RED).glb();
+    fs::write(folder.path().join("box.glb"), &complete[..complete.len() / 2]).unwrap();
+    assert!(session.wait_for_problem().message.contains("box.glb: "));
+    fs::write(folder.path().join("box.glb"), complete).unwrap();
+    wait_for(&session, RED);
 }
 
 /// Incomplete pieces cause no error; the state reports that files are being read.
@@ -79,20 +79,20 @@ fn incomplete_files_of_an_exporter_cause_no_error() {
     let folder = TempDir::new().unwrap();
     let path = folder.path().join("box.glb");
     model(RED).write_glb(folder.path(), "box.glb");
-    let running = start(folder.path(), "box.glb");
-    wait_for(&running, RED);
-    let whole = model(GREEN).glb();
+    let session = start(folder.path(), "box.glb");
+    wait_for(&session, RED);
+    let complete = model(GREEN).glb();
     // On a busy machine the writer may pause until the file seems complete.
     let shows_no_error = (0..20).any(|_| {
         let [start, mut written] = [Instant::now(); 2];
         let (mut was_read, mut has_paused) = (false, false);
         fs::write(&path, "").unwrap();
         let mut file = fs::OpenOptions::new().append(true).open(&path).unwrap();
-        for byte in whole.chunks(1) {
+        for byte in complete.chunks(1) {
             file.write_all(byte).unwrap();
             has_paused |= written.elapsed() > Duration::from_millis(80);
             written = Instant::now();
-            let state = running.state();
+            let state = session.state();
             was_read |= state.reading;
             if has_paused {
                 break;
@@ -104,8 +104,8 @@ fn incomplete_files_of_an_exporter_cause_no_error() {
             std::thread::sleep(Duration::from_millis(20));
         }
         assert!(was_read || has_paused);
-        fs::write(&path, &whole).unwrap();
-        wait_for(&running, GREEN);
+        fs::write(&path, &complete).unwrap();
+        wait_for(&session, GREEN);
         !has_paused
     });
     assert!(shows_no_error);
@@ -115,24 +115,24 @@ fn incomplete_files_of_an_exporter_cause_no_error() {
 fn files_that_a_model_refers_to_are_watched() {
     let folder = TempDir::new().unwrap();
     model(RED).write_gltf(folder.path(), "box");
-    let running = start(folder.path(), "box.gltf");
-    wait_for(&running, RED);
+    let session = start(folder.path(), "box.gltf");
+    wait_for(&session, RED);
     model(GREEN).write_gltf(folder.path(), "box");
-    wait_for(&running, GREEN);
-    // Without the buffer an error is reported; with the buffer the image returns.
+    wait_for(&session, GREEN);
+    // Without the buffer, an error is reported; with the buffer, the image returns.
     let buffer = folder.path().join("box.bin");
     let bytes = fs::read(&buffer).unwrap();
     fs::remove_file(&buffer).unwrap();
-    assert!(running.wait_problem().message.contains("box.bin"));
+    assert!(session.wait_for_problem().message.contains("box.bin"));
     fs::write(&buffer, &bytes).unwrap();
-    wait_for(&running, GREEN);
-    let revision = running.revision();
-    let larger: Vec<u8> = bytes[..96]
+    wait_for(&session, GREEN);
+    let revision = session.revision();
+    let scaled: Vec<u8> = bytes[..96]
         .chunks(4)
         .flat_map(|x| (f32::from_le_bytes([x[0], x[1], x[2], x[3]]) * 0.5).to_le_bytes())
         .collect();
-    fs::write(&buffer, [&larger, &bytes[96..]].concat()).unwrap();
-    running.wait_done(revision);
+    fs::write(&buffer, [&scaled, &bytes[96..]].concat()).unwrap();
+    session.wait_for_complete_image(revision);
 }
 
 #[test]
@@ -140,15 +140,15 @@ fn the_camera_moves_but_is_not_saved_into_a_model() {
     let folder = TempDir::new().unwrap();
     model(RED).write_glb(folder.path(), "box.glb");
     let before = fs::read(folder.path().join("box.glb")).unwrap();
-    let running = start(folder.path(), "box.glb");
-    wait_for(&running, RED);
-    let (still, revision) = (running.colors(), running.revision());
-    running.session.send(Command::Move(Move::Orbit(0.5, 0.1)));
-    running.wait_done(revision);
-    assert_ne!(running.colors(), still);
-    running.session.send(Command::SaveCamera);
-    running.wait("the reason", |running| {
-        let text = format!("{:?}", running.state());
+    let session = start(folder.path(), "box.glb");
+    wait_for(&session, RED);
+    let (initial, revision) = (session.colors(), session.revision());
+    session.inner.send(Command::Move(Move::Orbit(0.5, 0.1)));
+    session.wait_for_complete_image(revision);
+    assert_ne!(session.colors(), initial);
+    session.inner.send(Command::SaveCamera);
+    session.wait("the error message", |session| {
+        let text = format!("{:?}", session.state());
         text.contains("cannot save the camera: glTF files are read-only here")
             .then_some(())
     });

@@ -2,32 +2,32 @@
 
 use wgray_dev::{Command, Move, View};
 
-use super::running::{Files, KERNEL, RADIANCE, Running, SCENE};
+use super::running::{Files, KERNEL, RADIANCE, SCENE, TestSession};
 
 const FIRST_HITS: &str = "shaders/kernels/first_hits.wgsl";
 const ADAPTIVE: &str = "shaders/kernels/adaptive.wgsl";
 
-fn problems(running: &Running) -> Vec<String> {
-    let state = running.state();
-    let place = |place: &Option<String>| place.clone().unwrap_or_default();
+fn problems(session: &TestSession) -> Vec<String> {
+    let state = session.state();
+    let location = |place: &Option<String>| place.clone().unwrap_or_default();
     state
         .problems
         .iter()
-        .map(|problem| format!("{}: {}", place(&problem.place), problem.message))
+        .map(|problem| format!("{}: {}", location(&problem.place), problem.message))
         .collect()
 }
 
 #[test]
 fn errors_in_unused_kernels_are_reported_at_once() {
     let files = Files::new(SCENE);
-    let running = files.start();
-    running.wait_rendered(&files);
-    let good = running.colors();
+    let session = files.start();
+    session.wait_for_rendered_image(&files);
+    let valid_colors = session.colors();
     files.edit(FIRST_HITS, "fn first_hits", "fn hits_first");
     files.edit(ADAPTIVE, "= moments;", "= moments.xyz;");
     files.edit(KERNEL, "@workgroup_size(8, 8)", "@workgroup_size(4, 4)");
-    let message = running.wait("all problems", |running| {
-        Some(problems(running)).filter(|all| all.len() == 3)
+    let messages = session.wait("all problems", |session| {
+        Some(problems(session)).filter(|all| all.len() == 3)
     });
     for (file, words) in [
         (FIRST_HITS, "must be called `first_hits`"),
@@ -36,30 +36,30 @@ fn errors_in_unused_kernels_are_reported_at_once() {
     ] {
         let path = files.path(file).display().to_string();
         assert!(
-            message
+            messages
                 .iter()
                 .any(|message| message.starts_with(&path) && message.contains(words)),
-            "{file}: {message:?}"
+            "{file}: {messages:?}"
         );
     }
-    assert_eq!(running.colors(), good);
+    assert_eq!(session.colors(), valid_colors);
     // The session continues with the last valid shaders.
-    let revision = running.revision();
-    running.session.send(Command::Move(Move::Orbit(0.3, 0.0)));
-    running.wait_done(revision);
-    running.session.send(Command::View(View::Normal));
-    running.wait("the normals", |running| {
-        running
+    let revision = session.revision();
+    session.inner.send(Command::Move(Move::Orbit(0.3, 0.0)));
+    session.wait_for_complete_image(revision);
+    session.inner.send(Command::View(View::Normal));
+    session.wait("the normals", |session| {
+        session
             .frame()
             .filter(|frame| frame.header.view == View::Normal && frame.header.done)
     });
-    assert_eq!(problems(&running).len(), 3);
-    running.session.send(Command::View(View::Color));
-    running.session.send(Command::ResetCamera);
+    assert_eq!(problems(&session).len(), 3);
+    session.inner.send(Command::View(View::Color));
+    session.inner.send(Command::ResetCamera);
     files.edit(FIRST_HITS, "fn hits_first", "fn first_hits");
     files.edit(ADAPTIVE, "= moments.xyz;", "= moments;");
     files.edit(KERNEL, "(4, 4)", "(8, 8)");
-    running.wait_rendered(&files);
+    session.wait_for_rendered_image(&files);
 }
 
 /// Adds a loop of a million iterations without effect that no compiler can remove.
@@ -76,57 +76,57 @@ fn a_truncated_loop_is_reported_or_the_image_is_complete() {
         .replace("width = 40", "width = 8")
         .replace("height = 30", "height = 8");
     let files = Files::new(&small);
-    let running = files.start();
-    running.wait_rendered(&files);
-    let good = running.colors();
-    let red = files.rendered();
-    assert_eq!(good, red);
+    let session = files.start();
+    session.wait_for_rendered_image(&files);
+    let initial = session.colors();
+    let expected = files.rendered_image();
+    assert_eq!(initial, expected);
     long_loop(&files, KERNEL, "var sum = film[index];");
     files.edit(KERNEL, RADIANCE, &format!("({RADIANCE} * vec4f(vec3f(0.5), 1.0))"));
-    let halved = |running: &Running| {
-        let colors = running.colors().colors;
-        let pairs = colors.iter().flatten().zip(good.colors.iter().flatten());
+    let halved = |session: &TestSession| {
+        let colors = session.colors().colors;
+        let pairs = colors.iter().flatten().zip(initial.colors.iter().flatten());
         pairs.into_iter().all(|(new, old)| *new == old * 0.5)
     };
-    let cut = running.wait("a problem or the complete image", |running| {
-        let message = problems(running)
+    let is_truncated = session.wait("a problem or the complete image", |session| {
+        let message = problems(session)
             .iter()
             .any(|message| message.contains("ends long loops early"));
-        let is_complete = running.frame().is_some_and(|frame| frame.header.done) && halved(running);
+        let is_complete = session.frame().is_some_and(|frame| frame.header.done) && halved(session);
         (message || is_complete).then_some(message)
     });
-    if cut {
-        assert_eq!(running.state().problems[0].kind, "shader");
-        assert_eq!(running.colors(), good, "the last valid image was discarded");
-        let revision = running.revision();
-        running.session.send(Command::Move(Move::Orbit(0.3, 0.0)));
-        running.wait_done(revision);
-        running.session.send(Command::ResetCamera);
-        assert!(!problems(&running).is_empty());
+    if is_truncated {
+        assert_eq!(session.state().problems[0].kind, "shader");
+        assert_eq!(session.colors(), initial, "the last valid image was discarded");
+        let revision = session.revision();
+        session.inner.send(Command::Move(Move::Orbit(0.3, 0.0)));
+        session.wait_for_complete_image(revision);
+        session.inner.send(Command::ResetCamera);
+        assert!(!problems(&session).is_empty());
     }
     files.write(
         KERNEL,
         wgray_render::gpu::compose::Shaders::built_in().text("kernels/render.wgsl"),
     );
-    running.wait_rendered(&files);
+    session.wait_for_rendered_image(&files);
 
-    // The loop is in a kernel of another view, which alone reports the error.
+    // The loop is in the kernel of another view, and only that view reports the error.
     long_loop(&files, FIRST_HITS, "let pixel = params.origin");
-    running.wait_well();
-    running.session.send(Command::View(View::Normal));
-    running.wait("a problem or the normals", |running| {
-        let message = problems(running)
+    session.wait_for_no_problem();
+    session.inner.send(Command::View(View::Normal));
+    session.wait("a problem or the normals", |session| {
+        let message = problems(session)
             .iter()
             .any(|message| message.contains("ends long loops early"));
-        let frame = running.frame()?;
+        let frame = session.frame()?;
         (message || frame.header.view == View::Normal && frame.header.done).then_some(())
     });
-    running.session.send(Command::View(View::Color));
-    running.wait_rendered(&files);
+    session.inner.send(Command::View(View::Color));
+    session.wait_for_rendered_image(&files);
     files.tint(0.25);
     files.write(
         FIRST_HITS,
         wgray_render::gpu::compose::Shaders::built_in().text("kernels/first_hits.wgsl"),
     );
-    running.wait_rendered(&files);
+    session.wait_for_rendered_image(&files);
 }

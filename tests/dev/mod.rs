@@ -1,5 +1,5 @@
-//! The development mode without a browser: after any change of the files, it shows the image that `render` makes of
-//! the current files, or the last valid image together with the error.
+//! The development mode without a browser. After any change of the files, a session shows the image that `render` makes
+//! of the current files, or the last valid image together with the error.
 
 mod faults;
 mod film_layers;

@@ -6,12 +6,12 @@ use std::time::Duration;
 use wgray_dev::{Command, Preview, Report, Session, Settings};
 use wgray_render::gpu::AdapterChoice;
 
-use super::responsive::heavy;
-use super::running::{Files, Running, SCENE, SETTLED};
+use super::responsive::slow_scene;
+use super::running::{Files, IDLE_TIME, SCENE, TestSession};
 
 #[test]
 fn rendering_pauses_without_viewers() {
-    let files = Files::new(&heavy());
+    let files = Files::new(&slow_scene());
     let settings = Settings {
         sources: files.sources(),
         device: AdapterChoice::Auto,
@@ -20,32 +20,32 @@ fn rendering_pauses_without_viewers() {
         editor: None,
         report: Box::new(|_| ()),
     };
-    let running = Running {
-        session: Session::start(settings).unwrap(),
+    let session = TestSession {
+        inner: Session::start(settings).unwrap(),
     };
-    running.wait("a kernel", |running| running.state().compile_seconds);
-    std::thread::sleep(SETTLED);
-    assert!(running.frame().is_none(), "a render runs without a viewer");
-    let viewer = running.session.viewers().enter();
-    running.wait("a first image", |running| running.frame());
-    let other = running.session.viewers().enter();
+    session.wait("a kernel", |session| session.state().compile_seconds);
+    std::thread::sleep(IDLE_TIME);
+    assert!(session.frame().is_none(), "a render runs without a viewer");
+    let viewer = session.inner.viewers().enter();
+    session.wait("a first image", |session| session.frame());
+    let second_viewer = session.inner.viewers().enter();
     drop(viewer);
-    let last = running.frame().unwrap();
-    running.wait("more samples for the other viewer", |running| {
-        (!Arc::ptr_eq(&running.frame()?, &last)).then_some(())
+    let last = session.frame().unwrap();
+    session.wait("more samples for the second viewer", |session| {
+        (!Arc::ptr_eq(&session.frame()?, &last)).then_some(())
     });
-    drop(other);
-    std::thread::sleep(SETTLED);
-    let last = running.frame().unwrap();
+    drop(second_viewer);
+    std::thread::sleep(IDLE_TIME);
+    let last = session.frame().unwrap();
     assert!(!last.header.done, "the image is already complete");
     std::thread::sleep(Duration::from_secs(1));
     assert!(
-        Arc::ptr_eq(&running.frame().unwrap(), &last),
+        Arc::ptr_eq(&session.frame().unwrap(), &last),
         "rendering continued without viewers"
     );
-    let _viewer = running.session.viewers().enter();
-    running.wait("more samples", |running| {
-        (!Arc::ptr_eq(&running.frame()?, &last)).then_some(())
+    let _viewer = session.inner.viewers().enter();
+    session.wait("more samples", |session| {
+        (!Arc::ptr_eq(&session.frame()?, &last)).then_some(())
     });
 }
 
@@ -61,22 +61,22 @@ fn the_time_to_an_image_contains_the_time_to_compile() {
         editor: None,
         report: Box::new(move |report| drop(sender.send(report))),
     };
-    let running = Running {
-        session: Session::start(settings).unwrap(),
+    let session = TestSession {
+        inner: Session::start(settings).unwrap(),
     };
-    // A viewer that connects after the compilation has not waited for it.
-    running.wait("a kernel", |running| running.state().compile_seconds);
-    std::thread::sleep(SETTLED);
-    let _viewer = running.session.viewers().enter();
-    running.wait_rendered(&files);
+    // A viewer that connects after the compilation did not wait for the compilation.
+    session.wait("a kernel", |session| session.state().compile_seconds);
+    std::thread::sleep(IDLE_TIME);
+    let _viewer = session.inner.viewers().enter();
+    session.wait_for_rendered_image(&files);
     files.tint(0.5);
-    running.wait_rendered(&files);
+    session.wait_for_rendered_image(&files);
     // A preview size that the viewer chooses is not reported as too large to display.
-    running.session.send(Command::Preview(Preview::try_from(2).unwrap()));
-    running.wait("a preview", |running| {
-        (running.frame()?.header.finest == [20, 15]).then_some(())
+    session.inner.send(Command::Preview(Preview::try_from(2).unwrap()));
+    session.wait("a preview", |session| {
+        (session.frame()?.header.finest == [20, 15]).then_some(())
     });
-    drop(running);
+    drop(session);
     let mut images = 0;
     for report in reports {
         assert!(!matches!(report, Report::Smaller(..)), "{report:?}");

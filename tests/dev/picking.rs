@@ -6,7 +6,7 @@ use serde_json::json;
 use wgray::scene::Overrides;
 use wgray_dev::{Command, Object, SceneView, Set, Sources};
 
-use super::running::{Files, Running};
+use super::running::{Files, TestSession};
 use crate::model::Model;
 
 /// The camera is at -y; the image covers about x = -2 to 2.
@@ -41,8 +41,8 @@ f 5 6 7 8
 ";
 const MTL: &str = "newmtl bark\nKd 0.4 0.2 0.1\nnewmtl leaf\nKd 0.1 0.5 0.1\n";
 
-fn wait_for_view(running: &Running) -> std::sync::Arc<SceneView> {
-    running.wait("a scene", |running| running.session.seen.borrow().clone())
+fn wait_for_view(session: &TestSession) -> std::sync::Arc<SceneView> {
+    session.wait("a scene", |session| session.inner.seen.borrow().clone())
 }
 
 fn groups(object: &Object) -> Vec<&str> {
@@ -50,21 +50,21 @@ fn groups(object: &Object) -> Vec<&str> {
 }
 
 #[track_caller]
-fn line(text: &str, of: &str) -> usize {
-    1 + text.lines().position(|line| line == of).unwrap()
+fn line_number(text: &str, content: &str) -> usize {
+    1 + text.lines().position(|line| line == content).unwrap()
 }
 
-fn set(running: &Running, path: &str, value: serde_json::Value) -> Option<String> {
-    let executed = running.state().executed;
-    running.session.send(Command::Set(Set {
+fn set(session: &TestSession, path: &str, value: serde_json::Value) -> Option<String> {
+    let executed = session.state().executed;
+    session.inner.send(Command::Set(Set {
         path: path.to_owned(),
         value,
         gesture: None,
     }));
-    running.wait("the command to be followed", |running| {
-        (running.state().executed > executed).then_some(())
+    session.wait("the end of the command", |session| {
+        (session.state().executed > executed).then_some(())
     });
-    let state = running.state();
+    let state = session.state();
     let notice = state.notice.clone().filter(|notice| notice.command == state.executed);
     notice.filter(|notice| notice.bad).map(|notice| notice.text)
 }
@@ -84,7 +84,7 @@ mesh = 'tile'
 material = 'red'
 translate = [-1, 0, 0]
 
-# a ball is a shape: it comes before instances
+# shapes come before instances
 [[shapes]]
 type = 'sphere'
 material = 'green'
@@ -100,10 +100,10 @@ translate = [1, 0, 0]
     );
     let files = Files::new(&text);
     files.write("tile.obj", TILE);
-    let running = files.start();
-    running.wait_rendered(&files);
-    let scene = wait_for_view(&running);
-    for (pixel, name, first, named) in [
+    let session = files.start();
+    session.wait_for_rendered_image(&files);
+    let scene = wait_for_view(&session);
+    for (pixel, name, comment, expected) in [
         (LEFT, "instances[0]", "# the left one", ["materials.red", "meshes.tile"]),
         (
             RIGHT,
@@ -114,10 +114,10 @@ translate = [1, 0, 0]
     ] {
         let object = scene.at(pixel);
         assert_eq!((object.name.as_str(), &object.gone, &object.note), (name, &None, &None));
-        assert_eq!(object.groups[0].line, line(&text, first));
-        let mut others = groups(&object).split_off(1);
-        others.sort_unstable();
-        assert_eq!(others, named, "{object:?}");
+        assert_eq!(object.groups[0].line, line_number(&text, comment));
+        let mut references = groups(&object).split_off(1);
+        references.sort_unstable();
+        assert_eq!(references, expected, "{object:?}");
     }
     assert_eq!(scene.at(MIDDLE).name, "shapes[0]");
     assert_eq!(scene.at([0, 0]).name, "render");
@@ -125,25 +125,28 @@ translate = [1, 0, 0]
     let file = mesh.groups[0].fields.iter().find(|field| field.name == "file").unwrap();
     assert!(file.fixed.is_some(), "a viewer may replace the list of read files");
     // The instance is moved away from the clicked pixel and picked at its new position.
-    assert_eq!(set(&running, "instances[1].translate", json!([1, 0, 0.9])), None);
+    assert_eq!(set(&session, "instances[1].translate", json!([1, 0, 0.9])), None);
     assert_eq!(
         files.read("scene.toml"),
         text.replace("translate = [1, 0, 0]", "translate = [1, 0, 0.9]")
     );
-    running.wait_rendered(&files);
-    let scene = wait_for_view(&running);
+    session.wait_for_rendered_image(&files);
+    let scene = wait_for_view(&session);
     assert_eq!(scene.at(RIGHT).name, "render");
     assert_eq!(scene.at([30, 6]).name, "instances[1]");
     // Absent keys are added. A scale may be a number or a list.
-    assert_eq!(set(&running, "instances[0].scale", json!(0.5)), None);
+    assert_eq!(set(&session, "instances[0].scale", json!(0.5)), None);
     assert!(
         files
             .read("scene.toml")
             .contains("translate = [-1, 0, 0]\nscale = 0.5\n")
     );
-    running.wait_rendered(&files);
-    let message = set(&running, "instances[0].scale", json!(0)).unwrap();
-    assert!(message.contains("instances[0].scale: 0 must not be 0"), "{message}");
+    session.wait_for_rendered_image(&files);
+    let message = set(&session, "instances[0].scale", json!(0)).unwrap();
+    assert!(
+        message.contains("instances[0].scale: 0 must be from 1e-6 to 1e6"),
+        "{message}"
+    );
     assert!(files.read("scene.toml").contains("scale = 0.5\n"));
 }
 
@@ -164,12 +167,12 @@ materials = {{ leaf = 'leaf' }}
     let files = Files::new(&text);
     files.write("pair.obj", PAIR);
     files.write("pair.mtl", MTL);
-    let running = files.start();
-    running.wait_rendered(&files);
-    let scene = wait_for_view(&running);
+    let session = files.start();
+    session.wait_for_rendered_image(&files);
+    let scene = wait_for_view(&session);
     let trunk = scene.at(LEFT);
     assert_eq!((trunk.name.as_str(), &trunk.gone), ("shapes[0]", &None));
-    assert_eq!(trunk.groups[0].line, line(&text, "# a tree"));
+    assert_eq!(trunk.groups[0].line, line_number(&text, "# a tree"));
     assert_eq!(groups(&trunk), ["shapes[0]", "materials.leaf"]);
     let note = trunk.note.unwrap();
     assert!(note.contains("bark") && note.ends_with("is in another file"), "{note}");
@@ -196,14 +199,14 @@ materials = {{ leaf = 'leaf' }}
         ),
         ("materials.bark.color", json!([1, 1, 1]), "cannot be changed"),
     ] {
-        let message = set(&running, path, value).unwrap();
+        let message = set(&session, path, value).unwrap();
         assert!(message.contains(expected), "{path}: {message}");
         assert_eq!(files.read("scene.toml"), text);
     }
-    assert_eq!(set(&running, "shapes[0].scale", json!(0.75)), None);
-    running.wait_rendered(&files);
-    assert_eq!(set(&running, "materials.leaf.color", json!([0.8, 0.8, 0.1])), None);
-    running.wait_rendered(&files);
+    assert_eq!(set(&session, "shapes[0].scale", json!(0.75)), None);
+    session.wait_for_rendered_image(&files);
+    assert_eq!(set(&session, "materials.leaf.color", json!([0.8, 0.8, 0.1])), None);
+    session.wait_for_rendered_image(&files);
 }
 
 #[test]
@@ -220,9 +223,9 @@ fn picking_a_gltf_file_reports_that_it_is_read_only() {
         },
         shaders: None,
     };
-    let running = Running::start(sources, None);
-    running.wait_done(0);
-    let scene = wait_for_view(&running);
+    let session = TestSession::start(sources, None);
+    session.wait_for_complete_image(0);
+    let scene = wait_for_view(&session);
     let clicked = scene.at([12, 11]);
     assert_eq!((clicked.name.as_str(), clicked.groups.len()), ("shapes[0]", 0));
     let message = "glTF files are read-only here; run `wgray convert` for an editable scene";
@@ -231,11 +234,11 @@ fn picking_a_gltf_file_reports_that_it_is_read_only() {
         assert_eq!(scene.object(&name, None).gone.as_deref(), Some(message), "{name}");
     }
     for path in ["shapes[0].file", "camera.fov", "render.seed"] {
-        let error = set(&running, path, json!(1)).unwrap();
+        let error = set(&session, path, json!(1)).unwrap();
         assert!(error.ends_with("run `wgray convert` for an editable scene"), "{error}");
     }
     assert_eq!(fs::read(files.path("box.glb")).unwrap(), before);
-    assert_eq!(running.state().undo, None);
+    assert_eq!(session.state().undo, None);
 }
 
 #[test]
@@ -261,23 +264,23 @@ translate = [1, 0, -0.2]
     Model::default().write_glb(files.folder.path(), "box.glb");
     let model = fs::read(files.path("box.glb")).unwrap();
     let text = files.read("scene.toml");
-    let running = files.start();
-    running.wait_rendered(&files);
-    let scene = wait_for_view(&running);
+    let session = files.start();
+    session.wait_for_rendered_image(&files);
+    let scene = wait_for_view(&session);
     assert_eq!(scene.at(LEFT).name, "shapes[0]");
     let clicked = scene.at(RIGHT);
     assert_eq!(
         (clicked.name.as_str(), groups(&clicked)),
         ("shapes[1]", vec!["shapes[1]"])
     );
-    assert_eq!(clicked.groups[0].line, line(&text, "# the model"));
+    assert_eq!(clicked.groups[0].line, line_number(&text, "# the model"));
     assert_eq!(
         clicked.note.as_deref(),
-        Some("part of this glTF file, which is read-only here. Run `wgray convert` for an editable scene.")
+        Some("The object is part of a glTF file, which is read-only here. Run `wgray convert` for an editable scene.")
     );
-    assert_eq!(set(&running, "shapes[1].translate", json!([1, 0, 0.7])), None);
-    running.wait_rendered(&files);
-    assert_eq!(wait_for_view(&running).at(RIGHT).name, "render");
+    assert_eq!(set(&session, "shapes[1].translate", json!([1, 0, 0.7])), None);
+    session.wait_for_rendered_image(&files);
+    assert_eq!(wait_for_view(&session).at(RIGHT).name, "render");
     assert_eq!(
         (files.read("scene.toml"), fs::read(files.path("box.glb")).unwrap()),
         (text.replace("-0.2]", "0.7]"), model)

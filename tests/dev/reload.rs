@@ -6,16 +6,16 @@ use std::time::{Duration, Instant};
 use wgray_dev::{Command, Move};
 use wgray_render::gpu::compose::Shaders;
 
-use super::running::{Files, KERNEL, RADIANCE, Running, SCENE, SETTLED};
+use super::running::{Files, IDLE_TIME, KERNEL, RADIANCE, SCENE, TestSession};
 
 #[test]
 fn the_first_image_equals_the_image_of_render() {
     let files = Files::new(SCENE);
-    let running = files.start();
-    running.wait_rendered(&files);
-    let frame = running.frame().unwrap();
+    let session = files.start();
+    session.wait_for_rendered_image(&files);
+    let frame = session.frame().unwrap();
     assert_eq!((frame.header.samples, frame.header.total), (4, 4));
-    let colors = running.colors().colors;
+    let colors = session.colors().colors;
     assert!(colors.iter().any(|color| *color != colors[0]), "the image is empty");
     let (x, y) = (20, 20);
     let [r, g, b] = colors[y * 40 + x];
@@ -36,15 +36,15 @@ fn the_first_image_equals_the_image_of_render() {
 #[test]
 fn a_partly_written_scene_is_not_an_error() {
     let files = Files::new(SCENE);
-    let running = files.start();
-    running.wait_rendered(&files);
-    let half = &SCENE[..SCENE.find("radius").unwrap() + 3];
+    let session = files.start();
+    session.wait_for_rendered_image(&files);
+    let incomplete = &SCENE[..SCENE.find("radius").unwrap() + 3];
     // On a busy machine a save may take too long, but not each of ten saves.
     let is_silent = (0..10).any(|i| {
         let start = Instant::now();
-        files.write("scene.toml", half);
+        files.write("scene.toml", incomplete);
         let mut was_silent = true;
-        let mut check = || was_silent &= running.state().problems.is_empty();
+        let mut check = || was_silent &= session.state().problems.is_empty();
         while start.elapsed() < Duration::from_millis(50) {
             check();
             std::thread::sleep(Duration::from_millis(1));
@@ -60,54 +60,54 @@ fn a_partly_written_scene_is_not_an_error() {
         was_silent
     });
     assert!(is_silent);
-    running.wait_rendered(&files);
-    files.write("scene.toml", half); // a file that remains incomplete is an error
-    running.wait_problem();
+    session.wait_for_rendered_image(&files);
+    files.write("scene.toml", incomplete); // a file that remains incomplete is an error
+    session.wait_for_problem();
 }
 
 #[test]
 fn a_saved_scene_is_compiled_only_if_it_needs_another_kernel() {
     let files = Files::new(SCENE);
-    let running = files.start();
-    running.wait_rendered(&files);
-    let (before, compiled) = (running.colors(), running.state().compile_seconds);
+    let session = files.start();
+    session.wait_for_rendered_image(&files);
+    let (before, compiled) = (session.colors(), session.state().compile_seconds);
     files.edit("scene.toml", "0.8, 0.1, 0.1", "0.1, 0.8, 0.1");
-    running.wait_rendered(&files);
-    assert_ne!(running.colors(), before);
-    assert_eq!(running.state().compile_seconds, compiled, "a kernel was compiled");
-    let before = running.colors();
-    let more = |shape: &str| format!("[[shapes]]\nmaterial = 'red'\n{shape}\n\n[[shapes]]");
-    let sphere = more("type = 'sphere'\ncenter = [1, 0, 1]\nradius = 0.3");
+    session.wait_for_rendered_image(&files);
+    assert_ne!(session.colors(), before);
+    assert_eq!(session.state().compile_seconds, compiled, "a kernel was compiled");
+    let before = session.colors();
+    let new_shape = |shape: &str| format!("[[shapes]]\nmaterial = 'red'\n{shape}\n\n[[shapes]]");
+    let sphere = new_shape("type = 'sphere'\ncenter = [1, 0, 1]\nradius = 0.3");
     files.edit("scene.toml", "[[shapes]]", &sphere);
-    running.wait_rendered(&files);
-    assert_ne!(running.colors(), before);
+    session.wait_for_rendered_image(&files);
+    assert_ne!(session.colors(), before);
     assert_eq!(
-        running.state().compile_seconds,
+        session.state().compile_seconds,
         compiled,
         "a second sphere needed a compilation"
     );
-    let triangle = more("type = 'triangle'\nvertices = [[1, 0, 1], [1, 0, 2], [1, 1, 1]]");
+    let triangle = new_shape("type = 'triangle'\nvertices = [[1, 0, 1], [1, 0, 2], [1, 1, 1]]");
     files.edit("scene.toml", "[[shapes]]", &triangle);
-    running.wait_rendered(&files);
+    session.wait_for_rendered_image(&files);
     assert_ne!(
-        running.state().compile_seconds,
+        session.state().compile_seconds,
         compiled,
         "no other kernel was compiled"
     );
     files.edit("scene.toml", "width = 40", "width = 33");
-    running.wait_rendered(&files);
+    session.wait_for_rendered_image(&files);
 }
 
 #[test]
 fn a_view_transform_is_applied_without_rendering_again() {
     let files = Files::new(SCENE);
     let out = files.path("out.png");
-    let running = Running::start(files.sources(), Some(out.clone()));
-    running.wait_rendered(&files);
-    let (linear, revision) = (running.colors(), running.revision());
+    let session = TestSession::start(files.sources(), Some(out.clone()));
+    session.wait_for_rendered_image(&files);
+    let (linear, revision) = (session.colors(), session.revision());
     let keys = "width = 40\nview_transform = 'agx'\nexposure = 1";
     files.edit("scene.toml", "width = 40", keys);
-    let frame = running.wait_done(revision);
+    let frame = session.wait_for_complete_image(revision);
     let settings = wgray::scene::ViewSettings {
         transform: wgray::scene::ViewTransform::Agx,
         exposure: 1.0,
@@ -115,8 +115,8 @@ fn a_view_transform_is_applied_without_rendering_again() {
     let expected: Vec<u8> = linear.colors.iter().flat_map(|color| settings.rgb8(*color)).collect();
     let page = image::load_from_memory(&frame.pictures[0]).unwrap().into_rgb8();
     assert_eq!(*page.as_raw(), expected);
-    assert_eq!(running.colors(), linear);
-    running.wait("the file", |_| {
+    assert_eq!(session.colors(), linear);
+    session.wait("the file", |_| {
         let picture = image::open(&out).ok()?.into_rgb8();
         (*picture.as_raw() == expected).then_some(())
     });
@@ -125,24 +125,24 @@ fn a_view_transform_is_applied_without_rendering_again() {
 #[test]
 fn a_changed_comment_does_not_restart_the_render() {
     let files = Files::new(SCENE);
-    let running = files.start();
-    running.wait_rendered(&files);
-    let revision = running.revision();
+    let session = files.start();
+    session.wait_for_rendered_image(&files);
+    let revision = session.revision();
     files.edit("scene.toml", "# a small scene", "# a very small scene");
-    std::thread::sleep(SETTLED);
-    assert_eq!(running.revision(), revision);
+    std::thread::sleep(IDLE_TIME);
+    assert_eq!(session.revision(), revision);
     files.edit("scene.toml", "fov = 40", "fov = 41"); // control: the file is being watched
-    running.wait_rendered(&files);
+    session.wait_for_rendered_image(&files);
 }
 
 #[test]
 fn an_invalid_shader_is_reported_and_the_image_stays() {
     let files = Files::new(SCENE);
-    let running = files.start();
-    running.wait_rendered(&files);
-    let (good, revision) = (running.colors(), running.revision());
+    let session = files.start();
+    session.wait_for_rendered_image(&files);
+    let (valid_colors, revision) = (session.colors(), session.revision());
     files.edit(KERNEL, "= sum;", "= sun;");
-    let problem = running.wait_problem();
+    let problem = session.wait_for_problem();
     assert_eq!(problem.kind, "shader");
     let text = files.read(KERNEL);
     let before = &text[..text.find("sun;").unwrap()];
@@ -150,21 +150,21 @@ fn an_invalid_shader_is_reported_and_the_image_stays() {
         before.matches('\n').count() + 1,
         before.len() - before.rfind('\n').unwrap(),
     );
-    let place = format!("{}:{line}:{column}", files.path(KERNEL).display());
-    assert_eq!(problem.place, Some(place));
+    let location = format!("{}:{line}:{column}", files.path(KERNEL).display());
+    assert_eq!(problem.place, Some(location));
     assert!(problem.message.contains("sun"), "{}", problem.message);
     let excerpt = problem.excerpt.unwrap();
     assert!(excerpt.contains("= sun;") && excerpt.contains("^^^"), "{excerpt}");
-    std::thread::sleep(SETTLED);
-    assert_eq!((running.colors(), running.revision()), (good, revision));
+    std::thread::sleep(IDLE_TIME);
+    assert_eq!((session.colors(), session.revision()), (valid_colors, revision));
     // Changes that do not need the invalid shader take effect.
-    running.session.send(Command::Move(Move::Orbit(0.3, 0.0)));
-    running.wait_done(revision);
-    running.session.send(Command::ResetCamera);
+    session.inner.send(Command::Move(Move::Orbit(0.3, 0.0)));
+    session.wait_for_complete_image(revision);
+    session.inner.send(Command::ResetCamera);
     files.edit("scene.toml", "0.8, 0.1, 0.1", "0.1, 0.8, 0.1");
-    let scene_changed = Files::new(&files.read("scene.toml")).rendered();
-    running.wait("the changed scene with the last valid shaders", |running| {
-        (running.colors() == scene_changed).then_some(())
+    let scene_changed = Files::new(&files.read("scene.toml")).rendered_image();
+    session.wait("the changed scene with the last valid shaders", |session| {
+        (session.colors() == scene_changed).then_some(())
     });
     // Changes that need another kernel take effect, too.
     files.edit(
@@ -172,13 +172,13 @@ fn an_invalid_shader_is_reported_and_the_image_stays() {
         "radius = 0.5",
         "radius = 0.5\n\n[[shapes]]\ntype = 'sphere'\nmaterial = 'red'\ncenter = [1, 0, 1]\nradius = 0.3",
     );
-    let scene_changed = Files::new(&files.read("scene.toml")).rendered();
-    running.wait("a new kernel from the last valid shaders", |running| {
-        (running.colors() == scene_changed).then_some(())
+    let scene_changed = Files::new(&files.read("scene.toml")).rendered_image();
+    session.wait("a new kernel from the last valid shaders", |session| {
+        (session.colors() == scene_changed).then_some(())
     });
-    assert_eq!(running.wait_problem().kind, "shader");
+    assert_eq!(session.wait_for_problem().kind, "shader");
     files.tint(0.5);
-    running.wait_rendered(&files);
+    session.wait_for_rendered_image(&files);
 }
 
 #[test]
@@ -189,51 +189,51 @@ fn a_type_error_in_a_shader_is_reported() {
         "return Ray(camera.position, ",
         "return Ray(camera.seed, ",
     );
-    let running = files.start();
-    let problem = running.wait_problem();
+    let session = files.start();
+    let problem = session.wait_for_problem();
     assert!(
         problem.place.unwrap().contains("camera.wgsl:"),
         "the error does not name the shader"
     );
-    assert!(running.frame().is_none());
+    assert!(session.frame().is_none());
     files.edit(
         "shaders/camera.wgsl",
         "return Ray(camera.seed, ",
         "return Ray(camera.position, ",
     );
-    running.wait_rendered(&files);
+    session.wait_for_rendered_image(&files);
 }
 
 #[test]
 fn an_invalid_scene_is_reported_and_the_image_stays() {
     let files = Files::new(SCENE);
-    let running = files.start();
-    running.wait_rendered(&files);
-    let good = running.colors();
+    let session = files.start();
+    session.wait_for_rendered_image(&files);
+    let valid_colors = session.colors();
     for (old, new, line, rule) in [
         ("radius = 0.5", "radius = -1", 33, "must be"),
         ("radius = -1", "radius = = 1", 33, "extra"),
         ("radius = = 1", "radius = 1\nradios = 2", 34, "radios"),
     ] {
         files.edit("scene.toml", old, new);
-        let place = format!("{}:{line}", files.path("scene.toml").display());
-        let problem = running.wait("the problem", |running| {
-            let problem = running.state().problems.first().cloned()?;
-            (problem.place.as_ref()?.starts_with(&place) && problem.message.contains(rule)).then_some(problem)
+        let location = format!("{}:{line}", files.path("scene.toml").display());
+        let problem = session.wait("the problem", |session| {
+            let problem = session.state().problems.first().cloned()?;
+            (problem.place.as_ref()?.starts_with(&location) && problem.message.contains(rule)).then_some(problem)
         });
         assert_eq!(problem.kind, "scene");
         assert!(problem.excerpt.unwrap().contains(new.lines().last().unwrap()));
-        assert_eq!(running.colors(), good);
+        assert_eq!(session.colors(), valid_colors);
     }
     files.edit("scene.toml", "radios = 2\n", "");
-    running.wait_rendered(&files);
+    session.wait_for_rendered_image(&files);
 }
 
 #[test]
-fn after_a_burst_of_saves_the_last_one_is_shown() {
+fn after_a_burst_of_saves_the_last_save_is_shown() {
     let files = Files::new(SCENE);
-    let running = files.start();
-    running.wait_rendered(&files);
+    let session = files.start();
+    session.wait_for_rendered_image(&files);
     for i in 1..=40 {
         files.write("scene.toml", &SCENE.replace("fov = 40", &format!("fov = {}", 40 + i)));
         if i % 4 == 0 {
@@ -245,49 +245,49 @@ fn after_a_burst_of_saves_the_last_one_is_shown() {
         }
         std::thread::sleep(Duration::from_millis(i % 12));
     }
-    running.wait_rendered(&files);
+    session.wait_for_rendered_image(&files);
 }
 
 #[test]
 fn saves_by_rename_and_links_are_detected() {
     let files = Files::new(SCENE);
-    let running = files.start();
-    running.wait_rendered(&files);
+    let session = files.start();
+    session.wait_for_rendered_image(&files);
     files.save_by_rename("scene.toml", &SCENE.replace("fov = 40", "fov = 50"));
-    running.wait_rendered(&files);
+    session.wait_for_rendered_image(&files);
     let kernel = files
         .read(KERNEL)
         .replace(RADIANCE, &format!("({RADIANCE} * vec4f(vec3f(0.25), 1.0))"));
     files.save_by_rename(KERNEL, &kernel);
-    running.wait_rendered(&files);
+    session.wait_for_rendered_image(&files);
     #[cfg(unix)]
     {
         // Scene and shader become links to files in another folder, which are then edited.
-        let elsewhere = Files::new(&SCENE.replace("fov = 40", "fov = 60"));
+        let linked = Files::new(&SCENE.replace("fov = 40", "fov = 60"));
         for name in ["scene.toml", "shaders/phong.wgsl"] {
             fs::remove_file(files.path(name)).unwrap();
-            std::os::unix::fs::symlink(elsewhere.path(name), files.path(name)).unwrap();
+            std::os::unix::fs::symlink(linked.path(name), files.path(name)).unwrap();
         }
-        running.wait_rendered(&files);
-        elsewhere.save_by_rename("scene.toml", &SCENE.replace("fov = 40", "fov = 70"));
-        running.wait_rendered(&files);
-        elsewhere.edit(
+        session.wait_for_rendered_image(&files);
+        linked.save_by_rename("scene.toml", &SCENE.replace("fov = 40", "fov = 70"));
+        session.wait_for_rendered_image(&files);
+        linked.edit(
             "shaders/phong.wgsl",
             "return lobes;",
             "return Lobes(lobes.specular, lobes.diffuse);",
         );
-        running.wait_rendered(&files);
+        session.wait_for_rendered_image(&files);
     }
 }
 
 #[test]
 fn deleted_files_are_reported_until_they_return() {
     let files = Files::new(SCENE);
-    let running = files.start();
-    running.wait_rendered(&files);
-    let good = running.colors();
+    let session = files.start();
+    session.wait_for_rendered_image(&files);
+    let valid_colors = session.colors();
     fs::remove_file(files.path("scene.toml")).unwrap();
-    let problem = running.wait_problem();
+    let problem = session.wait_for_problem();
     assert_eq!(problem.kind, "file");
     assert!(
         problem.message.contains("scene.toml: cannot be read"),
@@ -295,31 +295,31 @@ fn deleted_files_are_reported_until_they_return() {
         problem.message
     );
     files.write("scene.toml", &SCENE.replace("fov = 40", "fov = 50"));
-    running.wait_rendered(&files);
-    assert_ne!(running.colors(), good);
+    session.wait_for_rendered_image(&files);
+    assert_ne!(session.colors(), valid_colors);
 
     fs::remove_file(files.path("shaders/phong.wgsl")).unwrap();
-    assert!(running.wait_problem().message.contains("phong.wgsl"));
+    assert!(session.wait_for_problem().message.contains("phong.wgsl"));
     files.write("shaders/phong.wgsl", Shaders::built_in().text("phong.wgsl"));
-    running.wait_well();
+    session.wait_for_no_problem();
 
     // A checkout of another branch also removes and restores folders.
     for name in ["shaders/kernels", "shaders"] {
         fs::rename(files.path(name), files.path("away")).unwrap();
-        assert_eq!(running.wait_problem().kind, "file");
+        assert_eq!(session.wait_for_problem().kind, "file");
         fs::rename(files.path("away"), files.path(name)).unwrap();
-        running.wait_well();
+        session.wait_for_no_problem();
     }
     fs::remove_dir_all(files.path("shaders")).unwrap();
     files.write_shaders();
     files.tint(0.125);
-    running.wait_rendered(&files);
+    session.wait_for_rendered_image(&files);
     files.edit(
         "shaders/kernels/render.wgsl",
         "film[index] = sum;",
         "film[index] = sum * vec4f(2.0, 1.0, 1.0, 1.0);",
     );
-    running.wait_rendered(&files);
+    session.wait_for_rendered_image(&files);
 }
 
 #[test]
@@ -327,31 +327,31 @@ fn an_edited_texture_updates_the_image() {
     let textured = SCENE.replacen("color = [0.8, 0.1, 0.1]", "color = { texture = 'wood' }", 1)
         + "\n[textures.wood]\ntype = 'image'\nfile = 'textures/wood.png'\n";
     let files = Files::new(&textured);
-    let paint = |color: [u8; 3]| {
+    let write_texture = |color: [u8; 3]| {
         fs::create_dir_all(files.path("textures")).unwrap();
         image::RgbImage::from_pixel(4, 4, image::Rgb(color))
             .save(files.path("textures/wood.png"))
             .unwrap();
     };
-    paint([200, 30, 30]);
-    let running = files.start();
-    running.wait_rendered(&files);
-    let red = running.colors();
-    paint([30, 30, 200]);
-    running.wait_rendered(&files);
-    assert_ne!(running.colors(), red);
-    // A missing or damaged texture has a stand-in, as in `render`.
+    write_texture([200, 30, 30]);
+    let session = files.start();
+    session.wait_for_rendered_image(&files);
+    let first_colors = session.colors();
+    write_texture([30, 30, 200]);
+    session.wait_for_rendered_image(&files);
+    assert_ne!(session.colors(), first_colors);
+    // A missing or damaged texture is replaced by a placeholder, as in `render`.
     fs::remove_dir_all(files.path("textures")).unwrap();
-    running.wait_rendered(&files);
-    assert_ne!(running.colors(), red);
-    paint([30, 200, 30]);
-    running.wait_rendered(&files);
+    session.wait_for_rendered_image(&files);
+    assert_ne!(session.colors(), first_colors);
+    write_texture([30, 200, 30]);
+    session.wait_for_rendered_image(&files);
     fs::write(files.path("textures/wood.png"), "not an image").unwrap();
-    running.wait_rendered(&files);
-    assert_ne!(running.colors(), red);
-    paint([200, 30, 30]);
-    running.wait("the first image again", |running| {
-        (running.colors() == red).then_some(())
+    session.wait_for_rendered_image(&files);
+    assert_ne!(session.colors(), first_colors);
+    write_texture([200, 30, 30]);
+    session.wait("the first image again", |session| {
+        (session.colors() == first_colors).then_some(())
     });
 }
 
@@ -359,34 +359,34 @@ fn an_edited_texture_updates_the_image() {
 #[test]
 fn a_pipe_or_a_device_instead_of_the_scene_is_reported() {
     let files = Files::new(SCENE);
-    let running = files.start();
-    running.wait_rendered(&files);
+    let session = files.start();
+    session.wait_for_rendered_image(&files);
     let path = files.path("scene.toml");
     fs::remove_file(&path).unwrap();
-    let made = std::process::Command::new("mkfifo").arg(&path).status().unwrap();
-    assert!(made.success());
-    assert!(running.wait_problem().message.contains("is a named pipe"));
+    let created = std::process::Command::new("mkfifo").arg(&path).status().unwrap();
+    assert!(created.success());
+    assert!(session.wait_for_problem().message.contains("is a named pipe"));
     fs::remove_file(&path).unwrap();
     files.write("scene.toml", &SCENE.replace("0.8, 0.1, 0.1", "0.1, 0.8, 0.1"));
-    running.wait_rendered(&files);
+    session.wait_for_rendered_image(&files);
     fs::remove_file(&path).unwrap();
     std::os::unix::fs::symlink("/dev/zero", &path).unwrap();
-    assert!(running.wait_problem().message.contains("is a device"));
+    assert!(session.wait_for_problem().message.contains("is a device"));
     fs::remove_file(&path).unwrap();
     files.write("scene.toml", SCENE);
-    running.wait_rendered(&files);
+    session.wait_for_rendered_image(&files);
 }
 
 #[test]
 fn a_finished_kernel_is_shown_while_a_newer_save_waits_for_the_compiler() {
     let files = Files::new(SCENE);
-    let running = files.start();
-    running.wait_rendered(&files);
-    let compile = Duration::from_secs_f64(running.state().compile_seconds.unwrap());
-    let revision = running.revision();
+    let session = files.start();
+    session.wait_for_rendered_image(&files);
+    let compile = Duration::from_secs_f64(session.state().compile_seconds.unwrap());
+    let revision = session.revision();
     let start = Instant::now();
     let mut saves = 0;
-    while running.revision() == revision {
+    while session.revision() == revision {
         assert!(
             start.elapsed() < 10 * compile,
             "{saves} saves in {:?}, no image",
@@ -397,55 +397,55 @@ fn a_finished_kernel_is_shown_while_a_newer_save_waits_for_the_compiler() {
         std::thread::sleep((compile / 3).max(Duration::from_millis(60)));
     }
     assert!(saves > 1);
-    running.wait_rendered(&files);
+    session.wait_for_rendered_image(&files);
 }
 
 #[test]
-fn a_comment_in_a_shader_is_not_compiled_and_later_errors_have_the_right_line() {
+fn a_comment_in_a_shader_is_not_compiled_and_later_errors_have_the_correct_line() {
     let files = Files::new(SCENE);
-    let running = files.start();
-    running.wait_rendered(&files);
-    let (revision, before) = (running.revision(), running.state());
+    let session = files.start();
+    session.wait_for_rendered_image(&files);
+    let (revision, before) = (session.revision(), session.state());
     files.write(KERNEL, &format!("// one\n// two\n{}", files.read(KERNEL)));
-    running.wait("the save", |running| {
-        (running.state().scenes > before.scenes).then_some(())
+    session.wait("the save", |session| {
+        (session.state().scenes > before.scenes).then_some(())
     });
-    std::thread::sleep(SETTLED);
-    let after = running.state();
+    std::thread::sleep(IDLE_TIME);
+    let after = session.state();
     assert_eq!(
-        (running.revision(), after.compile_seconds),
+        (session.revision(), after.compile_seconds),
         (revision, before.compile_seconds)
     );
     assert!(!after.compiling);
     files.edit(KERNEL, "= sum;", "= sun;");
     let text = files.read(KERNEL);
     let line = text.lines().position(|line| line.contains("= sun;")).unwrap() + 1;
-    assert_eq!(running.wait_problem().line, Some(line));
-    // A comment above it moves the line of the error.
+    assert_eq!(session.wait_for_problem().line, Some(line));
+    // A comment above the error moves its line.
     files.write(KERNEL, &format!("// zero\n{text}"));
-    running.wait("the error at its new line", |running| {
-        (running.state().problems.first()?.line == Some(line + 1)).then_some(())
+    session.wait("the error at its new line", |session| {
+        (session.state().problems.first()?.line == Some(line + 1)).then_some(())
     });
     files.write(KERNEL, &text.replace("sun;", "sum;"));
-    running.wait_rendered(&files);
+    session.wait_for_rendered_image(&files);
 }
 
 #[test]
 fn reading_a_changed_scene_is_reported_until_it_is_read() {
     let files = Files::new(SCENE);
-    let running = files.start();
-    running.wait_rendered(&files);
-    let half = &SCENE[..SCENE.find("radius").unwrap() + 3];
-    files.write("scene.toml", half);
-    running.wait("reading", |running| running.state().reading.then_some(()));
-    running.wait_problem();
-    assert!(!running.state().reading);
+    let session = files.start();
+    session.wait_for_rendered_image(&files);
+    let incomplete = &SCENE[..SCENE.find("radius").unwrap() + 3];
+    files.write("scene.toml", incomplete);
+    session.wait("the start of reading", |session| session.state().reading.then_some(()));
+    session.wait_for_problem();
+    assert!(!session.state().reading);
     files.write("scene.toml", SCENE);
-    running.wait_rendered(&files);
-    running.wait("the end", |running| (!running.state().reading).then_some(()));
+    session.wait_for_rendered_image(&files);
+    session.wait("the end of reading", |session| (!session.state().reading).then_some(()));
     // If the file returns to its previous content before it is read again, `reading` must end, too.
-    files.write("scene.toml", half);
-    running.wait("reading", |running| running.state().reading.then_some(()));
+    files.write("scene.toml", incomplete);
+    session.wait("the start of reading", |session| session.state().reading.then_some(()));
     files.write("scene.toml", SCENE);
-    running.wait("the end", |running| (!running.state().reading).then_some(()));
+    session.wait("the end of reading", |session| (!session.state().reading).then_some(()));
 }

@@ -19,9 +19,9 @@ use wgray_render::pack::pack;
 use wgray_render::records::Packed;
 
 /// Timeout of all waits, even on a busy machine.
-pub const LONGEST: Duration = Duration::from_secs(40);
+pub const TIMEOUT: Duration = Duration::from_secs(40);
 /// Time after which a session without events is idle.
-pub const SETTLED: Duration = Duration::from_millis(400);
+pub const IDLE_TIME: Duration = Duration::from_millis(400);
 
 pub const SCENE: &str = "# a small scene
 [image]
@@ -136,8 +136,8 @@ impl Files {
         }
     }
 
-    pub fn start(&self) -> Running {
-        Running::start(self.sources(), None)
+    pub fn start(&self) -> TestSession {
+        TestSession::start(self.sources(), None)
     }
 
     pub fn packed(&self) -> Packed {
@@ -145,15 +145,15 @@ impl Files {
     }
 
     /// Returns the image that `render` makes of the files.
-    pub fn rendered(&self) -> Pixels {
+    pub fn rendered_image(&self) -> Pixels {
         let packed = self.packed();
         let (width, height) = (packed.camera.width, packed.camera.height);
-        let colors = self.rendered_as(&packed, &|film, i| mean(film.sums[i]));
+        let colors = self.render_values(&packed, &|film, i| mean(film.sums[i]));
         Pixels { width, height, colors }
     }
 
     /// Returns `value` of each pixel of the film that `render` makes.
-    pub fn rendered_as<T>(&self, packed: &Packed, value: &dyn Fn(&Film, usize) -> T) -> Vec<T> {
+    pub fn render_values<T>(&self, packed: &Packed, value: &dyn Fn(&Film, usize) -> T) -> Vec<T> {
         let device = choose(&AdapterChoice::Auto).unwrap();
         let shaders = Shaders::read(&self.path("shaders")).unwrap();
         let options = Options {
@@ -162,10 +162,10 @@ impl Files {
         };
         let mut gpu = Gpu::new(&device, packed, &shaders, options).unwrap();
         let mut values = Vec::new();
-        let whole = Region::whole(packed.camera.width, packed.camera.height);
+        let region = Region::whole(packed.camera.width, packed.camera.height);
         job::render(
             &mut gpu,
-            whole,
+            region,
             packed.sampling.pixel_samples,
             &WorkSplit::default(),
             &mut |_| true,
@@ -179,53 +179,53 @@ impl Files {
     }
 }
 
-pub struct Running {
-    pub session: Session,
+pub struct TestSession {
+    pub inner: Session,
 }
 
-/// Serves a session for the rest of the process; returns it with its address.
-pub fn serve(running: Running) -> (&'static Running, SocketAddr) {
+/// Serves a session until the process ends, and returns the session and its address.
+pub fn serve(session: TestSession) -> (&'static TestSession, SocketAddr) {
     let listener = Listener::open("127.0.0.1:0").unwrap();
     let address = listener.address().unwrap();
-    let running: &'static Running = Box::leak(Box::new(running));
-    std::thread::spawn(move || listener.serve(&running.session).unwrap());
-    (running, address)
+    let session: &'static TestSession = Box::leak(Box::new(session));
+    std::thread::spawn(move || listener.serve(&session.inner).unwrap());
+    (session, address)
 }
 
-impl Running {
-    pub fn start(sources: Sources, out: Option<PathBuf>) -> Running {
+impl TestSession {
+    pub fn start(sources: Sources, out: Option<PathBuf>) -> TestSession {
         let settings = Settings {
             sources,
             device: AdapterChoice::Auto,
-            only_for_viewers: out.is_some(), // a file needs the image like a viewer
+            only_for_viewers: out.is_some(), // an output file must not wait for a viewer
             out,
             editor: None,
             report: Box::new(|_| ()),
         };
-        Running {
-            session: Session::start(settings).unwrap(),
+        TestSession {
+            inner: Session::start(settings).unwrap(),
         }
     }
 
     pub fn state(&self) -> Arc<State> {
-        self.session.state.borrow().clone()
+        self.inner.state.borrow().clone()
     }
 
     pub fn frame(&self) -> Option<Arc<Frame>> {
-        self.session.frames.borrow().clone()
+        self.inner.frames.borrow().clone()
     }
 
     #[track_caller]
-    pub fn wait<T>(&self, what: &str, ready: impl Fn(&Running) -> Option<T>) -> T {
+    pub fn wait<T>(&self, event: &str, ready: impl Fn(&TestSession) -> Option<T>) -> T {
         let start = Instant::now();
-        while start.elapsed() < LONGEST {
+        while start.elapsed() < TIMEOUT {
             if let Some(value) = ready(self) {
                 return value;
             }
             std::thread::sleep(Duration::from_millis(2));
         }
         panic!(
-            "{what}: not within {LONGEST:?}; state: {:?}, frame: {:?}",
+            "{event}: not within {TIMEOUT:?}; state: {:?}, frame: {:?}",
             self.state(),
             self.frame().map(|f| f.header.clone())
         );
@@ -233,9 +233,9 @@ impl Running {
 
     /// Waits for a complete image that is newer than a revision.
     #[track_caller]
-    pub fn wait_done(&self, after: u64) -> Arc<Frame> {
-        self.wait("a finished image", |running| {
-            running
+    pub fn wait_for_complete_image(&self, after: u64) -> Arc<Frame> {
+        self.wait("a finished image", |session| {
+            session
                 .frame()
                 .filter(|frame| frame.header.done && frame.header.revision > after)
         })
@@ -243,24 +243,24 @@ impl Running {
 
     /// Waits until the complete image equals the image that `render` makes.
     #[track_caller]
-    pub fn wait_rendered(&self, files: &Files) {
-        let wanted = files.rendered();
-        self.wait("the image that render makes", |running| {
-            let frame = running.frame()?;
-            matches!(&frame.content, Content::Color(pixels) if frame.header.done && *pixels == wanted).then_some(())
+    pub fn wait_for_rendered_image(&self, files: &Files) {
+        let expected = files.rendered_image();
+        self.wait("the image that render makes", |session| {
+            let frame = session.frame()?;
+            matches!(&frame.content, Content::Color(pixels) if frame.header.done && *pixels == expected).then_some(())
         });
         assert_eq!(self.state().problems, []);
     }
 
     #[track_caller]
-    pub fn wait_problem(&self) -> Diagnostic {
-        self.wait("a problem", |running| running.state().problems.first().cloned())
+    pub fn wait_for_problem(&self) -> Diagnostic {
+        self.wait("a problem", |session| session.state().problems.first().cloned())
     }
 
     #[track_caller]
-    pub fn wait_well(&self) {
-        self.wait("no problem", |running| {
-            (running.state().problems.is_empty() && !running.state().compiling).then_some(())
+    pub fn wait_for_no_problem(&self) {
+        self.wait("no problem", |session| {
+            (session.state().problems.is_empty() && !session.state().compiling).then_some(())
         });
     }
 

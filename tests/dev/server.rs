@@ -6,24 +6,24 @@ use std::time::{Duration, Instant};
 
 use wgray_dev::{Command, Listener, Move};
 
-use super::running::{Files, LONGEST, SCENE, serve};
+use super::running::{Files, SCENE, TIMEOUT, serve};
 
-fn ask(address: SocketAddr, request: &str) -> (String, String) {
+fn send_request(address: SocketAddr, request: &str) -> (String, String) {
     let mut stream = TcpStream::connect(address).unwrap();
-    stream.set_read_timeout(Some(LONGEST)).unwrap();
+    stream.set_read_timeout(Some(TIMEOUT)).unwrap();
     stream.write_all(request.as_bytes()).unwrap();
-    let mut answer = String::new();
+    let mut response = String::new();
     let mut buffer = [0; 4096];
-    while !is_whole(&answer) {
+    while !is_complete(&response) {
         let n = stream.read(&mut buffer).unwrap();
-        assert_ne!(n, 0, "the answer breaks off: {answer}");
-        answer.push_str(&String::from_utf8_lossy(&buffer[..n]));
+        assert_ne!(n, 0, "the response is incomplete: {response}");
+        response.push_str(&String::from_utf8_lossy(&buffer[..n]));
     }
-    (answer.lines().next().unwrap_or_default().to_string(), answer)
+    (response.lines().next().unwrap_or_default().to_string(), response)
 }
 
-fn is_whole(answer: &str) -> bool {
-    let Some((head, body)) = answer.split_once("\r\n\r\n") else {
+fn is_complete(response: &str) -> bool {
+    let Some((head, body)) = response.split_once("\r\n\r\n") else {
         return false;
     };
     let length = head
@@ -32,8 +32,8 @@ fn is_whole(answer: &str) -> bool {
     head.starts_with("HTTP/1.1 101") || body.len() >= length.unwrap_or(usize::MAX)
 }
 
-fn get(path: &str, host: &str, more: &str) -> String {
-    format!("GET {path} HTTP/1.1\r\nHost: {host}\r\n{more}Connection: close\r\n\r\n")
+fn get(path: &str, host: &str, extra_headers: &str) -> String {
+    format!("GET {path} HTTP/1.1\r\nHost: {host}\r\n{extra_headers}Connection: close\r\n\r\n")
 }
 
 fn upgrade(host: &str, origin: &str) -> String {
@@ -46,10 +46,10 @@ fn upgrade(host: &str, origin: &str) -> String {
 #[test]
 fn the_server_answers_its_own_pages_only() {
     let files = Files::new(SCENE);
-    let running = files.start();
-    running.wait_rendered(&files);
-    let (session, address) = serve(running);
-    let (own, port) = (address.to_string(), address.port());
+    let session = files.start();
+    session.wait_for_rendered_image(&files);
+    let (session, address) = serve(session);
+    let (own_host, port) = (address.to_string(), address.port());
 
     for path in [
         "/",
@@ -63,7 +63,7 @@ fn the_server_answers_its_own_pages_only() {
         "/parts.js",
         "/touch.js",
     ] {
-        let (status, text) = ask(address, &get(path, &own, ""));
+        let (status, text) = send_request(address, &get(path, &own_host, ""));
         assert_eq!(status, "HTTP/1.1 200 OK", "{path}");
         assert!(
             text.contains("default-src 'none'") && text.contains("nosniff"),
@@ -81,24 +81,28 @@ fn the_server_answers_its_own_pages_only() {
         "/%2e%2e/etc/passwd",
         "//etc/passwd",
     ] {
-        assert_eq!(ask(address, &get(path, &own, "")).0, "HTTP/1.1 404 Not Found", "{path}");
+        assert_eq!(
+            send_request(address, &get(path, &own_host, "")).0,
+            "HTTP/1.1 404 Not Found",
+            "{path}"
+        );
     }
-    let refused = "HTTP/1.1 403 Forbidden";
+    let forbidden = "HTTP/1.1 403 Forbidden";
     for host in [
         "evil.example",
         &format!("evil.example:{port}"),
         "192.168.0.1",
         "127.0.0.1.evil.example",
     ] {
-        assert_eq!(ask(address, &get("/", host, "")).0, refused, "{host}");
+        assert_eq!(send_request(address, &get("/", host, "")).0, forbidden, "{host}");
         assert_eq!(
-            ask(address, &get(&format!("http://{host}/"), &own, "")).0,
-            refused,
+            send_request(address, &get(&format!("http://{host}/"), &own_host, "")).0,
+            forbidden,
             "{host}"
         );
         assert_eq!(
-            ask(address, &upgrade(host, &format!("Origin: http://{host}\r\n"))).0,
-            refused,
+            send_request(address, &upgrade(host, &format!("Origin: http://{host}\r\n"))).0,
+            forbidden,
             "{host}"
         );
     }
@@ -108,21 +112,25 @@ fn the_server_answers_its_own_pages_only() {
         "Origin: http://127.0.0.1:1\r\n",
         "",
     ] {
-        assert_eq!(ask(address, &upgrade(&own, origin)).0, refused, "{origin}");
+        assert_eq!(
+            send_request(address, &upgrade(&own_host, origin)).0,
+            forbidden,
+            "{origin}"
+        );
     }
     assert_eq!(
-        ask(address, &get("/", &own, "Origin: http://evil.example\r\n")).0,
-        refused
+        send_request(address, &get("/", &own_host, "Origin: http://evil.example\r\n")).0,
+        forbidden
     );
-    let accepted = ask(address, &upgrade(&own, &format!("Origin: http://{own}\r\n"))).0;
+    let accepted = send_request(address, &upgrade(&own_host, &format!("Origin: http://{own_host}\r\n"))).0;
     assert_eq!(accepted, "HTTP/1.1 101 Switching Protocols");
 
-    // The number of viewers is limited; one that disconnects makes room.
-    let request = upgrade(&own, &format!("Origin: http://{own}\r\n"));
+    // The number of viewers is limited; a viewer that disconnects makes room for another viewer.
+    let request = upgrade(&own_host, &format!("Origin: http://{own_host}\r\n"));
     let mut open = Vec::new();
-    let full = loop {
+    let status = loop {
         let mut stream = TcpStream::connect(address).unwrap();
-        stream.set_read_timeout(Some(LONGEST)).unwrap();
+        stream.set_read_timeout(Some(TIMEOUT)).unwrap();
         stream.write_all(request.as_bytes()).unwrap();
         let mut head = [0; 12];
         stream.read_exact(&mut head).unwrap();
@@ -132,15 +140,15 @@ fn the_server_answers_its_own_pages_only() {
         open.push(stream);
         assert!(open.len() <= 16, "the number of viewers is not limited");
     };
-    assert_eq!(full, *b"HTTP/1.1 503");
+    assert_eq!(status, *b"HTTP/1.1 503");
     assert!(open.len() >= 15, "{}", open.len());
     // Viewers that read no messages do not block the session.
     for _ in 0..20 {
         let revision = session.revision();
-        session.session.send(Command::Move(Move::Orbit(0.1, 0.0)));
-        session.wait_done(revision);
+        session.inner.send(Command::Move(Move::Orbit(0.1, 0.0)));
+        session.wait_for_complete_image(revision);
     }
-    // Too large, which ends the connection: 5,000 bytes of text, masked with zeros.
+    // A text of 5,000 bytes, masked with zeros, is too large and ends the connection.
     let mut large = vec![0x81, 0x80 | 126, 0x13, 0x88, 0, 0, 0, 0];
     large.resize(8 + 5000, b' ');
     let mut stream = open.pop().unwrap();
@@ -149,39 +157,40 @@ fn the_server_answers_its_own_pages_only() {
     let end = stream.read_to_end(&mut rest);
     assert!(end.is_ok() || end.is_err_and(|error| error.kind() == std::io::ErrorKind::ConnectionReset));
     drop(open);
-    session.wait("a free place", |_| {
-        (ask(address, &request).0 == "HTTP/1.1 101 Switching Protocols").then_some(())
+    session.wait("a free slot", |_| {
+        (send_request(address, &request).0 == "HTTP/1.1 101 Switching Protocols").then_some(())
     });
 }
 
 #[test]
-fn images_are_not_sent_to_foreign_origins_and_accepted_from_the_page_only() {
+fn images_are_not_sent_to_foreign_origins_and_are_only_accepted_from_the_page() {
     let files = Files::new(SCENE);
-    let running = files.start();
-    running.wait_rendered(&files);
-    let (session, address) = serve(running);
-    let own = address.to_string();
+    let session = files.start();
+    session.wait_for_rendered_image(&files);
+    let (session, address) = serve(session);
+    let own_host = address.to_string();
     for (path, kind) in [("/picture.png", "image/png"), ("/picture.exr", "image/x-exr")] {
-        let (status, text) = ask(address, &get(path, &own, ""));
+        let (status, text) = send_request(address, &get(path, &own_host, ""));
         assert_eq!(status, "HTTP/1.1 200 OK", "{path}");
         assert!(text.contains(kind) && text.contains("same-origin"), "{path}");
-        let foreign = get(path, &own, "Origin: http://evil.example\r\n");
-        assert_eq!(ask(address, &foreign).0, "HTTP/1.1 403 Forbidden");
+        let foreign = get(path, &own_host, "Origin: http://evil.example\r\n");
+        assert_eq!(send_request(address, &foreign).0, "HTTP/1.1 403 Forbidden");
     }
-    let give = |origin: &str| {
-        let head = format!("POST /reference/a%20b.png HTTP/1.1\r\nHost: {own}\r\n{origin}Content-Length: 10\r\n\r\n");
-        ask(address, &(head + "not image."))
+    let upload = |origin: &str| {
+        let head =
+            format!("POST /reference/a%20b.png HTTP/1.1\r\nHost: {own_host}\r\n{origin}Content-Length: 10\r\n\r\n");
+        send_request(address, &(head + "not image."))
     };
-    let page = format!("Origin: http://{own}\r\n");
+    let own_origin = format!("Origin: http://{own_host}\r\n");
     for origin in ["", "Origin: null\r\n", "Origin: http://evil.example\r\n"] {
-        assert_eq!(give(origin).0, "HTTP/1.1 403 Forbidden", "{origin}");
+        assert_eq!(upload(origin).0, "HTTP/1.1 403 Forbidden", "{origin}");
     }
-    let (status, text) = give(&page);
+    let (status, text) = upload(&own_origin);
     assert_eq!(status, "HTTP/1.1 422 Unprocessable Entity");
     assert!(text.contains("a b.png: "), "{text}");
     assert_eq!(session.state().comparable, (false, None));
     assert_eq!(
-        ask(address, &get("/reference/a", &own, "")).0,
+        send_request(address, &get("/reference/a", &own_host, "")).0,
         "HTTP/1.1 405 Method Not Allowed"
     );
 }
@@ -190,7 +199,7 @@ fn images_are_not_sent_to_foreign_origins_and_accepted_from_the_page_only() {
 fn incomplete_requests_time_out_and_do_not_block_others() {
     let files = Files::new(SCENE);
     let (_, address) = serve(files.start());
-    let halves = [
+    let incomplete = [
         "",
         "GET / HTTP/1.1\r\nHost: ",
         &format!("POST / HTTP/1.1\r\nHost: {address}\r\nContent-Length: 9\r\n\r\nx"),
@@ -198,13 +207,16 @@ fn incomplete_requests_time_out_and_do_not_block_others() {
     let open: Vec<TcpStream> = (0..200)
         .map(|i| {
             let mut stream = TcpStream::connect(address).unwrap();
-            stream.set_read_timeout(Some(LONGEST)).unwrap();
-            stream.write_all(halves[i % 3].as_bytes()).unwrap();
+            stream.set_read_timeout(Some(TIMEOUT)).unwrap();
+            stream.write_all(incomplete[i % 3].as_bytes()).unwrap();
             stream
         })
         .collect();
     let start = Instant::now();
-    assert_eq!(ask(address, &get("/", &address.to_string(), "")).0, "HTTP/1.1 200 OK");
+    assert_eq!(
+        send_request(address, &get("/", &address.to_string(), "")).0,
+        "HTTP/1.1 200 OK"
+    );
     assert!(start.elapsed() < Duration::from_secs(3), "{:?}", start.elapsed());
     for mut stream in open {
         let end = stream.read_to_end(&mut Vec::new());
@@ -215,8 +227,8 @@ fn incomplete_requests_time_out_and_do_not_block_others() {
 #[test]
 fn an_address_that_is_in_use_or_invalid_is_reported() {
     let listener = Listener::open("127.0.0.1:0").unwrap();
-    let place = listener.address().unwrap().to_string();
-    let error = Listener::open(&place).err().unwrap().to_string();
-    assert!(error.starts_with(&place), "{error}");
+    let address = listener.address().unwrap().to_string();
+    let error = Listener::open(&address).err().unwrap().to_string();
+    assert!(error.starts_with(&address), "{error}");
     assert!(Listener::open("nowhere").is_err());
 }

@@ -3,42 +3,42 @@
 use wgray::image::Pixels;
 use wgray_dev::{Command, Content, Kind, Slider, SliderState, Value};
 
-use super::running::{Files, KERNEL, RADIANCE, Running, SCENE};
+use super::running::{Files, KERNEL, RADIANCE, SCENE, TestSession};
 
 const FILE: &str = "kernels/render.wgsl";
 
-fn declare(files: &Files, declared: &str, factor: &str) {
+fn declare_overrides(files: &Files, declarations: &str, factor: &str) {
     let text = files.read(KERNEL);
     let text = text.replace(RADIANCE, &format!("({RADIANCE} * vec4f(vec3f({factor}), 1.0))"));
-    files.write(KERNEL, &format!("{text}\n{declared}\n"));
+    files.write(KERNEL, &format!("{text}\n{declarations}\n"));
 }
 
-fn slide(running: &Running, name: &str, value: Value) {
+fn move_slider(session: &TestSession, name: &str, value: Value) {
     let (file, name) = (FILE.to_string(), name.to_string());
-    running.session.send(Command::Slide { file, name, value });
+    session.inner.send(Command::Slide { file, name, value });
 }
 
-fn slider(running: &Running, name: &str) -> SliderState {
-    let state = running.state();
+fn slider(session: &TestSession, name: &str) -> SliderState {
+    let state = session.state();
     let found = state.sliders.iter().find(|state| state.slider.name == name);
     found.unwrap_or_else(|| panic!("{name}: {state:?}")).clone()
 }
 
-fn line_of(files: &Files, what: &str) -> usize {
+fn line_of(files: &Files, pattern: &str) -> usize {
     let text = files.read(KERNEL);
-    text.lines().position(|line| line.contains(what)).unwrap() + 1
+    text.lines().position(|line| line.contains(pattern)).unwrap() + 1
 }
 
 #[track_caller]
-fn wait_for(running: &Running, wanted: &Pixels) {
-    running.wait("the image of the sliders", |running| {
-        let frame = running.frame()?;
-        matches!(&frame.content, Content::Color(pixels) if frame.header.done && pixels == wanted).then_some(())
+fn wait_for(session: &TestSession, expected: &Pixels) {
+    session.wait("the image of the sliders", |session| {
+        let frame = session.frame()?;
+        matches!(&frame.content, Content::Color(pixels) if frame.header.done && pixels == expected).then_some(())
     });
 }
 
 /// Returns the image that `render` makes after edits of the kernel.
-fn rendered(files: &Files, edits: &[(&str, &str)]) -> Pixels {
+fn render_with_edits(files: &Files, edits: &[(&str, &str)]) -> Pixels {
     let text = files.read(KERNEL);
     let edited = Files::new(&files.read("scene.toml"));
     let new = edits.iter().fold(text.clone(), |text, (old, new)| {
@@ -46,23 +46,23 @@ fn rendered(files: &Files, edits: &[(&str, &str)]) -> Pixels {
         text.replace(old, new)
     });
     edited.write(KERNEL, &new);
-    edited.rendered()
+    edited.rendered_image()
 }
 
 #[test]
 fn a_slider_equals_an_edit_without_a_compilation() {
     let files = Files::new(SCENE);
-    declare(
+    declare_overrides(
         &files,
         "override tint: f32 = 0.5; // 0..1\noverride shift: i32 = -1; // slider -4..4\n\
          override on: bool = false;\noverride level: u32 = 2u; // 0..8\noverride hue = 0.75;\n\
          fn factor() -> f32 { return hue * (tint + f32(shift) * 0.125 + f32(level) * select(0.1, 0.3, on)); }",
         "factor()",
     );
-    let running = files.start();
-    running.wait_rendered(&files);
-    let compiled = running.state().compile_seconds;
-    let wanted = SliderState {
+    let session = files.start();
+    session.wait_for_rendered_image(&files);
+    let compiled = session.state().compile_seconds;
+    let expected = SliderState {
         slider: Slider {
             file: FILE.to_string(),
             name: "tint".to_string(),
@@ -75,8 +75,8 @@ fn a_slider_equals_an_edit_without_a_compilation() {
         path: Some(files.path(KERNEL).display().to_string()),
         value: Value::Number(0.5),
     };
-    assert_eq!(slider(&running, "tint"), wanted);
-    let first = running.colors();
+    assert_eq!(slider(&session, "tint"), expected);
+    let first = session.colors();
     let mut last = first.clone();
     let mut edits = Vec::new();
     for (name, value, edit) in [
@@ -87,20 +87,20 @@ fn a_slider_equals_an_edit_without_a_compilation() {
         ("hue", Value::Number(0.1), ("hue = 0.75", "hue = 0.1")),
     ] {
         edits.push(edit);
-        let edited = rendered(&files, &edits);
+        let edited = render_with_edits(&files, &edits);
         assert_ne!(edited, last, "{name} has no effect");
-        slide(&running, name, value);
-        wait_for(&running, &edited);
-        assert_eq!(slider(&running, name).value, value, "{name}");
+        move_slider(&session, name, value);
+        wait_for(&session, &edited);
+        assert_eq!(slider(&session, name).value, value, "{name}");
         last = edited;
     }
-    assert_eq!(running.state().compile_seconds, compiled, "a kernel was compiled");
-    running
-        .session
+    assert_eq!(session.state().compile_seconds, compiled, "a kernel was compiled");
+    session
+        .inner
         .send(Command::ResetSlider(FILE.to_string(), "hue".to_string()));
-    wait_for(&running, &rendered(&files, &edits[..4]));
-    running.session.send(Command::ResetSliders);
-    wait_for(&running, &first);
+    wait_for(&session, &render_with_edits(&files, &edits[..4]));
+    session.inner.send(Command::ResetSliders);
+    wait_for(&session, &first);
 
     // Range and line of a slider follow the file without a compilation.
     files.edit(
@@ -108,44 +108,47 @@ fn a_slider_equals_an_edit_without_a_compilation() {
         "override tint: f32 = 0.5; // 0..1",
         "\noverride tint: f32 = 0.5; // 0..2",
     );
-    running.wait("the range", |running| {
-        (slider(running, "tint").slider.max == 2.0).then_some(())
+    session.wait("the range", |session| {
+        (slider(session, "tint").slider.max == 2.0).then_some(())
     });
-    assert_eq!(slider(&running, "tint").slider.line, wanted.slider.line + 1);
-    assert_eq!(running.state().compile_seconds, compiled);
+    assert_eq!(slider(&session, "tint").slider.line, expected.slider.line + 1);
+    assert_eq!(session.state().compile_seconds, compiled);
     // An edited value in the file replaces the value of its slider; other sliders keep their values through a
     // compilation.
-    slide(&running, "tint", Value::Number(0.9));
-    slide(&running, "level", Value::Number(5.0));
+    move_slider(&session, "tint", Value::Number(0.9));
+    move_slider(&session, "level", Value::Number(5.0));
     files.edit(KERNEL, "tint: f32 = 0.5", "tint: f32 = 0.75");
-    wait_for(&running, &rendered(&files, &[("level: u32 = 2u", "level: u32 = 5u")]));
-    assert_eq!(slider(&running, "tint").value, Value::Number(0.75));
-    assert_eq!(running.state().problems, []);
+    wait_for(
+        &session,
+        &render_with_edits(&files, &[("level: u32 = 2u", "level: u32 = 5u")]),
+    );
+    assert_eq!(slider(&session, "tint").value, Value::Number(0.75));
+    assert_eq!(session.state().problems, []);
 }
 
 #[test]
 fn an_override_that_is_needed_to_compile_has_no_slider() {
     let files = Files::new(SCENE);
-    declare(
+    declare_overrides(
         &files,
         "override size: u32 = 2u; // 1..8\nvar<workgroup> many: array<f32, size>;\noverride tint: f32 = 0.5;\n\
          fn factor() -> f32 { return tint * f32(arrayLength(&film) * 0u + size); }",
         "factor()",
     );
-    let running = files.start();
-    running.wait_rendered(&files);
-    let names: Vec<String> = running
+    let session = files.start();
+    session.wait_for_rendered_image(&files);
+    let names: Vec<String> = session
         .state()
         .sliders
         .iter()
         .map(|state| state.slider.name.clone())
         .collect();
     assert_eq!(names, ["tint"]);
-    slide(&running, "tint", Value::Number(0.25));
-    wait_for(&running, &rendered(&files, &[("f32 = 0.5", "f32 = 0.25")]));
+    move_slider(&session, "tint", Value::Number(0.25));
+    wait_for(&session, &render_with_edits(&files, &[("f32 = 0.5", "f32 = 0.25")]));
     // A slider that does not exist cannot be moved.
-    slide(&running, "size", Value::Number(3.0));
-    let notice = running.wait("a notice", |running| running.state().notice.clone());
+    move_slider(&session, "size", Value::Number(3.0));
+    let notice = session.wait("a notice", |session| session.state().notice.clone());
     assert!(
         notice.bad && notice.text.contains("no slider `size`"),
         "{}",
@@ -156,19 +159,19 @@ fn an_override_that_is_needed_to_compile_has_no_slider() {
 #[test]
 fn sliders_remain_while_a_shader_has_errors() {
     let files = Files::new(SCENE);
-    declare(&files, "override c: f32 = 0.5;", "min(1.0 / c, 1.0)");
-    let running = files.start();
-    running.wait_rendered(&files);
-    let (text, picture) = (files.read(KERNEL), running.colors());
-    slide(&running, "c", Value::Number(0.0));
-    wait_for(&running, &picture); // 1 / 0 is infinite, and the minimum is 1
+    declare_overrides(&files, "override c: f32 = 0.5;", "min(1.0 / c, 1.0)");
+    let session = files.start();
+    session.wait_for_rendered_image(&files);
+    let (text, picture) = (files.read(KERNEL), session.colors());
+    move_slider(&session, "c", Value::Number(0.0));
+    wait_for(&session, &picture); // 1 / 0 is infinite, and the minimum is 1
     files.write(KERNEL, &text.replace("min(1.0 / c, 1.0)", "min(1.0 / d, 1.0)"));
-    running.wait_problem();
-    slide(&running, "c", Value::Number(1.0));
-    running.wait("the value", |running| {
-        (slider(running, "c").value == Value::Number(1.0)).then_some(())
+    session.wait_for_problem();
+    move_slider(&session, "c", Value::Number(1.0));
+    session.wait("the value", |session| {
+        (slider(session, "c").value == Value::Number(1.0)).then_some(())
     });
     files.write(KERNEL, &text);
-    running.wait_well();
-    wait_for(&running, &rendered(&files, &[("f32 = 0.5", "f32 = 1.0")]));
+    session.wait_for_no_problem();
+    wait_for(&session, &render_with_edits(&files, &[("f32 = 0.5", "f32 = 1.0")]));
 }

@@ -8,8 +8,8 @@ use wgray_dev::{Command, Move};
 use super::running::{Files, SCENE, serve};
 use super::viewer::{Received, Viewer};
 
-/// Returns noisy frames, which PNG hardly compresses.
-fn noisy() -> String {
+/// Returns a scene with noisy frames, which PNG hardly compresses.
+fn noisy_scene() -> String {
     SCENE
         .replace("width = 40", "width = 320")
         .replace("height = 30", "height = 240")
@@ -26,23 +26,23 @@ fn noisy() -> String {
 #[test]
 fn two_frames_at_most_are_in_flight_and_the_next_one_is_the_newest() {
     let files = Files::new(SCENE);
-    let running = files.start();
-    running.wait_rendered(&files);
-    let (session, address) = serve(running);
+    let session = files.start();
+    session.wait_for_rendered_image(&files);
+    let (session, address) = serve(session);
     let mut viewer = Viewer::new(address);
     let mut frames = Vec::new();
-    let mut states = 0;
+    let mut reported_frame = 0;
     for _ in 0..6 {
         let revision = session.revision();
-        session.session.send(Command::Move(Move::Orbit(0.1, 0.0)));
-        session.wait_done(revision);
+        session.inner.send(Command::Move(Move::Orbit(0.1, 0.0)));
+        session.wait_for_complete_image(revision);
     }
-    // Without acknowledgements: two frames and every state.
+    // Without acknowledgements, the viewer receives two frames and every state.
     let newest = session.state().frame;
-    while states < newest {
+    while reported_frame < newest {
         match viewer.receive().unwrap() {
             Received::Frame(header, _) => frames.push(header),
-            Received::Text(message) => states = message["state"]["frame"].as_u64().unwrap_or(states),
+            Received::Text(message) => reported_frame = message["state"]["frame"].as_u64().unwrap_or(reported_frame),
         }
     }
     viewer.set_timeout(Duration::from_secs(2));
@@ -65,26 +65,26 @@ fn two_frames_at_most_are_in_flight_and_the_next_one_is_the_newest() {
 #[test]
 fn a_slow_connection_does_not_delay_camera_moves() {
     const RATE: f64 = 30_000.0; // bytes per second
-    let files = Files::new(&noisy());
-    let running = files.start();
-    running.wait("a first image", |running| running.frame());
-    let (session, address) = serve(running);
+    let files = Files::new(&noisy_scene());
+    let session = files.start();
+    session.wait("a first image", |session| session.frame());
+    let (session, address) = serve(session);
     let mut viewer = Viewer::slow(address, RATE);
     let mut sender = viewer.sender();
     let moves = std::thread::spawn(move || {
         let start = Instant::now();
         while start.elapsed() < Duration::from_secs(5) {
             sender
-                .say(json!({ "move": { "orbit": [0.02, 0.0] } }).to_string().as_bytes())
+                .send_text(json!({ "move": { "orbit": [0.02, 0.0] } }).to_string().as_bytes())
                 .unwrap();
             std::thread::sleep(Duration::from_millis(40));
         }
     });
-    let mut largest = 0;
+    let mut max_size = 0;
     while !moves.is_finished() {
         match viewer.receive().unwrap() {
             Received::Frame(header, size) => {
-                largest = largest.max(size);
+                max_size = max_size.max(size);
                 viewer.acknowledge(&header);
             }
             Received::Text(_) => {}
@@ -95,15 +95,15 @@ fn a_slow_connection_does_not_delay_camera_moves() {
     loop {
         match viewer.receive().unwrap() {
             Received::Frame(header, size) => {
-                largest = largest.max(size); // frames are finer when the camera is at rest
+                max_size = max_size.max(size); // frames are finer when the camera is at rest
                 viewer.acknowledge(&header);
             }
             Received::Text(message) if message["state"]["executed"].as_u64() >= Some(executed) => break,
             Received::Text(_) => {}
         }
     }
-    let frames = Duration::from_secs_f64(2.0 * largest as f64 / RATE);
-    assert!(largest > 4_000, "frames are too small to take time: {largest}");
+    let frames = Duration::from_secs_f64(2.0 * max_size as f64 / RATE);
+    assert!(max_size > 4_000, "frames are too small to take time: {max_size}");
     assert!(
         start.elapsed() < frames + Duration::from_secs(1),
         "{:?}",

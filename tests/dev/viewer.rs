@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
 
-use super::running::LONGEST;
+use super::running::TIMEOUT;
 
 /// A connection of a viewer.
 pub struct Viewer {
@@ -26,7 +26,7 @@ pub enum Received {
 impl Viewer {
     pub fn new(address: SocketAddr) -> Viewer {
         let mut stream = TcpStream::connect(address).unwrap();
-        stream.set_read_timeout(Some(LONGEST)).unwrap();
+        stream.set_read_timeout(Some(TIMEOUT)).unwrap();
         let request = format!(
             "GET /socket HTTP/1.1\r\nHost: {address}\r\nOrigin: http://{address}\r\nConnection: Upgrade\r\n\
              Upgrade: websocket\r\nSec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n"
@@ -51,7 +51,7 @@ impl Viewer {
     }
 
     /// Sends bytes as a text message, masked with zeros.
-    pub fn say(&mut self, text: &[u8]) -> std::io::Result<()> {
+    pub fn send_text(&mut self, text: &[u8]) -> std::io::Result<()> {
         let mut bytes = vec![0x81, 0x80 | 127];
         bytes.extend((text.len() as u64).to_be_bytes());
         bytes.extend([0; 4]);
@@ -70,7 +70,7 @@ impl Viewer {
     /// Acknowledges a frame.
     pub fn acknowledge(&mut self, header: &Value) {
         let message = json!({ "shown": header["number"] }).to_string();
-        self.say(message.as_bytes()).unwrap();
+        self.send_text(message.as_bytes()).unwrap();
     }
 
     /// Sets the maximum time to wait for each message.
@@ -103,7 +103,7 @@ impl Viewer {
     }
 
     /// Returns the next text message; `None` as for [`Viewer::receive`].
-    pub fn hear(&mut self) -> Option<Value> {
+    pub fn receive_text(&mut self) -> Option<Value> {
         loop {
             if let Received::Text(message) = self.receive()? {
                 return Some(message);
@@ -132,22 +132,22 @@ impl Viewer {
 
     /// Sends a message that must be rejected; returns the reason, from the answer or the following state.
     #[track_caller]
-    pub fn refused(&mut self, text: &str) -> String {
-        self.say(text.as_bytes()).unwrap();
-        let mut number = None;
+    pub fn send_rejected(&mut self, text: &str) -> String {
+        self.send_text(text.as_bytes()).unwrap();
+        let mut command = None;
         loop {
-            let message = self.hear().unwrap();
-            if let Some(refused) = message.get("refused") {
-                return refused.as_str().unwrap().to_owned();
+            let message = self.receive_text().unwrap();
+            if let Some(reason) = message.get("refused") {
+                return reason.as_str().unwrap().to_owned();
             }
-            number = message.get("asked").and_then(Value::as_u64).or(number);
+            command = message.get("asked").and_then(Value::as_u64).or(command);
             let notice = &message["state"]["notice"];
-            if number.is_some() && notice["command"].as_u64() == number {
+            if command.is_some() && notice["command"].as_u64() == command {
                 assert_eq!(notice["bad"], json!(true), "{text}: {notice}");
                 return notice["text"].as_str().unwrap().to_owned();
             }
             let executed = message["state"]["executed"].as_u64();
-            assert!(number.is_none() || executed < number, "{text} was followed");
+            assert!(command.is_none() || executed < command, "{text} was executed");
         }
     }
 }

@@ -7,42 +7,42 @@ use wgray_image::Region;
 use wgray_render::backend::Backend as _;
 use wgray_render::cpu::Cpu;
 
-use super::running::{Files, KERNEL, RADIANCE, Running, SCENE, SETTLED};
+use super::running::{Files, IDLE_TIME, KERNEL, RADIANCE, SCENE, TestSession};
 
 #[test]
 fn the_camera_moves_and_is_saved_without_a_flicker() {
     let files = Files::new(SCENE);
-    let running = files.start();
-    running.wait_rendered(&files);
-    assert!(!running.state().camera_moved);
-    for by in [Move::Orbit(0.4, 0.2), Move::Pan(0.1, -0.1), Move::Dolly(0.3)] {
-        let revision = running.revision();
-        running.session.send(Command::Move(by));
-        running.wait_done(revision);
+    let session = files.start();
+    session.wait_for_rendered_image(&files);
+    assert!(!session.state().camera_moved);
+    for motion in [Move::Orbit(0.4, 0.2), Move::Pan(0.1, -0.1), Move::Dolly(0.3)] {
+        let revision = session.revision();
+        session.inner.send(Command::Move(motion));
+        session.wait_for_complete_image(revision);
     }
-    running.session.send(Command::Move(Move::Orbit(-0.1, 0.0)));
-    running.session.send(Command::View(View::Normal));
-    running.session.send(Command::View(View::Color));
-    let settled = |running: &Running| {
-        let frame = running.frame()?;
+    session.inner.send(Command::Move(Move::Orbit(-0.1, 0.0)));
+    session.inner.send(Command::View(View::Normal));
+    session.inner.send(Command::View(View::Color));
+    let finished = |session: &TestSession| {
+        let frame = session.frame()?;
         (frame.header.done && frame.header.view == View::Color).then_some(frame.header.revision)
     };
-    std::thread::sleep(SETTLED);
-    running.wait("a finished image", settled);
-    let state = running.state();
+    std::thread::sleep(IDLE_TIME);
+    session.wait("a finished image", finished);
+    let state = session.state();
     assert!(state.camera_moved);
-    // The camera's text gives the displayed image.
+    // The text of the moved camera gives the displayed image.
     let from_text = {
         let (start, end) = (SCENE.find("[camera]").unwrap(), SCENE.find("[render]").unwrap());
         Files::new(&format!("{}{}\n{}", &SCENE[..start], state.camera, &SCENE[end..]))
     };
-    assert_eq!(running.colors(), from_text.rendered());
-    let (shown, revision) = (running.colors(), running.revision());
-    running.session.send(Command::SaveCamera);
-    running.wait("the camera to be the file's", |running| {
-        (!running.state().camera_moved).then_some(())
+    assert_eq!(session.colors(), from_text.rendered_image());
+    let (shown, revision) = (session.colors(), session.revision());
+    session.inner.send(Command::SaveCamera);
+    session.wait("the saved camera", |session| {
+        (!session.state().camera_moved).then_some(())
     });
-    assert_eq!(files.rendered(), shown);
+    assert_eq!(files.rendered_image(), shown);
     let saved = files.read("scene.toml");
     for text in [
         "# a small scene\n",
@@ -52,23 +52,23 @@ fn the_camera_moves_and_is_saved_without_a_flicker() {
     ] {
         assert!(saved.contains(text), "{saved}");
     }
-    let notice = running.state().notice.clone().unwrap();
+    let notice = session.state().notice.clone().unwrap();
     assert!(!notice.bad && notice.text.contains("scene.toml"), "{}", notice.text);
-    std::thread::sleep(SETTLED);
-    assert_eq!(running.revision(), revision, "the image was rendered again");
+    std::thread::sleep(IDLE_TIME);
+    assert_eq!(session.revision(), revision, "the image was rendered again");
     // Undoing restores the text, but not the view.
-    assert_eq!(running.state().undo.as_deref(), Some("camera"));
-    running.session.send(Command::UndoWrite);
-    running.wait("the original file", |running| {
-        (running.state().camera_moved && running.state().undo.is_none()).then_some(())
+    assert_eq!(session.state().undo.as_deref(), Some("camera"));
+    session.inner.send(Command::UndoWrite);
+    session.wait("the original file", |session| {
+        (session.state().camera_moved && session.state().undo.is_none()).then_some(())
     });
     assert_eq!(files.read("scene.toml"), SCENE);
-    std::thread::sleep(SETTLED);
-    assert_eq!((running.colors(), running.state().camera_moved), (shown, true));
-    running.session.send(Command::UndoWrite);
-    running.session.send(Command::SaveCamera);
-    running.wait("the camera to be the file's", |running| {
-        (!running.state().camera_moved).then_some(())
+    std::thread::sleep(IDLE_TIME);
+    assert_eq!((session.colors(), session.state().camera_moved), (shown, true));
+    session.inner.send(Command::UndoWrite);
+    session.inner.send(Command::SaveCamera);
+    session.wait("the saved camera", |session| {
+        (!session.state().camera_moved).then_some(())
     });
     assert_eq!(files.read("scene.toml"), saved);
 }
@@ -76,80 +76,80 @@ fn the_camera_moves_and_is_saved_without_a_flicker() {
 #[test]
 fn an_edit_of_the_file_changes_only_the_edited_keys_of_a_moved_camera() {
     let files = Files::new(SCENE);
-    let running = files.start();
-    running.wait_rendered(&files);
-    let before = running.revision();
-    running.session.send(Command::Move(Move::Orbit(0.4, 0.2)));
-    running.wait_done(before);
-    let moved = running.state().camera.clone();
+    let session = files.start();
+    session.wait_for_rendered_image(&files);
+    let before = session.revision();
+    session.inner.send(Command::Move(Move::Orbit(0.4, 0.2)));
+    session.wait_for_complete_image(before);
+    let moved = session.state().camera.clone();
     files.edit("scene.toml", "fov = 40", "fov = 44");
     let wide = moved.replace("fov = 40", "fov = 44");
-    running.wait("the moved camera with another field", |running| {
-        (running.state().camera == wide).then_some(())
+    session.wait("the moved camera with another field", |session| {
+        (session.state().camera == wide).then_some(())
     });
-    assert!(running.state().camera_moved);
+    assert!(session.state().camera_moved);
     files.edit("scene.toml", "position = [0, -4, 1]", "position = [0, -5, 1]");
-    running.wait_rendered(&files);
-    assert!(!running.state().camera_moved, "a part of the move is left");
+    session.wait_for_rendered_image(&files);
+    assert!(!session.state().camera_moved, "the camera is still moved");
 }
 
 #[test]
 fn the_views_show_the_first_hits() {
     let files = Files::new(SCENE);
-    let running = files.start();
-    running.wait_rendered(&files);
+    let session = files.start();
+    session.wait_for_rendered_image(&files);
     let packed = files.packed();
-    let wanted = Cpu::new(&packed).first_hits(Region::whole(40, 30)).unwrap();
+    let expected = Cpu::new(&packed).first_hits(Region::whole(40, 30)).unwrap();
     for view in [View::Normal, View::Depth, View::Uv, View::Primitive] {
-        running.session.send(Command::View(view));
-        let frame = running.wait("the view", |running| {
-            running
+        session.inner.send(Command::View(view));
+        let frame = session.wait("the view", |session| {
+            session
                 .frame()
                 .filter(|frame| frame.header.view == view && frame.header.done)
         });
         let Content::Hits(_, hits) = &frame.content else {
             panic!("{:?}", frame.content)
         };
-        assert_eq!(*hits, wanted);
+        assert_eq!(*hits, expected);
         let values = frame.pixel(20, 15).unwrap();
         assert!(
             values.contains(&("on", "shapes[0]".to_string())) && values.contains(&("material", "red".to_string())),
             "{values:?}"
         );
     }
-    running.session.send(Command::View(View::Samples));
-    let frame = running.wait("the counts", |running| {
-        running.frame().filter(|frame| frame.header.view == View::Samples)
+    session.inner.send(Command::View(View::Samples));
+    let frame = session.wait("the counts", |session| {
+        session.frame().filter(|frame| frame.header.view == View::Samples)
     });
     assert!(matches!(&frame.content, Content::Samples(counts, 4) if counts.iter().all(|count| *count == 4)));
-    running.session.send(Command::View(View::Color));
-    running.wait_rendered(&files);
+    session.inner.send(Command::View(View::Color));
+    session.wait_for_rendered_image(&files);
 }
 
 #[test]
 fn another_view_shows_the_samples_of_a_paused_render() {
-    // Takes minutes, but soon has a sample of each pixel.
-    let long = SCENE
+    // The image takes minutes, but soon has a sample of each pixel.
+    let slow = SCENE
         .replace("width = 40", "width = 120")
         .replace("height = 30", "height = 90");
-    let files = Files::new(&long.replacen("count = 4", "count = 65536", 1));
-    let running = files.start();
-    running.wait("samples of all pixels", |running| {
-        running.frame().filter(|frame| frame.header.samples > 0)
+    let files = Files::new(&slow.replacen("count = 4", "count = 65536", 1));
+    let session = files.start();
+    session.wait("samples of all pixels", |session| {
+        session.frame().filter(|frame| frame.header.samples > 0)
     });
-    running.session.send(Command::Pause(true));
-    running.wait("the end of rendering", |running| {
-        let state = running.state();
+    session.inner.send(Command::Pause(true));
+    session.wait("the end of rendering", |session| {
+        let state = session.state();
         (state.paused && !state.busy).then_some(())
     });
-    running.session.send(Command::View(View::Samples));
-    let frame = running.wait("the counts", |running| {
-        running.frame().filter(|frame| frame.header.view == View::Samples)
+    session.inner.send(Command::View(View::Samples));
+    let frame = session.wait("the counts", |session| {
+        session.frame().filter(|frame| frame.header.view == View::Samples)
     });
     assert!(frame.header.samples > 0 && !frame.header.done);
-    std::thread::sleep(SETTLED);
+    std::thread::sleep(IDLE_TIME);
     assert_eq!(
-        running.frame().unwrap().header.number,
+        session.frame().unwrap().header.number,
         frame.header.number,
         "the view was rendered again"
     );
@@ -158,23 +158,23 @@ fn another_view_shows_the_samples_of_a_paused_render() {
 #[test]
 fn the_cpu_agrees_until_a_shader_is_changed() {
     let files = Files::new(SCENE);
-    let running = files.start();
-    running.wait_rendered(&files);
-    running.session.send(Command::View(View::Compare(Against::Cpu)));
-    let compared = |running: &Running| {
-        running
+    let session = files.start();
+    session.wait_for_rendered_image(&files);
+    session.inner.send(Command::View(View::Compare(Against::Cpu)));
+    let compared = |session: &TestSession| {
+        session
             .frame()
             .filter(|frame| frame.header.done)
             .and_then(|frame| frame.header.differing)
     };
-    assert_eq!(running.wait("a comparison", compared), (0, 0.0));
+    assert_eq!(session.wait("a comparison", compared), (0, 0.0));
     files.edit(KERNEL, RADIANCE, &format!("({RADIANCE} + vec4f(0.25, 0.0, 0.0, 0.0))"));
-    let (pixels, largest) = running.wait("a difference", |running| {
-        compared(running).filter(|(pixels, _)| *pixels > 0)
+    let (pixels, max_difference) = session.wait("a difference", |session| {
+        compared(session).filter(|(pixels, _)| *pixels > 0)
     });
     assert!(pixels > 100, "{pixels}");
-    assert!((largest - 0.25).abs() < 1e-5, "{largest}");
-    let Content::Compare(gpu, cpu) = &running.frame().unwrap().content else {
+    assert!((max_difference - 0.25).abs() < 1e-5, "{max_difference}");
+    let Content::Compare(gpu, cpu) = &session.frame().unwrap().content else {
         panic!()
     };
     assert_ne!(gpu, cpu);
@@ -184,19 +184,19 @@ fn the_cpu_agrees_until_a_shader_is_changed() {
 fn the_output_file_is_the_finished_image() {
     let files = Files::new(SCENE);
     let out = files.path("pictures.png");
-    let running = Running::start(files.sources(), Some(out.clone()));
+    let session = TestSession::start(files.sources(), Some(out.clone()));
     for fov in [40, 50] {
         files.write("scene.toml", &SCENE.replace("fov = 40", &format!("fov = {fov}")));
-        running.wait_rendered(&files);
-        let wanted: Vec<u8> = running
+        session.wait_for_rendered_image(&files);
+        let expected: Vec<u8> = session
             .colors()
             .colors
             .iter()
             .flat_map(|color| color.map(wgray::image::encode))
             .collect();
-        running.wait("the file", |_| {
+        session.wait("the file", |_| {
             let picture = image::open(&out).ok()?.into_rgb8();
-            (picture.dimensions() == (40, 30) && *picture.as_raw() == wanted).then_some(())
+            (picture.dimensions() == (40, 30) && *picture.as_raw() == expected).then_some(())
         });
     }
     // Writing the image triggers no reload, and no temporary file remains.

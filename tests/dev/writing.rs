@@ -1,4 +1,4 @@
-//! Values set on the page: written into the scene file, shown at once, undone, or rejected.
+//! Values set on the page are written into the scene file, shown at once, undone, or rejected.
 
 use std::fs;
 
@@ -6,26 +6,26 @@ use serde_json::{Value, json};
 use wgray::scene::Overrides;
 use wgray_dev::{Command, Move, Set, Sources};
 
-use super::running::{Files, Running, SCENE, SETTLED};
+use super::running::{Files, IDLE_TIME, SCENE, TestSession};
 
 #[track_caller]
-fn set(running: &Running, path: &str, value: Value, gesture: Option<u64>) {
+fn set(session: &TestSession, path: &str, value: Value, gesture: Option<u64>) {
     let path = path.to_owned();
-    follow(running, Command::Set(Set { path, value, gesture }));
+    execute(session, Command::Set(Set { path, value, gesture }));
 }
 
 #[track_caller]
-fn follow(running: &Running, command: Command) {
-    let executed = running.state().executed;
-    running.session.send(command);
-    running.wait("the command to be followed", |running| {
-        (running.state().executed > executed).then_some(())
+fn execute(session: &TestSession, command: Command) {
+    let executed = session.state().executed;
+    session.inner.send(command);
+    session.wait("the end of the command", |session| {
+        (session.state().executed > executed).then_some(())
     });
 }
 
 #[track_caller]
-fn refused(running: &Running) -> String {
-    let state = running.state();
+fn rejection(session: &TestSession) -> String {
+    let state = session.state();
     let notice = state.notice.clone().unwrap();
     assert!(notice.bad && notice.command == state.executed, "{notice:?}");
     notice.text
@@ -34,54 +34,54 @@ fn refused(running: &Running) -> String {
 #[test]
 fn a_new_value_is_written_and_shown() {
     let files = Files::new(SCENE);
-    let running = files.start();
-    running.wait_rendered(&files);
-    let before = running.colors();
-    set(&running, "materials.red.color", json!([0.1, 0.75, 0.1]), None);
+    let session = files.start();
+    session.wait_for_rendered_image(&files);
+    let before = session.colors();
+    set(&session, "materials.red.color", json!([0.1, 0.75, 0.1]), None);
     assert_eq!(
         files.read("scene.toml"),
         SCENE.replace("[0.8, 0.1, 0.1]", "[0.1, 0.75, 0.1]")
     );
-    running.wait_rendered(&files);
-    assert_ne!(running.colors(), before);
-    assert_eq!(running.state().undo.as_deref(), Some("materials.red.color"));
-    // Absent keys are added and removed. A value equal to the file's is not written.
-    set(&running, "shapes[0].radius", json!(0.5), None);
-    assert_eq!(running.state().undo.as_deref(), Some("materials.red.color"));
-    set(&running, "render.seed", json!(3), None);
+    session.wait_for_rendered_image(&files);
+    assert_ne!(session.colors(), before);
+    assert_eq!(session.state().undo.as_deref(), Some("materials.red.color"));
+    // Absent keys are added and removed. A value equal to the value in the file is not written.
+    set(&session, "shapes[0].radius", json!(0.5), None);
+    assert_eq!(session.state().undo.as_deref(), Some("materials.red.color"));
+    set(&session, "render.seed", json!(3), None);
     assert!(files.read("scene.toml").contains("count = 4 }\nseed = 3\n\n[materials"));
-    set(&running, "render.seed", Value::Null, None);
+    set(&session, "render.seed", Value::Null, None);
     assert!(!files.read("scene.toml").contains("seed"));
     // An enumeration value that needs another kernel.
-    set(&running, "render.pixel_samples.pattern", json!("random"), None);
-    running.wait_rendered(&files);
+    set(&session, "render.pixel_samples.pattern", json!("random"), None);
+    session.wait_for_rendered_image(&files);
     // Only edits of the file trigger the watcher.
-    let scenes = running.state().scenes;
-    std::thread::sleep(SETTLED);
-    assert_eq!(running.state().scenes, scenes);
+    let scenes = session.state().scenes;
+    std::thread::sleep(IDLE_TIME);
+    assert_eq!(session.state().scenes, scenes);
     files.edit("scene.toml", "fov = 40", "fov = 44");
-    running.wait("the edited scene", |running| {
-        (running.state().scenes > scenes).then_some(())
+    session.wait("the edited scene", |session| {
+        (session.state().scenes > scenes).then_some(())
     });
-    running.wait_rendered(&files);
+    session.wait_for_rendered_image(&files);
 }
 
 #[test]
 fn concurrent_saves_of_an_editor_are_kept() {
     let files = Files::new(SCENE);
-    let running = files.start();
-    running.wait_rendered(&files);
+    let session = files.start();
+    session.wait_for_rendered_image(&files);
     for round in 0..10 {
         let fov = |round: i32| format!("fov = {}", 40 + round);
         files.edit("scene.toml", &fov(round), &fov(round + 1));
-        set(&running, "shapes[0].radius", json!(0.6), None);
+        set(&session, "shapes[0].radius", json!(0.6), None);
         let text = files.read("scene.toml");
         assert!(
             text.contains(&fov(round + 1)) && text.contains("radius = 0.6"),
             "{text}"
         );
-        running.wait_rendered(&files);
-        set(&running, "shapes[0].radius", json!(0.5), None);
+        session.wait_for_rendered_image(&files);
+        set(&session, "shapes[0].radius", json!(0.5), None);
         assert!(files.read("scene.toml").contains("radius = 0.5\n"));
     }
 }
@@ -89,17 +89,17 @@ fn concurrent_saves_of_an_editor_are_kept() {
 #[test]
 fn setting_a_list_element_keeps_the_other_elements() {
     let files = Files::new(&SCENE.replace("center = [0, 0, 0.5]", "center = [0,  0, # here\n 0.5]"));
-    let start = files.read("scene.toml");
-    let running = files.start();
-    running.wait_rendered(&files);
-    set(&running, "shapes[0].center[2]", json!(0.75), Some(1));
+    let original = files.read("scene.toml");
+    let session = files.start();
+    session.wait_for_rendered_image(&files);
+    set(&session, "shapes[0].center[2]", json!(0.75), Some(1));
     files.edit("scene.toml", "[0,  0, #", "[0.25,  0, #");
-    set(&running, "shapes[0].center[2]", json!(1), Some(1));
-    let center = |numbers: &str| start.replace("[0,  0, # here\n 0.5]", numbers);
+    set(&session, "shapes[0].center[2]", json!(1), Some(1));
+    let center = |numbers: &str| original.replace("[0,  0, # here\n 0.5]", numbers);
     assert_eq!(files.read("scene.toml"), center("[0.25,  0, # here\n 1]"));
-    running.wait_rendered(&files);
+    session.wait_for_rendered_image(&files);
     // Other elements of an absent list get their defaults.
-    set(&running, "camera.up[0]", json!(0.5), None);
+    set(&session, "camera.up[0]", json!(0.5), None);
     assert!(files.read("scene.toml").contains("fov = 40\nup = [0.5, 0, 1]\n"));
     let text = files.read("scene.toml");
     for (path, value, expected) in [
@@ -110,78 +110,82 @@ fn setting_a_list_element_keeps_the_other_elements() {
         ("shapes[0].center[0]", json!("a"), "must be a list of 3 numbers"),
         ("shapes[0].center[0]", json!(1e300), "shapes[0].center: "),
     ] {
-        set(&running, path, value, None);
-        assert!(refused(&running).contains(expected), "{path}: {}", refused(&running));
+        set(&session, path, value, None);
+        assert!(
+            rejection(&session).contains(expected),
+            "{path}: {}",
+            rejection(&session)
+        );
     }
     assert_eq!(files.read("scene.toml"), text);
-    set(&running, "shapes[0].center[0]", json!(0), None);
-    let notice = running.state().notice.clone().unwrap();
+    set(&session, "shapes[0].center[0]", json!(0), None);
+    let notice = session.state().notice.clone().unwrap();
     assert!(!notice.bad && notice.text.is_empty(), "{notice:?}");
-    files.write("scene.toml", &start);
-    running.wait_rendered(&files);
+    files.write("scene.toml", &original);
+    session.wait_for_rendered_image(&files);
 }
 
 #[test]
 fn written_values_are_undone_and_redone() {
     let files = Files::new(&SCENE.replace('\n', "\r\n"));
-    let start = files.read("scene.toml");
-    let running = files.start();
-    running.wait_rendered(&files);
-    let mut texts = vec![start.clone()];
+    let original = files.read("scene.toml");
+    let session = files.start();
+    session.wait_for_rendered_image(&files);
+    let mut texts = vec![original.clone()];
     for (path, value) in [
         ("shapes[0].radius", json!(0.25)),
         ("camera.fov", json!(50)),
         ("lights[0].visible", json!(false)),
     ] {
-        set(&running, path, value, None);
+        set(&session, path, value, None);
         texts.push(files.read("scene.toml"));
     }
     // A drag of a slider is one undo step.
     for i in 1..=20 {
-        set(&running, "materials.red.shininess", json!(16 + i), Some(7));
+        set(&session, "materials.red.shininess", json!(16 + i), Some(7));
     }
-    assert_eq!(running.state().undo.as_deref(), Some("materials.red.shininess"));
+    assert_eq!(session.state().undo.as_deref(), Some("materials.red.shininess"));
     let last = files.read("scene.toml");
     assert!(last.contains("shininess = 36\r\n"), "{last}");
     // Undoing a saved camera keeps the view.
-    follow(&running, Command::Move(Move::Orbit(0.3, 0.1)));
-    follow(&running, Command::SaveCamera);
-    assert_eq!(running.state().undo.as_deref(), Some("camera"));
-    follow(&running, Command::UndoWrite);
-    assert!(running.state().camera_moved);
+    execute(&session, Command::Move(Move::Orbit(0.3, 0.1)));
+    execute(&session, Command::SaveCamera);
+    assert_eq!(session.state().undo.as_deref(), Some("camera"));
+    execute(&session, Command::UndoWrite);
+    assert!(session.state().camera_moved);
     assert_eq!(files.read("scene.toml"), last);
     for text in texts.iter().rev() {
-        follow(&running, Command::UndoWrite);
+        execute(&session, Command::UndoWrite);
         assert_eq!(files.read("scene.toml"), *text);
     }
-    let state = running.state();
+    let state = session.state();
     assert_eq!(
         (state.undo.as_deref(), state.redo.as_deref()),
         (None, Some("shapes[0].radius"))
     );
-    follow(&running, Command::UndoWrite); // nothing to undo
-    assert_eq!(files.read("scene.toml"), start);
+    execute(&session, Command::UndoWrite); // nothing to undo
+    assert_eq!(files.read("scene.toml"), original);
     for text in &texts[1..] {
-        follow(&running, Command::RedoWrite);
+        execute(&session, Command::RedoWrite);
         assert_eq!(files.read("scene.toml"), *text);
     }
-    follow(&running, Command::RedoWrite);
+    execute(&session, Command::RedoWrite);
     assert_eq!(files.read("scene.toml"), last);
-    follow(&running, Command::ResetCamera);
-    running.wait_rendered(&files);
+    execute(&session, Command::ResetCamera);
+    session.wait_for_rendered_image(&files);
 }
 
 #[test]
 fn invalid_values_are_rejected_and_the_file_is_unchanged() {
     let files = Files::new(SCENE);
     fs::write(files.path("other.png"), "").unwrap();
-    let running = files.start();
-    running.wait_rendered(&files);
+    let session = files.start();
+    session.wait_for_rendered_image(&files);
     for (path, value, expected) in [
         (
             "shapes[0].radius",
             json!(-1),
-            "shapes[0].radius: -1 must be finite and greater than 0",
+            "shapes[0].radius: -1 must be from 1e-9 to 1e9",
         ),
         ("shapes[0].radius", json!("large"), "\"large\" must be a number"),
         ("shapes[0].radius", Value::Null, "is required"),
@@ -200,47 +204,47 @@ fn invalid_values_are_rejected_and_the_file_is_unchanged() {
         ("shapes[0", json!(1), "must be"),
         ("", json!(1), "must be"),
     ] {
-        set(&running, path, value, None);
-        let message = refused(&running);
+        set(&session, path, value, None);
+        let message = rejection(&session);
         assert!(message.contains(expected), "{path}: {message}");
         assert_eq!(files.read("scene.toml"), SCENE, "{path}");
     }
-    assert_eq!(running.state().undo, None);
+    assert_eq!(session.state().undo, None);
     // A file with a syntax error must be fixed by hand.
     files.edit("scene.toml", "radius = 0.5", "radius = ");
     let broken = files.read("scene.toml");
-    set(&running, "camera.fov", json!(50), None);
-    assert!(refused(&running).starts_with("fix the file first: "));
+    set(&session, "camera.fov", json!(50), None);
+    assert!(rejection(&session).starts_with("fix the file first: "));
     assert_eq!(files.read("scene.toml"), broken);
     files.write("scene.toml", SCENE);
-    set(&running, "camera.fov", json!(50), None);
+    set(&session, "camera.fov", json!(50), None);
     assert_eq!(files.read("scene.toml"), SCENE.replace("fov = 40", "fov = 50"));
-    running.wait_rendered(&files);
+    session.wait_for_rendered_image(&files);
 }
 
 #[test]
 fn changes_of_another_program_are_not_undone() {
     let files = Files::new(SCENE);
-    let running = files.start();
-    running.wait_rendered(&files);
-    set(&running, "camera.fov", json!(50), None);
+    let session = files.start();
+    session.wait_for_rendered_image(&files);
+    set(&session, "camera.fov", json!(50), None);
     files.edit("scene.toml", "# a small scene", "# another scene");
     let edited = files.read("scene.toml");
-    running.session.send(Command::UndoWrite); // whether or not the change was detected by then
-    running.wait("nothing to undo", |running| {
-        running.state().undo.is_none().then_some(())
+    session.inner.send(Command::UndoWrite); // whether or not the change was detected by then
+    session.wait("nothing to undo", |session| {
+        session.state().undo.is_none().then_some(())
     });
     assert_eq!(files.read("scene.toml"), edited);
-    running.wait("the change", |running| running.state().undo_blocked.clone());
-    follow(&running, Command::UndoWrite);
-    let refused = refused(&running);
-    assert!(refused.contains("changed by another program"), "{refused}");
-    // Keeps the change of the other program.
-    set(&running, "camera.fov", json!(55), None);
+    session.wait("the change", |session| session.state().undo_blocked.clone());
+    execute(&session, Command::UndoWrite);
+    let message = rejection(&session);
+    assert!(message.contains("changed by another program"), "{message}");
+    // Setting a value keeps the change of the other program.
+    set(&session, "camera.fov", json!(55), None);
     assert_eq!(files.read("scene.toml"), edited.replace("fov = 50", "fov = 55"));
-    follow(&running, Command::UndoWrite);
+    execute(&session, Command::UndoWrite);
     assert_eq!(files.read("scene.toml"), edited);
-    running.wait_rendered(&files);
+    session.wait_for_rendered_image(&files);
 }
 
 #[test]
@@ -254,8 +258,8 @@ fn values_overridden_by_options_cannot_be_set() {
         },
         ..files.sources()
     };
-    let running = Running::start(sources, None);
-    running.wait_done(0);
+    let session = TestSession::start(sources, None);
+    session.wait_for_complete_image(0);
     for (path, value, expected) in [
         (
             "shapes[0].radius",
@@ -268,20 +272,20 @@ fn values_overridden_by_options_cannot_be_set() {
             "image.width: --size overrides the value of the file",
         ),
     ] {
-        set(&running, path, value, None);
-        assert_eq!(refused(&running), expected);
+        set(&session, path, value, None);
+        assert_eq!(rejection(&session), expected);
         assert_eq!(files.read("scene.toml"), SCENE);
     }
-    // Other values can be set; the defined one stays.
-    let revision = running.revision();
-    set(&running, "shapes[0].center", json!([0, 0, 0.75]), None);
-    running.wait_done(revision);
+    // Other values can be set; the value of `--define` stays.
+    let revision = session.revision();
+    set(&session, "shapes[0].center", json!([0, 0, 0.75]), None);
+    session.wait_for_complete_image(revision);
     assert_eq!(
         files.read("scene.toml"),
         SCENE.replace("[0, 0, 0.5]\nradius", "[0, 0, 0.75]\nradius")
     );
-    let seen = running.session.seen.borrow().clone().unwrap();
-    let field = seen.object("shapes[0]", None).groups[0]
+    let view = session.inner.seen.borrow().clone().unwrap();
+    let field = view.object("shapes[0]", None).groups[0]
         .fields
         .iter()
         .find(|field| field.name == "radius")
@@ -302,13 +306,13 @@ fn links_and_permissions_are_preserved() {
             scene: files.path("link.toml"),
             ..files.sources()
         };
-        let running = Running::start(sources, None);
-        running.wait_rendered(&files);
-        set(&running, "camera.fov", json!(50), None);
+        let session = TestSession::start(sources, None);
+        session.wait_for_rendered_image(&files);
+        set(&session, "camera.fov", json!(50), None);
         assert!(fs::symlink_metadata(files.path("link.toml")).unwrap().is_symlink());
         assert_eq!(files.read("scene.toml"), SCENE.replace("fov = 40", "fov = 50"));
         let mode = fs::metadata(files.path("scene.toml")).unwrap().permissions().mode();
         assert_eq!(mode & 0o777, 0o640);
-        running.wait_rendered(&files);
+        session.wait_for_rendered_image(&files);
     }
 }

@@ -56,33 +56,33 @@ pub fn driver() -> Option<&'static Driver> {
 
 fn prepare() -> Option<Driver> {
     let Some((lavapipe, api_version)) = lavapipe() else {
-        let without = env::var_os("WGRAY_TEST_WITHOUT_GPU").is_some_and(|value| value == "1");
+        let is_optional = env::var_os("WGRAY_TEST_WITHOUT_GPU").is_some_and(|value| value == "1");
         assert!(
-            without,
+            is_optional,
             "no manifest of lavapipe for the fault tests; on Debian, 'apt-get install mesa-vulkan-drivers'"
         );
         return None;
     };
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("faults");
     fs::create_dir_all(&folder).expect("a folder below target/");
-    // Renamed when complete, as tests run concurrently.
+    // Files are renamed when complete, because tests run concurrently.
     let [library, manifest] = ["libfaults.so", "faults.json"].map(|name| folder.join(name));
-    let own = tempfile::tempdir_in(&folder).expect("a temporary folder");
-    let made = own.path().join("libfaults.so");
+    let temp_folder = tempfile::tempdir_in(&folder).expect("a temporary folder");
+    let built = temp_folder.path().join("libfaults.so");
     let rustc = Command::new(env::var_os("RUSTC").unwrap_or("rustc".into()))
         .args(["--crate-type", "cdylib", "--edition", "2024", "-O", "-o"])
-        .args([&made, &project("tests/faults/icd.rs")])
+        .args([&built, &project("tests/faults/icd.rs")])
         .output()
         .expect("rustc runs");
     assert!(rustc.status.success(), "{}", String::from_utf8_lossy(&rustc.stderr));
-    fs::rename(&made, &library).expect("the library in its place");
+    fs::rename(&built, &library).expect("the renamed library");
     let json = serde_json::json!({
         "file_format_version": "1.0.0",
         "ICD": { "library_path": library, "api_version": api_version },
     });
-    let made = own.path().join("faults.json");
-    fs::write(&made, json.to_string()).expect("a manifest");
-    fs::rename(&made, &manifest).expect("the manifest in its place");
+    let built = temp_folder.path().join("faults.json");
+    fs::write(&built, json.to_string()).expect("a manifest");
+    fs::rename(&built, &manifest).expect("the renamed manifest");
     Some(Driver {
         manifest,
         library,
@@ -103,19 +103,19 @@ fn lavapipe() -> Option<(PathBuf, String)> {
     manifests.iter().find_map(|manifest| {
         let text = fs::read_to_string(manifest).ok()?;
         let json: serde_json::Value = serde_json::from_str(&text).ok()?;
-        let of_driver = |key: &str| Some(json.get("ICD")?.get(key)?.as_str()?.to_string());
-        let library = of_driver("library_path")?;
+        let icd_value = |key: &str| Some(json.get("ICD")?.get(key)?.as_str()?.to_string());
+        let library = icd_value("library_path")?;
         let is_path = library.contains('/'); // otherwise the dynamic linker finds it
         let is_lavapipe = library.contains("libvulkan_lvp");
         let library = match is_path {
             true => manifest.parent()?.join(library),
             false => library.into(),
         };
-        (is_lavapipe && (!is_path || library.exists())).then_some((library, of_driver("api_version")?))
+        (is_lavapipe && (!is_path || library.exists())).then_some((library, icd_value("api_version")?))
     })
 }
 
-pub struct Ran {
+pub struct RunResult {
     pub code: i32,
     pub stderr: String,
     pub log: Vec<String>,
@@ -125,10 +125,10 @@ pub struct Ran {
 /// Channel names and the bits of the values.
 pub type Picture = Vec<(String, Vec<u32>)>;
 
-impl Ran {
-    /// Returns the number of log lines that start with `start`.
-    pub fn count(&self, start: &str) -> usize {
-        self.log.iter().filter(|line| line.starts_with(start)).count()
+impl RunResult {
+    /// Returns the number of log lines that start with `prefix`.
+    pub fn count(&self, prefix: &str) -> usize {
+        self.log.iter().filter(|line| line.starts_with(prefix)).count()
     }
 
     pub fn lines(&self) -> Vec<&str> {
@@ -137,11 +137,11 @@ impl Ran {
 }
 
 impl TestFolder {
-    pub fn of(scene: &str) -> TestFolder {
+    pub fn with_scene(scene: &str) -> TestFolder {
         TestFolder::with_file("scene.toml", scene)
     }
 
-    /// Returns a command on the driver with these faults.
+    /// Returns a command that runs the program on the driver with these faults.
     pub fn command_on(&self, driver: &Driver, arguments: &[&str], faults: &[(&str, &str)]) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_wgray"));
         command
@@ -154,18 +154,18 @@ impl TestFolder {
     }
 
     /// Runs the program, which must leave no files except an image.
-    pub fn run_on(&self, driver: &Driver, arguments: &[&str], faults: &[(&str, &str)]) -> Ran {
+    pub fn run_on(&self, driver: &Driver, arguments: &[&str], faults: &[(&str, &str)]) -> RunResult {
         let out = self.path("out.exr");
         for name in ["out.exr", "log"] {
-            let _ = fs::remove_file(self.path(name)); // the image of an earlier run
+            let _ = fs::remove_file(self.path(name)); // files of an earlier run
         }
         let mut command = assert_cmd::Command::from_std(self.command_on(driver, arguments, faults));
         let output = command
             .timeout(Duration::from_secs(120))
             .output()
             .expect("the program runs");
-        let known = |name: &str| ["scene.toml", "log", "out.exr"].contains(&name) || name.ends_with(".png");
-        let unexpected = self.files_but(known);
+        let is_expected = |name: &str| ["scene.toml", "log", "out.exr"].contains(&name) || name.ends_with(".png");
+        let unexpected = self.files_but(is_expected);
         assert_eq!(unexpected, [""; 0], "temporary files are left");
         let stderr = without_summary(&String::from_utf8(output.stderr).expect("UTF-8"));
         assert!(
@@ -173,7 +173,7 @@ impl TestFolder {
             "{stderr}"
         );
         let log = fs::read_to_string(self.path("log")).unwrap_or_default();
-        Ran {
+        RunResult {
             code: output.status.code().unwrap_or(-1),
             stderr,
             log: log.lines().map(str::to_string).collect(),
@@ -182,10 +182,10 @@ impl TestFolder {
     }
 
     /// Renders the image on the CPU, which uses no driver.
-    pub fn expected(&self, driver: &Driver, arguments: &[&str]) -> Picture {
-        let ran = self.run_on(driver, &[arguments, &["--device", "cpu"]].concat(), &[]);
-        assert_eq!((ran.code, ran.stderr.as_str(), ran.log.len()), (0, "", 0));
-        ran.picture.expect("an image")
+    pub fn render_expected(&self, driver: &Driver, arguments: &[&str]) -> Picture {
+        let result = self.run_on(driver, &[arguments, &["--device", "cpu"]].concat(), &[]);
+        assert_eq!((result.code, result.stderr.as_str(), result.log.len()), (0, "", 0));
+        result.picture.expect("an image")
     }
 
     pub fn start(&self, driver: &Driver, arguments: &[&str], faults: &[(&str, &str)]) -> Child {

@@ -1,7 +1,7 @@
 //! A Vulkan driver that injects faults and otherwise forwards to another driver. It can lose its device, refuse to open
 //! one, run out of memory, or be slow. The tests compile it separately, as a library for the Vulkan loader.
 //!
-//! Environment variables control it. Numbers count from 1; submits and allocations of all devices of a process count:
+//! Environment variables control the driver. Submits and allocations of all devices of a process are numbered from 1:
 //!
 //! | variable | meaning |
 //! | --- | --- |
@@ -63,7 +63,7 @@ fn log(line: &str) {
     let _ = file.and_then(|mut file| writeln!(file, "{line}"));
 }
 
-fn of_driver(name: &CStr) -> *mut c_void {
+fn driver_function(name: &CStr) -> *mut c_void {
     let path = std::env::var("FAULTS_DRIVER").expect("FAULTS_DRIVER names a driver");
     let path = CString::new(path).expect("a path");
     let library = unsafe { dlopen(path.as_ptr(), RTLD_NOW) };
@@ -73,33 +73,33 @@ fn of_driver(name: &CStr) -> *mut c_void {
 
 #[unsafe(no_mangle)]
 pub unsafe extern "system" fn vk_icdNegotiateLoaderICDInterfaceVersion(version: *mut u32) -> Code {
-    let itself = std::env::var("FAULTS_ITSELF").expect("FAULTS_ITSELF names this library");
-    let itself = CString::new(itself).expect("a path");
-    let library = unsafe { dlopen(itself.as_ptr(), RTLD_NOW | RTLD_NODELETE) };
-    assert!(!library.is_null(), "{itself:?} cannot be loaded");
-    let real = of_driver(c"vk_icdNegotiateLoaderICDInterfaceVersion");
+    let this_library = std::env::var("FAULTS_ITSELF").expect("FAULTS_ITSELF names this library");
+    let this_library = CString::new(this_library).expect("a path");
+    let library = unsafe { dlopen(this_library.as_ptr(), RTLD_NOW | RTLD_NODELETE) };
+    assert!(!library.is_null(), "{this_library:?} cannot be loaded");
+    let real = driver_function(c"vk_icdNegotiateLoaderICDInterfaceVersion");
     let real: unsafe extern "system" fn(*mut u32) -> Code = unsafe { std::mem::transmute(real) };
     unsafe { real(version) }
 }
 
 #[unsafe(no_mangle)]
 pub unsafe extern "system" fn vk_icdGetPhysicalDeviceProcAddr(instance: Handle, name: *const c_char) -> Function {
-    let real = of_driver(c"vk_icdGetPhysicalDeviceProcAddr");
+    let real = driver_function(c"vk_icdGetPhysicalDeviceProcAddr");
     let real: GetProcAddr = unsafe { std::mem::transmute(real) };
     unsafe { replaced(name, real(instance, name)) }
 }
 
 #[unsafe(no_mangle)]
 pub unsafe extern "system" fn vk_icdGetInstanceProcAddr(instance: Handle, name: *const c_char) -> Function {
-    let real = of_driver(c"vk_icdGetInstanceProcAddr");
+    let real = driver_function(c"vk_icdGetInstanceProcAddr");
     let real: GetProcAddr = unsafe { std::mem::transmute(real) };
     unsafe { replaced(name, real(instance, name)) }
 }
 
 /// Replacements of driver functions: names, static for the driver's function, replacement and its type.
 macro_rules! replacements {
-    ($($name:literal $($other:literal)* => $place:ident, $function:ident: fn($($ty:ty),*) -> $result:ty;)*) => {
-        $(static $place: AtomicPtr<c_void> = AtomicPtr::new(null_mut());)*
+    ($($name:literal $($other:literal)* => $original:ident, $function:ident: fn($($ty:ty),*) -> $result:ty;)*) => {
+        $(static $original: AtomicPtr<c_void> = AtomicPtr::new(null_mut());)*
 
         /// Returns the replacement of a function, or the function itself.
         unsafe fn replaced(name: *const c_char, real: Function) -> Function {
@@ -108,7 +108,7 @@ macro_rules! replacements {
             }
             match unsafe { CStr::from_ptr(name) }.to_bytes() {
                 $($name $(| $other)* => {
-                    $place.store(real, SeqCst);
+                    $original.store(real, SeqCst);
                     let function: unsafe extern "system" fn($($ty),*) -> $result = $function;
                     function as Function
                 })*
@@ -119,7 +119,7 @@ macro_rules! replacements {
         mod real {
             use super::*;
             $(pub unsafe fn $function() -> unsafe extern "system" fn($($ty),*) -> $result {
-                unsafe { std::mem::transmute($place.load(SeqCst)) }
+                unsafe { std::mem::transmute($original.load(SeqCst)) }
             })*
         }
     };
@@ -174,9 +174,9 @@ unsafe extern "system" fn create_device(physical: Handle, info: Handle, host: Ha
 unsafe extern "system" fn allocate_memory(device: Handle, info: *const Allocation, host: Handle, out: Handle) -> Code {
     let number = 1 + ALLOCATIONS.fetch_add(1, SeqCst);
     let size = unsafe { (*info).size };
-    let too_large = variable("FAULTS_LARGEST").is_some_and(|largest: u64| size > largest);
-    let too_many = variable("FAULTS_NO_MEMORY_FROM").is_some_and(|first: u64| number >= first);
-    if too_large || too_many {
+    let is_too_large = variable("FAULTS_LARGEST").is_some_and(|max_size: u64| size > max_size);
+    let is_too_late = variable("FAULTS_NO_MEMORY_FROM").is_some_and(|first: u64| number >= first);
+    if is_too_large || is_too_late {
         log(&format!("allocation {number} of {size} refused"));
         return OUT_OF_DEVICE_MEMORY;
     }
@@ -184,58 +184,58 @@ unsafe extern "system" fn allocate_memory(device: Handle, info: *const Allocatio
     unsafe { real::allocate_memory()(device, info, host, out) }
 }
 
-/// Returns true if a submit loses the device; `number` counts in the process, `of_device` on the device.
-fn loses(number: u64, of_device: u64) -> bool {
-    let Ok(which) = std::env::var("FAULTS_LOSE") else {
+/// Returns true if a submit loses the device; `process_submit` counts in the process, `device_submit` on the device.
+fn loses(process_submit: u64, device_submit: u64) -> bool {
+    let Ok(spec) = std::env::var("FAULTS_LOSE") else {
         return false;
     };
-    match which.strip_prefix("every:") {
-        Some(n) => n.parse() == Ok(of_device),
-        None => which.split(',').any(|n| n.parse() == Ok(number)),
+    match spec.strip_prefix("every:") {
+        Some(n) => n.parse() == Ok(device_submit),
+        None => spec.split(',').any(|n| n.parse() == Ok(process_submit)),
     }
 }
 
-fn lose(by: &str) -> Code {
-    log(&format!("lost in {by}"));
+fn lose(function: &str) -> Code {
+    log(&format!("lost in {function}"));
     LOST.store(true, SeqCst);
     LOSS_PENDING.store(false, SeqCst);
     TO_REFUSE.store(variable("FAULTS_REFUSE").unwrap_or(0), SeqCst);
     DEVICE_LOST
 }
 
-/// Returns true if the function `by` is the first to return the pending loss.
-fn is_first_to_return_loss(by: &str) -> bool {
-    LOSS_PENDING.load(SeqCst) && std::env::var("FAULTS_LOSE_IN").is_ok_and(|first| first == by)
+/// Returns true if `function` is the first to return the pending loss.
+fn is_first_to_return_loss(function: &str) -> bool {
+    LOSS_PENDING.load(SeqCst) && std::env::var("FAULTS_LOSE_IN").is_ok_and(|first| first == function)
 }
 
 unsafe fn submit(queue: Handle, forward: impl FnOnce() -> Code) -> Code {
     if LOST.load(SeqCst) {
         return DEVICE_LOST;
     }
-    let number = 1 + SUBMITS.fetch_add(1, SeqCst);
-    let of_device = 1 + SUBMITS_OF_DEVICE.fetch_add(1, SeqCst);
-    log(&format!("submit {number}"));
+    let process_submit = 1 + SUBMITS.fetch_add(1, SeqCst);
+    let device_submit = 1 + SUBMITS_OF_DEVICE.fetch_add(1, SeqCst);
+    log(&format!("submit {process_submit}"));
     if let Some((n, milliseconds)) = std::env::var("FAULTS_SLEEP")
         .ok()
         .as_deref()
         .and_then(|s| s.split_once(':'))
-        && n.parse() == Ok(number)
+        && n.parse() == Ok(process_submit)
     {
         log("sleep");
         std::thread::sleep(Duration::from_millis(milliseconds.parse().unwrap_or(0)));
     }
-    if variable("FAULTS_NO_MEMORY_IN") == Some(number) {
+    if variable("FAULTS_NO_MEMORY_IN") == Some(process_submit) {
         log("no memory for a submit");
         return OUT_OF_DEVICE_MEMORY;
     }
-    if !loses(number, of_device) {
+    if !loses(process_submit, device_submit) {
         return forward();
     }
     // The wrapped driver first finishes all work, so that its objects can be released.
-    let at_once = std::env::var("FAULTS_LOSE_IN").is_ok_and(|first| first != "submit");
-    let code = if at_once { forward() } else { SUCCESS };
+    let loses_later = std::env::var("FAULTS_LOSE_IN").is_ok_and(|first| first != "submit");
+    let code = if loses_later { forward() } else { SUCCESS };
     unsafe { real::queue_wait_idle()(queue) };
-    if !at_once {
+    if !loses_later {
         return lose("submit");
     }
     LOSS_PENDING.store(true, SeqCst);
@@ -251,18 +251,18 @@ unsafe extern "system" fn queue_submit_2(queue: Handle, count: u32, submits: Han
 }
 
 /// Returns the loss if the device is lost; otherwise forwards the call.
-fn asked(by: &str, forward: impl FnOnce() -> Code) -> Code {
+fn forward_unless_lost(function: &str, forward: impl FnOnce() -> Code) -> Code {
     if LOST.load(SeqCst) {
         return DEVICE_LOST;
     }
-    if is_first_to_return_loss(by) {
-        lose(by)
+    if is_first_to_return_loss(function) {
+        lose(function)
     } else {
         forward()
     }
 }
 
-fn idle(forward: impl FnOnce() -> Code) -> Code {
+fn forward_unless_idle_fails(forward: impl FnOnce() -> Code) -> Code {
     if !LOST.load(SeqCst) {
         return forward();
     }
@@ -271,27 +271,27 @@ fn idle(forward: impl FnOnce() -> Code) -> Code {
 }
 
 unsafe extern "system" fn queue_wait_idle(queue: Handle) -> Code {
-    idle(|| unsafe { real::queue_wait_idle()(queue) })
+    forward_unless_idle_fails(|| unsafe { real::queue_wait_idle()(queue) })
 }
 
 unsafe extern "system" fn device_wait_idle(device: Handle) -> Code {
-    idle(|| unsafe { real::device_wait_idle()(device) })
+    forward_unless_idle_fails(|| unsafe { real::device_wait_idle()(device) })
 }
 
 unsafe extern "system" fn wait_for_fences(device: Handle, count: u32, fences: Handle, all: u32, time: u64) -> Code {
-    asked("wait", || unsafe {
+    forward_unless_lost("wait", || unsafe {
         real::wait_for_fences()(device, count, fences, all, time)
     })
 }
 
 unsafe extern "system" fn wait_semaphores(device: Handle, info: Handle, time: u64) -> Code {
-    asked("wait", || unsafe { real::wait_semaphores()(device, info, time) })
+    forward_unless_lost("wait", || unsafe { real::wait_semaphores()(device, info, time) })
 }
 
 unsafe extern "system" fn get_fence_status(device: Handle, fence: u64) -> Code {
-    asked("status", || unsafe { real::get_fence_status()(device, fence) })
+    forward_unless_lost("status", || unsafe { real::get_fence_status()(device, fence) })
 }
 
 unsafe extern "system" fn get_counter(device: Handle, semaphore: u64, value: *mut u64) -> Code {
-    asked("status", || unsafe { real::get_counter()(device, semaphore, value) })
+    forward_unless_lost("status", || unsafe { real::get_counter()(device, semaphore, value) })
 }

@@ -35,30 +35,30 @@ fn render_in_the_child_process() {
         ..Options::default()
     };
     let mut callbacks = 0;
-    let grown = wgray::render_progressive(&scene, &options, &mut |progress| {
+    let progressive = wgray::render_progressive(&scene, &options, &mut |progress| {
         progress.picture()?;
         callbacks += 1;
         Ok(ControlFlow::Continue(()))
     });
-    assert_eq!(grown.expect("an image").pixels(), expected.pixels());
+    assert_eq!(progressive.expect("an image").pixels(), expected.pixels());
     assert!(callbacks > 0);
 }
 
 #[test]
 fn images_survive_device_losses() {
     let Some(driver) = driver() else { return };
-    let place = TestFolder::of(SCENE);
-    // The first image loses its samples; the second, after 6 submits, samples and a readback.
+    let folder = TestFolder::with_scene(SCENE);
+    // The first image loses its samples; the second image, after 6 submits, loses samples and a readback.
     for (lose, losses) in [("2", 1), ("2,7,10", 3), ("999", 0)] {
-        let log = place.path("log");
-        let _ = std::fs::remove_file(&log); // of the previous run
+        let log = folder.path("log");
+        let _ = std::fs::remove_file(&log); // the log of the previous run
         let output = Command::new(std::env::current_exe().expect("this program"))
             .args(["--exact", "--nocapture", "faults::library::render_in_the_child_process"])
             .envs(driver.environment(&log))
-            .env(FILE, place.path("scene.toml"))
+            .env(FILE, folder.path("scene.toml"))
             .envs([("FAULTS_LOSE", lose), ("FAULTS_LOSE_IN", "wait")])
             .output()
-            .expect("it runs");
+            .expect("the test program runs");
         assert!(
             output.status.success(),
             "{lose}: {}",

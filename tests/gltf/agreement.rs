@@ -4,7 +4,7 @@ use serde_json::json;
 use wgray_render::pack::pack;
 
 use super::build::{Builder, Packing, QUAD, QUAD_UVS};
-use super::read::scene_with;
+use super::read::load_scene;
 use crate::pictures::{RenderMode, differing, exact_modes, reference, render};
 
 #[test]
@@ -28,7 +28,7 @@ fn a_file_has_the_same_bits_on_cpu_and_gpu() {
             [128, 170, 240, 255],
         ],
     );
-    let rough = builder.texture(
+    let roughness = builder.texture(
         2,
         &[
             [0, 60, 255, 255],
@@ -39,14 +39,14 @@ fn a_file_has_the_same_bits_on_cpu_and_gpu() {
     );
     builder.get("samplers")[0]["wrapT"] = json!(33071);
     builder.uses("KHR_texture_transform");
-    let turned = json!({ "KHR_texture_transform": { "offset": [0.2, 0.1], "rotation": 0.4, "scale": [1.5, 0.7] } });
+    let transform = json!({ "KHR_texture_transform": { "offset": [0.2, 0.1], "rotation": 0.4, "scale": [1.5, 0.7] } });
     let material = builder.add(
         "materials",
         json!({
             "pbrMetallicRoughness": {
-                "baseColorTexture": { "index": colors, "extensions": turned },
+                "baseColorTexture": { "index": colors, "extensions": transform },
                 "baseColorFactor": [0.9, 0.8, 0.7, 0.9],
-                "metallicRoughnessTexture": { "index": rough, "texCoord": 1 },
+                "metallicRoughnessTexture": { "index": roughness, "texCoord": 1 },
             },
             "normalTexture": { "index": normals, "scale": 0.7 },
             "emissiveFactor": [0.05, 0.1, 0.02],
@@ -65,16 +65,16 @@ fn a_file_has_the_same_bits_on_cpu_and_gpu() {
     builder.root_node(json!({ "mesh": mesh, "translation": [0.3, -0.2, -1], "scale": [-1.2, 1, 1] }));
     let folder = tempfile::tempdir().unwrap();
     let file = builder.write(folder.path(), "many", Packing::Binary);
-    let mut scene = scene_with(&file, "");
+    let mut scene = load_scene(&file, "");
     (scene.width, scene.height) = (24, 24);
     let packed = pack(&scene);
-    let known = reference(&packed);
+    let expected = reference(&packed);
     for mode in exact_modes().into_iter().filter(|mode| *mode == RenderMode::Baked) {
-        assert_eq!(differing(&render(&packed, mode), &known), 0, "{mode:?}");
+        assert_eq!(differing(&render(&packed, mode), &expected), 0, "{mode:?}");
     }
     // Control: another strength of the normal map.
     builder.get("materials")[material]["normalTexture"]["scale"] = json!(0.6);
-    let mut other = scene_with(&builder.write(folder.path(), "other", Packing::Binary), "");
-    (other.width, other.height) = (24, 24);
-    assert!(differing(&reference(&pack(&other)), &known) > 50);
+    let mut control = load_scene(&builder.write(folder.path(), "other", Packing::Binary), "");
+    (control.width, control.height) = (24, 24);
+    assert!(differing(&reference(&pack(&control)), &expected) > 50);
 }

@@ -1,4 +1,4 @@
-//! Builder of small glTF files. The buffer may be in any of the permitted places.
+//! Builder of small glTF files. The buffer may be at any of the permitted locations.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -186,12 +186,12 @@ impl Builder {
         if !size.is_multiple_of(4) {
             self.get("bufferViews")[view]["byteStride"] = json!(size.next_multiple_of(4));
         }
-        let end = |least: bool| -> Vec<Value> {
-            let pick = |k: usize| flat.iter().skip(k).step_by(N).copied();
+        let bound = |is_min: bool| -> Vec<Value> {
+            let component_values = |k: usize| flat.iter().skip(k).step_by(N).copied();
             (0..N)
-                .map(|k| match least {
-                    true => pick(k).fold(f64::INFINITY, f64::min),
-                    false => pick(k).fold(f64::NEG_INFINITY, f64::max),
+                .map(|k| match is_min {
+                    true => component_values(k).fold(f64::INFINITY, f64::min),
+                    false => component_values(k).fold(f64::NEG_INFINITY, f64::max),
                 })
                 .map(|value| {
                     if component == Component::F32 {
@@ -204,7 +204,7 @@ impl Builder {
         };
         let mut accessor = json!({
             "bufferView": view, "componentType": component as u32, "count": values.len(), "type": kind,
-            "min": end(true), "max": end(false),
+            "min": bound(true), "max": bound(false),
         });
         if normalized && component != Component::F32 {
             accessor["normalized"] = json!(true);
@@ -338,21 +338,21 @@ impl Builder {
         file
     }
 
-    /// Writes `NAME.glb` or `NAME.gltf`. `WGRAY_TEST_GLTF` is a folder for a copy for `scripts/check-gltf`.
+    /// Writes `NAME.glb` or `NAME.gltf`, and a copy to the folder `WGRAY_TEST_GLTF`, if set, for `scripts/check-gltf`.
     pub fn write(&self, folder: &Path, name: &str, packing: Packing) -> PathBuf {
-        if let Some(kept) = std::env::var_os("WGRAY_TEST_GLTF") {
-            self.write_into(Path::new(&kept), name, packing);
+        if let Some(copy_folder) = std::env::var_os("WGRAY_TEST_GLTF") {
+            self.write_into(Path::new(&copy_folder), name, packing);
         }
         self.write_into(folder, name, packing)
     }
 
     /// Writes an invalid file, without a copy.
-    pub fn write_unsound(&self, folder: &Path, name: &str, packing: Packing) -> PathBuf {
+    pub fn write_invalid(&self, folder: &Path, name: &str, packing: Packing) -> PathBuf {
         self.write_into(folder, name, packing)
     }
 
     fn write_into(&self, folder: &Path, name: &str, packing: Packing) -> PathBuf {
-        let (ending, bytes) = match packing {
+        let (extension, bytes) = match packing {
             Packing::Binary => ("glb", self.glb()),
             Packing::Beside => {
                 fs::write(folder.join(format!("{name} data.bin")), &self.bytes).expect("a file");
@@ -363,7 +363,7 @@ impl Builder {
                 ("gltf", self.json(Some(data)))
             }
         };
-        let path = folder.join(format!("{name}.{ending}"));
+        let path = folder.join(format!("{name}.{extension}"));
         fs::write(&path, bytes).expect("a file");
         path
     }
@@ -377,7 +377,7 @@ pub fn png(width: u32, texels: &[[u8; 4]]) -> Vec<u8> {
     encoder.set_depth(png::BitDepth::Eight);
     let mut writer = encoder.write_header().expect("a header");
     writer.write_image_data(texels.as_flattened()).expect("texels");
-    writer.finish().expect("an end");
+    writer.finish().expect("a complete PNG");
     bytes
 }
 

@@ -9,24 +9,24 @@ use super::build::{Builder, Packing};
 use super::read::{assert_near, to_file, triangles};
 use crate::test_folder::TestFolder;
 
-/// Returns a quad and a camera on a rotated node below a scaled one.
-fn seen_by(camera: Value) -> Builder {
+/// Returns a quad and a camera on a rotated node below a scaled node.
+fn quad_with_camera(camera: Value) -> Builder {
     let mut builder = Builder::new();
     let mesh = builder.quad(None);
     builder.root_node(json!({ "mesh": mesh }));
     let camera = builder.add("cameras", camera);
-    let turn = DQuat::from_rotation_y(0.5).to_array();
+    let rotation = DQuat::from_rotation_y(0.5).to_array();
     let node = builder.add(
         "nodes",
-        json!({ "camera": camera, "rotation": turn, "translation": [0, 0, 1] }),
+        json!({ "camera": camera, "rotation": rotation, "translation": [0, 0, 1] }),
     );
     builder.root_node(json!({ "translation": [1, 2, 3], "scale": [2, 2, 2], "children": [node] }));
     builder
 }
 
 fn load(builder: &Builder, name: &str) -> Scene {
-    let place = TestFolder::with_file("a", "");
-    let file = builder.write(place.folder(), name, Packing::Binary);
+    let folder = TestFolder::with_file("a", "");
+    let file = builder.write(folder.folder(), name, Packing::Binary);
     Scene::load(&file).unwrap_or_else(|error| panic!("{error}"))
 }
 
@@ -41,8 +41,8 @@ fn a_turntable_of_a_tilted_camera_is_level() {
     );
     let tilt = DQuat::from_rotation_x(-0.4).to_array();
     builder.root_node(json!({ "camera": camera, "rotation": tilt, "translation": [0, 2, 5] }));
-    let place = TestFolder::with_file("a", "");
-    let file = builder.write(place.folder(), "tilted", Packing::Binary);
+    let folder = TestFolder::with_file("a", "");
+    let file = builder.write(folder.folder(), "tilted", Packing::Binary);
     let overrides = Overrides {
         turntable: Some(5),
         ..Overrides::default()
@@ -68,10 +68,10 @@ fn the_camera_of_a_file_is_placed_by_its_node() {
         ("camera-infinite", json!({ "yfov": 0.7, "znear": 0.1 })),
     ];
     for (name, perspective) in perspectives {
-        let wide = perspective["aspectRatio"].is_number();
-        let builder = seen_by(json!({ "type": "perspective", "perspective": perspective }));
+        let is_wide = perspective["aspectRatio"].is_number();
+        let builder = quad_with_camera(json!({ "type": "perspective", "perspective": perspective }));
         let scene = load(&builder, name);
-        assert_eq!((scene.width, scene.height), (720, if wide { 360 } else { 720 }));
+        assert_eq!((scene.width, scene.height), (720, if is_wide { 360 } else { 720 }));
         let camera = scene.camera;
         assert_near(to_file(camera.position).to_array(), [1.0, 2.0, 5.0]);
         // The camera looks along -z of its node; the node's scale is ignored.
@@ -90,7 +90,7 @@ fn the_camera_of_a_file_is_placed_by_its_node() {
 #[test]
 fn an_orthographic_camera_sees_twice_its_ymag() {
     let camera = json!({ "type": "orthographic", "orthographic": { "xmag": 3, "ymag": 2, "znear": 0, "zfar": 10 } });
-    let camera = load(&seen_by(camera), "camera-orthographic").camera;
+    let camera = load(&quad_with_camera(camera), "camera-orthographic").camera;
     match camera.projection {
         Projection::Orthographic { height } => assert_near([height], [4.0]),
         other => panic!("{other:?}"),
@@ -120,17 +120,17 @@ fn a_file_without_a_camera_is_framed() {
         let Projection::Perspective { fov } = camera.projection else {
             panic!("{:?}", camera.projection);
         };
-        let mut most: f64 = 0.0;
+        let mut max_extent: f64 = 0.0;
         for corner in triangles(&scene).iter().flat_map(|triangle| triangle.corners) {
-            let to = corner - to_file(camera.position);
-            let away = to.dot(to_file(camera.forward));
-            assert!(away > 0.0);
+            let to_corner = corner - to_file(camera.position);
+            let depth = to_corner.dot(to_file(camera.forward));
+            assert!(depth > 0.0);
             for axis in [camera.right, camera.up] {
-                most = most.max((to.dot(to_file(axis)) / away / (fov / 2.0).tan()).abs());
+                max_extent = max_extent.max((to_corner.dot(to_file(axis)) / depth / (fov / 2.0).tan()).abs());
             }
         }
-        // Inside the image, over at least half of its extent.
-        assert!(most < 1.0 && most > 0.5, "{scale:?}: {most}");
+        // The model lies inside the image and covers at least half of its width or height.
+        assert!(max_extent < 1.0 && max_extent > 0.5, "{scale:?}: {max_extent}");
         assert!(to_file(camera.forward).z < 0.0, "{:?}", camera.forward);
     }
 }

@@ -23,9 +23,9 @@ fn triangles(scene: &Scene) -> usize {
 
 #[test]
 fn a_missing_texture_leaves_the_factor() {
-    let place = TestFolder::with_file("a", "");
-    std::fs::write(place.folder().join("broken.png"), b"\x89PNG\r\n\x1a\nno more").unwrap();
-    for (uri, why) in [
+    let folder = TestFolder::with_file("a", "");
+    std::fs::write(folder.folder().join("broken.png"), b"\x89PNG\r\n\x1a\nno more").unwrap();
+    for (uri, reason) in [
         ("missing.png", "images[0].uri: \"missing.png\" cannot be read: "),
         (
             "data:image/png;base64,*",
@@ -53,12 +53,12 @@ fn a_missing_texture_leaves_the_factor() {
         );
         let mesh = builder.quad(Some(material));
         builder.root_node(json!({ "mesh": mesh }));
-        let file = builder.write_unsound(place.folder(), "texture", Packing::Binary);
+        let file = builder.write_invalid(folder.folder(), "texture", Packing::Binary);
         let scene = load(&file, false).unwrap();
         assert_eq!(scene.notes.len(), 1, "{:?}", scene.notes);
         let note = &scene.notes[0];
         assert!(
-            note.message.starts_with(why) && note.message.ends_with("; the texture is replaced by its factor"),
+            note.message.starts_with(reason) && note.message.ends_with("; the texture is replaced by its factor"),
             "{note}"
         );
         let Reflection::Principled(principled) = &scene.materials[0].reflection else {
@@ -81,70 +81,70 @@ fn a_missing_texture_leaves_the_factor() {
             (Color::BLACK, None)
         );
         let error = load(&file, true).unwrap_err();
-        assert!(error.starts_with(&format!("{}: {why}", file.display())), "{error}");
+        assert!(error.starts_with(&format!("{}: {reason}", file.display())), "{error}");
     }
 }
 
 #[test]
 fn triangles_with_invalid_positions_are_skipped() {
-    let place = TestFolder::with_file("a", "");
-    for (bad, left) in [(0, 0), (1, 1), (3, 1), (4, 2)] {
+    let folder = TestFolder::with_file("a", "");
+    for (invalid_vertex, valid_triangles) in [(0, 0), (1, 1), (3, 1), (4, 2)] {
         for value in [f64::NAN, f64::INFINITY, -2e9] {
             let mut builder = Builder::new();
             let mut points = QUAD.to_vec();
             points.push([9.0, 9.0, 0.0]); // an unused vertex
-            points[bad][1] = value;
+            points[invalid_vertex][1] = value;
             let position = builder.attribute(Component::F32, false, &points);
             let indices = builder.indices(&QUAD_INDICES);
             let primitive = json!({ "attributes": { "POSITION": position }, "indices": indices });
             let mesh = builder.add("meshes", json!({ "primitives": [primitive] }));
             builder.root_node(json!({ "mesh": mesh }));
-            let whole = builder.quad(None);
-            builder.root_node(json!({ "mesh": whole }));
+            let valid_mesh = builder.quad(None);
+            builder.root_node(json!({ "mesh": valid_mesh }));
             // JSON has no NaN, so the bounds cover only the valid vertices.
             builder.get("accessors")[position]["min"] = json!([-1, -1, 0]);
             builder.get("accessors")[position]["max"] = json!([9, 9, 0]);
-            let file = builder.write_unsound(place.folder(), "positions", Packing::Binary);
+            let file = builder.write_invalid(folder.folder(), "positions", Packing::Binary);
             let scene = load(&file, false).unwrap();
-            let context = format!("{bad} {value}: {:?}", scene.notes);
-            assert_eq!(triangles(&scene), left + 2, "{context}");
+            let context = format!("{invalid_vertex} {value}: {:?}", scene.notes);
+            assert_eq!(triangles(&scene), valid_triangles + 2, "{context}");
             let rule = "a vertex with a coordinate that is not finite or beyond 1e9";
-            let what = match left {
+            let message = match valid_triangles {
                 0 => format!("meshes[0].primitives[0].attributes.POSITION: 2 triangles have {rule}"),
                 1 => format!("meshes[0].primitives[0].attributes.POSITION: 1 triangle has {rule}"),
                 _ => String::new(),
             };
             let strict = load(&file, true);
-            if what.is_empty() {
+            if message.is_empty() {
                 assert!(scene.notes.is_empty() && strict.is_ok(), "{context}");
                 continue;
             }
             let note = &scene.notes[0];
             assert!(
-                note.message.starts_with(&what) && note.message.ends_with(" skipped"),
+                note.message.starts_with(&message) && note.message.ends_with(" skipped"),
                 "{context}"
             );
-            assert_eq!(strict.unwrap_err(), format!("{}: {what}", file.display()));
+            assert_eq!(strict.unwrap_err(), format!("{}: {message}", file.display()));
         }
     }
 }
 
 #[test]
 fn a_node_may_have_any_scale() {
-    let place = TestFolder::with_file("a", "");
+    let folder = TestFolder::with_file("a", "");
     for scale in [1e-8, 1e-6, 1e6, 1e8] {
         let mut builder = Builder::new();
         let mesh = builder.quad(None);
         builder.root_node(json!({ "mesh": mesh, "scale": [scale, scale, scale] }));
-        let file = builder.write(place.folder(), "scaled", Packing::Binary);
+        let file = builder.write(folder.folder(), "scaled", Packing::Binary);
         let scene = load(&file, true).unwrap_or_else(|error| panic!("{error}"));
         assert!(scene.notes.is_empty(), "{:?}", scene.notes);
         assert_eq!(triangles(&scene), 2, "{scale}");
         let (low, high) = scene.bounds().expect("bounds");
-        let wide = high - low;
+        let size = high - low;
         assert!(
-            (wide.max_element() / (2.0 * scale) - 1.0).abs() < 1e-6,
-            "{scale}: {wide}"
+            (size.max_element() / (2.0 * scale) - 1.0).abs() < 1e-6,
+            "{scale}: {size}"
         );
     }
     // Scaled beyond the coordinate limit.
@@ -152,7 +152,7 @@ fn a_node_may_have_any_scale() {
     let mesh = builder.quad(None);
     builder.root_node(json!({ "mesh": mesh }));
     builder.root_node(json!({ "mesh": mesh, "scale": [1e12, 1e12, 1e12] }));
-    let file = builder.write(place.folder(), "large", Packing::Binary);
+    let file = builder.write(folder.folder(), "large", Packing::Binary);
     let scene = load(&file, false).unwrap();
     assert_eq!(triangles(&scene), 2);
     assert_eq!(

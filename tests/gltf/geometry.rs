@@ -5,7 +5,7 @@ use serde_json::json;
 use wgray::Scene;
 
 use super::build::{Builder, Component, Packing, QUAD, QUAD_INDICES, QUAD_UVS};
-use super::read::{assert_all, assert_corners, corners, pixels, refusal, scene, scene_with, triangles};
+use super::read::{assert_all, assert_corners, corners, load_scene, pixels, rejection, scene, triangles};
 use crate::test_folder::TestFolder;
 
 const QUAD_CORNERS: [[[f64; 3]; 3]; 2] = [[QUAD[0], QUAD[1], QUAD[2]], [QUAD[0], QUAD[2], QUAD[3]]];
@@ -19,20 +19,20 @@ fn quad() -> Builder {
 
 #[test]
 fn a_buffer_may_be_in_the_glb_file_in_its_own_file_or_in_a_data_uri() {
-    let place = TestFolder::with_file("a", "");
+    let folder = TestFolder::with_file("a", "");
     for packing in Packing::ALL {
-        let file = quad().write(place.folder(), &format!("packing-{packing:?}"), packing);
-        let scene = scene_with(&file, "");
+        let file = quad().write(folder.folder(), &format!("packing-{packing:?}"), packing);
+        let scene = load_scene(&file, "");
         assert_corners(&scene, &QUAD_CORNERS);
         for triangle in triangles(&scene) {
             assert_eq!(triangle.normals, [DVec3::Z; 3]);
-            assert_eq!(triangle.side(), DVec3::Z);
+            assert_eq!(triangle.geometric_normal(), DVec3::Z);
             for (corner, uv) in triangle.corners.iter().zip(triangle.uvs) {
                 assert_eq!((uv.x, uv.y), ((corner.x + 1.0) / 2.0, (1.0 - corner.y) / 2.0));
             }
         }
-        let beside = usize::from(packing == Packing::Beside);
-        assert_eq!(scene.files.len(), 1 + beside, "{:?}", scene.files);
+        let buffer_files = usize::from(packing == Packing::Beside);
+        assert_eq!(scene.files.len(), 1 + buffer_files, "{:?}", scene.files);
     }
 }
 
@@ -49,8 +49,8 @@ fn indices_may_have_any_integer_type() {
     }
 }
 
-/// Returns a value after quantization to a normalized integer (glTF 2.0, 3.6.2.2; `KHR_mesh_quantization`).
-fn rounded(component: Component, value: f64) -> f64 {
+/// Returns the value of the nearest normalized integer (glTF 2.0, 3.6.2.2; `KHR_mesh_quantization`).
+fn quantize(component: Component, value: f64) -> f64 {
     (value * component.one()).round() / component.one()
 }
 
@@ -71,15 +71,15 @@ fn positions_may_have_any_integer_type() {
             let scale = 2.0 / unit;
             builder.root_node(json!({ "mesh": mesh, "scale": [scale, scale, scale], "translation": [0, 0, 1] }));
             let stored = |x: f64| match normalized {
-                true => rounded(component, x),
+                true => quantize(component, x),
                 false => (x as i64) as f64,
             };
-            let known = positions.map(|p| {
+            let expected = positions.map(|p| {
                 let [x, y, z] = p.map(|x| stored(x) * scale);
                 [x, y, z + 1.0]
             });
             let name = format!("positions-{component:?}-{normalized}");
-            assert_corners(&scene(&builder, &name), &[known]);
+            assert_corners(&scene(&builder, &name), &[expected]);
         }
     }
 }
@@ -112,10 +112,10 @@ fn texture_coordinates_may_have_any_type() {
         builder.root_node(json!({ "mesh": mesh }));
         let found = triangles(&scene(&builder, &format!("uvs-{component:?}-{normalized}")));
         for (uv, index) in found.iter().flat_map(|triangle| triangle.uvs).zip(QUAD_INDICES) {
-            let known = uvs[index as usize].map(|x| if normalized { rounded(component, x) } else { x });
+            let expected = uvs[index as usize].map(|x| if normalized { quantize(component, x) } else { x });
             assert!(
-                (uv.x - known[0]).abs() + (uv.y - known[1]).abs() < 1e-6,
-                "{component:?}: {uv}, not {known:?}"
+                (uv.x - expected[0]).abs() + (uv.y - expected[1]).abs() < 1e-6,
+                "{component:?}: {uv}, not {expected:?}"
             );
         }
     }
@@ -180,12 +180,12 @@ fn triangles_of_strips_and_fans_have_the_right_winding_order() {
             let found = triangles(&scene);
             assert_eq!(found.len(), triples.len(), "mode {mode}");
             for (triangle, triple) in found.iter().zip(&triples) {
-                assert_eq!(triangle.side(), DVec3::Z, "mode {mode}");
-                let mut known = triple.map(|i| points[i as usize]);
+                assert_eq!(triangle.geometric_normal(), DVec3::Z, "mode {mode}");
+                let mut expected = triple.map(|i| points[i as usize]);
                 let mut corners = triangle.corners.map(|corner| corner.to_array());
-                known.sort_by(|a, b| a.partial_cmp(b).expect("numbers"));
+                expected.sort_by(|a, b| a.partial_cmp(b).expect("numbers"));
                 corners.sort_by(|a, b| a.partial_cmp(b).expect("numbers"));
-                assert_eq!(corners, known, "mode {mode}");
+                assert_eq!(corners, expected, "mode {mode}");
             }
         }
     }
@@ -197,10 +197,10 @@ fn points_and_lines_are_skipped_and_reported() {
         let mut builder = Builder::new();
         let attributes = builder.quad_attributes();
         let indices = builder.indices(&QUAD_INDICES);
-        let others = builder.indices(&[0, 1, 2, 3]);
+        let other_indices = builder.indices(&[0, 1, 2, 3]);
         let triangles = json!({ "attributes": attributes, "indices": indices });
-        let other = json!({ "attributes": attributes, "indices": others, "mode": mode });
-        let mesh = builder.add("meshes", json!({ "primitives": [other.clone(), triangles] }));
+        let other_primitive = json!({ "attributes": attributes, "indices": other_indices, "mode": mode });
+        let mesh = builder.add("meshes", json!({ "primitives": [other_primitive.clone(), triangles] }));
         builder.root_node(json!({ "mesh": mesh }));
         let scene = scene(&builder, &format!("mode-{mode}"));
         assert_corners(&scene, &QUAD_CORNERS);
@@ -211,51 +211,51 @@ fn points_and_lines_are_skipped_and_reported() {
             .collect::<Vec<_>>()
             .join("\n");
         assert!(notes.contains(word) && notes.contains(".glb"), "{notes:?}");
-        builder.get("meshes")[0]["primitives"] = json!([other]);
-        let message = refusal(&builder, "");
+        builder.get("meshes")[0]["primitives"] = json!([other_primitive]);
+        let message = rejection(&builder, "");
         assert!(message.contains("triangle"), "{message}");
     }
 }
 
 #[test]
 fn sparse_accessors_replace_values_of_a_buffer_or_zeros() {
-    for based in [true, false] {
+    for has_base in [true, false] {
         let mut builder = Builder::new();
-        let places = builder.view(&[1, 0, 3, 0]);
+        let sparse_indices = builder.view(&[1, 0, 3, 0]);
         let values = [0.5, 0.25, 0.0, -0.5, 0.75, 0.125];
         let values = builder.view(&Builder::elements("VEC3", Component::F32, &values, 4));
         let mut accessor = json!({
             "componentType": 5126, "count": 4, "type": "VEC3",
             "sparse": {
                 "count": 2,
-                "indices": { "bufferView": places, "componentType": 5123 },
+                "indices": { "bufferView": sparse_indices, "componentType": 5123 },
                 "values": { "bufferView": values },
             },
         });
-        let mut known = [[0.0; 3]; 4];
-        if based {
+        let mut expected = [[0.0; 3]; 4];
+        if has_base {
             let flat: Vec<f64> = QUAD.iter().flatten().copied().collect();
             accessor["bufferView"] = json!(builder.view(&Builder::elements("VEC3", Component::F32, &flat, 4)));
-            known = QUAD;
+            expected = QUAD;
         }
-        known[1] = [0.5, 0.25, 0.0];
-        known[3] = [-0.5, 0.75, 0.125];
-        let end =
-            |pick: fn(f64, f64) -> f64| [0, 1, 2].map(|k| known.iter().map(|p| p[k]).reduce(pick).expect("points"));
-        accessor["min"] = json!(end(f64::min));
-        accessor["max"] = json!(end(f64::max));
+        expected[1] = [0.5, 0.25, 0.0];
+        expected[3] = [-0.5, 0.75, 0.125];
+        let bound =
+            |pick: fn(f64, f64) -> f64| [0, 1, 2].map(|k| expected.iter().map(|p| p[k]).reduce(pick).expect("points"));
+        accessor["min"] = json!(bound(f64::min));
+        accessor["max"] = json!(bound(f64::max));
         let position = builder.add("accessors", accessor);
-        // Without a base accessor two corners are at the origin: one triangle remains.
-        let order: &[u32] = if based { &QUAD_INDICES } else { &[0, 1, 3] };
+        // Without a base accessor, two corners are at the origin: one triangle remains.
+        let order: &[u32] = if has_base { &QUAD_INDICES } else { &[0, 1, 3] };
         let indices = builder.indices(order);
         let primitive = json!({ "attributes": { "POSITION": position }, "indices": indices });
         let mesh = builder.add("meshes", json!({ "primitives": [primitive] }));
         builder.root_node(json!({ "mesh": mesh }));
         let triples: Vec<_> = order
             .chunks(3)
-            .map(|t| [0, 1, 2].map(|k| known[t[k] as usize]))
+            .map(|t| [0, 1, 2].map(|k| expected[t[k] as usize]))
             .collect();
-        assert_corners(&scene(&builder, &format!("sparse-{based}")), &triples);
+        assert_corners(&scene(&builder, &format!("sparse-{has_base}")), &triples);
     }
 }
 
@@ -305,14 +305,14 @@ fn without_normals_triangles_are_flat() {
     for triangle in found {
         for normal in triangle.normals {
             assert!(
-                normal == DVec3::ZERO || normal.distance(triangle.side()) < 1e-6,
+                normal == DVec3::ZERO || normal.distance(triangle.geometric_normal()) < 1e-6,
                 "{triangle:?}"
             );
         }
     }
 }
 
-fn colored<const N: usize>(component: Component, colors: &[[f64; N]; 4], alpha: &str) -> Builder {
+fn colored_quad<const N: usize>(component: Component, colors: &[[f64; N]; 4], alpha: &str) -> Builder {
     let mut builder = Builder::new();
     let material = builder.unlit(json!({ "baseColorFactor": [1, 0.5, 1, 1] }));
     builder.get("materials")[material]["alphaMode"] = json!(alpha);
@@ -326,30 +326,30 @@ fn colored<const N: usize>(component: Component, colors: &[[f64; N]; 4], alpha: 
 #[test]
 fn vertex_colors_of_each_type_are_factors_of_the_base_color() {
     for component in [Component::U8, Component::U16, Component::F32] {
-        let three = colored(component, &[[0.2, 0.4, 0.8]; 4], "OPAQUE");
-        assert_all(&scene(&three, &format!("colors-{component:?}-3")), [0.2, 0.2, 0.8]);
+        let rgb = colored_quad(component, &[[0.2, 0.4, 0.8]; 4], "OPAQUE");
+        assert_all(&scene(&rgb, &format!("colors-{component:?}-3")), [0.2, 0.2, 0.8]);
         // `OPAQUE` ignores alpha.
-        let four = colored(component, &[[0.2, 0.4, 0.8, 0.2]; 4], "OPAQUE");
-        assert_all(&scene(&four, &format!("colors-{component:?}-4")), [0.2, 0.2, 0.8]);
+        let rgba = colored_quad(component, &[[0.2, 0.4, 0.8, 0.2]; 4], "OPAQUE");
+        assert_all(&scene(&rgba, &format!("colors-{component:?}-4")), [0.2, 0.2, 0.8]);
         // Alpha is below the cutoff, so the white environment is visible.
-        let mask = colored(component, &[[0.2, 0.4, 0.8, 0.2]; 4], "MASK");
-        assert_all(&scene(&mask, &format!("colors-{component:?}-mask")), [1.0, 1.0, 1.0]);
+        let masked = colored_quad(component, &[[0.2, 0.4, 0.8, 0.2]; 4], "MASK");
+        assert_all(&scene(&masked, &format!("colors-{component:?}-mask")), [1.0, 1.0, 1.0]);
     }
 }
 
 #[test]
 fn vertex_colors_are_linear_between_vertices() {
     let colors = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 1.0], [0.0, 1.0, 1.0]];
-    let scene = scene(&colored(Component::F32, &colors, "OPAQUE"), "colors-between");
+    let scene = scene(&colored_quad(Component::F32, &colors, "OPAQUE"), "colors-between");
     for (i, pixel) in pixels(&scene).iter().enumerate() {
         let (x, y) = (
             (i % 6) as f32 / 6.0 + 1.0 / 12.0,
             1.0 - (i / 6) as f32 / 6.0 - 1.0 / 12.0,
         );
-        let known = [x, y / 2.0, y];
+        let expected = [x, y / 2.0, y];
         assert!(
-            (0..3).all(|k| (pixel[k] - known[k]).abs() < 1e-5),
-            "{i}: {pixel:?}, not {known:?}"
+            (0..3).all(|k| (pixel[k] - expected[k]).abs() < 1e-5),
+            "{i}: {pixel:?}, not {expected:?}"
         );
     }
 }
@@ -361,46 +361,52 @@ fn morph_targets_are_added_by_their_weights() {
     let indices = builder.indices(&QUAD_INDICES);
     let first = builder.floats(&[[0.0; 3], [1.0, 0.0, 0.0], [0.0; 3], [0.0, 0.0, 4.0]]);
     let second = builder.floats(&[[0.0, -2.0, 0.0]; 4]);
-    let bent = builder.floats(&[[0.75, 0.0, 0.0]; 4]);
+    let normal_delta = builder.floats(&[[0.75, 0.0, 0.0]; 4]);
     let primitive = json!({
         "attributes": attributes, "indices": indices,
-        "targets": [{ "POSITION": first, "NORMAL": bent }, { "POSITION": second }],
+        "targets": [{ "POSITION": first, "NORMAL": normal_delta }, { "POSITION": second }],
     });
     let mesh = builder.add("meshes", json!({ "primitives": [primitive], "weights": [0.5, 0.25] }));
     let node = builder.root_node(json!({ "mesh": mesh }));
-    let known = |a: f64, b: f64| {
+    let expected = |a: f64, b: f64| {
         let mut points = QUAD.map(|[x, y, z]| [x, y - 2.0 * b, z]);
         points[1][0] += a;
         points[3][2] += 4.0 * a;
         [[points[0], points[1], points[2]], [points[0], points[2], points[3]]]
     };
-    let by_mesh = scene(&builder, "morph-mesh");
-    assert_corners(&by_mesh, &known(0.5, 0.25));
-    let bent = DVec3::new(0.375, 0.0, 1.0).normalize();
-    for normal in triangles(&by_mesh).iter().flat_map(|triangle| triangle.normals) {
-        assert!(normal.distance(bent) < 1e-5, "{normal}, not {bent}");
+    let with_mesh_weights = scene(&builder, "morph-mesh");
+    assert_corners(&with_mesh_weights, &expected(0.5, 0.25));
+    let expected_normal = DVec3::new(0.375, 0.0, 1.0).normalize();
+    for normal in triangles(&with_mesh_weights)
+        .iter()
+        .flat_map(|triangle| triangle.normals)
+    {
+        assert!(
+            normal.distance(expected_normal) < 1e-5,
+            "{normal}, not {expected_normal}"
+        );
     }
     // Weights of the node override weights of the mesh.
     builder.get("nodes")[node]["weights"] = json!([1.0, -0.5]);
-    assert_corners(&scene(&builder, "morph-node"), &known(1.0, -0.5));
+    assert_corners(&scene(&builder, "morph-node"), &expected(1.0, -0.5));
     // Instances have independent weights.
     builder.root_node(json!({ "mesh": mesh }));
-    let known = [known(1.0, -0.5), known(0.5, 0.25)].concat();
-    assert_corners(&scene(&builder, "morph-two"), &known);
+    let expected = [expected(1.0, -0.5), expected(0.5, 0.25)].concat();
+    assert_corners(&scene(&builder, "morph-two"), &expected);
 }
 
 #[test]
 fn a_file_renders_without_a_scene() {
-    let place = TestFolder::with_file("a", "");
+    let folder = TestFolder::with_file("a", "");
     for packing in Packing::ALL {
-        let file = quad().write(place.folder(), &format!("whole-{packing:?}"), packing);
+        let file = quad().write(folder.folder(), &format!("whole-{packing:?}"), packing);
         let scene = Scene::load(&file).unwrap_or_else(|error| panic!("{error}"));
         assert_eq!(corners(&scene).len(), 2);
         assert_eq!((scene.width, scene.height), (720, 720));
         assert_eq!(scene.render.pixel_samples.count, 32);
         assert_eq!(scene.render.integrator, wgray::scene::Integrator::Path);
         assert_eq!(scene.view.transform, wgray::scene::ViewTransform::KhronosPbrNeutral);
-        // Without lights the studio environment is used.
+        // Without lights, the studio environment is used.
         assert!(scene.environment.is_some());
     }
 }

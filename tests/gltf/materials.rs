@@ -5,11 +5,11 @@ use wgray::scene::{AlphaMode, Scene};
 
 use super::build::{Builder, Packing};
 use super::read::{
-    assert_all, assert_near, material, plain, plain_color, principled, refusal, scene, scene_by, scene_with,
+    assert_all, assert_near, load_scene, material, plain, plain_color, principled, rejection, scene, scene_with_keys,
 };
 use crate::test_folder::TestFolder;
 
-fn quad_of(material: Value) -> Builder {
+fn quad_with_material(material: Value) -> Builder {
     let mut builder = Builder::new();
     if let Some(extensions) = material["extensions"].as_object() {
         extensions.keys().for_each(|extension| builder.uses(extension));
@@ -20,7 +20,7 @@ fn quad_of(material: Value) -> Builder {
     builder
 }
 
-fn extended(extension: &str, values: Value) -> Value {
+fn extension_material(extension: &str, values: Value) -> Value {
     json!({
         "pbrMetallicRoughness": { "metallicFactor": 0 },
         "extensions": { extension: values },
@@ -29,10 +29,13 @@ fn extended(extension: &str, values: Value) -> Value {
 
 #[test]
 fn defaults_match_the_specification() {
-    let mut without = Builder::new();
-    let mesh = without.quad(None);
-    without.root_node(json!({ "mesh": mesh }));
-    for (name, builder) in [("default-none", without), ("default-empty", quad_of(json!({})))] {
+    let mut without_material = Builder::new();
+    let mesh = without_material.quad(None);
+    without_material.root_node(json!({ "mesh": mesh }));
+    for (name, builder) in [
+        ("default-none", without_material),
+        ("default-empty", quad_with_material(json!({}))),
+    ] {
         let scene = scene(&builder, name);
         let material = material(&scene);
         let principled = principled(&scene);
@@ -56,7 +59,7 @@ fn defaults_match_the_specification() {
 #[test]
 fn core_parameters_are_imported() {
     let scene = scene(
-        &quad_of(json!({
+        &quad_with_material(json!({
             "pbrMetallicRoughness": { "baseColorFactor": [0.1, 0.2, 0.3, 0.4], "metallicFactor": 0.25, "roughnessFactor": 0.75 },
             "emissiveFactor": [0.5, 0.6, 0.7],
         })),
@@ -72,62 +75,68 @@ fn core_parameters_are_imported() {
 
 #[test]
 fn emission_may_be_stronger_than_one() {
-    let mut material = extended("KHR_materials_emissive_strength", json!({ "emissiveStrength": 8 }));
+    let mut material = extension_material("KHR_materials_emissive_strength", json!({ "emissiveStrength": 8 }));
     material["emissiveFactor"] = json!([0.5, 0.25, 1]);
-    let scene = scene(&quad_of(material), "emissive-strength");
+    let scene = scene(&quad_with_material(material), "emissive-strength");
     assert_near(plain_color(super::read::material(&scene).emission), [4.0, 2.0, 8.0]);
 }
 
 #[test]
 fn indices_of_refraction_are_imported() {
-    let of = |ior: f64, name: &str| scene(&quad_of(extended("KHR_materials_ior", json!({ "ior": ior }))), name);
-    assert_near([principled(&of(1.33, "ior")).ior], [1.33]);
+    let with_ior = |ior: f64, name: &str| {
+        scene(
+            &quad_with_material(extension_material("KHR_materials_ior", json!({ "ior": ior }))),
+            name,
+        )
+    };
+    assert_near([principled(&with_ior(1.33, "ior")).ior], [1.33]);
     // An IOR of 0 means a Fresnel term of 1; a high IOR approximates it.
-    assert!(principled(&of(0.0, "ior-zero")).ior >= 50.0);
+    assert!(principled(&with_ior(0.0, "ior-zero")).ior >= 50.0);
 }
 
 #[test]
 fn transmission_without_a_volume_is_thin_walled() {
-    let sheet = extended("KHR_materials_transmission", json!({ "transmissionFactor": 0.75 }));
-    let sheet = scene(&quad_of(sheet), "transmission");
+    let sheet = extension_material("KHR_materials_transmission", json!({ "transmissionFactor": 0.75 }));
+    let sheet = scene(&quad_with_material(sheet), "transmission");
     assert_near([plain(principled(&sheet).transmission)], [0.75]);
     assert!(principled(&sheet).thin);
     let volume = |thickness: f64, name: &str| {
-        let mut material = extended("KHR_materials_transmission", json!({ "transmissionFactor": 1 }));
+        let mut material = extension_material("KHR_materials_transmission", json!({ "transmissionFactor": 1 }));
         material["extensions"]["KHR_materials_volume"] =
             json!({ "thicknessFactor": thickness, "attenuationDistance": 2, "attenuationColor": [0.5, 0.25, 1] });
-        scene(&quad_of(material), name)
+        scene(&quad_with_material(material), name)
     };
     // 0 is thin-walled (`KHR_materials_volume`).
     assert!(principled(&volume(0.0, "volume-thin")).thin);
     let thick = volume(0.5, "volume");
     assert!(!principled(&thick).thin);
     // Beer-Lambert: the color is the transmittance over the distance.
-    let known = [0.5_f64, 0.25, 1.0].map(|left| -left.ln() / 2.0);
-    assert_near(principled(&thick).absorption.to_array(), known);
+    let expected = [0.5_f64, 0.25, 1.0].map(|transmittance| -transmittance.ln() / 2.0);
+    assert_near(principled(&thick).absorption.to_array(), expected);
 }
 
 #[test]
 fn a_volume_absorbs_nothing_without_a_distance_and_everything_if_black() {
-    let of = |volume: Value, name: &str| {
-        let mut material = extended("KHR_materials_transmission", json!({ "transmissionFactor": 1 }));
+    let with_volume = |volume: Value, name: &str| {
+        let mut material = extension_material("KHR_materials_transmission", json!({ "transmissionFactor": 1 }));
         material["extensions"]["KHR_materials_volume"] = volume;
-        scene(&quad_of(material), name)
+        scene(&quad_with_material(material), name)
     };
-    let clear = of(
+    let clear = with_volume(
         json!({ "thicknessFactor": 1, "attenuationColor": [0.5, 0.5, 0.5] }),
         "volume-clear",
     );
     assert_eq!(principled(&clear).absorption.to_array(), [0.0; 3]);
     let black = json!({ "thicknessFactor": 1, "attenuationColor": [0, 0, 0], "attenuationDistance": 1 });
-    let black = of(black, "volume-black");
+    let black = with_volume(black, "volume-black");
     assert!(principled(&black).absorption.min_element() > 10.0);
 }
 
 #[test]
 fn extensions_of_reflection_are_imported() {
     let specular = json!({ "specularFactor": 0.25, "specularColorFactor": [0.5, 0.75, 1] });
-    let scene_of = |extension: &str, values: Value| scene(&quad_of(extended(extension, values)), extension);
+    let scene_of =
+        |extension: &str, values: Value| scene(&quad_with_material(extension_material(extension, values)), extension);
     let scene = scene_of("KHR_materials_specular", specular);
     assert_near([plain(principled(&scene).specular)], [0.25]);
     assert_near(plain_color(principled(&scene).specular_color), [0.5, 0.75, 1.0]);
@@ -162,16 +171,16 @@ fn specular_glossiness_materials_become_dielectrics() {
     let values =
         json!({ "diffuseFactor": [0.1, 0.2, 0.3, 0.5], "specularFactor": [0.04, 0.08, 1], "glossinessFactor": 0.75 });
     let scene = scene(
-        &quad_of(extended("KHR_materials_pbrSpecularGlossiness", values)),
+        &quad_with_material(extension_material("KHR_materials_pbrSpecularGlossiness", values)),
         "specular-glossiness",
     );
     let principled = principled(&scene);
     assert_near(plain_color(principled.base_color), [0.1, 0.2, 0.3]);
     assert_near([plain(principled.metallic), plain(principled.roughness)], [0.0, 0.25]);
     // F0 is the specular color times the F0 of the IOR.
-    let head_on = ((principled.ior - 1.0) / (principled.ior + 1.0)).powi(2);
+    let f0 = ((principled.ior - 1.0) / (principled.ior + 1.0)).powi(2);
     assert_near(
-        plain_color(principled.specular_color).map(|x| x * head_on),
+        plain_color(principled.specular_color).map(|x| x * f0),
         [0.04, 0.08, 1.0],
     );
 }
@@ -189,12 +198,12 @@ fn a_clearcoat_may_have_its_own_normal_map() {
     let mesh = builder.quad(Some(material));
     builder.root_node(json!({ "mesh": mesh }));
     let scene = scene(&builder, "coat-normal");
-    let below = super::read::material(&scene).normal_map.expect("a normal map");
+    let base_map = super::read::material(&scene).normal_map.expect("a normal map");
     let coat = principled(&scene)
         .clearcoat_normal_map
         .expect("a normal map of the coat");
-    assert_eq!((below.strength, coat.strength), (-1.0, 0.5));
-    assert_ne!(below.texture, coat.texture);
+    assert_eq!((base_map.strength, coat.strength), (-1.0, 0.5));
+    assert_ne!(base_map.texture, coat.texture);
 }
 
 #[test]
@@ -217,7 +226,7 @@ fn unlit_materials_emit_their_base_color() {
 fn smooth_metal_in_a_white_environment_has_its_base_color() {
     // At normal incidence Schlick's Fresnel term is the base color.
     let metal = json!({ "pbrMetallicRoughness": { "baseColorFactor": [0.25, 0.5, 0.75, 1], "roughnessFactor": 0 } });
-    assert_all(&scene(&quad_of(metal), "metal"), [0.25, 0.5, 0.75]);
+    assert_all(&scene(&quad_with_material(metal), "metal"), [0.25, 0.5, 0.75]);
 }
 
 fn unlit_with_alpha(mode: &str, cutoff: Option<f64>) -> Scene {
@@ -234,45 +243,45 @@ fn unlit_with_alpha(mode: &str, cutoff: Option<f64>) -> Scene {
 
 #[test]
 fn alpha_modes_are_applied() {
-    let (surface, behind) = ([0.25, 0.5, 0.75], [1.0; 3]);
+    let (surface, background) = ([0.25, 0.5, 0.75], [1.0; 3]);
     assert_all(&unlit_with_alpha("OPAQUE", None), surface);
-    assert_all(&unlit_with_alpha("MASK", None), behind);
+    assert_all(&unlit_with_alpha("MASK", None), background);
     assert_all(&unlit_with_alpha("MASK", Some(0.375)), surface);
     assert_all(&unlit_with_alpha("MASK", Some(0.0)), surface);
-    assert_all(&unlit_with_alpha("MASK", Some(2.0)), behind);
+    assert_all(&unlit_with_alpha("MASK", Some(2.0)), background);
     // `BLEND` is stochastic.
     let mut scene = unlit_with_alpha("BLEND", None);
     scene.render.pixel_samples.count = 64 * 64;
     let pixels = super::read::pixels(&scene);
     for k in 0..3 {
         let mean = pixels.iter().map(|pixel| f64::from(pixel[k])).sum::<f64>() / pixels.len() as f64;
-        let known = 0.4 * surface[k] + 0.6;
-        assert!((mean - known).abs() < 0.005, "{mean}, not {known}");
+        let expected = 0.4 * surface[k] + 0.6;
+        assert!((mean - expected).abs() < 0.005, "{mean}, not {expected}");
     }
 }
 
 #[test]
 fn single_sided_materials_are_invisible_from_behind() {
-    let seen = |double: bool, turned: bool, mirrored: bool| {
+    let sided_quad = |is_double_sided: bool, is_rotated: bool, is_mirrored: bool| {
         let mut builder = Builder::new();
         let material = builder.unlit(json!({ "baseColorFactor": [0.25, 0.5, 0.75, 1] }));
-        builder.get("materials")[material]["doubleSided"] = json!(double);
+        builder.get("materials")[material]["doubleSided"] = json!(is_double_sided);
         let mesh = builder.quad(Some(material));
         let mut node = json!({ "mesh": mesh });
-        if turned {
+        if is_rotated {
             node["rotation"] = json!([0, 1, 0, 0]);
         }
-        if mirrored {
+        if is_mirrored {
             node["scale"] = json!([-1, 1, 1]);
         }
         builder.root_node(node);
-        scene(&builder, &format!("sides-{double}-{turned}-{mirrored}"))
+        scene(&builder, &format!("sides-{is_double_sided}-{is_rotated}-{is_mirrored}"))
     };
-    for mirrored in [false, true] {
-        assert_all(&seen(true, false, mirrored), [0.25, 0.5, 0.75]);
-        assert_all(&seen(true, true, mirrored), [0.25, 0.5, 0.75]);
-        assert_all(&seen(false, false, mirrored), [0.25, 0.5, 0.75]);
-        assert_all(&seen(false, true, mirrored), [1.0; 3]);
+    for is_mirrored in [false, true] {
+        assert_all(&sided_quad(true, false, is_mirrored), [0.25, 0.5, 0.75]);
+        assert_all(&sided_quad(true, true, is_mirrored), [0.25, 0.5, 0.75]);
+        assert_all(&sided_quad(false, false, is_mirrored), [0.25, 0.5, 0.75]);
+        assert_all(&sided_quad(false, true, is_mirrored), [1.0; 3]);
     }
 }
 
@@ -300,9 +309,9 @@ fn a_variant_replaces_the_materials_of_primitives() {
         ("variant = \"dusk\"", 0.5),
         ("variant = \"dawn\"", 0.25),
     ] {
-        assert_all(&scene_by(&builder, "variants", keys), [level; 3]);
+        assert_all(&scene_with_keys(&builder, "variants", keys), [level; 3]);
     }
-    let message = refusal(&builder, "variant = \"noon\"");
+    let message = rejection(&builder, "variant = \"noon\"");
     assert!(
         ["day", "night", "dusk", "dawn"]
             .iter()
@@ -321,29 +330,29 @@ fn a_scene_may_replace_a_material_of_the_file() {
         let mesh = builder.quad(Some(material));
         builder.root_node(json!({ "mesh": mesh, "translation": [x, 0, 0] }));
     }
-    let place = TestFolder::with_file("a", "");
-    let file = builder.write(place.folder(), "replaced", Packing::Binary);
+    let folder = TestFolder::with_file("a", "");
+    let file = builder.write(folder.folder(), "replaced", Packing::Binary);
     let emitter = "[materials.emitter]\ntype = \"diffuse\"\ncolor = [0, 0, 0]\nemission = [0.125, 0.25, 0.5]";
     let keys = format!("materials = {{ blue = \"emitter\" }}\n{emitter}");
-    let pixels = super::read::pixels(&scene_with(&file, &keys));
+    let pixels = super::read::pixels(&load_scene(&file, &keys));
     for row in pixels.chunks(6) {
         assert!(row[..3].iter().all(|pixel| *pixel == [0.5; 3]), "{row:?}");
         assert!(row[3..].iter().all(|pixel| *pixel == [0.125, 0.25, 0.5]), "{row:?}");
     }
     let keys = format!("materials = {{ green = \"emitter\" }}\n{emitter}");
-    let message = super::read::try_scene(&file, &keys).expect_err("no such material");
+    let message = super::read::try_load_scene(&file, &keys).expect_err("no such material");
     assert!(message.contains("green") && message.contains("red"), "{message}");
 }
 
 #[test]
 fn unknown_extensions_are_rejected_if_required_and_reported_if_used() {
     for extension in ["KHR_draco_mesh_compression", "EXT_texture_avif", "EXT_of_nobody"] {
-        let mut builder = quad_of(json!({}));
+        let mut builder = quad_with_material(json!({}));
         builder.requires(extension);
-        let message = refusal(&builder, "");
+        let message = rejection(&builder, "");
         assert!(message.contains(extension), "{message}");
     }
-    let mut builder = quad_of(json!({}));
+    let mut builder = quad_with_material(json!({}));
     builder.uses("EXT_of_nobody");
     let scene = scene(&builder, "used-unknown");
     assert!(

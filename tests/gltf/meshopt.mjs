@@ -4,7 +4,7 @@
 //     npm install meshoptimizer@1.3.0
 //     node tests/gltf/meshopt.mjs > crates/scene/src/gltf/meshopt/streams.txt
 //
-// With a number as argument, generates that many random streams instead, for tests that do not store them.
+// With a number N as argument, it prints N random streams instead, for tests that do not store the streams.
 //
 // Each line contains: name, mode, filter, stride, count, the stream in base64, and the decoded bytes: in base64 for
 // filters, whose results may be rounded, otherwise as their 64-bit FNV-1a hash.
@@ -34,21 +34,21 @@ const base64 = (bytes) => Buffer.from(bytes).toString("base64");
 function line(name, mode, filter, stride, count, stream) {
 	const decoded = new Uint8Array(count * stride);
 	MeshoptDecoder.decodeGltfBuffer(decoded, count, stride, stream, mode, filter);
-	const wanted = filter === "NONE" ? hash(decoded) : base64(decoded);
-	console.log([name, mode, filter, stride, count, base64(stream), wanted].join(" "));
+	const expected = filter === "NONE" ? hash(decoded) : base64(decoded);
+	console.log([name, mode, filter, stride, count, base64(stream), expected].join(" "));
 }
 
 // Generators of the elements of a kind, as bytes.
 const KINDS = {
 	zeros: (count, stride) => new Uint8Array(count * stride),
 	random: (count, stride) => Uint8Array.from({ length: count * stride }, () => random(256)),
-	// Bytes with small changes and occasional large ones.
+	// Bytes with small changes and occasional large changes.
 	smooth: (count, stride) => {
-		const now = Uint8Array.from({ length: stride }, () => random(256));
+		const current = Uint8Array.from({ length: stride }, () => random(256));
 		return Uint8Array.from({ length: count * stride }, (_, i) => {
 			const k = i % stride;
-			now[k] += random(20) === 0 ? random(256) : random(1 << (k % 5));
-			return now[k];
+			current[k] += random(20) === 0 ? random(256) : random(1 << (k % 5));
+			return current[k];
 		});
 	},
 	shorts: (count, stride) => {
@@ -82,31 +82,31 @@ function attributes(kind, stride, count, level, version) {
 	line(`${kind}-${stride}-${count}-${level}-v${version}`, "ATTRIBUTES", "NONE", stride, count, stream);
 }
 
-// Returns the triangles of a grid by row, with `strays` random ones between them.
+// Returns the triangles of a grid by row, with `strays` random triangles between them.
 function grid(side, strays) {
 	const indices = [];
 	for (let y = 0; y < side; y++) {
 		for (let x = 0; x < side; x++) {
-			const at = y * (side + 1) + x;
-			indices.push(at, at + 1, at + side + 1, at + side + 1, at + 1, at + side + 2);
+			const corner = y * (side + 1) + x;
+			indices.push(corner, corner + 1, corner + side + 1, corner + side + 1, corner + 1, corner + side + 2);
 		}
 	}
-	const most = (side + 1) ** 2;
+	const vertexCount = (side + 1) ** 2;
 	for (let i = 0; i < strays; i++) {
-		const at = random(indices.length / 3 + 1) * 3;
-		indices.splice(at, 0, random(most), random(most), random(most));
+		const offset = random(indices.length / 3 + 1) * 3;
+		indices.splice(offset, 0, random(vertexCount), random(vertexCount), random(vertexCount));
 	}
 	return Uint32Array.from(indices);
 }
 
-function indices(name, all, mode, stride) {
-	const typed = stride === 2 ? Uint16Array.from(all) : Uint32Array.from(all);
+function indices(name, values, mode, stride) {
+	const typed = stride === 2 ? Uint16Array.from(values) : Uint32Array.from(values);
 	const bytes = new Uint8Array(typed.buffer);
 	const encode = mode === "TRIANGLES" ? MeshoptEncoder.encodeIndexBuffer : MeshoptEncoder.encodeIndexSequence;
 	line(name, mode, "NONE", stride, typed.length, encode(bytes, typed.length, stride));
 }
 
-// Returns random unit vectors, some along an axis, with a fourth component of 1 or -1 if of three dimensions.
+// Returns random unit vectors, some along an axis, with a fourth component of 1 or -1 if `dimensions` is 3.
 function units(count, dimensions) {
 	const values = [];
 	for (let i = 0; i < count; i++) {
@@ -119,7 +119,7 @@ function units(count, dimensions) {
 	return Float32Array.from(values);
 }
 
-function filtered(filter, stride, bits, version, count = 24) {
+function filteredAttributes(filter, stride, bits, version, count = 24) {
 	let elements;
 	if (filter === "OCTAHEDRAL") elements = MeshoptEncoder.encodeFilterOct(units(count, 3), count, stride, bits);
 	if (filter === "QUATERNION") elements = MeshoptEncoder.encodeFilterQuat(units(count, 4), count, stride, bits);
@@ -135,8 +135,8 @@ function filtered(filter, stride, bits, version, count = 24) {
 	line(`${filter.toLowerCase()}-${stride}-${bits}-v${version}`, "ATTRIBUTES", filter, stride, count, stream);
 }
 
-const many = Number(process.argv[2] ?? 0);
-if (many === 0) {
+const streamCount = Number(process.argv[2] ?? 0);
+if (streamCount === 0) {
 	for (const [kind, stride, count] of [
 		["zeros", 4, 1],
 		["zeros", 256, 600],
@@ -165,15 +165,15 @@ if (many === 0) {
 	}
 	indices("large", [4294967294, 0, 7, 3000000000, 2147483648, 4294967294], "TRIANGLES", 4);
 	for (const version of [0, 1]) {
-		for (const bits of [2, 5, 8]) filtered("OCTAHEDRAL", 4, bits, version);
-		for (const bits of [9, 12, 16]) filtered("OCTAHEDRAL", 8, bits, version);
-		for (const bits of [4, 11, 16]) filtered("QUATERNION", 8, bits, version);
-		for (const bits of [1, 12, 24]) filtered("EXPONENTIAL", 12, bits, version);
-		for (const bits of [2, 7, 8]) filtered("COLOR", 4, bits, version);
-		for (const bits of [9, 12, 16]) filtered("COLOR", 8, bits, version);
+		for (const bits of [2, 5, 8]) filteredAttributes("OCTAHEDRAL", 4, bits, version);
+		for (const bits of [9, 12, 16]) filteredAttributes("OCTAHEDRAL", 8, bits, version);
+		for (const bits of [4, 11, 16]) filteredAttributes("QUATERNION", 8, bits, version);
+		for (const bits of [1, 12, 24]) filteredAttributes("EXPONENTIAL", 12, bits, version);
+		for (const bits of [2, 7, 8]) filteredAttributes("COLOR", 4, bits, version);
+		for (const bits of [9, 12, 16]) filteredAttributes("COLOR", 8, bits, version);
 	}
 }
-for (let i = 0; i < many; i++) {
+for (let i = 0; i < streamCount; i++) {
 	const version = random(2);
 	const pick = (list) => list[random(list.length)];
 	switch (random(4)) {
@@ -191,9 +191,9 @@ for (let i = 0; i < many; i++) {
 		default: {
 			const filter = pick(["OCTAHEDRAL", "QUATERNION", "EXPONENTIAL", "COLOR"]);
 			const stride = filter === "QUATERNION" ? 8 : filter === "EXPONENTIAL" ? 4 * (1 + random(8)) : pick([4, 8]);
-			const least = { OCTAHEDRAL: 2, QUATERNION: 4, EXPONENTIAL: 1, COLOR: 2 }[filter];
-			const most = filter === "EXPONENTIAL" ? 24 : filter === "QUATERNION" ? 16 : stride * 2;
-			filtered(filter, stride, least + random(most - least + 1), version, 1 + random(300));
+			const minBits = { OCTAHEDRAL: 2, QUATERNION: 4, EXPONENTIAL: 1, COLOR: 2 }[filter];
+			const maxBits = filter === "EXPONENTIAL" ? 24 : filter === "QUATERNION" ? 16 : stride * 2;
+			filteredAttributes(filter, stride, minBits + random(maxBits - minBits + 1), version, 1 + random(300));
 		}
 	}
 }

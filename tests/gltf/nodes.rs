@@ -8,9 +8,9 @@ use wgray::mesh::Mesh;
 use wgray::scene::{Geometry, Reflection, Scene, Shape};
 
 use super::build::{Builder, Component, QUAD};
-use super::read::{assert_corners, corners, plain_color, refusal, scene, scene_by, triangles};
+use super::read::{assert_corners, corners, plain_color, rejection, scene, scene_with_keys, triangles};
 
-fn quad_by(map: impl Fn(DVec3) -> DVec3) -> [[[f64; 3]; 3]; 2] {
+fn mapped_quad(map: impl Fn(DVec3) -> DVec3) -> [[[f64; 3]; 3]; 2] {
     let p = QUAD.map(|corner| map(DVec3::from_array(corner)).to_array());
     [[p[0], p[1], p[2]], [p[0], p[2], p[3]]]
 }
@@ -19,23 +19,23 @@ fn quad_by(map: impl Fn(DVec3) -> DVec3) -> [[[f64; 3]; 3]; 2] {
 fn transforms_of_nodes_are_multiplied_from_the_root() {
     let mut builder = Builder::new();
     let mesh = builder.quad(None);
-    let turn = DQuat::from_axis_angle(DVec3::new(1.0, 2.0, 3.0).normalize(), 0.7);
+    let rotation = DQuat::from_axis_angle(DVec3::new(1.0, 2.0, 3.0).normalize(), 0.7);
     let inner = DMat4::from_cols_array(&[
         0.5, 0.1, 0.0, 0.0, 0.2, 1.5, 0.3, 0.0, 0.0, -0.4, 2.0, 0.0, 1.0, 2.0, 3.0, 1.0,
     ]);
     let leaf = builder.add("nodes", json!({ "mesh": mesh, "matrix": inner.to_cols_array() }));
     let outer = json!({
-        "translation": [4, 5, 6], "rotation": turn.to_array(), "scale": [1, 2, 0.5], "children": [leaf],
+        "translation": [4, 5, 6], "rotation": rotation.to_array(), "scale": [1, 2, 0.5], "children": [leaf],
     });
     builder.root_node(outer);
     // A scale after a rotation shears.
-    let map = DAffine3::from_scale_rotation_translation(DVec3::new(1.0, 2.0, 0.5), turn, DVec3::new(4.0, 5.0, 6.0));
-    let known = quad_by(|p| map.transform_point3(inner.transform_point3(p)));
+    let map = DAffine3::from_scale_rotation_translation(DVec3::new(1.0, 2.0, 0.5), rotation, DVec3::new(4.0, 5.0, 6.0));
+    let expected = mapped_quad(|p| map.transform_point3(inner.transform_point3(p)));
     let scene = scene(&builder, "hierarchy");
-    assert_corners(&scene, &known);
+    assert_corners(&scene, &expected);
     for triangle in triangles(&scene) {
         for normal in triangle.normals {
-            assert!(normal.distance(triangle.side()) < 1e-5, "{triangle:?}");
+            assert!(normal.distance(triangle.geometric_normal()) < 1e-5, "{triangle:?}");
         }
     }
 }
@@ -51,11 +51,11 @@ fn mirrored_meshes_keep_their_outside() {
         let mesh = builder.quad(None);
         builder.root_node(json!({ "mesh": mesh, "scale": scale }));
         let scene = scene(&builder, &format!("mirrored-{name}"));
-        assert_corners(&scene, &quad_by(|p| p * DVec3::from_array(scale)));
+        assert_corners(&scene, &mapped_quad(|p| p * DVec3::from_array(scale)));
         // A negative determinant reverses the winding order (glTF 2.0, 3.7.4).
         let outside = DVec3::new(0.0, 0.0, if name == "three" { -1.0 } else { 1.0 });
         for triangle in triangles(&scene) {
-            assert_eq!(triangle.side(), outside, "{name}");
+            assert_eq!(triangle.geometric_normal(), outside, "{name}");
             assert!(
                 triangle.normals.iter().all(|normal| normal.distance(outside) < 1e-6),
                 "{name}"
@@ -70,7 +70,7 @@ fn nodes_with_zero_scale_are_skipped() {
     let mesh = builder.quad(None);
     builder.root_node(json!({ "mesh": mesh, "scale": [0, 0, 0] }));
     builder.root_node(json!({ "mesh": mesh, "translation": [0, 1, 0] }));
-    assert_corners(&scene(&builder, "flat-node"), &quad_by(|p| p + DVec3::Y));
+    assert_corners(&scene(&builder, "flat-node"), &mapped_quad(|p| p + DVec3::Y));
 }
 
 #[test]
@@ -82,9 +82,9 @@ fn meshes_flattened_along_their_normal_are_kept() {
         scene(&builder, "flattened")
     };
     // Flattened along the normal, or below the minimum scale of an instance.
-    for (scale, by) in [([1.0, 1.0, 0.0], 1.0), ([1e-7; 3], 1e-7), ([-1e-7; 3], -1e-7)] {
+    for (scale, factor) in [([1.0, 1.0, 0.0], 1.0), ([1e-7; 3], 1e-7), ([-1e-7; 3], -1e-7)] {
         let scene = flattened(scale);
-        assert_corners(&scene, &quad_by(|p| p * by + 2.0 * DVec3::Z));
+        assert_corners(&scene, &mapped_quad(|p| p * factor + 2.0 * DVec3::Z));
         assert!(
             scene.notes.iter().all(|note| !note.message.contains("skipped")),
             "{:?}",
@@ -115,10 +115,10 @@ fn a_mesh_of_many_nodes_is_kept_once() {
     let meshes = meshes(&scene);
     assert_eq!(meshes.len(), 5);
     assert!(meshes.iter().all(|mesh| Arc::ptr_eq(mesh, meshes[0])));
-    let known: Vec<_> = (0..5)
-        .flat_map(|x| quad_by(|p| p + DVec3::new(3.0 * f64::from(x), 0.0, 0.0)))
+    let expected: Vec<_> = (0..5)
+        .flat_map(|x| mapped_quad(|p| p + DVec3::new(3.0 * f64::from(x), 0.0, 0.0)))
         .collect();
-    assert_corners(&scene, &known);
+    assert_corners(&scene, &expected);
 }
 
 fn meshes(scene: &Scene) -> Vec<&Arc<Mesh>> {
@@ -143,9 +143,9 @@ fn instances_of_a_node_are_below_it() {
     let attributes = json!({ "TRANSLATION": translation, "ROTATION": rotation, "SCALE": scale });
     let instancing = json!({ "EXT_mesh_gpu_instancing": { "attributes": attributes } });
     builder.root_node(json!({ "mesh": mesh, "scale": [1, 1, 2], "translation": [0, 10, 0], "extensions": instancing }));
-    let first = quad_by(|p| p + DVec3::new(0.0, 10.0, 0.0));
-    // Scale, rotation by 90 degrees, translation, node.
-    let second = quad_by(|p| DVec3::new(-p.y + 3.0, 2.0 * p.x + 10.0, p.z));
+    let first = mapped_quad(|p| p + DVec3::new(0.0, 10.0, 0.0));
+    // The instance is scaled, rotated by 90 degrees and translated; the transform of the node follows.
+    let second = mapped_quad(|p| DVec3::new(-p.y + 3.0, 2.0 * p.x + 10.0, p.z));
     assert_corners(&scene(&builder, "gpu-instancing"), &[first, second].concat());
 }
 
@@ -163,8 +163,8 @@ fn instance_rotations_may_be_normalized_integers() {
     builder.get("accessors")[rotation]["normalized"] = json!(true);
     let instancing = json!({ "EXT_mesh_gpu_instancing": { "attributes": { "ROTATION": rotation } } });
     builder.root_node(json!({ "mesh": mesh, "extensions": instancing }));
-    let first = quad_by(|p| DVec3::new(-p.x, -p.y, p.z));
-    let second = quad_by(|p| DVec3::new(-p.x, p.y, -p.z));
+    let first = mapped_quad(|p| DVec3::new(-p.x, -p.y, p.z));
+    let second = mapped_quad(|p| DVec3::new(-p.x, p.y, -p.z));
     assert_corners(&scene(&builder, "gpu-instancing-i16"), &[first, second].concat());
 }
 
@@ -181,15 +181,21 @@ fn two_scenes() -> Builder {
 
 #[test]
 fn one_of_several_scenes_is_shown() {
-    let at = |x: f64| quad_by(|p| p + DVec3::X * x);
+    let quad_at = |x: f64| mapped_quad(|p| p + DVec3::X * x);
     let mut builder = two_scenes();
-    assert_corners(&scene(&builder, "scenes-first"), &at(0.0));
+    assert_corners(&scene(&builder, "scenes-first"), &quad_at(0.0));
     builder.set("scene", json!(1));
-    assert_corners(&scene(&builder, "scenes-second"), &at(10.0));
-    assert_corners(&scene_by(&builder, "scenes-named", "scene = \"first\""), &at(0.0));
-    assert_corners(&scene_by(&builder, "scenes-numbered", "scene = 0"), &at(0.0));
+    assert_corners(&scene(&builder, "scenes-second"), &quad_at(10.0));
+    assert_corners(
+        &scene_with_keys(&builder, "scenes-named", "scene = \"first\""),
+        &quad_at(0.0),
+    );
+    assert_corners(
+        &scene_with_keys(&builder, "scenes-numbered", "scene = 0"),
+        &quad_at(0.0),
+    );
     for keys in ["scene = \"third\"", "scene = 2"] {
-        let message = refusal(&builder, keys);
+        let message = rejection(&builder, keys);
         assert!(message.contains("first") && message.contains("second"), "{message}");
     }
 }
@@ -199,12 +205,12 @@ fn cyclic_nodes_are_rejected() {
     let mut builder = two_scenes();
     builder.get("nodes")[0]["children"] = json!([1]);
     builder.get("nodes")[1]["children"] = json!([0]);
-    let message = refusal(&builder, "");
+    let message = rejection(&builder, "");
     assert!(message.contains("nodes"), "{message}");
     // A node that is its own child.
     let mut builder = two_scenes();
     builder.get("nodes")[0]["children"] = json!([0]);
-    assert!(refusal(&builder, "").contains("nodes"));
+    assert!(rejection(&builder, "").contains("nodes"));
 }
 
 #[test]
@@ -216,7 +222,7 @@ fn long_chains_of_nodes_are_supported() {
         node = builder.add("nodes", json!({ "children": [node], "translation": [0.001, 0, 0] }));
     }
     builder.add("scenes", json!({ "nodes": [node] }));
-    assert_corners(&scene(&builder, "chain"), &quad_by(|p| p + DVec3::X));
+    assert_corners(&scene(&builder, "chain"), &mapped_quad(|p| p + DVec3::X));
 }
 
 #[test]
@@ -257,11 +263,11 @@ fn a_file_may_be_translated_rotated_and_scaled() {
     builder.root_node(json!({ "mesh": mesh, "translation": [1, 0, 0] }));
     // z of the scene is y of the file.
     let keys = "scale = 2\nrotate = { axis = [0, 0, 1], degrees = 90 }\ntranslate = [0, 0, 5]";
-    let turn = DMat3::from_axis_angle(DVec3::Y, std::f64::consts::FRAC_PI_2);
-    let known = quad_by(|p| turn * (2.0 * (p + DVec3::X)) + 5.0 * DVec3::Y);
-    assert_corners(&scene_by(&builder, "moved", keys), &known);
+    let rotation = DMat3::from_axis_angle(DVec3::Y, std::f64::consts::FRAC_PI_2);
+    let expected = mapped_quad(|p| rotation * (2.0 * (p + DVec3::X)) + 5.0 * DVec3::Y);
+    assert_corners(&scene_with_keys(&builder, "moved", keys), &expected);
     assert_eq!(
-        corners(&scene_by(
+        corners(&scene_with_keys(
             &builder,
             "moved",
             "matrix = [[1, 0, 0, 3], [0, 1, 0, 0], [0, 0, 1, 0]]"

@@ -12,7 +12,7 @@ use super::read::triangles;
 use crate::test_folder::TestFolder;
 
 /// Writes a model of a spike that starts at the origin and has length 3 along an axis.
-fn spike(place: &TestFolder, axis: DVec3, has_camera: bool) -> PathBuf {
+fn write_spike(folder: &TestFolder, axis: DVec3, has_camera: bool) -> PathBuf {
     let mut builder = Builder::new();
     let side = axis.any_orthonormal_vector() * 0.25;
     let points = [side, -side, axis * 3.0].map(|p| p.to_array());
@@ -25,7 +25,7 @@ fn spike(place: &TestFolder, axis: DVec3, has_camera: bool) -> PathBuf {
         let camera = builder.add("cameras", json!({ "type": "perspective", "perspective": lens }));
         builder.root_node(json!({ "camera": camera, "translation": [0, 0, 9] }));
     }
-    builder.write(place.folder(), "spike", Packing::Binary)
+    builder.write(folder.folder(), "spike", Packing::Binary)
 }
 
 fn load(file: &PathBuf, presentation: Presentation, view: Option<View>) -> Result<Scene, String> {
@@ -42,7 +42,7 @@ fn load(file: &PathBuf, presentation: Presentation, view: Option<View>) -> Resul
 
 #[test]
 fn any_axis_can_point_up() {
-    let place = TestFolder::with_file("a", "");
+    let folder = TestFolder::with_file("a", "");
     for (name, axis) in [
         ("x", DVec3::X),
         ("-x", DVec3::NEG_X),
@@ -51,16 +51,16 @@ fn any_axis_can_point_up() {
         ("+z", DVec3::Z),
         ("-z", DVec3::NEG_Z),
     ] {
-        let file = spike(&place, axis, false);
+        let file = write_spike(&folder, axis, false);
         let presentation = Presentation {
             up: Some(name.parse().unwrap()),
             ..Presentation::default()
         };
         let scene = load(&file, presentation, Some(View::Front)).unwrap();
         let triangle = triangles(&scene)[0].corners;
-        // Coordinates as if the file were upright.
+        // The coordinates are as if the file were upright.
         assert!(triangle[2].distance(DVec3::Y * 3.0) < 1e-6, "{name}: {triangle:?}");
-        // Frames the model in its new orientation.
+        // The camera frames the model in its new orientation.
         let camera = scene.camera;
         assert!(camera.position.z > 0.0 && camera.position.z < 3.0, "{name}: {camera:?}");
         assert_eq!(camera.forward.z, 0.0, "{name}");
@@ -73,9 +73,9 @@ fn any_axis_can_point_up() {
 
 #[test]
 fn the_ground_lies_below_the_model() {
-    let place = TestFolder::with_file("a", "");
-    for (up, low) in [("y", 0.0), ("-y", -3.0), ("x", 0.0)] {
-        let file = spike(&place, DVec3::Y, false);
+    let folder = TestFolder::with_file("a", "");
+    for (up, min_z) in [("y", 0.0), ("-y", -3.0), ("x", 0.0)] {
+        let file = write_spike(&folder, DVec3::Y, false);
         let presentation = Presentation {
             ground: true,
             up: Some(up.parse().unwrap()),
@@ -94,22 +94,22 @@ fn the_ground_lies_below_the_model() {
             panic!("{up}: {:?}", scene.shapes);
         };
         assert_eq!(scene.material_names[material], "ground");
-        let gap = low - center.z;
+        let gap = min_z - center.z;
         assert!(gap > 0.0 && gap < 1e-3, "{up}: {center}");
         assert!(radius > 10.0, "{radius}");
-        // Frames the model, not the ground.
-        let without = Presentation {
+        // The camera frames the model, not the ground.
+        let without_ground = Presentation {
             ground: false,
             ..presentation
         };
-        assert_eq!(scene.camera, load(&file, without, None).unwrap().camera);
+        assert_eq!(scene.camera, load(&file, without_ground, None).unwrap().camera);
     }
 }
 
 #[test]
 fn a_ground_that_hides_the_model_is_reported() {
-    let place = TestFolder::with_file("a", "");
-    let file = spike(&place, DVec3::Y, false);
+    let folder = TestFolder::with_file("a", "");
+    let file = write_spike(&folder, DVec3::Y, false);
     let notes = |ground, view| {
         let presentation = Presentation {
             ground,
@@ -132,8 +132,8 @@ fn a_ground_that_hides_the_model_is_reported() {
 
 #[test]
 fn the_automatic_camera_is_adjusted() {
-    let place = TestFolder::with_file("a", "");
-    let file = spike(&place, DVec3::Y, true);
+    let folder = TestFolder::with_file("a", "");
+    let file = write_spike(&folder, DVec3::Y, true);
     let fov = |fov| Presentation {
         fov: Some(fov),
         ..Presentation::default()
@@ -152,9 +152,9 @@ fn the_automatic_camera_is_adjusted() {
     };
     let camera = load(&file, orbit, None).unwrap().camera;
     assert!(camera.forward.distance(DVec3::NEG_X) < 1e-9, "{camera:?}");
-    for wrong in [0.5, 171.0, f64::NAN] {
-        let message = load(&file, fov(wrong), Some(View::Front)).unwrap_err();
-        assert_eq!(message, format!("fov: {wrong} must be from 1 to 170 degrees"));
+    for invalid_fov in [0.5, 171.0, f64::NAN] {
+        let message = load(&file, fov(invalid_fov), Some(View::Front)).unwrap_err();
+        assert_eq!(message, format!("fov: {invalid_fov} must be from 1 to 170 degrees"));
     }
     let rule = "only applies to the automatic camera, and the file has its own camera; add --view or --orbit";
     assert_eq!(load(&file, fov(50.0), None).unwrap_err(), format!("fov: {rule}"));
@@ -163,7 +163,7 @@ fn the_automatic_camera_is_adjusted() {
         ..Presentation::default()
     };
     assert_eq!(load(&file, up, None).unwrap_err(), format!("up: {rule}"));
-    // With any camera.
+    // The ground does not depend on the camera.
     let ground = Presentation {
         ground: true,
         ..Presentation::default()

@@ -9,7 +9,7 @@ use wgray::{Device, Options};
 use super::build::{Builder, Packing};
 use crate::test_folder::TestFolder;
 
-/// A camera at +z of the file (-y of the scene), placed so that [`QUAD`](super::build::QUAD) fills the image; the
+/// A camera at +z of the file (-y of the scene), placed so that [`QUAD`](super::build::QUAD) fills the image. The
 /// environment is white.
 const SCENE: &str = r#"
 image = { width = 6, height = 6 }
@@ -39,7 +39,7 @@ pub struct Triangle {
 
 impl Triangle {
     /// Returns the geometric normal.
-    pub fn side(&self) -> DVec3 {
+    pub fn geometric_normal(&self) -> DVec3 {
         let [a, b, c] = self.corners;
         let normal = (b - a).cross(c - a).normalize();
         if self.mirrored { -normal } else { normal }
@@ -52,36 +52,36 @@ pub fn to_file(p: DVec3) -> DVec3 {
 }
 
 /// Loads the scene with additional keys of its shape.
-pub fn scene_with(file: &Path, keys: &str) -> Scene {
-    try_scene(file, keys).unwrap_or_else(|error| panic!("{error}"))
+pub fn load_scene(file: &Path, keys: &str) -> Scene {
+    try_load_scene(file, keys).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// Loads as [`scene_with`], or returns the error.
-pub fn try_scene(file: &Path, keys: &str) -> Result<Scene, String> {
-    let folder = file.parent().expect("a folder");
+/// Loads the scene as [`load_scene`], or returns the error.
+pub fn try_load_scene(file: &Path, keys: &str) -> Result<Scene, String> {
+    let scene_folder = file.parent().expect("a folder");
     let name = file.file_name().expect("a name").to_string_lossy();
     let text = format!("{SCENE}file = \"{name}\"\n{keys}\n");
-    let path = folder.join("scene.toml");
+    let path = scene_folder.join("scene.toml");
     std::fs::write(&path, text).expect("a file");
     Scene::load(&path).map_err(|error| error.to_string())
 }
 
 pub fn scene(builder: &Builder, name: &str) -> Scene {
-    let place = TestFolder::with_file("a", "");
-    scene_with(&builder.write(place.folder(), name, Packing::Binary), "")
+    let folder = TestFolder::with_file("a", "");
+    load_scene(&builder.write(folder.folder(), name, Packing::Binary), "")
 }
 
-/// Loads as [`scene`], with additional keys.
-pub fn scene_by(builder: &Builder, name: &str, keys: &str) -> Scene {
-    let place = TestFolder::with_file("a", "");
-    scene_with(&builder.write(place.folder(), name, Packing::Binary), keys)
+/// Loads the scene as [`scene`], with additional keys.
+pub fn scene_with_keys(builder: &Builder, name: &str, keys: &str) -> Scene {
+    let folder = TestFolder::with_file("a", "");
+    load_scene(&builder.write(folder.folder(), name, Packing::Binary), keys)
 }
 
-/// Returns the error message.
-pub fn refusal(builder: &Builder, keys: &str) -> String {
-    let place = TestFolder::with_file("a", "");
-    let file = builder.write_unsound(place.folder(), "bad", Packing::Binary);
-    match try_scene(&file, keys) {
+/// Returns the error message of an invalid file.
+pub fn rejection(builder: &Builder, keys: &str) -> String {
+    let folder = TestFolder::with_file("a", "");
+    let file = builder.write_invalid(folder.folder(), "bad", Packing::Binary);
+    match try_load_scene(&file, keys) {
         Ok(_) => panic!("the file was not rejected"),
         Err(message) => message,
     }
@@ -90,12 +90,12 @@ pub fn refusal(builder: &Builder, keys: &str) -> String {
 /// Returns all triangles in the order of shapes and meshes.
 pub fn triangles(scene: &Scene) -> Vec<Triangle> {
     let mut found = Vec::new();
-    for thing in &scene.shapes {
+    for shape in &scene.shapes {
         let Geometry::Mesh {
             mesh,
             to_world,
             materials,
-        } = &thing.geometry
+        } = &shape.geometry
         else {
             continue;
         };
@@ -127,12 +127,15 @@ pub fn corners(scene: &Scene) -> Vec<[DVec3; 3]> {
 }
 
 #[track_caller]
-pub fn assert_corners(scene: &Scene, known: &[[[f64; 3]; 3]]) {
+pub fn assert_corners(scene: &Scene, expected: &[[[f64; 3]; 3]]) {
     let corners = corners(scene);
-    assert_eq!(corners.len(), known.len(), "triangles: {corners:?}");
-    for (found, known) in corners.iter().flatten().zip(known.as_flattened()) {
-        let known = DVec3::from_array(*known);
-        assert!(found.distance(known) < 1e-5, "{found} is not {known}, of {corners:?}");
+    assert_eq!(corners.len(), expected.len(), "triangles: {corners:?}");
+    for (found, expected) in corners.iter().flatten().zip(expected.as_flattened()) {
+        let expected = DVec3::from_array(*expected);
+        assert!(
+            found.distance(expected) < 1e-5,
+            "{found} must be {expected}; corners: {corners:?}"
+        );
     }
 }
 
@@ -170,9 +173,12 @@ pub fn plain_color(color: Color) -> [f64; 3] {
 
 /// Asserts that values are equal in single precision.
 #[track_caller]
-pub fn assert_near<const N: usize>(found: [f64; N], known: [f64; N]) {
-    let near = |(a, b): (&f64, &f64)| (a - b).abs() <= 1e-6 * b.abs().max(1.0);
-    assert!(found.iter().zip(&known).all(near), "{found:?} is not {known:?}");
+pub fn assert_near<const N: usize>(found: [f64; N], expected: [f64; N]) {
+    let is_near = |(a, b): (&f64, &f64)| (a - b).abs() <= 1e-6 * b.abs().max(1.0);
+    assert!(
+        found.iter().zip(&expected).all(is_near),
+        "{found:?} is not {expected:?}"
+    );
 }
 
 /// Renders on the CPU and returns the pixels in row-major order, top row first.
@@ -186,10 +192,10 @@ pub fn pixels(scene: &Scene) -> Vec<[f32; 3]> {
 
 /// Asserts one color for all pixels, within 1e-5.
 #[track_caller]
-pub fn assert_all(scene: &Scene, known: [f64; 3]) {
+pub fn assert_all(scene: &Scene, expected: [f64; 3]) {
     let pixels = pixels(scene);
     for (i, pixel) in pixels.iter().enumerate() {
-        let near = (0..3).all(|k| (f64::from(pixel[k]) - known[k]).abs() < 1e-5 * known[k].max(1.0));
-        assert!(near, "pixel {i} is {pixel:?}, not {known:?}");
+        let is_near = (0..3).all(|k| (f64::from(pixel[k]) - expected[k]).abs() < 1e-5 * expected[k].max(1.0));
+        assert!(is_near, "pixel {i} is {pixel:?}, not {expected:?}");
     }
 }

@@ -4,7 +4,7 @@ use serde_json::{Value, json};
 use wgray::{Aov, Channel, Device, Options, Scene};
 
 use super::build::{Builder, Component, Packing, QUAD, QUAD_INDICES, QUAD_UVS, png};
-use super::read::{assert_all, pixels, scene, scene_with};
+use super::read::{assert_all, load_scene, pixels, scene};
 use crate::test_folder::TestFolder;
 
 const RED: [u8; 4] = [255, 0, 0, 255];
@@ -12,7 +12,7 @@ const GREEN: [u8; 4] = [0, 255, 0, 255];
 const BLUE: [u8; 4] = [0, 0, 255, 255];
 const WHITE: [u8; 4] = [255; 4];
 
-fn pictured(builder: &mut Builder, info: Value) {
+fn add_textured_quad(builder: &mut Builder, info: Value) {
     let material = builder.unlit(json!({ "baseColorTexture": info }));
     let mesh = builder.quad(Some(material));
     builder.root_node(json!({ "mesh": mesh }));
@@ -20,11 +20,11 @@ fn pictured(builder: &mut Builder, info: Value) {
 
 /// Asserts the colors of the four quarters: top left, top right, bottom left, bottom right.
 #[track_caller]
-fn assert_quarters(scene: &Scene, known: [[u8; 4]; 4]) {
+fn assert_quarters(scene: &Scene, expected: [[u8; 4]; 4]) {
     let pixels = pixels(scene);
     for (i, pixel) in pixels.iter().enumerate() {
         let quarter = 2 * (i / 18) + i % 6 / 3;
-        let texel = known[quarter];
+        let texel = expected[quarter];
         let color = [0, 1, 2].map(|k| f32::from(texel[k]) / 255.0);
         assert_eq!(*pixel, color, "pixel {i} of {pixels:?}");
     }
@@ -34,14 +34,14 @@ fn assert_quarters(scene: &Scene, known: [[u8; 4]; 4]) {
 fn the_first_texel_is_at_the_upper_left() {
     let mut builder = Builder::new();
     let texture = builder.texture(2, &[RED, GREEN, BLUE, WHITE]);
-    pictured(&mut builder, json!({ "index": texture }));
+    add_textured_quad(&mut builder, json!({ "index": texture }));
     assert_quarters(&scene(&builder, "texture"), [RED, GREEN, BLUE, WHITE]);
 }
 
 #[test]
 fn images_may_be_in_the_buffer_in_their_own_files_or_in_a_data_uri() {
     let bytes = png(2, &[RED, GREEN, BLUE, WHITE]);
-    let place = TestFolder::with_file("a", "");
+    let folder = TestFolder::with_file("a", "");
     for uri in ["my%20image.png", "data"] {
         let data = format!("data:image/png;base64,{}", super::build::base64(&bytes));
         let uri = if uri == "data" { data.as_str() } else { uri };
@@ -49,17 +49,17 @@ fn images_may_be_in_the_buffer_in_their_own_files_or_in_a_data_uri() {
         let image = builder.add("images", json!({ "uri": uri }));
         let sampler = builder.add("samplers", json!({ "magFilter": 9728 }));
         let texture = builder.add("textures", json!({ "source": image, "sampler": sampler }));
-        pictured(&mut builder, json!({ "index": texture }));
+        add_textured_quad(&mut builder, json!({ "index": texture }));
         let name = if uri.len() < 20 { "image-beside" } else { "image-data" };
-        for folder in [
-            Some(place.folder().to_owned()),
+        for image_folder in [
+            Some(folder.folder().to_owned()),
             std::env::var_os("WGRAY_TEST_GLTF").map(Into::into),
         ] {
-            let write = |folder: std::path::PathBuf| std::fs::write(folder.join("my image.png"), &bytes);
-            folder.map(write).transpose().expect("a file");
+            let write = |image_folder: std::path::PathBuf| std::fs::write(image_folder.join("my image.png"), &bytes);
+            image_folder.map(write).transpose().expect("a file");
         }
-        let file = builder.write(place.folder(), name, Packing::Embedded);
-        assert_quarters(&scene_with(&file, ""), [RED, GREEN, BLUE, WHITE]);
+        let file = builder.write(folder.folder(), name, Packing::Embedded);
+        assert_quarters(&load_scene(&file, ""), [RED, GREEN, BLUE, WHITE]);
     }
 }
 
@@ -80,9 +80,9 @@ fn jpeg_and_webp_are_read() {
     let sampler = builder.add("samplers", json!({ "magFilter": 9728 }));
     let texture = json!({ "sampler": sampler, "extensions": { "EXT_texture_webp": { "source": image } } });
     let texture = builder.add("textures", texture);
-    pictured(&mut builder, json!({ "index": texture }));
+    add_textured_quad(&mut builder, json!({ "index": texture }));
     assert_quarters(&scene(&builder, "webp"), [RED, GREEN, BLUE, WHITE]);
-    // 8 x 8 texels of one color are almost exact in a JPEG.
+    // A JPEG stores a block of 8 x 8 texels of one color almost exactly.
     let large: Vec<u8> = (0..256).flat_map(|i| [[255, 0, 0], [255; 3]][(i / 8) % 2]).collect();
     let mut jpeg = Vec::new();
     let mut encoder = image::codecs::jpeg::JpegEncoder::new_with_quality(&mut jpeg, 100);
@@ -92,11 +92,11 @@ fn jpeg_and_webp_are_read() {
     let mut builder = Builder::new();
     let image = builder.image(&jpeg, "image/jpeg");
     let texture = builder.add("textures", json!({ "source": image }));
-    pictured(&mut builder, json!({ "index": texture }));
+    add_textured_quad(&mut builder, json!({ "index": texture }));
     let pixels = pixels(&scene(&builder, "jpeg"));
-    let near = |pixel: [f32; 3], known: [f32; 3]| (0..3).all(|k| (pixel[k] - known[k]).abs() < 0.02);
+    let is_near = |pixel: [f32; 3], expected: [f32; 3]| (0..3).all(|k| (pixel[k] - expected[k]).abs() < 0.02);
     assert!(
-        near(pixels[1], [1.0, 0.0, 0.0]) && near(pixels[4], [1.0; 3]),
+        is_near(pixels[1], [1.0, 0.0, 0.0]) && is_near(pixels[4], [1.0; 3]),
         "{pixels:?}"
     );
 }
@@ -106,8 +106,8 @@ fn ktx2_file(name: &str) -> Vec<u8> {
     std::fs::read(crate::sources::path(&format!("tests/textures/ktx2/{name}"))).expect("a file")
 }
 
-/// Returns an unlit quad; for KTX2 through `KHR_texture_basisu`.
-fn with_image(bytes: &[u8], kind: &str, more: &Value) -> Builder {
+/// Returns an unlit quad with an image, for KTX2 through `KHR_texture_basisu`.
+fn with_image(bytes: &[u8], kind: &str, material_keys: &Value) -> Builder {
     let mut builder = Builder::new();
     let image = builder.image(bytes, kind);
     let sampler = builder.add("samplers", json!({ "magFilter": 9728 }));
@@ -120,7 +120,7 @@ fn with_image(bytes: &[u8], kind: &str, more: &Value) -> Builder {
     };
     let texture = builder.add("textures", texture);
     let material = builder.unlit(json!({ "baseColorTexture": { "index": texture } }));
-    for (key, value) in more.as_object().expect("a table") {
+    for (key, value) in material_keys.as_object().expect("a table") {
         builder.get("materials")[material][key] = value.clone();
     }
     let mesh = builder.quad(Some(material));
@@ -137,9 +137,9 @@ fn ktx2_files_are_read() {
     let blend = json!({ "alphaMode": "BLEND" });
     let mut pictures = Vec::new();
     for name in ["etc1s-48x20-alpha", "uastc-48x20-alpha", "etc1s-quarters"] {
-        let [ktx2, png] = [("ktx2", "image/ktx2"), ("png", "image/png")].map(|(ending, kind)| {
-            let builder = with_image(&ktx2_file(&format!("{name}.{ending}")), kind, &blend);
-            pixels(&scene(&builder, &format!("{name}-{ending}")))
+        let [ktx2, png] = [("ktx2", "image/ktx2"), ("png", "image/png")].map(|(extension, kind)| {
+            let builder = with_image(&ktx2_file(&format!("{name}.{extension}")), kind, &blend);
+            pixels(&scene(&builder, &format!("{name}-{extension}")))
         });
         assert_eq!(ktx2, png, "{name}");
         pictures.push(ktx2);
@@ -181,8 +181,12 @@ fn textures_wrap_as_their_sampler_specifies() {
         let material = builder.unlit(json!({ "baseColorTexture": { "index": texture } }));
         let mesh = builder.quad_with(json!({ "POSITION": position, "TEXCOORD_0": uv }), Some(material));
         builder.root_node(json!({ "mesh": mesh }));
-        let known = row.map(|texel: [u8; 4]| [0, 1, 2].map(|k| f32::from(texel[k]) / 255.0));
-        assert_eq!(pixels(&scene(&builder, &format!("wrap-{mode}")))[..6], known, "{mode}");
+        let expected = row.map(|texel: [u8; 4]| [0, 1, 2].map(|k| f32::from(texel[k]) / 255.0));
+        assert_eq!(
+            pixels(&scene(&builder, &format!("wrap-{mode}")))[..6],
+            expected,
+            "{mode}"
+        );
     }
 }
 
@@ -217,12 +221,12 @@ fn a_texture_may_use_another_set_of_coordinates() {
         let material = builder.unlit(json!({ "baseColorTexture": { "index": texture, "texCoord": set } }));
         let mesh = builder.quad_with(attributes, Some(material));
         builder.root_node(json!({ "mesh": mesh }));
-        let known = if set == 1 {
+        let expected = if set == 1 {
             [GREEN, RED, WHITE, BLUE]
         } else {
             [BLUE, WHITE, RED, GREEN]
         };
-        assert_quarters(&scene(&builder, &format!("uv-set-{set}")), known);
+        assert_quarters(&scene(&builder, &format!("uv-set-{set}")), expected);
     }
 }
 
@@ -254,7 +258,7 @@ fn transformed(name: &str, transform: Value) -> Scene {
 
 #[test]
 fn texture_transforms_follow_khr_texture_transform() {
-    let quarter = std::f64::consts::FRAC_PI_2;
+    let quarter_turn = std::f64::consts::FRAC_PI_2;
     assert_quarters(&transformed("transform-none", json!({})), [RED, GREEN, BLUE, WHITE]);
     assert_quarters(
         &transformed("transform-offset", json!({ "offset": [0.5, 0] })),
@@ -270,16 +274,19 @@ fn texture_transforms_follow_khr_texture_transform() {
     );
     let lower = json!({ "offset": [0.5, 0.5], "scale": [0.5, 0.5] });
     assert_quarters(&transformed("transform-lower", lower), [WHITE; 4]);
-    // Examples of the extension: a clockwise rotation of the whole image, the same for a part of it, and a flip.
-    let turned = json!({ "offset": [0, 1], "rotation": quarter });
-    assert_quarters(&transformed("transform-turn", turned), [BLUE, RED, WHITE, GREEN]);
-    let turned = json!({ "offset": [0, 1], "rotation": quarter, "scale": [0.5, 0.5] });
-    assert_quarters(&transformed("transform-turn-quarter", turned), [BLUE; 4]);
+    // Examples of the extension: a clockwise rotation of the full image and of a part of the image, and a flip.
+    let rotated = json!({ "offset": [0, 1], "rotation": quarter_turn });
+    assert_quarters(&transformed("transform-turn", rotated), [BLUE, RED, WHITE, GREEN]);
+    let rotated = json!({ "offset": [0, 1], "rotation": quarter_turn, "scale": [0.5, 0.5] });
+    assert_quarters(&transformed("transform-turn-quarter", rotated), [BLUE; 4]);
     let flipped = json!({ "offset": [0, 1], "scale": [1, -1] });
     assert_quarters(&transformed("transform-flip", flipped), [BLUE, WHITE, RED, GREEN]);
     // The scale precedes the rotation.
-    let both = json!({ "offset": [0, 1], "rotation": quarter, "scale": [0.5, 1] });
-    assert_quarters(&transformed("transform-order", both), [BLUE, BLUE, WHITE, WHITE]);
+    let scaled_and_rotated = json!({ "offset": [0, 1], "rotation": quarter_turn, "scale": [0.5, 1] });
+    assert_quarters(
+        &transformed("transform-order", scaled_and_rotated),
+        [BLUE, BLUE, WHITE, WHITE],
+    );
     // `texCoord` of the transform takes precedence.
     assert_quarters(
         &transformed("transform-set", json!({ "texCoord": 1 })),
@@ -308,7 +315,7 @@ fn rows() -> Vec<Row> {
     };
     // The component that 128 encodes.
     let half: f64 = 128.0 / 255.0 * 2.0 - 1.0;
-    // Delta-specular, as NEE samples textured emission differently.
+    // The emissive rows are delta-specular, because NEE samples textured emission differently.
     vec![
         row(
             "base-color",
@@ -449,7 +456,7 @@ fn rows() -> Vec<Row> {
     ]
 }
 
-fn leaning(name: &str, texel: [u8; 4], material: &Value) -> Scene {
+fn tilted_quad(name: &str, texel: [u8; 4], material: &Value) -> Scene {
     let mut builder = Builder::new();
     builder.uses("KHR_lights_punctual");
     let texture = builder.plain_texture(texel);
@@ -467,8 +474,8 @@ fn leaning(name: &str, texel: [u8; 4], material: &Value) -> Scene {
     builder.root_node(json!({ "mesh": mesh, "rotation": [-0.3826834323650898, 0, 0, 0.9238795325112867] }));
     let lights = json!({ "lights": [{ "type": "directional", "intensity": 3 }] });
     builder.set("extensions", json!({ "KHR_lights_punctual": lights }));
-    let turn = glam::DQuat::from_euler(glam::EulerRot::YXZ, 0.4, -0.9, 0.0).to_array();
-    builder.root_node(json!({ "rotation": turn, "extensions": { "KHR_lights_punctual": { "light": 0 } } }));
+    let rotation = glam::DQuat::from_euler(glam::EulerRot::YXZ, 0.4, -0.9, 0.0).to_array();
+    builder.root_node(json!({ "rotation": rotation, "extensions": { "KHR_lights_punctual": { "light": 0 } } }));
     scene(&builder, name)
 }
 
@@ -476,20 +483,28 @@ fn leaning(name: &str, texel: [u8; 4], material: &Value) -> Scene {
 fn constant_textures_equal_plain_values() {
     for row in rows() {
         let name = format!("texture-{}", row.name);
-        let textured = pixels(&leaning(&name, row.texel, &row.textured));
-        let plain = pixels(&leaning(&format!("{name}-plain"), row.texel, &row.plain));
-        let white = pixels(&leaning(&format!("{name}-white"), WHITE, &row.textured));
-        let far = |a: &[[f32; 3]], b: &[[f32; 3]]| {
+        let textured = pixels(&tilted_quad(&name, row.texel, &row.textured));
+        let plain = pixels(&tilted_quad(&format!("{name}-plain"), row.texel, &row.plain));
+        let white = pixels(&tilted_quad(&format!("{name}-white"), WHITE, &row.textured));
+        let max_difference = |a: &[[f32; 3]], b: &[[f32; 3]]| {
             let pairs = a.as_flattened().iter().zip(b.as_flattened());
             pairs
                 .map(|(a, b)| (a - b).abs() / b.abs().max(0.05))
                 .fold(0.0, f32::max)
         };
         // Textured anisotropy uses a coarser multiple-scattering table.
-        let bound = if row.name.starts_with("anisotropy") { 0.01 } else { 1e-5 };
-        assert!(far(&textured, &plain) < bound, "{}: {textured:?} {plain:?}", row.name);
+        let tolerance = if row.name.starts_with("anisotropy") { 0.01 } else { 1e-5 };
+        assert!(
+            max_difference(&textured, &plain) < tolerance,
+            "{}: {textured:?} {plain:?}",
+            row.name
+        );
         // Control: the images differ visibly.
-        assert!(far(&white, &plain) > 0.1, "{}: {white:?} {plain:?}", row.name);
+        assert!(
+            max_difference(&white, &plain) > 0.1,
+            "{}: {white:?} {plain:?}",
+            row.name
+        );
     }
 }
 
@@ -514,10 +529,10 @@ fn occlusion_textures_are_ignored_and_reported() {
 }
 
 /// Returns the shading normal in file coordinates.
-fn bent(name: &str, map: Value, uvs: [[f64; 2]; 4], tangent: Option<[f64; 4]>) -> [f64; 3] {
+fn shading_normal(name: &str, map: Value, uvs: [[f64; 2]; 4], tangent: Option<[f64; 4]>) -> [f64; 3] {
     let mut builder = Builder::new();
     builder.uses("KHR_texture_transform");
-    // About (0.6, 0.2, 0.77).
+    // The texel encodes about (0.6, 0.2, 0.77).
     let texture = builder.plain_texture([204, 153, 226, 255]);
     let mut info = map;
     info["index"] = json!(texture);
@@ -538,23 +553,25 @@ fn bent(name: &str, map: Value, uvs: [[f64; 2]; 4], tangent: Option<[f64; 4]>) -
         ..Options::default()
     };
     let picture = wgray::render(&scene, &options).expect("an image");
-    let of = |axis: &str| match picture.channel(&format!("shading_normal.{axis}")) {
+    let component = |axis: &str| match picture.channel(&format!("shading_normal.{axis}")) {
         Some(Channel::Floats(values)) => f64::from(values[14]),
         other => panic!("{other:?}"),
     };
-    [of("X"), of("Z"), -of("Y")]
+    [component("X"), component("Z"), -component("Y")]
 }
 
 #[test]
 fn texels_of_normal_maps_tilt_the_normal() {
-    let known = |name: &str, found: [f64; 3], known: [f64; 3]| {
-        let length = known.iter().map(|x| x * x).sum::<f64>().sqrt();
-        let near = (0..3).all(|k| (found[k] - known[k] / length).abs() < 0.002);
-        assert!(near, "{name}: {found:?}, not {:?}", known.map(|x| x / length));
+    let assert_normal = |name: &str, found: [f64; 3], expected: [f64; 3]| {
+        let length = expected.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let is_near = (0..3).all(|k| (found[k] - expected[k] / length).abs() < 0.002);
+        assert!(is_near, "{name}: {found:?}, not {:?}", expected.map(|x| x / length));
     };
     let (x, y, z) = (0.6, 0.2, 226.0 / 255.0 * 2.0 - 1.0);
     let upright = QUAD_UVS;
-    let check = |name: &str, map: Value, uvs, tangent, normal| known(name, bent(name, map, uvs, tangent), normal);
+    let check = |name: &str, map: Value, uvs, tangent, normal| {
+        assert_normal(name, shading_normal(name, map, uvs, tangent), normal)
+    };
     // Red is along +u, green along -v (glTF 2.0, 3.9.3).
     check("normal", json!({}), upright, None, [x, y, z]);
     check(
@@ -564,7 +581,7 @@ fn texels_of_normal_maps_tilt_the_normal() {
         None,
         [0.5 * x, 0.5 * y, z],
     );
-    // Mirrored and rotated.
+    // The texture coordinates are mirrored or rotated.
     check(
         "normal-mirrored",
         json!({}),
@@ -599,8 +616,8 @@ fn texels_of_normal_maps_tilt_the_normal() {
 #[test]
 fn a_transformed_normal_map_keeps_its_tangents() {
     // `KHR_texture_transform` changes the lookup, not the tangents.
-    let turned = json!({ "extensions": { "KHR_texture_transform": { "rotation": std::f64::consts::FRAC_PI_2 } } });
-    let found = bent("normal-transformed", turned, QUAD_UVS, Some([1.0, 0.0, 0.0, 1.0]));
+    let transform = json!({ "extensions": { "KHR_texture_transform": { "rotation": std::f64::consts::FRAC_PI_2 } } });
+    let found = shading_normal("normal-transformed", transform, QUAD_UVS, Some([1.0, 0.0, 0.0, 1.0]));
     assert!(
         (found[0] - 0.6).abs() < 0.01 && (found[1] - 0.2).abs() < 0.01,
         "{found:?}"

@@ -6,21 +6,21 @@ use std::path::Path;
 use serde_json::{Value, json};
 
 use super::seeds::{START, TEXTURE, container, ktx2, triangle};
-use super::{Ran, render, render_with, run};
+use super::{RunResult, render, render_with, run};
 
-fn model(json: &Value, binary: &[u8]) -> Ran {
+fn model(json: &Value, binary: &[u8]) -> RunResult {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("a.glb"), container(json, binary)).unwrap();
     render(folder.path(), "a.glb")
 }
 
-fn refused(json: &Value, binary: &[u8], message: &str) {
-    let ran = model(json, binary);
+fn assert_rejected(json: &Value, binary: &[u8], message: &str) {
+    let result = model(json, binary);
     assert!(
-        ran.code == 3 && ran.said.contains(message),
+        result.code == 3 && result.output.contains(message),
         "{}: {}",
-        ran.code,
-        ran.said
+        result.code,
+        result.output
     );
 }
 
@@ -39,11 +39,11 @@ fn instances_are_in_proportion_to_the_file() {
     push(&mut json["accessors"], zeros(1 << 20, "VEC3"));
     push(&mut json["accessors"], zeros(1 << 16, "VEC3"));
     json["nodes"] = node(1);
-    refused(&json, &binary, "nodes[0]: a file of ");
-    refused(&json, &binary, " bytes must have at most 656");
+    assert_rejected(&json, &binary, "nodes[0]: a file of ");
+    assert_rejected(&json, &binary, " bytes must have at most 656");
     json["nodes"] = node(2);
     assert_eq!(model(&json, &binary).code, 0);
-    // The text bounds the number of nodes.
+    // The length of the JSON text limits the number of nodes.
     json["nodes"] = json!(vec![json!({ "mesh": 0 }); 100_000]);
     assert_eq!(model(&json, &binary).code, 0);
 }
@@ -65,7 +65,7 @@ fn meshes_that_share_all_they_have_are_few() {
         json["nodes"] = (0..count).map(|i| json!({ "mesh": i })).collect();
     };
     meshes(&mut json, 1000);
-    refused(&json, &binary, " triangles");
+    assert_rejected(&json, &binary, " triangles");
     meshes(&mut json, 20);
     assert_eq!(model(&json, &binary).code, 0);
 }
@@ -75,24 +75,24 @@ fn accessors_are_not_read_for_ever() {
     let (mut json, binary) = triangle();
     push(&mut json["accessors"], zeros(1 << 22, "VEC3"));
     push(&mut json["accessors"], zeros(1 << 20, "MAT4"));
-    let rule = "counted as often as they are read";
-    let mut many = json.clone();
-    many["meshes"] = json!(vec![
+    let rule = "counted once per read";
+    let mut many_meshes = json.clone();
+    many_meshes["meshes"] = json!(vec![
         json!({ "primitives": [{ "attributes": { "POSITION": 1 }, "mode": 6 }] });
         400
     ]);
-    many["nodes"] = (0..400).map(|i| json!({ "mesh": i })).collect();
-    refused(&many, &binary, "a file of ");
+    many_meshes["nodes"] = (0..400).map(|i| json!({ "mesh": i })).collect();
+    assert_rejected(&many_meshes, &binary, "a file of ");
     let mut morphed = json.clone();
     morphed["meshes"] = json!([{
         "weights": vec![1; 1000],
         "primitives": [{ "attributes": { "POSITION": 1 }, "targets": vec![json!({ "POSITION": 1 }); 1000] }],
     }]);
-    refused(&morphed, &binary, rule);
+    assert_rejected(&morphed, &binary, rule);
     let mut skinned = json.clone();
     skinned["skins"] = json!(vec![json!({ "joints": [0], "inverseBindMatrices": 2 }); 200]);
     skinned["nodes"] = (0..200).map(|i| json!({ "mesh": 0, "skin": i })).collect();
-    refused(&skinned, &binary, rule);
+    assert_rejected(&skinned, &binary, rule);
     push(&mut json["accessors"], zeros(1 << 22, "SCALAR"));
     json["animations"] = json!([{
         "samplers": [{ "input": 3, "output": 1 }],
@@ -100,8 +100,13 @@ fn accessors_are_not_read_for_ever() {
     }]);
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("a.glb"), container(&json, &binary)).unwrap();
-    let ran = super::render_with(folder.path(), "a.glb", &["--time", "0.5"]);
-    assert!(ran.code == 3 && ran.said.contains(rule), "{}: {}", ran.code, ran.said);
+    let result = super::render_with(folder.path(), "a.glb", &["--time", "0.5"]);
+    assert!(
+        result.code == 3 && result.output.contains(rule),
+        "{}: {}",
+        result.code,
+        result.output
+    );
 }
 
 #[test]
@@ -112,11 +117,10 @@ fn compressed_views_are_in_proportion() {
     json["buffers"][0]["byteLength"] = json!(binary.len());
     json["extensionsUsed"] = json!(["EXT_meshopt_compression"]);
     let (stride, count) = (256, 1 << 24);
-    let how = json!({ "buffer": 0, "byteOffset": 36, "byteLength": 1, "byteStride": stride, "count": count, "mode": "ATTRIBUTES" });
-    let view =
-        json!({ "buffer": 0, "byteLength": stride * count as u64, "extensions": { "EXT_meshopt_compression": how } });
+    let compression = json!({ "buffer": 0, "byteOffset": 36, "byteLength": 1, "byteStride": stride, "count": count, "mode": "ATTRIBUTES" });
+    let view = json!({ "buffer": 0, "byteLength": stride * count as u64, "extensions": { "EXT_meshopt_compression": compression } });
     push(&mut json["bufferViews"], view);
-    refused(&json, &binary, "bytes of compressed views, once they are decoded");
+    assert_rejected(&json, &binary, "bytes of decompressed buffer views");
 }
 
 #[test]
@@ -142,12 +146,12 @@ fn sparse_files_are_refused_by_their_length() {
         [[shapes]]\ntype = 'sphere'\nmaterial = 'm'\ncenter = [0, 0, 0]\nradius = 1\n";
     fs::write(folder.join("texture.toml"), format!("{START}{texture}")).unwrap();
     for name in ["b.gltf", "a.toml", "a.glb", "mesh.toml", "texture.toml"] {
-        let ran = render(folder, name);
+        let result = render(folder, name);
         assert!(
-            ran.code == 3 && ran.said.contains("larger than"),
+            result.code == 3 && result.output.contains("larger than"),
             "{name}: {}: {}",
-            ran.code,
-            ran.said
+            result.code,
+            result.output
         );
     }
 }
@@ -161,18 +165,18 @@ fn shapes_that_name_one_file_often_are_few() {
     fs::write(folder.join("a.glb"), container(&json, &binary)).unwrap();
     let shape = "[[shapes]]\ntype = 'gltf'\nfile = 'a.glb'\n";
     fs::write(folder.join("a.toml"), START.to_owned() + &shape.repeat(20_000)).unwrap();
-    let ran = render(folder, "a.toml");
+    let result = render(folder, "a.toml");
     assert!(
-        ran.code == 3 && ran.said.contains("together must bring at most 262144"),
+        result.code == 3 && result.output.contains("together must import at most 262144"),
         "{}",
-        ran.said
+        result.output
     );
     // Name lookup is not quadratic.
     json["nodes"] = json!([{ "mesh": 0 }]);
     fs::write(folder.join("a.glb"), container(&json, &binary)).unwrap();
     fs::write(folder.join("a.toml"), START.to_owned() + &shape.repeat(3000)).unwrap();
-    let ran = render(folder, "a.toml");
-    assert_eq!(ran.code, 0, "{}", ran.said);
+    let result = render(folder, "a.toml");
+    assert_eq!(result.code, 0, "{}", result.output);
 }
 
 /// Returns a PNG of zeros, encoded row by row.
@@ -195,7 +199,7 @@ fn blank(width: u32, height: u32, color: png::ColorType, depth: png::BitDepth) -
 
 #[test]
 fn images_that_grow_a_thousandfold_are_told() {
-    // 65 KB, 67 million texels.
+    // A file of 65 KB with 67 million texels.
     let image = blank(8192, 8192, png::ColorType::Grayscale, png::BitDepth::Eight);
     let (mut json, mut binary) = triangle();
     let start = binary.len();
@@ -211,8 +215,8 @@ fn images_that_grow_a_thousandfold_are_told() {
     json["materials"] = (0..50).map(slots).collect();
     let primitive = |i: usize| json!({ "attributes": { "POSITION": 0 }, "material": i });
     json["meshes"][0]["primitives"] = (0..50).map(primitive).collect();
-    refused(&json, &binary, "texels in total; for files of ");
-    // 2 MB that decode to 2 GB. Large images of models are halved.
+    assert_rejected(&json, &binary, "texels in total; for files of ");
+    // A file of 2 MB decodes to 2 GB. Large images of models are halved.
     let deep = blank(16_384, 16_384, png::ColorType::Rgba, png::BitDepth::Sixteen);
     binary.truncate(start);
     binary.extend(&deep);
@@ -220,14 +224,14 @@ fn images_that_grow_a_thousandfold_are_told() {
     json["bufferViews"][1]["byteLength"] = json!(deep.len());
     json["meshes"][0]["primitives"] = json!([primitive(0)]);
     json["materials"] = json!([slots(0)]);
-    refused(&json, &binary, "; the limit for a file of ");
+    assert_rejected(&json, &binary, "; the limit for a file of ");
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("deep.png"), &deep).unwrap();
-    let ran = run(folder.path(), &["diff", "deep.png", "deep.png"]);
+    let result = run(folder.path(), &["diff", "deep.png", "deep.png"]);
     assert!(
-        ran.code == 1 && ran.said.contains("; the limit for a file of "),
+        result.code == 1 && result.output.contains("; the limit for a file of "),
         "{}",
-        ran.said
+        result.output
     );
 }
 
@@ -235,16 +239,21 @@ fn images_that_grow_a_thousandfold_are_told() {
 #[test]
 fn ktx2_files_are_refused_by_their_headers() {
     let folder = tempfile::tempdir().unwrap();
-    let refused = |bytes: &[u8], rule: &str| {
+    let assert_rejected = |bytes: &[u8], rule: &str| {
         fs::write(folder.path().join("a.ktx2"), bytes).unwrap();
         fs::write(
             folder.path().join("a.toml"),
             START.to_owned() + &TEXTURE.replace("FILE", "a.ktx2"),
         )
         .unwrap();
-        let ran = render_with(folder.path(), "a.toml", &["--strict"]);
-        assert!(ran.code == 3 && ran.said.contains(rule), "{}: {}", ran.code, ran.said);
-        assert!(ran.seconds < 5.0, "{}", ran.seconds);
+        let result = render_with(folder.path(), "a.toml", &["--strict"]);
+        assert!(
+            result.code == 3 && result.output.contains(rule),
+            "{}: {}",
+            result.code,
+            result.output
+        );
+        assert!(result.seconds < 5.0, "{}", result.seconds);
     };
     // RFC 8878, section 3.1.1: a window of 1 KiB, 8 raw bytes, and a block of 12,000 sequences without literals that
     // copy 131,074 bytes each (codes 0, 0 and 52).
@@ -262,27 +271,27 @@ fn ktx2_files_are_refused_by_their_headers() {
     bytes.truncate(level as usize);
     bytes.extend(&frame);
     bytes[88..96].copy_from_slice(&(frame.len() as u64).to_le_bytes());
-    refused(&bytes, "its Zstandard data cannot be decompressed");
+    assert_rejected(&bytes, "its Zstandard data cannot be decompressed");
     let mut bytes = ktx2("etc1s-48x20");
     bytes[20..28].copy_from_slice(&[0, 64, 0, 0, 0, 32, 0, 0]);
-    refused(&bytes, "; the limit for a file of ");
+    assert_rejected(&bytes, "; the limit for a file of ");
     bytes[20..28].copy_from_slice(&[1, 64, 0, 0, 1, 0, 0, 0]);
-    refused(&bytes, "must have at most 16384 texels along a side");
+    assert_rejected(&bytes, "must have at most 16384 texels along a side");
 }
 
 /// The data window may exceed the display window.
 #[test]
 fn windows_of_exr_files_are_refused_by_their_headers() {
     let folder = tempfile::tempdir().unwrap();
-    let sound = folder.path().join("sound.exr");
-    image::Rgb32FImage::new(8, 6).save(&sound).unwrap();
-    let sound = fs::read(sound).unwrap();
-    let corners = |name: &str| {
+    let valid = folder.path().join("sound.exr");
+    image::Rgb32FImage::new(8, 6).save(&valid).unwrap();
+    let valid = fs::read(valid).unwrap();
+    let window_offset = |name: &str| {
         let window = [name.as_bytes(), b"\0box2i\0\x10\0\0\0"].concat();
-        let found = sound.windows(window.len()).position(|bytes| bytes == window);
+        let found = valid.windows(window.len()).position(|bytes| bytes == window);
         found.expect("a window") + window.len()
     };
-    let (data, display) = (corners("dataWindow"), corners("displayWindow"));
+    let (data, display) = (window_offset("dataWindow"), window_offset("displayWindow"));
     let scene = "image = { width = 8, height = 6 }\ncamera = { position = [0, -4, 1], look_at = [0, 0, 0], fov = 40 }\n\
                  [textures.t]\ntype = 'image'\nfile = 'a.exr'\n[materials.m]\ntype = 'phong'\ncolor = { texture = 't' }\n\
                  [[shapes]]\ntype = 'sphere'\nmaterial = 'm'\ncenter = [0, 0, 0]\nradius = 1\n";
@@ -298,21 +307,21 @@ fn windows_of_exr_files_are_refused_by_their_headers() {
             2..4,
             3999,
             3,
-            "declares 4000 x 4000 texels and stores 48; the rest needs ",
+            "declares 4000 x 4000 texels and stores 48; the missing texels need ",
         ),
     ] {
-        let mut file = sound.clone();
+        let mut file = valid.clone();
         for number in numbers {
-            let at = window + 4 * number;
-            file[at..at + 4].copy_from_slice(&i32::to_le_bytes(value));
+            let offset = window + 4 * number;
+            file[offset..offset + 4].copy_from_slice(&i32::to_le_bytes(value));
         }
         fs::write(folder.path().join("a.exr"), file).unwrap();
-        let ran = super::render(folder.path(), "s.toml");
+        let result = super::render(folder.path(), "s.toml");
         assert!(
-            ran.code == code && ran.said.contains(rule),
+            result.code == code && result.output.contains(rule),
             "{value}: {} {}",
-            ran.code,
-            ran.said
+            result.code,
+            result.output
         );
     }
 }
@@ -321,10 +330,10 @@ fn windows_of_exr_files_are_refused_by_their_headers() {
 fn pipes_and_devices_are_not_read() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
-    super::seeds::put(folder);
+    super::seeds::write_referenced_files(folder);
     for name in ["pipe", "pipe.gltf", "pipe.obj", "pipe.png"] {
-        let made = std::process::Command::new("mkfifo").arg(folder.join(name)).status();
-        assert!(made.unwrap().success());
+        let created = std::process::Command::new("mkfifo").arg(folder.join(name)).status();
+        assert!(created.unwrap().success());
     }
     let plain = ["render", "plain.toml", "--device", "cpu", "-o", "out.png"];
     for name in ["pipe", "/dev/zero"] {
@@ -338,12 +347,17 @@ fn pipes_and_devices_are_not_read() {
                 [2],
             ),
         ] {
-            let ran = run(folder, &arguments);
-            assert!(codes.contains(&ran.code), "{arguments:?}: {}: {}", ran.code, ran.said);
+            let result = run(folder, &arguments);
+            assert!(
+                codes.contains(&result.code),
+                "{arguments:?}: {}: {}",
+                result.code,
+                result.output
+            );
         }
     }
     assert_eq!(run(folder, &["check", "pipe.gltf"]).code, 3);
-    for (named, text) in [
+    for (file, text) in [
         (
             "pipe.obj",
             "[materials.m]\ntype = 'diffuse'\ncolor = [1, 1, 1]\n[[shapes]]\ntype = 'mesh'\nmaterial = 'm'\nfile = 'FILE'\n",
@@ -351,16 +365,20 @@ fn pipes_and_devices_are_not_read() {
         ("pipe.png", "[textures.t]\ntype = 'image'\nfile = 'FILE'\n"),
         ("pipe.png", "[environment]\nfile = 'FILE'\n"),
     ] {
-        fs::write(folder.join("a.toml"), format!("{START}{}", text.replace("FILE", named))).unwrap();
-        let ran = run(folder, &["check", "a.toml"]);
-        assert!(ran.code == 3 && ran.said.contains("must be a file"), "{}", ran.said);
+        fs::write(folder.join("a.toml"), format!("{START}{}", text.replace("FILE", file))).unwrap();
+        let result = run(folder, &["check", "a.toml"]);
+        assert!(
+            result.code == 3 && result.output.contains("must be a file"),
+            "{}",
+            result.output
+        );
     }
     // Pipes of a shell have a writer.
-    let ran = shell(
+    let result = shell(
         folder,
         "\"$0\" check <(cat plain.toml) && \"$0\" check /dev/stdin < plain.toml && cat plain.toml | \"$0\" check /dev/stdin",
     );
-    assert_eq!(ran.matches("ok: 8 x 6 pixels").count(), 3, "{ran}");
+    assert_eq!(result.matches("ok: 8 x 6 pixels").count(), 3, "{result}");
 }
 
 fn shell(folder: &Path, script: &str) -> String {
@@ -399,12 +417,12 @@ fn texts_that_go_deep_or_on_for_ever_are_told() {
         ("a.gltf", format!("{{\"asset\":{}", "{\"a\":".repeat(deep)), json),
     ] {
         fs::write(folder.path().join(name), text).unwrap();
-        let ran = run(folder.path(), &["check", name]);
+        let result = run(folder.path(), &["check", name]);
         assert!(
-            ran.code == 3 && ran.said.contains(message),
+            result.code == 3 && result.output.contains(message),
             "{name}: expected {message}: {}: {}",
-            ran.code,
-            ran.said
+            result.code,
+            result.output
         );
     }
 }
@@ -414,7 +432,7 @@ fn what_acts_on_a_terminal_is_shown() {
     // `run` rejects control characters.
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
-    super::seeds::put(folder);
+    super::seeds::write_referenced_files(folder);
     for text in [
         "a\u{1b}[31m=1",
         "a=\u{7f}\u{9b}31m",
@@ -424,17 +442,22 @@ fn what_acts_on_a_terminal_is_shown() {
         "[[shapes]]\ntype=\"mesh\"\nfile=\"a\\u001b[31m\\n.obj\"\n",
     ] {
         fs::write(folder.join("a.toml"), format!("{START}{text}")).unwrap();
-        let ran = run(folder, &["check", "a.toml"]);
-        assert_eq!((ran.code, ran.said.lines().count()), (3, 1), "{text:?}: {}", ran.said);
-        assert!(!ran.said.contains('\u{202e}'), "{}", ran.said);
+        let result = run(folder, &["check", "a.toml"]);
+        assert_eq!(
+            (result.code, result.output.lines().count()),
+            (3, 1),
+            "{text:?}: {}",
+            result.output
+        );
+        assert!(!result.output.contains('\u{202e}'), "{}", result.output);
     }
     let name = "a\u{1b}[31m\nerror: b.toml";
     fs::copy(folder.join("plain.toml"), folder.join(name)).unwrap();
-    let ran = run(folder, &["check", name]);
+    let result = run(folder, &["check", name]);
     assert!(
-        ran.code == 0 && ran.said.starts_with("a\\u{1b}[31m\\nerror: b.toml: ok"),
+        result.code == 0 && result.output.starts_with("a\\u{1b}[31m\\nerror: b.toml: ok"),
         "{}",
-        ran.said
+        result.output
     );
-    assert_eq!(ran.said.lines().count(), 1);
+    assert_eq!(result.output.lines().count(), 1);
 }

@@ -1,5 +1,5 @@
 //! Untrusted files: random mutations of every format, and small files that request excessive resources.
-//! `scripts/test-slow hostile` tries a thousand mutations of each.
+//! `scripts/test-slow hostile` tries a thousand mutations of each format.
 
 #[path = "../../crates/scene/src/gltf/changed.rs"]
 mod changed;
@@ -17,25 +17,25 @@ use std::process::{Command, Stdio};
 use std::thread;
 use std::time::{Duration, Instant};
 
-struct Ran {
+struct RunResult {
     code: i32,
-    said: String,
+    output: String,
     seconds: f64,
 }
 
 /// Maximum address space in KiB, for the program, its image and two stacks.
-const MEMORY: u64 = 1 << 20;
+const MAX_MEMORY_KIB: u64 = 1 << 20;
 /// Maximum CPU time in seconds, over all threads.
-const SECONDS: u64 = 10;
-const PATIENCE: Duration = Duration::from_secs(60);
+const MAX_CPU_SECONDS: u64 = 10;
+const TIMEOUT: Duration = Duration::from_secs(60);
 
 /// Runs the program within these limits.
 ///
 /// # Panics
 ///
-/// If it is killed, hangs, panics, or prints control characters or more than 64 KiB.
-fn run(folder: &Path, arguments: &[&str]) -> Ran {
-    let script = format!("ulimit -v {MEMORY} -t {SECONDS}; exec \"$0\" \"$@\"");
+/// If the program is killed, hangs, panics, or prints control characters or more than 64 KiB.
+fn run(folder: &Path, arguments: &[&str]) -> RunResult {
+    let script = format!("ulimit -v {MAX_MEMORY_KIB} -t {MAX_CPU_SECONDS}; exec \"$0\" \"$@\"");
     let start = Instant::now();
     let mut child = Command::new("bash")
         .args(["-c", &script, env!("CARGO_BIN_EXE_wgray")])
@@ -62,34 +62,34 @@ fn run(folder: &Path, arguments: &[&str]) -> Ran {
         if let Some(status) = child.try_wait().unwrap() {
             break status;
         }
-        if start.elapsed() > PATIENCE {
+        if start.elapsed() > TIMEOUT {
             child.kill().unwrap();
             panic!("{arguments:?} hangs");
         }
         thread::sleep(Duration::from_millis(2));
     };
     let bytes = readers.map(|reader| reader.join().unwrap().unwrap()).concat();
-    let said = String::from_utf8_lossy(&bytes).into_owned();
+    let output = String::from_utf8_lossy(&bytes).into_owned();
     let code = status
         .code()
-        .unwrap_or_else(|| panic!("{arguments:?} ended by {status}: {said}"));
-    assert!(!said.contains("panicked"), "{arguments:?}: {said}");
-    let acts = |c: char| c.is_control() && c != '\n';
-    assert!(!said.contains(acts), "{arguments:?}: {said:?}");
-    assert!(said.len() < 1 << 16, "{arguments:?} says {} bytes", said.len());
-    Ran {
+        .unwrap_or_else(|| panic!("{arguments:?} ended by {status}: {output}"));
+    assert!(!output.contains("panicked"), "{arguments:?}: {output}");
+    let is_control = |c: char| c.is_control() && c != '\n';
+    assert!(!output.contains(is_control), "{arguments:?}: {output:?}");
+    assert!(output.len() < 1 << 16, "{arguments:?} prints {} bytes", output.len());
+    RunResult {
         code,
-        said,
+        output,
         seconds: start.elapsed().as_secs_f64(),
     }
 }
 
-fn render(folder: &Path, scene: &str) -> Ran {
+fn render(folder: &Path, scene: &str) -> RunResult {
     render_with(folder, scene, &[])
 }
 
-fn render_with(folder: &Path, scene: &str, more: &[&str]) -> Ran {
-    let small = [
+fn render_with(folder: &Path, scene: &str, extra: &[&str]) -> RunResult {
+    let options = [
         "render",
         scene,
         "--device",
@@ -103,5 +103,5 @@ fn render_with(folder: &Path, scene: &str, more: &[&str]) -> Ran {
         "-o",
         "out.png",
     ];
-    run(folder, &[&small, more].concat())
+    run(folder, &[&options, extra].concat())
 }

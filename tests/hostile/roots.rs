@@ -6,13 +6,13 @@ use std::path::{Path, PathBuf};
 use serde_json::json;
 
 use super::seeds::{START, triangle};
-use super::{Ran, render, render_with};
+use super::{RunResult, render, render_with};
 
 /// Contents that no message may contain.
 const SECRET: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n# secret\n";
 
 /// Creates a scene folder, with secret files next to it.
-fn place() -> (tempfile::TempDir, PathBuf) {
+fn create_folders() -> (tempfile::TempDir, PathBuf) {
     let outer = tempfile::tempdir().unwrap();
     let folder = outer.path().join("scene");
     fs::create_dir_all(folder.join("below")).unwrap();
@@ -22,42 +22,42 @@ fn place() -> (tempfile::TempDir, PathBuf) {
     #[cfg(unix)]
     {
         std::os::unix::fs::symlink("..", folder.join("up")).unwrap();
-        for ending in ["obj", "bin", "png", "mtl", "glb"] {
-            let link = folder.join(format!("link.{ending}"));
-            std::os::unix::fs::symlink(format!("../secret.{ending}"), link).unwrap();
+        for extension in ["obj", "bin", "png", "mtl", "glb"] {
+            let link = folder.join(format!("link.{extension}"));
+            std::os::unix::fs::symlink(format!("../secret.{extension}"), link).unwrap();
         }
     }
     (outer, folder)
 }
 
-fn names(outer: &Path, ending: &str) -> Vec<String> {
-    let secret = outer.join(format!("secret.{ending}"));
+fn escaping_names(outer: &Path, extension: &str) -> Vec<String> {
+    let secret = outer.join(format!("secret.{extension}"));
     let absolute = secret.display().to_string();
     vec![
-        format!("../secret.{ending}"),
-        format!("below/../../secret.{ending}"),
-        format!("./.././secret.{ending}"),
-        format!("up/secret.{ending}"),
-        format!("link.{ending}"),
+        format!("../secret.{extension}"),
+        format!("below/../../secret.{extension}"),
+        format!("./.././secret.{extension}"),
+        format!("up/secret.{extension}"),
+        format!("link.{extension}"),
         absolute.clone(),
         format!("//{absolute}"),
         format!("file://{absolute}"),
-        format!("%2e%2e/secret.{ending}"),
-        format!("..%2fsecret.{ending}"),
-        format!("..\\\\secret.{ending}"),
-        format!("C:\\\\secret.{ending}"),
-        format!("\\\\\\\\host\\\\share\\\\secret.{ending}"),
-        format!("http://localhost/secret.{ending}"),
-        format!("..\\u0000/secret.{ending}"),
+        format!("%2e%2e/secret.{extension}"),
+        format!("..%2fsecret.{extension}"),
+        format!("..\\\\secret.{extension}"),
+        format!("C:\\\\secret.{extension}"),
+        format!("\\\\\\\\host\\\\share\\\\secret.{extension}"),
+        format!("http://localhost/secret.{extension}"),
+        format!("..\\u0000/secret.{extension}"),
     ]
 }
 
-fn is_refused(ran: &Ran, name: &str) {
-    assert_eq!(ran.code, 3, "{name}: {}", ran.said);
+fn assert_rejected(result: &RunResult, name: &str) {
+    assert_eq!(result.code, 3, "{name}: {}", result.output);
     assert!(
-        !ran.said.contains("secret\n") && !ran.said.contains("# secret"),
+        !result.output.contains("secret\n") && !result.output.contains("# secret"),
         "{name}: {}",
-        ran.said
+        result.output
     );
     let rules = [
         "lies outside of",
@@ -68,12 +68,16 @@ fn is_refused(ran: &Ran, name: &str) {
         "must not leave the folder",
         "must be in the folder",
     ];
-    assert!(rules.iter().any(|rule| ran.said.contains(rule)), "{name}: {}", ran.said);
+    assert!(
+        rules.iter().any(|rule| result.output.contains(rule)),
+        "{name}: {}",
+        result.output
+    );
 }
 
 #[test]
 fn a_scene_reads_no_file_outside_the_asset_root() {
-    let (outer, folder) = place();
+    let (outer, folder) = create_folders();
     let material = "\n[materials.m]\ntype = 'diffuse'\ncolor = [1, 1, 1]\n";
     let sphere = "[[shapes]]\ntype = 'sphere'\nmaterial = 'm'\ncenter = [0, 0, 0]\nradius = 1\n";
     let texts: [(&str, String); 5] = [
@@ -95,33 +99,33 @@ fn a_scene_reads_no_file_outside_the_asset_root() {
             format!("{material}{sphere}[[shapes]]\ntype = 'gltf'\nfile = \"FILE\"\n"),
         ),
     ];
-    for (ending, text) in texts {
-        for name in names(outer.path(), ending) {
+    for (extension, text) in texts {
+        for name in escaping_names(outer.path(), extension) {
             fs::write(folder.join("a.toml"), START.to_owned() + &text.replace("FILE", &name)).unwrap();
-            is_refused(&render_with(&folder, "a.toml", &["--strict"]), &name);
+            assert_rejected(&render_with(&folder, "a.toml", &["--strict"]), &name);
         }
     }
     // `--asset-root` permits shared files.
     let shared = format!("{START}{material}[[shapes]]\ntype = 'mesh'\nmaterial = 'm'\nfile = '../secret.obj'\n");
     fs::write(folder.join("a.toml"), shared).unwrap();
     assert_eq!(render(&folder, "a.toml").code, 3);
-    let ran = render_with(&folder, "a.toml", &["--asset-root", ".."]);
-    assert_eq!(ran.code, 0, "{}", ran.said);
-    let ran = render_with(&folder, "a.toml", &["--asset-root", "below"]);
-    assert_eq!(ran.code, 3, "{}", ran.said);
+    let result = render_with(&folder, "a.toml", &["--asset-root", ".."]);
+    assert_eq!(result.code, 0, "{}", result.output);
+    let result = render_with(&folder, "a.toml", &["--asset-root", "below"]);
+    assert_eq!(result.code, 3, "{}", result.output);
 }
 
 #[test]
 fn a_gltf_file_reads_no_file_outside_the_asset_root() {
-    let (outer, folder) = place();
+    let (outer, folder) = create_folders();
     let (json, binary) = triangle();
-    for ending in ["bin", "png"] {
-        for name in names(outer.path(), ending) {
+    for extension in ["bin", "png"] {
+        for name in escaping_names(outer.path(), extension) {
             let name: String = serde_json::from_str(&format!("\"{name}\"")).unwrap();
             let mut json = json.clone();
-            let coded: String = binary.iter().map(|byte| format!("%{byte:02x}")).collect();
-            json["buffers"][0]["uri"] = json!(format!("data:,{coded}"));
-            match ending {
+            let encoded: String = binary.iter().map(|byte| format!("%{byte:02x}")).collect();
+            json["buffers"][0]["uri"] = json!(format!("data:,{encoded}"));
+            match extension {
                 "bin" => json["buffers"][0]["uri"] = json!(name),
                 _ => {
                     json["images"] = json!([{ "uri": name }]);
@@ -131,21 +135,21 @@ fn a_gltf_file_reads_no_file_outside_the_asset_root() {
                 }
             }
             fs::write(folder.join("a.gltf"), json.to_string()).unwrap();
-            is_refused(&render_with(&folder, "a.gltf", &["--strict"]), &name);
-            // The same in a scene.
+            assert_rejected(&render_with(&folder, "a.gltf", &["--strict"]), &name);
+            // A scene with this glTF file is rejected, too.
             fs::write(
                 folder.join("a.toml"),
                 format!("{START}[[shapes]]\ntype = 'gltf'\nfile = 'a.gltf'\n"),
             )
             .unwrap();
-            is_refused(&render_with(&folder, "a.toml", &["--strict"]), &name);
+            assert_rejected(&render_with(&folder, "a.toml", &["--strict"]), &name);
         }
     }
 }
 
 #[test]
 fn a_mesh_reads_no_file_outside_the_asset_root() {
-    let (outer, folder) = place();
+    let (outer, folder) = create_folders();
     fs::write(
         folder.join("a.toml"),
         format!("{START}[[shapes]]\ntype = 'mesh'\nfile = 'a.obj'\n"),
@@ -158,31 +162,31 @@ fn a_mesh_reads_no_file_outside_the_asset_root() {
     fs::write(folder.join("a.obj"), mesh("in.mtl")).unwrap();
     assert_eq!(render(&folder, "a.toml").code, 0);
     fs::write(outer.path().join("secret.mtl"), material).unwrap();
-    for name in names(outer.path(), "mtl") {
+    for name in escaping_names(outer.path(), "mtl") {
         fs::write(folder.join("a.obj"), mesh(&name)).unwrap();
-        is_refused(&render_with(&folder, "a.toml", &["--strict"]), &name);
-        let ran = render(&folder, "a.toml");
+        assert_rejected(&render_with(&folder, "a.toml", &["--strict"]), &name);
+        let result = render(&folder, "a.toml");
         assert!(
-            ran.code == 0 && ran.said.contains("cannot be read"),
+            result.code == 0 && result.output.contains("cannot be read"),
             "{name}: {}",
-            ran.said
+            result.output
         );
     }
-    for name in names(outer.path(), "png") {
+    for name in escaping_names(outer.path(), "png") {
         fs::write(folder.join("a.obj"), mesh("in.mtl")).unwrap();
         fs::write(folder.join("in.mtl"), format!("{material}map_Kd {name}\n")).unwrap();
-        let ran = render(&folder, "a.toml");
-        // A warning without `--strict`.
+        let result = render(&folder, "a.toml");
+        // Without `--strict`, the file gives a warning.
         assert!(
-            ran.said.contains("map_Kd") && !ran.said.contains("# secret"),
+            result.output.contains("map_Kd") && !result.output.contains("# secret"),
             "{name}: {}",
-            ran.said
+            result.output
         );
-        assert!(ran.code == 0 || ran.code == 3, "{name}: {}", ran.said);
+        assert!(result.code == 0 || result.code == 3, "{name}: {}", result.output);
         assert!(
-            !ran.said.contains("must be a PNG") && !ran.said.contains("is damaged"),
+            !result.output.contains("must be a PNG") && !result.output.contains("is damaged"),
             "{name} is read: {}",
-            ran.said
+            result.output
         );
     }
 }

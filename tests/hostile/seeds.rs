@@ -11,24 +11,24 @@ use serde_json::{Value, json};
 use super::everything::everything;
 use crate::sources::path as project;
 
-pub type Written = fn(&Value) -> Option<Vec<u8>>;
+pub type Serializer = fn(&Value) -> Option<Vec<u8>>;
 
 /// A file format.
-pub struct Kind {
+pub struct Format {
     /// Extension of the file name.
-    pub ending: &'static str,
+    pub extension: &'static str,
     /// A valid file.
     pub bytes: Vec<u8>,
     /// The values of the file and their serializer, for formats that consist of values.
-    pub values: Option<(Value, Written)>,
+    pub values: Option<(Value, Serializer)>,
     /// Permitted exit codes for a mutated file, in addition to 0.
     pub codes: &'static [i32],
-    pub how: How,
+    pub command: ReadCommand,
 }
 
 /// Command that reads a file.
 #[derive(Clone, Copy, PartialEq, Eq)]
-pub enum How {
+pub enum ReadCommand {
     Scene,
     /// `wgray render` of a scene that consists of [`START`] and this text.
     Named(&'static str),
@@ -58,7 +58,7 @@ material = 'm'
 center = [0, 0, 0]
 radius = 1
 ";
-const ENVIRONMENT_FLAGS: &str = "
+const ENVIRONMENT: &str = "
 [environment]
 file = 'FILE'
 [materials.m]
@@ -153,36 +153,36 @@ pub fn container(json: &Value, binary: &[u8]) -> Vec<u8> {
 }
 
 /// Serializes a .gltf file with a data URI.
-fn in_text(json: &Value) -> Option<Vec<u8>> {
+fn to_gltf(json: &Value) -> Option<Vec<u8>> {
     let (_, binary) = everything();
     let mut json = json.clone();
-    let coded: String = binary.iter().map(|byte| format!("%{byte:02x}")).collect();
+    let encoded: String = binary.iter().map(|byte| format!("%{byte:02x}")).collect();
     let buffer = json.get_mut("buffers")?.get_mut(0)?.as_object_mut()?;
-    buffer.insert("uri".to_owned(), json!(format!("data:,{coded}")));
+    buffer.insert("uri".to_owned(), json!(format!("data:,{encoded}")));
     Some(json.to_string().into_bytes())
 }
 
-fn in_container(json: &Value) -> Option<Vec<u8>> {
+fn to_glb(json: &Value) -> Option<Vec<u8>> {
     Some(container(json, &everything().1))
 }
 
-fn in_toml(values: &Value) -> Option<Vec<u8>> {
+fn to_toml(values: &Value) -> Option<Vec<u8>> {
     toml::to_string(values).ok().map(String::into_bytes)
 }
 
-fn in_json(values: &Value) -> Option<Vec<u8>> {
+fn to_json(values: &Value) -> Option<Vec<u8>> {
     Some(values.to_string().into_bytes())
 }
 
-/// Writes the files that others reference.
-pub fn put(folder: &Path) {
+/// Writes the files that the seed files reference.
+pub fn write_referenced_files(folder: &Path) {
     fs::write(folder.join("named.obj"), OBJ).unwrap();
     fs::write(folder.join("a.mtl"), MTL).unwrap();
     fs::write(folder.join("t.png"), image(ImageFormat::Png)).unwrap();
     fs::write(folder.join("plain.toml"), SCENE).unwrap();
 }
 
-/// Scene of checkpoints and parts.
+/// The scene of the checkpoint and the part.
 const SCENE: &str = "
 image = { width = 8, height = 6 }
 camera = { position = [0, -4, 1], look_at = [0, 0, 0], fov = 50 }
@@ -199,24 +199,24 @@ center = [0, 0, 0]
 radius = 1
 ";
 
-/// Scenes without other files.
+/// Names of scenes that reference no other files.
 pub const SCENES: [&str; 5] = ["materials", "cornell", "lens", "lights", "turntable"];
 
 /// Returns all formats.
-pub fn all(folder: &Path) -> Vec<Kind> {
-    put(folder);
+pub fn all_formats(folder: &Path) -> Vec<Format> {
+    write_referenced_files(folder);
     let (json, glb) = model();
-    let made = |arguments: &[&str], file: &str| {
-        let ran = super::run(folder, arguments);
-        assert_eq!(ran.code, 0, "{}", ran.said);
+    let run_and_read = |arguments: &[&str], file: &str| {
+        let result = super::run(folder, arguments);
+        assert_eq!(result.code, 0, "{}", result.output);
         fs::read(folder.join(file)).unwrap()
     };
     let render = ["render", "plain.toml", "--device", "cpu", "--threads", "2"];
-    let checkpoint = made(
+    let checkpoint = run_and_read(
         &[&render[..], &["--checkpoint", "made.checkpoint", "-o", "made.png"]].concat(),
         "made.checkpoint",
     );
-    let part = made(
+    let part = run_and_read(
         &[
             &render[..],
             &["--tile", "1/1", "--aov", "normal,depth", "-o", "made.part"],
@@ -225,59 +225,59 @@ pub fn all(folder: &Path) -> Vec<Kind> {
         "made.part",
     );
     let course: Value = serde_json::from_str(COURSE).unwrap();
-    let kind = |ending, bytes: Vec<u8>, how| Kind {
-        ending,
+    let new_format = |extension, bytes: Vec<u8>, command| Format {
+        extension,
         bytes,
         values: None,
         codes: &[3],
-        how,
+        command,
     };
-    let picture = |ending, format, text| Kind {
+    let image_format = |extension, encoding, text| Format {
         // `wgray diff`: unreadable (1), different (5), too large (7).
         codes: &[1, 3, 5, 7],
-        ..kind(ending, image(format), How::Picture(text))
+        ..new_format(extension, image(encoding), ReadCommand::Picture(text))
     };
     let scenes = SCENES.map(|name| {
         let text = fs::read_to_string(project(&format!("scenes/{name}.toml"))).unwrap();
-        Kind {
-            values: Some((toml::from_str(&text).unwrap(), in_toml)),
-            ..kind("toml", text.into_bytes(), How::Scene)
+        Format {
+            values: Some((toml::from_str(&text).unwrap(), to_toml)),
+            ..new_format("toml", text.into_bytes(), ReadCommand::Scene)
         }
     });
-    let others = vec![
-        Kind {
-            values: Some((course, in_json)),
-            ..kind("json", COURSE.into(), How::Scene)
+    let other_formats = vec![
+        Format {
+            values: Some((course, to_json)),
+            ..new_format("json", COURSE.into(), ReadCommand::Scene)
         },
-        Kind {
-            values: Some((json.clone(), in_text)),
-            ..kind("gltf", in_text(&json).unwrap(), How::Scene)
+        Format {
+            values: Some((json.clone(), to_gltf)),
+            ..new_format("gltf", to_gltf(&json).unwrap(), ReadCommand::Scene)
         },
-        Kind {
-            values: Some((json, in_container)),
-            ..kind("glb", glb, How::Scene)
+        Format {
+            values: Some((json, to_glb)),
+            ..new_format("glb", glb, ReadCommand::Scene)
         },
-        kind("obj", OBJ.into(), How::Named(MESH)),
-        kind("mtl", MTL.into(), How::Named(LIBRARY)),
-        kind("ply", ply(), How::Named(MESH)),
-        kind("stl", STL.into(), How::Named(MESH)),
-        picture("png", ImageFormat::Png, TEXTURE),
-        picture("jpg", ImageFormat::Jpeg, TEXTURE),
-        picture("webp", ImageFormat::WebP, TEXTURE),
-        kind("ktx2", ktx2("etc1s-5x7-alpha-levels"), How::Named(TEXTURE)),
-        kind("ktx2", ktx2("zstandard-48x20"), How::Named(TEXTURE)),
-        picture("exr", ImageFormat::OpenExr, ENVIRONMENT_FLAGS),
-        picture("hdr", ImageFormat::Hdr, ENVIRONMENT_FLAGS),
-        Kind {
+        new_format("obj", OBJ.into(), ReadCommand::Named(MESH)),
+        new_format("mtl", MTL.into(), ReadCommand::Named(LIBRARY)),
+        new_format("ply", ply(), ReadCommand::Named(MESH)),
+        new_format("stl", STL.into(), ReadCommand::Named(MESH)),
+        image_format("png", ImageFormat::Png, TEXTURE),
+        image_format("jpg", ImageFormat::Jpeg, TEXTURE),
+        image_format("webp", ImageFormat::WebP, TEXTURE),
+        new_format("ktx2", ktx2("etc1s-5x7-alpha-levels"), ReadCommand::Named(TEXTURE)),
+        new_format("ktx2", ktx2("zstandard-48x20"), ReadCommand::Named(TEXTURE)),
+        image_format("exr", ImageFormat::OpenExr, ENVIRONMENT),
+        image_format("hdr", ImageFormat::Hdr, ENVIRONMENT),
+        Format {
             codes: &[2],
-            ..kind("checkpoint", checkpoint, How::Checkpoint)
+            ..new_format("checkpoint", checkpoint, ReadCommand::Checkpoint)
         },
-        Kind {
+        Format {
             codes: &[1],
-            ..kind("part", part, How::Part)
+            ..new_format("part", part, ReadCommand::Part)
         },
     ];
-    scenes.into_iter().chain(others).collect()
+    scenes.into_iter().chain(other_formats).collect()
 }
 
 /// Reads a KTX2 file of `tests/textures/ktx2.mjs`.

@@ -5,16 +5,16 @@ use std::path::Path;
 
 use crate::sources::path as project;
 
-fn texts(folder: &Path, all: &mut String) {
+fn append_sources(folder: &Path, source: &mut String) {
     for entry in fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();
         match path.is_dir() {
-            true => texts(&path, all),
-            false if path.extension().is_some_and(|ending| ending == "rs") => {
+            true => append_sources(&path, source),
+            false if path.extension().is_some_and(|extension| extension == "rs") => {
                 // Joins continued lines of strings.
                 let text = fs::read_to_string(&path).unwrap();
                 let lines = text.split("\\\n").map(str::trim_start);
-                all.push_str(&lines.collect::<String>());
+                source.push_str(&lines.collect::<String>());
             }
             false => {}
         }
@@ -26,26 +26,33 @@ fn every_limit_in_the_table_has_a_message_and_a_test() {
     let docs = fs::read_to_string(project("docs/reliability.md")).unwrap();
     let section = docs.split("## Untrusted files").nth(1).unwrap();
     let section = section.split("\n## ").next().unwrap();
-    let mut all = [String::new(), String::new()];
+    let mut sources = [String::new(), String::new()];
     for folder in ["src", "crates"] {
-        all.iter_mut().for_each(|all| texts(&project(folder), all));
+        sources
+            .iter_mut()
+            .for_each(|source| append_sources(&project(folder), source));
     }
-    texts(&project("tests"), &mut all[1]);
+    append_sources(&project("tests"), &mut sources[1]);
     let code = |cell: &str| cell.trim().trim_matches('`').to_owned();
     let mut count = 0;
     for row in section.lines().filter(|line| line.starts_with("| ")) {
         let cells: Vec<&str> = row.trim_matches('|').split(" | ").collect();
-        let [what, _, message, test] = cells[..] else { continue };
+        let [resource, _, message, test] = cells[..] else {
+            continue;
+        };
         if !test.contains('`') {
             continue; // the header
         }
         count += 1;
         let message = message.trim();
         assert!(
-            !message.starts_with('`') || all[0].contains(&code(message)),
-            "{what}: {message}"
+            !message.starts_with('`') || sources[0].contains(&code(message)),
+            "{resource}: {message}"
         );
-        assert!(all[1].contains(&format!("fn {}()", code(test))), "{what}: {test}");
+        assert!(
+            sources[1].contains(&format!("fn {}()", code(test))),
+            "{resource}: {test}"
+        );
     }
     assert!(count >= 20, "{count}");
 }

@@ -9,7 +9,7 @@ use super::readers::in_all_formats;
 use crate::random::Random;
 
 /// File name, contents, expected error.
-const BAD: &[(&str, &str, &str)] = &[
+const CASES: &[(&str, &str, &str)] = &[
     ("a.fbx", "", "a.fbx: the name of a mesh must end in .obj, .ply or .stl"),
     ("a", "", "a: the name of a mesh must end in .obj, .ply or .stl"),
     ("a.obj", "", "a.obj: the file is empty"),
@@ -37,37 +37,37 @@ const BAD: &[(&str, &str, &str)] = &[
     (
         "a.obj",
         "v 1 2 3\nf 1 1 2\n",
-        "a.obj:2: vertex 2 of the face does not exist; there are 1 so far",
+        "a.obj:2: vertex 2 of the face does not exist; defined so far: 1",
     ),
     (
         "a.obj",
         "v 1 2 3\nf 1 1 -2\n",
-        "a.obj:2: vertex -2 of the face does not exist; there are 1 so far",
+        "a.obj:2: vertex -2 of the face does not exist; defined so far: 1",
     ),
     (
         "a.obj",
         "v 1 2 3\nf 0 1 1\n",
-        "a.obj:2: vertex 0 of the face: they are counted from 1, or from -1 backwards",
+        "a.obj:2: vertex 0 of the face does not exist; indices count from 1, or from -1 backwards",
     ),
     (
         "a.obj",
         "v 1 2 3\nf 1/1 1 1\n",
-        "a.obj:2: texture coordinate 1 of the face does not exist; there are 0 so far",
+        "a.obj:2: texture coordinate 1 of the face does not exist; defined so far: 0",
     ),
     (
         "a.obj",
         "v 1 2 3\nf 1//4294967297 1 1\n",
-        "a.obj:2: normal 4294967297 of the face does not exist; there are 0 so far",
+        "a.obj:2: normal 4294967297 of the face does not exist; defined so far: 0",
     ),
     (
         "a.obj",
         "v 1 2 3\nf 1 1 99999999999999999999999999999999999999\n",
-        "a.obj:2: vertex 999999999999999999999999999999 of the face does not exist; there are 1 so far",
+        "a.obj:2: vertex 999999999999999999999999999999 of the face does not exist; defined so far: 1",
     ),
     (
         "a.obj",
         "v 1 2 3\nf 1 1\n",
-        "a.obj:2: a face must have 3 corners or more; this one has 2",
+        "a.obj:2: a face must have at least 3 corners, not 2",
     ),
     (
         "a.obj",
@@ -94,7 +94,7 @@ const BAD: &[(&str, &str, &str)] = &[
     (
         "a.ply",
         "ply\n",
-        "a.ply:2: the file ends inside of its header; \"end_header\" is missing",
+        "a.ply:2: the file ends inside the header; \"end_header\" is missing",
     ),
     (
         "a.ply",
@@ -114,12 +114,12 @@ const BAD: &[(&str, &str, &str)] = &[
     (
         "a.ply",
         "ply\nfromat ascii\n",
-        "a.ply:3: the file ends inside of its header; \"end_header\" is missing",
+        "a.ply:3: the file ends inside the header; \"end_header\" is missing",
     ),
     (
         "a.ply",
         "ply\nelement vertex -1\n",
-        "a.ply:2: element \"vertex\": \"-1\" must be a whole number that memory has room for",
+        "a.ply:2: element \"vertex\": \"-1\" must be a whole number that fits into memory",
     ),
     (
         "a.ply",
@@ -134,24 +134,24 @@ const BAD: &[(&str, &str, &str)] = &[
     (
         "a.ply",
         "ply\nelement vertex 1\nproperty list float int x\n",
-        "a.ply:3: property: \"float\" must be a type of whole numbers",
+        "a.ply:3: property: \"float\" must be an integer type",
     ),
     (
         "a.ply",
         "ply\nelement vertex 1\nproperty int\n",
-        "a.ply:3: property: its name is missing",
+        "a.ply:3: property: the name is missing",
     ),
     ("a.stl", "", "a.stl: the file is empty"),
     (
         "a.stl",
         "solid",
-        "a.stl:1: the file ends inside of a solid; \"endsolid\" is missing",
+        "a.stl:1: the file ends inside a solid; \"endsolid\" is missing",
     ),
     ("a.stl", "solid a\nendsolid", "a.stl: has no triangles"),
     (
         "a.stl",
         "solid\nendsolid\nfacet",
-        "a.stl:3: \"facet\" must be \"solid\", or the end of the file",
+        "a.stl:3: expected \"solid\" or the end of the file, found \"facet\"",
     ),
     (
         "a.stl",
@@ -167,18 +167,18 @@ const BAD: &[(&str, &str, &str)] = &[
     (
         "a.stl",
         "solid\nfacet normal 0 0 1\nouter",
-        "a.stl:3: the file ends where \"loop\" must be",
+        "a.stl:3: the file ends before \"loop\"",
     ),
     (
         "a.stl",
         "solid\nfacet normal 0 0 1\nouter loop\nvertex 1 -inf 2",
-        "a.stl:4: the file ends where \"vertex\" must be",
+        "a.stl:4: the file ends before \"vertex\"",
     ),
 ];
 
 #[test]
 fn invalid_files_are_reported() {
-    for (name, text, message) in BAD {
+    for (name, text, message) in CASES {
         assert_eq!(load(name, text, None).unwrap_err(), *message, "{text:?}");
     }
 }
@@ -208,7 +208,7 @@ fn invalid_ply_bodies_are_reported() {
                 "element tristrips 1\nproperty list int int vertex_indices\n",
                 points,
             ),
-            "a.ply: has tristrips, which are not read: it must have an element \"face\"",
+            "a.ply: tristrips are not supported; the file must have an element \"face\"",
         ),
         (
             ply(
@@ -216,7 +216,7 @@ fn invalid_ply_bodies_are_reported() {
                 face,
                 points,
             ),
-            "a.ply:3: element \"vertex\": it must have a property \"z\"",
+            "a.ply:3: element \"vertex\": the property \"z\" is missing",
         ),
         (
             ply(
@@ -224,7 +224,7 @@ fn invalid_ply_bodies_are_reported() {
                 "element face 1\nproperty list int float vertex_indices\n",
                 points,
             ),
-            "a.ply:7: element \"face\": it must have a list of whole numbers, \"vertex_indices\"",
+            "a.ply:7: element \"face\": a list of whole numbers, \"vertex_indices\", is missing",
         ),
         (
             ply(vertex, face, points),
@@ -240,19 +240,19 @@ fn invalid_ply_bodies_are_reported() {
         ),
         (
             ply(vertex, face, &format!("{points}3 0 1 3\n")),
-            "a.ply:13: face 0: vertex 3 does not exist; there are 3, counted from 0",
+            "a.ply:13: face 0: vertex 3 does not exist; number of vertices, counted from 0: 3",
         ),
         (
             ply(vertex, face, &format!("{points}3 0 1 -1\n")),
-            "a.ply:13: face 0: vertex -1 does not exist; there are 3, counted from 0",
+            "a.ply:13: face 0: vertex -1 does not exist; number of vertices, counted from 0: 3",
         ),
         (
             ply(vertex, face, &format!("{points}3 0 1 1.5\n")),
-            "a.ply:13: face 0: vertex 1.5 does not exist; there are 3, counted from 0",
+            "a.ply:13: face 0: vertex 1.5 does not exist; number of vertices, counted from 0: 3",
         ),
         (
             ply(vertex, face, &format!("{points}2 0 1\n")),
-            "a.ply:13: face 0: must have 3 vertices or more; it has 2",
+            "a.ply:13: face 0: must have at least 3 vertices, not 2",
         ),
         (
             ply(vertex, face, &format!("{points}-3 0 1 2\n")),
@@ -278,15 +278,15 @@ fn counts_without_bytes_are_refused_at_once() {
             (vertex("99999999999", xyz) + face, "must be at most 1073741824"),
             (
                 vertex("99999999999999999999", xyz) + face,
-                "must be a whole number that memory has room for",
+                "must be a whole number that fits into memory",
             ),
-            (vertex("1073741824", xyz) + face, "bytes or more; the file has "),
+            (vertex("1073741824", xyz) + face, "bytes or more; remaining bytes: "),
             (
                 format!(
                     "element other 99999999999\nproperty list uchar int x\n{}{face}",
                     vertex("3", xyz)
                 ),
-                "bytes or more; the file has ",
+                "bytes or more; remaining bytes: ",
             ),
             (
                 vertex("3", xyz) + "element face 18446744073709551615\nproperty list uchar int vertex_indices\n",
@@ -320,7 +320,7 @@ fn counts_without_bytes_are_refused_at_once() {
     let error = load("a.stl", &stl, None).unwrap_err();
     assert_eq!(
         error,
-        "a.stl: byte 80: 4294967295 triangles take 214748364834 bytes, and the file has 84: it is truncated, or not an STL file"
+        "a.stl: byte 80: the triangle count 4294967295 requires 214748364834 bytes; the file has 84 bytes and is truncated, or is not an STL file"
     );
 }
 
@@ -340,7 +340,7 @@ fn unusable_paths_are_reported() {
 }
 
 /// Returns valid files with all features.
-fn good_files() -> Vec<(&'static str, Vec<u8>)> {
+fn valid_files() -> Vec<(&'static str, Vec<u8>)> {
     let mut files = in_all_formats();
     let text = "mtllib none.mtl\no a\nv 0 0 0\nv 1 0 0\nv 1 1 0 1\nvt 0 0.5\nvt 1\nvn 0 0 -1\nvn 0 1 0\nusemtl red\n\
                 f 1/1/1 2/1/1 \\\n-1/2/2\ng b # c\nf 3//1 2//1 1//2\ns 1\nvt 2 3 4\nf 1/3 2/2 3/1\n";
@@ -379,7 +379,7 @@ const ALL_NORMALS: [Option<Normals>; 4] = [None, Some(Normals::Smooth), Some(Nor
 
 #[test]
 fn truncated_files_are_meshes_or_errors() {
-    for (name, bytes) in good_files() {
+    for (name, bytes) in valid_files() {
         let mut errors = 0;
         for end in 0..=bytes.len() {
             let normals = ALL_NORMALS[end % 4];
@@ -470,27 +470,27 @@ fn material_files_with_random_bytes_are_scenes() {
         b"\xff",
         &long,
     ];
-    let (mut good, mut bad) = (0, 0);
+    let (mut scenes, mut errors) = (0, 0);
     for _ in 0..1000 {
         let mut bytes = MTL.as_bytes().to_vec();
         for _ in 0..=random.below(6) {
-            let at = random.below(bytes.len() as u32) as usize;
+            let offset = random.below(bytes.len() as u32) as usize;
             match random.below(4) {
-                0 => bytes[at] = random.bits() as u8,
-                1 => bytes[at] ^= 1 << random.below(8),
-                2 => drop(bytes.splice(at..at + 1, random.pick(words).iter().copied())),
-                _ => drop(bytes.drain(at..(at + random.below(9) as usize).min(bytes.len()))),
+                0 => bytes[offset] = random.bits() as u8,
+                1 => bytes[offset] ^= 1 << random.below(8),
+                2 => drop(bytes.splice(offset..offset + 1, random.pick(words).iter().copied())),
+                _ => drop(bytes.drain(offset..(offset + random.below(9) as usize).min(bytes.len()))),
             }
             if bytes.is_empty() {
                 break;
             }
         }
         match check_mtl(folder.path(), &bytes) {
-            true => good += 1,
-            false => bad += 1,
+            true => scenes += 1,
+            false => errors += 1,
         }
     }
-    assert!(good > 100 && bad > 100, "{good} scenes, {bad} errors");
+    assert!(scenes > 100 && errors > 100, "{scenes} scenes, {errors} errors");
 }
 
 #[test]
@@ -515,27 +515,27 @@ fn files_with_random_bytes_are_meshes_or_errors() {
         b"5e-324",
         b"0",
     ];
-    for (name, bytes) in good_files() {
-        let (mut good, mut bad) = (0, 0);
+    for (name, bytes) in valid_files() {
+        let (mut meshes, mut errors) = (0, 0);
         for i in 0..1000 {
             let mut bytes = bytes.clone();
             for _ in 0..=random.below(3) {
-                let at = random.below(bytes.len() as u32) as usize;
+                let offset = random.below(bytes.len() as u32) as usize;
                 match random.below(4) {
-                    0 => bytes[at] = random.bits() as u8,
-                    1 => bytes[at] ^= 1 << random.below(8),
-                    2 => drop(bytes.splice(at..at + 1, random.pick(words).iter().copied())),
-                    _ => drop(bytes.drain(at..(at + random.below(20) as usize).min(bytes.len()))),
+                    0 => bytes[offset] = random.bits() as u8,
+                    1 => bytes[offset] ^= 1 << random.below(8),
+                    2 => drop(bytes.splice(offset..offset + 1, random.pick(words).iter().copied())),
+                    _ => drop(bytes.drain(offset..(offset + random.below(20) as usize).min(bytes.len()))),
                 }
                 if bytes.is_empty() {
                     break;
                 }
             }
             match check(name, load(name, &bytes, ALL_NORMALS[i % 4])) {
-                true => good += 1,
-                false => bad += 1,
+                true => meshes += 1,
+                false => errors += 1,
             }
         }
-        assert!(good > 20 && bad > 20, "{name}: {good} meshes, {bad} errors");
+        assert!(meshes > 20 && errors > 20, "{name}: {meshes} meshes, {errors} errors");
     }
 }

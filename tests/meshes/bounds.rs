@@ -7,19 +7,19 @@ use wgray::scene::Scene;
 use crate::gltf::build::{Builder, Packing, QUAD};
 use crate::random::Random;
 
-fn around(points: impl Iterator<Item = DVec3>) -> (DVec3, DVec3) {
+fn bounds_of(points: impl Iterator<Item = DVec3>) -> (DVec3, DVec3) {
     points.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| {
         (low.min(p), high.max(p))
     })
 }
 
-fn assert_bounds(scene: &Scene, truth: (DVec3, DVec3), what: &str) {
+fn assert_bounds(scene: &Scene, expected: (DVec3, DVec3), case: &str) {
     let (low, high) = scene.bounds().expect("bounds");
-    let size = (truth.1 - truth.0).max_element();
-    for (found, expected) in [(low, truth.0), (high, truth.1)] {
+    let size = (expected.1 - expected.0).max_element();
+    for (found, corner) in [(low, expected.0), (high, expected.1)] {
         // Stored positions have 24 significant bits.
-        let error = (found - expected).abs().max_element();
-        assert!(error <= 1e-6 * size, "{what}: {found} must be {expected}");
+        let error = (found - corner).abs().max_element();
+        assert!(error <= 1e-6 * size, "{case}: {found} must be {corner}");
     }
 }
 
@@ -60,25 +60,28 @@ fn meshes_away_from_the_origin_have_exact_bounds() {
         std::fs::write(folder.path().join(format!("{i}.obj")), text).unwrap();
         let path = folder.path().join("scene.toml");
         let file = format!("file = '{i}.obj'\n");
-        let placed = "material = 'm'\nscale = [2, 1, -3]\nrotate = [0, 0, 90]\ntranslate = [5, 6, 7]\n";
+        let transform = "material = 'm'\nscale = [2, 1, -3]\nrotate = [0, 0, 90]\ntranslate = [5, 6, 7]\n";
         // The scaled coordinates are rotated by 90 degrees around z: x' = -y, y' = x.
-        let placement = |p: &DVec3| DVec3::new(-p.y + 5.0, 2.0 * p.x + 6.0, -3.0 * p.z + 7.0);
+        let transformed = |p: &DVec3| DVec3::new(-p.y + 5.0, 2.0 * p.x + 6.0, -3.0 * p.z + 7.0);
 
-        let shape = format!("{HEAD}[[shapes]]\ntype = 'mesh'\n{file}{placed}");
+        let shape = format!("{HEAD}[[shapes]]\ntype = 'mesh'\n{file}{transform}");
         std::fs::write(&path, shape).unwrap();
         let scene = Scene::load(&path).unwrap();
-        assert_bounds(&scene, around(points.iter().map(placement)), "a shape");
+        assert_bounds(&scene, bounds_of(points.iter().map(transformed)), "a shape");
 
-        let two = format!(
-            "{HEAD}[meshes.a]\n{file}[[instances]]\nmesh = 'a'\n{placed}[[instances]]\nmesh = 'a'\nmaterial = 'm'\n"
+        let instances = format!(
+            "{HEAD}[meshes.a]\n{file}[[instances]]\nmesh = 'a'\n{transform}[[instances]]\nmesh = 'a'\nmaterial = 'm'\n"
         );
-        std::fs::write(&path, two).unwrap();
+        std::fs::write(&path, instances).unwrap();
         let scene = Scene::load(&path).unwrap();
-        let both = points.iter().map(placement).chain(points.iter().copied());
-        assert_bounds(&scene, around(both), "two instances");
-        let one = scene.shapes[1].geometry.bounds().expect("bounds");
-        let truth = around(points.iter().copied());
-        assert!((one.0 - truth.0).abs().max_element() < 1e-5 * size, "{one:?} {truth:?}");
+        let all_points = points.iter().map(transformed).chain(points.iter().copied());
+        assert_bounds(&scene, bounds_of(all_points), "two instances");
+        let instance_bounds = scene.shapes[1].geometry.bounds().expect("bounds");
+        let expected = bounds_of(points.iter().copied());
+        assert!(
+            (instance_bounds.0 - expected.0).abs().max_element() < 1e-5 * size,
+            "{instance_bounds:?} {expected:?}"
+        );
     }
 }
 
@@ -86,13 +89,13 @@ fn meshes_away_from_the_origin_have_exact_bounds() {
 fn gltf_files_have_exact_bounds() {
     let folder = tempfile::tempdir().unwrap();
     let mut file = Builder::new();
-    let moved = QUAD.map(|[x, y, z]| [x + 20.0, y - 7.0, z + 3.0]);
-    let position = file.floats(&moved);
+    let positions = QUAD.map(|[x, y, z]| [x + 20.0, y - 7.0, z + 3.0]);
+    let position = file.floats(&positions);
     let mesh = file.quad_with(json!({ "POSITION": position }), None);
     file.root_node(json!({ "mesh": mesh, "translation": [1, 2, 3], "scale": [2, 2, 2] }));
     let path = file.write(folder.path(), "away", Packing::Binary);
     let scene = Scene::load(&path).unwrap();
     // glTF's (x, y, z) is (x, -z, y) in scene coordinates.
-    let placed = |[x, y, z]: [f64; 3]| DVec3::new(2.0 * x + 1.0, -(2.0 * z + 3.0), 2.0 * y + 2.0);
-    assert_bounds(&scene, around(moved.into_iter().map(placed)), "glTF");
+    let to_scene = |[x, y, z]: [f64; 3]| DVec3::new(2.0 * x + 1.0, -(2.0 * z + 3.0), 2.0 * y + 2.0);
+    assert_bounds(&scene, bounds_of(positions.into_iter().map(to_scene)), "glTF");
 }

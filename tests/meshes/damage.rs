@@ -26,11 +26,11 @@ fn damaged_lines_of_obj_files_are_replaced() {
         ),
         (
             "f 1 2 3\nf 1 2\nf 3\n",
-            "line 6: a face must have 3 corners or more; this one has 2; the face was removed (1 similar)",
+            "line 6: a face must have at least 3 corners, not 2; the face was removed (1 similar)",
         ),
         (
             "f 1 2 3\nf 1 2 9\n",
-            "line 6: vertex 9 of the face does not exist; there are 4 so far; the face was removed",
+            "line 6: vertex 9 of the face does not exist; defined so far: 4; the face was removed",
         ),
         (
             "f 1 2 3\nf 1 2 x\n",
@@ -38,12 +38,12 @@ fn damaged_lines_of_obj_files_are_replaced() {
         ),
         (
             "f 1/1 2/2 3/3\n",
-            "line 5: texture coordinate 1 of the face does not exist; there are 0 so far; \
+            "line 5: texture coordinate 1 of the face does not exist; defined so far: 0; \
              the texture coordinates (0, 0) are used instead (2 similar)",
         ),
         (
             "f 1//1 2//2 3//3\n",
-            "line 5: normal 1 of the face does not exist; there are 0 so far; the normal of the triangles is used instead (2 similar)",
+            "line 5: normal 1 of the face does not exist; defined so far: 0; the normal of the triangles is used instead (2 similar)",
         ),
         (
             "vt 0 nan\nf 1/1 2/1 3/1\n",
@@ -69,7 +69,7 @@ fn facets_of_a_truncated_stl_file_are_kept() {
     let facet = "facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 1 1 0\nendloop\nendfacet\n";
     let mesh = load("a.stl", format!("solid a\n{facet}"), None).unwrap();
     assert_eq!(corners(&mesh), [FIRST]);
-    let note = "line 9: the file ends inside of a solid; \"endsolid\" is missing; the facets up to there are used";
+    let note = "line 9: the file ends inside a solid; \"endsolid\" is missing; the facets before the end are used";
     assert_eq!(mesh.notes, [note]);
 }
 
@@ -79,7 +79,7 @@ fn files_without_a_valid_face_are_errors() {
         ("v 0 0 nan\nf 1 1 1\n", "a.obj:1: z: NaN must be from -1e9 to 1e9"),
         (
             "v 0 0 0\nf 1 1\n",
-            "a.obj:2: a face must have 3 corners or more; this one has 2",
+            "a.obj:2: a face must have at least 3 corners, not 2",
         ),
     ] {
         assert_eq!(load("a.obj", text, None).unwrap_err(), message);
@@ -109,12 +109,12 @@ fn damaged_rows_of_ply_files_are_removed() {
         (
             POINTS,
             "3 0 1 2\n2 0 1\n",
-            "line 15: face 1: must have 3 vertices or more; it has 2; the face was removed",
+            "line 15: face 1: must have at least 3 vertices, not 2; the face was removed",
         ),
         (
             POINTS,
             "3 0 1 4\n3 0 1 2\n",
-            "line 14: face 0: vertex 4 does not exist; there are 4, counted from 0; the face was removed",
+            "line 14: face 0: vertex 4 does not exist; number of vertices, counted from 0: 4; the face was removed",
         ),
     ] {
         let mesh = load("a.ply", ply(vertices, faces), None).unwrap();
@@ -130,7 +130,7 @@ fn vertex_colors_that_are_not_finite_are_white() {
                   property list uchar int vertex_indices\nend_header\n";
     let text = format!("{header}0 0 0 0.5 0.25 0\n1 0 0 nan 0 0\n1 1 0 0 1e39 0\n3 0 1 2\n");
     let mesh = load("a.ply", text, None).unwrap();
-    let note = "line 14: vertex 1: the color: its values must be finite as 32-bit floats; \
+    let note = "line 14: vertex 1: color: the values must be finite as 32-bit floats; \
                 white is used instead (1 similar)";
     assert_eq!(mesh.notes, [note]);
     assert_eq!(mesh.colors[0].to_array(), [0.5, 0.25, 0.0, 1.0]);
@@ -144,7 +144,7 @@ fn ply_lines_may_have_more_values_than_declared() {
     assert_eq!(corners(&mesh), [FIRST]);
     assert_eq!(
         mesh.notes,
-        ["line 10: the line has more values than the header declares; the other values were ignored (3 similar)"]
+        ["line 10: the line has more values than the header declares; the extra values were ignored (3 similar)"]
     );
     // A row may span several lines, and a line may contain several rows.
     for points in [POINTS.replace("1 1 0", "1 1\n\n0"), POINTS.replace("\n1", " 1")] {

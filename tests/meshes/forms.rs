@@ -43,34 +43,39 @@ impl Form {
         }
     }
 
-    /// Returns a unit icosphere after `times` subdivisions.
-    pub fn icosphere(times: u32) -> Form {
-        let golden = (1.0 + 5f64.sqrt()) / 2.0;
+    /// Returns a unit icosphere, subdivided `subdivisions` times.
+    pub fn icosphere(subdivisions: u32) -> Form {
+        let golden_ratio = (1.0 + 5f64.sqrt()) / 2.0;
         let mut points = Vec::new();
-        for (a, b) in [(1.0, golden), (-1.0, golden), (1.0, -golden), (-1.0, -golden)] {
+        for (a, b) in [
+            (1.0, golden_ratio),
+            (-1.0, golden_ratio),
+            (1.0, -golden_ratio),
+            (-1.0, -golden_ratio),
+        ] {
             points.extend([DVec3::new(0.0, a, b), DVec3::new(a, b, 0.0), DVec3::new(b, 0.0, a)].map(DVec3::normalize));
         }
         // Faces are triples of adjacent points.
-        let near = |i: usize, j: usize| points[i].distance(points[j]) < 1.1;
+        let is_adjacent = |i: usize, j: usize| points[i].distance(points[j]) < 1.1;
         let mut triangles = Vec::new();
         for i in 0..12 {
             for j in i + 1..12 {
                 for k in j + 1..12 {
-                    if near(i, j) && near(j, k) && near(k, i) {
-                        let outward = (points[j] - points[i]).cross(points[k] - points[i]).dot(points[i]) > 0.0;
-                        triangles.push(if outward { [i, j, k] } else { [i, k, j] }.map(|i| i as u32));
+                    if is_adjacent(i, j) && is_adjacent(j, k) && is_adjacent(k, i) {
+                        let faces_outward = (points[j] - points[i]).cross(points[k] - points[i]).dot(points[i]) > 0.0;
+                        triangles.push(if faces_outward { [i, j, k] } else { [i, k, j] }.map(|i| i as u32));
                     }
                 }
             }
         }
         let mut form = Form { points, triangles };
-        for _ in 0..times {
-            form = form.divided();
+        for _ in 0..subdivisions {
+            form = form.subdivided();
         }
         form
     }
 
-    fn divided(&self) -> Form {
+    fn subdivided(&self) -> Form {
         let (mut points, mut middles, mut triangles) = (self.points.clone(), HashMap::new(), Vec::new());
         for &[a, b, c] in &self.triangles {
             let [ab, bc, ca] = [(a, b), (b, c), (c, a)].map(|(i, j)| {
@@ -102,12 +107,12 @@ impl Form {
         let point = || DVec3::from_array([(); 3].map(|()| random.between(-1.0, 1.0)));
         let (mut points, mut faces) = (Vec::new(), Vec::new());
         for i in 0..triangles {
-            let (at, size) = (point(), random.magnitude(-2.0, 0.0));
-            let mut corners = [(); 3].map(|()| at + point() * size);
+            let (center, size) = (point(), random.magnitude(-2.0, 0.0));
+            let mut corners = [(); 3].map(|()| center + point() * size);
             match random.below(6) {
                 0 => corners[2] = corners[0].lerp(corners[1], random.unit()) + point() * size * 1e-4,
-                1 => corners.iter_mut().for_each(|corner| corner.z = at.z), // flat bounding box
-                2 => corners = corners.map(|corner| (corner * 8.0).round() / 8.0), // on a lattice: coplanar with others
+                1 => corners.iter_mut().for_each(|corner| corner.z = center.z), // flat bounding box
+                2 => corners = corners.map(|corner| (corner * 8.0).round() / 8.0), // on a lattice: coplanar triangles
                 _ => {}
             }
             let first = points.len() as u32;
@@ -186,13 +191,13 @@ pub struct Sheet {
 }
 
 impl Sheet {
-    /// Returns `columns` by `rows` quads; `at` gives position and outward normal.
-    pub fn of(columns: u32, rows: u32, at: impl Fn(f64, f64) -> [DVec3; 2]) -> Sheet {
+    /// Returns `columns` by `rows` quads; `surface` returns position and outward normal.
+    pub fn of(columns: u32, rows: u32, surface: impl Fn(f64, f64) -> [DVec3; 2]) -> Sheet {
         let (mut points, mut normals, mut uvs, mut triangles) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         for j in 0..=rows {
             for i in 0..=columns {
                 let (u, v) = (f64::from(i) / f64::from(columns), f64::from(j) / f64::from(rows));
-                let [point, normal] = at(u, v);
+                let [point, normal] = surface(u, v);
                 points.push(point);
                 normals.push(normal);
                 uvs.push([u, v]);

@@ -24,12 +24,12 @@ fn description() -> Description {
     };
     Description::new(8, 8, camera)
         .with_material("m", PhongDescription::new([0.5; 3]))
-        .with_shape(MeshDescription::new("m", "it"))
+        .with_shape(MeshDescription::new("m", "mesh"))
 }
 
 fn scene(mesh: Arc<Mesh>) -> Result<Scene, String> {
     let mut assets = Assets::default();
-    assets.meshes.insert("it".to_owned(), mesh);
+    assets.meshes.insert("mesh".to_owned(), mesh);
     description()
         .validate_with(&assets)
         .map_err(|problem| problem.to_string())
@@ -52,26 +52,23 @@ fn depth(mesh: &Arc<Mesh>) -> f32 {
 fn an_edited_clone_is_rendered_with_its_edits() {
     let first = Arc::new(square());
     assert!((depth(&first) - 5.0).abs() < 0.1);
-    let lower = |mesh: &mut Mesh| mesh.positions.iter_mut().for_each(|p| p.z -= 2.0);
+    let move_back = |mesh: &mut Mesh| mesh.positions.iter_mut().for_each(|p| p.z -= 2.0);
 
     let mut clone = Mesh::clone(&first);
-    lower(&mut clone);
-    assert!(
-        (depth(&Arc::new(clone)) - 7.0).abs() < 0.1,
-        "a clone keeps the old depth"
-    );
+    move_back(&mut clone);
+    assert!((depth(&Arc::new(clone)) - 7.0).abs() < 0.1, "a clone has the old depth");
 
     let mut unshared = Arc::clone(&first);
-    lower(Arc::make_mut(&mut unshared));
+    move_back(Arc::make_mut(&mut unshared));
     assert!((depth(&unshared) - 7.0).abs() < 0.1, "Arc::make_mut of a shared mesh");
-    lower(Arc::make_mut(&mut unshared));
+    move_back(Arc::make_mut(&mut unshared));
     assert!(
         (depth(&unshared) - 9.0).abs() < 0.1,
         "Arc::make_mut of an unshared mesh"
     );
 
     let mut owned = Arc::try_unwrap(unshared).unwrap();
-    lower(&mut owned);
+    move_back(&mut owned);
     assert!((depth(&Arc::new(owned)) - 11.0).abs() < 0.1, "Arc::try_unwrap");
     assert!((depth(&first) - 5.0).abs() < 0.1);
 }
@@ -86,49 +83,49 @@ fn the_bvh_of_a_mesh_is_cached() {
 
 #[test]
 fn broken_rules_are_errors() {
-    type Break = fn(&mut Mesh);
-    let cases: [(Break, &str); 20] = [
+    type Edit = fn(&mut Mesh);
+    let cases: [(Edit, &str); 20] = [
         (|m| *m = Mesh::default(), "triangles: must not be empty"),
         (|m| m.groups.clear(), "groups: must not be empty"),
         (
             |m| m.group_of = vec![0, 1],
-            "group_of[1]: group 1 does not exist; groups has 1",
+            "group_of[1]: group 1 does not exist; number of groups: 1",
         ),
         (
             |m| m.groups.push(Group::default()),
-            "group_of: 0 elements; must have one for each of 2 triangles, or none if there is one group",
+            "group_of: the length 0 must be 2, the number of triangles, or 0 if there is one group",
         ),
         (
             |m| m.group_of = vec![0],
-            "group_of: 1 elements; must have one for each of 2 triangles, or none if there is one group",
+            "group_of: the length 1 must be 2, the number of triangles, or 0 if there is one group",
         ),
         (
             |m| m.triangles[1] = [0, 99, 1],
-            "triangles[1]: vertex 99 does not exist; positions has 4",
+            "triangles[1]: vertex 99 does not exist; number of positions: 4",
         ),
         (
             |m| m.positions.clear(),
-            "triangles[0]: vertex 0 does not exist; positions has 0",
+            "triangles[0]: vertex 0 does not exist; number of positions: 0",
         ),
         (
             |m| m.positions[2].y = f32::NAN,
-            "positions[2]: [1, NaN, 0] must be finite, and with center from -1e9 to 1e9",
+            "positions[2]: [1, NaN, 0] plus center must be from -1e9 to 1e9",
         ),
         (
             |m| m.positions[3].z = f32::INFINITY,
-            "positions[3]: [-1, 1, inf] must be finite, and with center from -1e9 to 1e9",
+            "positions[3]: [-1, 1, inf] plus center must be from -1e9 to 1e9",
         ),
         (
             |m| m.positions[0].x = 2e9,
-            "positions[0]: [2000000000, -1, 0] must be finite, and with center from -1e9 to 1e9",
+            "positions[0]: [2000000000, -1, 0] plus center must be from -1e9 to 1e9",
         ),
         (
             |m| m.center.x = f64::NAN,
-            "center: [NaN, 0, 0] must be finite, and at most 1e9 from 0",
+            "center: [NaN, 0, 0] must be from -1e9 to 1e9",
         ),
         (
             |m| m.normals = vec![glam::Vec3::Z; 3],
-            "normals: 3 elements; must have one for each of 4 positions, or none",
+            "normals: the length 3 must be 4, the number of positions, or 0",
         ),
         (
             |m| m.normals = vec![glam::Vec3::ZERO; 4],
@@ -140,7 +137,7 @@ fn broken_rules_are_errors() {
         ),
         (
             |m| m.uvs = vec![glam::Vec2::ZERO],
-            "uvs: 1 elements; must have one for each of 4 positions, or none",
+            "uvs: the length 1 must be 4, the number of positions, or 0",
         ),
         (
             |m| m.uvs = vec![glam::Vec2::NAN; 4],
@@ -148,23 +145,23 @@ fn broken_rules_are_errors() {
         ),
         (
             |m| m.more_uvs = vec![vec![glam::Vec2::ZERO; 5]],
-            "more_uvs[0]: 5 elements; must have one for each of 4 positions, or none",
+            "more_uvs[0]: the length 5 must be 4, the number of positions, or 0",
         ),
         (
             |m| m.colors = vec![glam::Vec4::new(0.0, 0.0, 0.0, 1.5); 4],
-            "colors[0]: [0, 0, 0, 1.5] must be from 0 to 1e6, and its opacity from 0 to 1",
+            "colors[0]: [0, 0, 0, 1.5] must be from 0 to 1e6, and the opacity from 0 to 1",
         ),
         (
             |m| m.tangents = vec![glam::Vec4::X; 4],
-            "tangents[0]: [1, 0, 0, 0] must be a unit vector with 1 or -1, or zeros",
+            "tangents[0]: [1, 0, 0, 0] must be a unit vector with w = 1 or w = -1, or zero",
         ),
         (|m| m.triangles.clear(), "triangles: must not be empty"),
     ];
-    for (break_it, expected) in cases {
+    for (edit, expected) in cases {
         let mut mesh = square();
-        break_it(&mut mesh);
+        edit(&mut mesh);
         let message = scene(Arc::new(mesh)).expect_err(expected);
-        assert_eq!(message, format!("shapes[0].file: \"it\": {expected}"));
+        assert_eq!(message, format!("shapes[0].file: \"mesh\": {expected}"));
     }
     assert!(scene(Arc::new(square())).is_ok());
 }

@@ -7,10 +7,10 @@ use wgray::mesh::{Mesh, Normals};
 use super::load;
 
 #[path = "../../examples/make_mesh.rs"]
-#[allow(dead_code, reason = "a test calls what the program does, but not its `main`")]
+#[allow(dead_code, reason = "the tests do not call `main`")]
 mod make_mesh;
 
-/// Returns true if each edge is used equally often in both directions. Vertices at the same position are the same.
+/// Returns true if each edge is used equally often in both directions. Vertices at the same position are merged.
 fn is_closed(mesh: &Mesh) -> bool {
     let mut edges = std::collections::HashMap::new();
     for triangle in &mesh.triangles {
@@ -23,8 +23,8 @@ fn is_closed(mesh: &Mesh) -> bool {
     edges.values().all(|sum| *sum == 0)
 }
 
-/// Returns six times the volume; positive if counterclockwise.
-fn volume(mesh: &Mesh) -> f64 {
+/// Returns six times the volume, which is positive if the triangles are counterclockwise.
+fn volume_times_6(mesh: &Mesh) -> f64 {
     let position = |vertex: u32| mesh.positions[vertex as usize].as_dvec3();
     let volume = |triangle: &[u32; 3]| {
         let [a, b, c] = triangle.map(position);
@@ -49,18 +49,18 @@ fn the_knot_is_closed_and_rests_on_the_floor() {
     let mesh = load("knot.obj", &text, None).unwrap();
     assert_eq!(mesh.notes, Vec::<String>::new());
     assert!((4000..8000).contains(&mesh.triangles.len()));
-    assert!(is_closed(&mesh) && volume(&mesh) > 0.0);
+    assert!(is_closed(&mesh) && volume_times_6(&mesh) > 0.0);
     assert_eq!(
         (mesh.normals.len(), mesh.uvs.len()),
         (mesh.positions.len(), mesh.positions.len())
     );
-    let lowest = mesh.positions.iter().map(|p| p.z).fold(f32::INFINITY, f32::min);
-    let widest = mesh
+    let min_z = mesh.positions.iter().map(|p| p.z).fold(f32::INFINITY, f32::min);
+    let max_radius = mesh
         .positions
         .iter()
         .map(|p| p.x.abs().max(p.y.abs()))
         .fold(0.0, f32::max);
-    assert_eq!((lowest, widest), (0.0, 0.4));
+    assert_eq!((min_z, max_radius), (0.0, 0.4));
     // Analytic and averaged normals agree.
     let smooth = load("knot.obj", &text, Some(Normals::Smooth)).unwrap();
     let position = |mesh: &Mesh, i: usize, k: usize| mesh.positions[mesh.triangles[i][k] as usize];
@@ -86,11 +86,14 @@ fn large_meshes_are_valid_and_of_the_requested_size() {
                 assert!((0.9..1.1).contains(&ratio), "{ratio}");
                 assert_eq!(is_closed(&mesh), is_rock);
                 if is_rock {
-                    assert!(volume(&mesh) > 0.0);
+                    assert!(volume_times_6(&mesh) > 0.0);
                     rocks.push(mesh);
                 }
             }
         }
-        assert!(volume(&rocks[0]) == volume(&rocks[1]) && volume(&rocks[0]) == volume(&rocks[2]));
+        assert!(
+            volume_times_6(&rocks[0]) == volume_times_6(&rocks[1])
+                && volume_times_6(&rocks[0]) == volume_times_6(&rocks[2])
+        );
     }
 }

@@ -112,7 +112,7 @@ fn bump_maps_are_used_as_normal_maps_or_reported() {
     assert_eq!(gray.normal_map, None);
     assert_eq!(
         notes,
-        ["a.mtl:2: material \"m\": map_Bump: a map of heights is ignored; bake a normal map, and name it by norm"]
+        ["a.mtl:2: material \"m\": map_Bump: a height map is ignored; bake a normal map and reference it with norm"]
     );
     let (opaque, notes) = material("map_d gray.png\n");
     assert!(matches!(principled(&opaque).alpha, Value::Texture(_, Channel::R)) && notes.is_empty());
@@ -179,13 +179,13 @@ fn only_maps_that_exist_need_texture_coordinates() {
 }
 
 #[test]
-fn bad_values_and_missing_maps_are_reported() {
+fn invalid_values_and_missing_maps_are_reported() {
     for (mtl, note) in [
-        ("Pr 2\n", "Pr: 2 must be from 0 to 1; 1 stands in"),
-        ("d 0\n", "d: 0 makes the material invisible; it is opaque at 1"),
+        ("Pr 2\n", "Pr: 2 must be from 0 to 1; 1 is used instead"),
+        ("d 0\n", "d: 0 makes the material invisible; 1 is opaque"),
         (
             "Kd 1 2 -1\n",
-            "Kd: each of [1, 2, -1] must be from 0 to 1; [1, 1, 0] stands in",
+            "Kd: each of [1, 2, -1] must be from 0 to 1; [1, 1, 0] is used instead",
         ),
         ("map_Pr none.png\n", "map_Pr: \"none.png\" cannot be read: "),
         ("map_d none.png\n", "map_d: \"none.png\" cannot be read: "),

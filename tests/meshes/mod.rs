@@ -18,16 +18,16 @@ mod watertight;
 
 use wgray::mesh::{Mesh, Normals};
 
-/// Loads a file of this content. Errors begin with its name.
+/// Loads a mesh file with this content. Error messages begin with the name of the file.
 pub fn load(name: &str, bytes: impl AsRef<[u8]>, normals: Option<Normals>) -> Result<Mesh, String> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join(name);
     std::fs::write(&path, bytes).unwrap();
     Mesh::load(&path, normals).map_err(|error| {
         let message = error.to_string();
-        let start = format!("{}/", folder.path().display());
+        let prefix = format!("{}/", folder.path().display());
         message
-            .strip_prefix(&start)
+            .strip_prefix(&prefix)
             .unwrap_or_else(|| panic!("{message}"))
             .to_string()
     })

@@ -27,7 +27,7 @@ fn coverage(scene: &Scene) -> f64 {
 #[test]
 fn mesh_files_of_all_formats_are_framed() {
     let folder = tempfile::tempdir().unwrap();
-    let small = |view| Overrides {
+    let overrides = |view| Overrides {
         size: Some((40, 30)),
         pixel_samples: Some(4),
         background: Some("none".parse().unwrap()),
@@ -41,10 +41,10 @@ fn mesh_files_of_all_formats_are_framed() {
         let path = folder.path().join(name);
         fs::write(&path, bytes).unwrap();
         for view in [None, Some(View::Front), Some(View::Top)] {
-            let scene = Scene::load_with(&path, &small(view)).unwrap();
+            let scene = Scene::load_with(&path, &overrides(view)).unwrap();
             assert_eq!(scene.notes, Vec::<String>::new(), "{name}");
-            let share = coverage(&scene);
-            assert!((0.1..0.9).contains(&share), "{name} {view:?}: {share}");
+            let covered = coverage(&scene);
+            assert!((0.1..0.9).contains(&covered), "{name} {view:?}: {covered}");
         }
     }
 }
@@ -118,10 +118,13 @@ fn the_description_of_a_mesh_is_the_same_scene() {
     let text = description.to_toml().unwrap();
     let file = folder.path().join("a.toml");
     fs::write(&file, text).unwrap();
-    let again = Scene::load(&file).unwrap();
-    assert_eq!(again.shapes, scene.shapes);
-    assert_eq!((&again.materials, &again.camera), (&scene.materials, &scene.camera));
-    assert_eq!(again.render, scene.render);
+    let reloaded = Scene::load(&file).unwrap();
+    assert_eq!(reloaded.shapes, scene.shapes);
+    assert_eq!(
+        (&reloaded.materials, &reloaded.camera),
+        (&scene.materials, &scene.camera)
+    );
+    assert_eq!(reloaded.render, scene.render);
     assert_eq!(scene.material_names, ["red", "default"]);
     // The list of files of the scene contains files that the mesh refers to.
     let has = |name: &str| scene.files.iter().any(|file| file.ends_with(name));
@@ -160,7 +163,7 @@ fn unsupported_files_are_rejected_with_a_hint() {
     );
     fs::write(&path, "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n").unwrap();
     let expected = format!(
-        "{}:4: vertex 9 of the face does not exist; there are 3 so far",
+        "{}:4: vertex 9 of the face does not exist; defined so far: 3",
         path.display()
     );
     assert_eq!(load(&path).unwrap_err(), expected);
@@ -237,7 +240,7 @@ fn strict_rejects_damage() {
             ..Overrides::default()
         };
         let load = |path: &Path| Scene::load_with(path, &overrides).map_err(|error| error.to_string());
-        let rule = "a face must have 3 corners or more; this one has 2";
+        let rule = "a face must have at least 3 corners, not 2";
         match strict {
             true => {
                 assert_eq!(load(&path).unwrap_err(), format!("{}:5: {rule}", path.display()));
@@ -250,8 +253,8 @@ fn strict_rejects_damage() {
             false => {
                 let note = format!("line 5: {rule}; the face was removed");
                 assert_eq!(load(&path).unwrap().notes, std::slice::from_ref(&note));
-                let of_scene = format!("a.obj:5: {rule}; the face was removed");
-                assert_eq!(load(&scene).unwrap().notes, [of_scene]);
+                let scene_note = format!("a.obj:5: {rule}; the face was removed");
+                assert_eq!(load(&scene).unwrap().notes, [scene_note]);
             }
         }
     }
@@ -282,14 +285,14 @@ fn a_model_without_lights_needs_the_path_tracer() {
     for (name, bytes) in in_all_formats() {
         let path = folder.path().join(name);
         fs::write(&path, bytes).unwrap();
-        for (integrator, is_refused) in [(Integrator::Phong, true), (Integrator::Path, false)] {
+        for (integrator, is_rejected) in [(Integrator::Phong, true), (Integrator::Path, false)] {
             let overrides = Overrides {
                 integrator: Some(integrator),
                 ..Overrides::default()
             };
             let message = Scene::load_with(&path, &overrides).map_or_else(|error| error.to_string(), |_| String::new());
             let rule = "integrator: phong does not support environment light";
-            assert_eq!(message.starts_with(rule), is_refused, "{name}: {message}");
+            assert_eq!(message.starts_with(rule), is_rejected, "{name}: {message}");
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Triangulation of polygons: the triangles cover exactly the polygon, compared with point-in-polygon tests.
+//! Triangulation of polygons: point-in-polygon tests confirm that the triangles cover exactly the polygon.
 
 use std::f64::consts::TAU;
 
@@ -34,24 +34,27 @@ fn is_inside(points: &[DVec3], [x, y]: [f64; 2]) -> bool {
 }
 
 /// Checks that the triangles cover a simple polygon exactly once, with its orientation.
-fn assert_covers(mesh: &Mesh, points: &[DVec3], what: &str) {
+fn assert_covers(mesh: &Mesh, points: &[DVec3], case: &str) {
     let random = Random::new(5);
     let triangles: Vec<Vec<DVec3>> = (corners(mesh).iter())
         .map(|triangle| triangle.iter().map(|corner| DVec3::from(*corner)).collect())
         .collect();
-    let most = points.iter().map(|p| p.abs().max_element()).fold(0.0, f64::max);
-    let mut wrong = 0;
+    let max_coordinate = points.iter().map(|p| p.abs().max_element()).fold(0.0, f64::max);
+    let mut mismatches = 0;
     for _ in 0..2000 {
-        let at = [most * random.between(-1.0, 1.0), most * random.between(-1.0, 1.0)];
-        let count = triangles.iter().filter(|triangle| is_inside(triangle, at)).count();
-        wrong += usize::from(count != usize::from(is_inside(points, at)));
+        let point = [
+            max_coordinate * random.between(-1.0, 1.0),
+            max_coordinate * random.between(-1.0, 1.0),
+        ];
+        let count = triangles.iter().filter(|triangle| is_inside(triangle, point)).count();
+        mismatches += usize::from(count != usize::from(is_inside(points, point)));
     }
     // Positions are rounded to f32, which may misclassify a point at an edge.
-    assert!(wrong <= 1, "{what}: {wrong} points");
-    let whole: DVec3 = areas(mesh).into_iter().sum();
+    assert!(mismatches <= 1, "{case}: {mismatches} points");
+    let total: DVec3 = areas(mesh).into_iter().sum();
     assert!(
-        areas(mesh).iter().all(|area| area.dot(whole) > 0.0),
-        "{what}: turned triangles"
+        areas(mesh).iter().all(|area| area.dot(total) > 0.0),
+        "{case}: flipped triangles"
     );
 }
 
@@ -62,18 +65,18 @@ const L: [[f64; 2]; 6] = [[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [1.0, 1.0], [1.0, 
 fn concave_polygons_are_covered() {
     for shape in [&ARROW[..], &L[..]] {
         for first in 0..shape.len() {
-            for is_turned in [false, true] {
+            for is_reversed in [false, true] {
                 let mut points = flat(shape);
                 points.rotate_left(first);
-                if is_turned {
+                if is_reversed {
                     points.reverse();
                 }
                 let mesh = load("a.obj", polygon(&points), None).unwrap();
-                let what = format!("{first} {is_turned}");
-                assert_covers(&mesh, &points, &what);
-                assert_eq!(mesh.triangles.len(), points.len() - 2, "{what}");
-                assert!(mesh.notes.is_empty(), "{what}: {:?}", mesh.notes);
-                assert_eq!(areas(&mesh)[0].z < 0.0, is_turned, "{what}");
+                let case = format!("{first} {is_reversed}");
+                assert_covers(&mesh, &points, &case);
+                assert_eq!(mesh.triangles.len(), points.len() - 2, "{case}");
+                assert!(mesh.notes.is_empty(), "{case}: {:?}", mesh.notes);
+                assert_eq!(areas(&mesh)[0].z < 0.0, is_reversed, "{case}");
             }
         }
     }
@@ -90,11 +93,11 @@ fn ply_polygons_are_covered() {
     assert_covers(&load("a.ply", text, None).unwrap(), &flat(&L), "PLY");
 }
 
-/// Returns a simple, star-shaped polygon with `count` corners at random radii from `least` to 1.
-fn star(random: &Random, count: usize, least: f64) -> Vec<DVec3> {
+/// Returns a simple, star-shaped polygon with `count` corners at random radii from `min_radius` to 1.
+fn star(random: &Random, count: usize, min_radius: f64) -> Vec<DVec3> {
     let corner = |i: usize| {
         let (sin, cos) = (TAU * i as f64 / count as f64).sin_cos();
-        DVec3::new(cos, sin, 0.0) * random.between(least, 1.0)
+        DVec3::new(cos, sin, 0.0) * random.between(min_radius, 1.0)
     };
     (0..count).map(corner).collect()
 }
@@ -109,10 +112,10 @@ fn random_polygons_are_covered() {
         assert!(mesh.notes.is_empty(), "{round}: {:?}", mesh.notes);
         // The area is the same in another plane.
         let [u, v] = [DVec3::new(0.6, 0.0, 0.8), DVec3::new(-0.48, 0.8, 0.36)];
-        let turned: Vec<DVec3> = points.iter().map(|p| u * p.x + v * p.y).collect();
-        let other = load("a.obj", polygon(&turned), None).unwrap();
+        let rotated: Vec<DVec3> = points.iter().map(|p| u * p.x + v * p.y).collect();
+        let rotated_mesh = load("a.obj", polygon(&rotated), None).unwrap();
         let sum = |mesh: &Mesh| areas(mesh).iter().map(|area| area.length()).sum::<f64>();
-        assert!((sum(&mesh) - sum(&other)).abs() < 1e-5, "{round}");
+        assert!((sum(&mesh) - sum(&rotated_mesh)).abs() < 1e-5, "{round}");
     }
 }
 
@@ -120,20 +123,23 @@ fn random_polygons_are_covered() {
 fn ten_thousand_corners_are_covered() {
     let points = star(&Random::new(3), 10_000, 0.5);
     let mesh = load("a.obj", polygon(&points), None).unwrap();
-    let whole: f64 = (points.iter().zip(points.iter().cycle().skip(1)))
+    let polygon_area: f64 = (points.iter().zip(points.iter().cycle().skip(1)))
         .map(|(a, b)| (a.x * b.y - a.y * b.x) / 2.0)
         .sum();
-    let covered: f64 = areas(&mesh).iter().map(|area| area.length()).sum();
-    assert!((covered / whole - 1.0).abs() < 1e-5, "{covered} {whole}");
+    let covered_area: f64 = areas(&mesh).iter().map(|area| area.length()).sum();
+    assert!(
+        (covered_area / polygon_area - 1.0).abs() < 1e-5,
+        "{covered_area} {polygon_area}"
+    );
     assert!(mesh.notes.is_empty(), "{:?}", mesh.notes);
 }
 
 #[test]
 fn convex_polygons_are_fans() {
     let regular = |count: usize| {
-        let turn = |i: usize| TAU * i as f64 / count as f64;
+        let angle = |i: usize| TAU * i as f64 / count as f64;
         (0..count)
-            .map(|i| DVec3::new(turn(i).cos(), turn(i).sin(), 0.25))
+            .map(|i| DVec3::new(angle(i).cos(), angle(i).sin(), 0.25))
             .collect::<Vec<_>>()
     };
     for count in [4, 5, 64, 1000] {
@@ -181,7 +187,7 @@ fn degenerate_polygons_are_reported() {
     ]);
     let mesh = load("a.obj", polygon(&doubled), None).unwrap();
     assert_covers(&mesh, &doubled, "doubled");
-    let on_line = flat(&[
+    let with_collinear = flat(&[
         [0.0, 0.0],
         [1.0, 0.0],
         [2.0, 0.0],
@@ -190,11 +196,21 @@ fn degenerate_polygons_are_reported() {
         [1.0, 2.0],
         [0.0, 2.0],
     ]);
-    assert_covers(&load("a.obj", polygon(&on_line), None).unwrap(), &on_line, "collinear");
-    let empty = flat(&[[0.0, 0.0], [1.0, 1.0], [2.0, 2.0], [3.0, 3.0]]);
-    assert_eq!(notes(&empty), ["a.obj: has no triangles but 2 without an area"]);
-    let nothing = flat(&[[1.0, 1.0]; 5]);
-    assert_eq!(notes(&nothing), ["a.obj: has no triangles but 3 without an area"]);
+    assert_covers(
+        &load("a.obj", polygon(&with_collinear), None).unwrap(),
+        &with_collinear,
+        "collinear",
+    );
+    let collinear = flat(&[[0.0, 0.0], [1.0, 1.0], [2.0, 2.0], [3.0, 3.0]]);
+    assert_eq!(
+        notes(&collinear),
+        ["a.obj: has no triangles with an area; degenerate triangles: 2"]
+    );
+    let coincident = flat(&[[1.0, 1.0]; 5]);
+    assert_eq!(
+        notes(&coincident),
+        ["a.obj: has no triangles with an area; degenerate triangles: 3"]
+    );
 }
 
 #[test]

@@ -10,7 +10,7 @@ const TWO_TRIANGLES: [[[f64; 3]; 3]; 2] = [
 ];
 const SQUARE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
 
-/// Returns positions, one of them unused, and polygons of a solid.
+/// Returns the positions, of which one is unused, and the polygons of a solid.
 fn crystal() -> (Vec<[f32; 3]>, Vec<Vec<u32>>) {
     let positions = vec![
         [0.1, 0.2, 0.3],
@@ -175,7 +175,7 @@ fn a_backslash_may_end_a_file() {
     let mesh = load("a.obj", format!("{SQUARE}f 1 2 3\nf 1 3 4 \\"), None).unwrap();
     assert_eq!(corners(&mesh), TWO_TRIANGLES);
     let error = load("a.obj", format!("{SQUARE}f 1 2\\"), None).unwrap_err();
-    assert_eq!(error, "a.obj:5: a face must have 3 corners or more; this one has 2");
+    assert_eq!(error, "a.obj:5: a face must have at least 3 corners, not 2");
 }
 
 #[test]
@@ -204,7 +204,7 @@ fn degenerate_triangles_are_dropped_and_counted() {
     assert_eq!(mesh.group_of, [1]);
     assert!(mesh.normals.iter().all(|normal| (normal.length() - 1.0).abs() < 1e-6));
     let error = load("a.obj", "v 0 0 0\nv 1 1 1\nv 2 2 2\nf 1 2 3\n", None).unwrap_err();
-    assert_eq!(error, "a.obj: has no triangles but 1 without an area");
+    assert_eq!(error, "a.obj: has no triangles with an area; degenerate triangles: 1");
     // The last point is collinear in decimal, but not in binary.
     let mesh = load(
         "a.obj",
@@ -229,9 +229,12 @@ fn duplicate_triangles_are_dropped_and_counted() {
     assert_eq!((mesh.triangles.len(), mesh.notes.len()), (3, 2), "{:?}", mesh.notes);
     let mesh = load("a.obj", text.replace("f 2 3 5", "f 3 2 5"), None).unwrap();
     assert_eq!(mesh.triangles.len(), 3);
-    let many = load("a.obj", format!("{text}{}", "f 1 3 4\nf 3 4 1\n".repeat(1000)), None).unwrap();
-    assert_eq!(corners(&many), TWO_TRIANGLES);
-    assert_eq!(many.notes, ["2001 of 2003 triangles are duplicates and were removed"]);
+    let repeated = load("a.obj", format!("{text}{}", "f 1 3 4\nf 3 4 1\n".repeat(1000)), None).unwrap();
+    assert_eq!(corners(&repeated), TWO_TRIANGLES);
+    assert_eq!(
+        repeated.notes,
+        ["2001 of 2003 triangles are duplicates and were removed"]
+    );
 }
 
 #[test]
@@ -311,7 +314,7 @@ fn material_files_may_have_paths_of_other_machines() {
         assert_eq!(mesh.notes, Vec::<String>::new(), "{named}");
         assert_eq!(mesh.libraries[0].materials[0].name, expected, "{named}");
     }
-    // A plain file name is only looked up in the mesh's folder.
+    // A file name without a folder is only looked up in the folder of the mesh.
     std::fs::write(&path, format!("mtllib c.mtl\n{SQUARE}f 1 2 3\n")).unwrap();
     let mesh = Mesh::load(&path, None).unwrap();
     assert!(
@@ -337,7 +340,9 @@ fn ply_may_have_all_types_in_any_order() {
     assert_eq!(uvs, [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]);
     assert_eq!(
         mesh.notes,
-        ["texture coordinates per face corner (\"texcoord\") are not supported and were ignored; use those per vertex"]
+        [
+            "texture coordinates per face corner (\"texcoord\") are not supported and were ignored; use texture coordinates per vertex"
+        ]
     );
 }
 
@@ -350,19 +355,19 @@ fn faces_first(is_big: bool, normal: [f64; 3]) -> Vec<u8> {
          property double ny\nproperty double nz\nproperty double texture_u\nproperty double texture_v\nend_header\n"
     )
     .into_bytes();
-    let mut put = |little: &[u8]| {
+    let mut append = |little: &[u8]| {
         let mut value = little.to_vec();
         if is_big {
             value.reverse();
         }
         bytes.extend(value);
     };
-    put(&3u16.to_le_bytes());
-    (0..3i16).for_each(|i| put(&i.to_le_bytes()));
-    put(&77i32.to_le_bytes());
+    append(&3u16.to_le_bytes());
+    (0..3i16).for_each(|i| append(&i.to_le_bytes()));
+    append(&77i32.to_le_bytes());
     for position in TWO_TRIANGLES[0] {
         let row = position.iter().chain(&normal).chain(&[0.25, 0.75]);
-        row.for_each(|x| put(&x.to_le_bytes()));
+        row.for_each(|x| append(&x.to_le_bytes()));
     }
     bytes
 }
@@ -375,11 +380,11 @@ fn binary_ply_has_normals_and_texture_coordinates() {
         assert_eq!(mesh.normals[2].to_array(), [0.0, -0.6, 0.8]);
         assert_eq!(mesh.uvs[2].to_array(), [0.25, 0.75]);
         // Invalid normals are replaced.
-        for none in [[0.0; 3], [f64::NAN, 0.0, 1.0], [f64::INFINITY, 0.0, 1.0]] {
-            let mesh = load("a.ply", faces_first(is_big, none), Some(Normals::File)).unwrap();
+        for invalid in [[0.0; 3], [f64::NAN, 0.0, 1.0], [f64::INFINITY, 0.0, 1.0]] {
+            let mesh = load("a.ply", faces_first(is_big, invalid), Some(Normals::File)).unwrap();
             assert_eq!(mesh.normals[2].to_array(), [0.0, 0.0, 1.0]);
-            let rest = "have no normal, or one that is zero or not finite; they get those of their triangles";
-            assert_eq!(mesh.notes, [format!("3 vertices {rest}")]);
+            let rule = "have no valid normals; the triangle normals are used instead";
+            assert_eq!(mesh.notes, [format!("3 vertices {rule}")]);
         }
     }
 }
@@ -416,7 +421,7 @@ fn binary_stl_is_recognized_by_its_size() {
     assert_eq!(mesh.notes, ["1 byte after the last triangle was ignored"]);
     assert_eq!(
         load("a.stl", &longer[..300], None).unwrap_err(),
-        "a.stl: byte 80: 6 triangles take 384 bytes, and the file has 300: it is truncated, or not an STL file"
+        "a.stl: byte 80: the triangle count 6 requires 384 bytes; the file has 300 bytes and is truncated, or is not an STL file"
     );
 }
 
@@ -460,11 +465,11 @@ fn requesting_normals_of_a_file_without_normals_is_an_error() {
     for (name, bytes) in in_all_formats() {
         let result = load(name, bytes, Some(Normals::File));
         if name.to_lowercase().ends_with("stl") {
-            // STL files always have normals; these are zero.
-            assert!(result.unwrap().notes[0].message.contains("no normal"));
+            // STL files always have normals, which are zero in this file.
+            assert!(result.unwrap().notes[0].message.contains("no valid normal"));
         } else {
-            let rest = "has no normals; \"smooth\" and \"flat\" ones are made from the triangles";
-            assert_eq!(result.unwrap_err(), format!("{name}: {rest}"));
+            let rule = "has no normals; \"smooth\" and \"flat\" normals are computed from the triangles";
+            assert_eq!(result.unwrap_err(), format!("{name}: {rule}"));
         }
     }
 }

@@ -11,7 +11,7 @@ const CENTER: DVec3 = DVec3::new(0.0, 0.0, 1.3);
 const LIGHT: DVec3 = DVec3::new(0.3, 0.2, -1.0);
 const OUTSIDE: &str = "[0.5, -6, 3.5]";
 
-fn above_floor(form: &Form, normals: &str, camera: &str) -> Packed {
+fn pack_above_floor(form: &Form, normals: &str, camera: &str) -> Packed {
     let folder = tempfile::tempdir().expect("a folder");
     std::fs::write(folder.path().join("sphere.obj"), form.obj(Some(&form.points), None)).expect("a mesh");
     let text = format!(
@@ -46,69 +46,70 @@ fn above_floor(form: &Form, normals: &str, camera: &str) -> Packed {
 }
 
 fn entry(origin: DVec3, direction: DVec3, radius: f64) -> Option<f64> {
-    let to = origin - CENTER;
-    let b = to.dot(direction);
-    let discriminant = b * b - to.length_squared() + radius * radius;
+    let from_center = origin - CENTER;
+    let b = from_center.dot(direction);
+    let discriminant = b * b - from_center.length_squared() + radius * radius;
     (discriminant >= 0.0)
         .then(|| -b - discriminant.sqrt())
         .filter(|t| *t > 0.0)
 }
 
-/// Numbers of pixels; `wrong_` means that a pixel contradicts the bounds.
+/// Numbers of pixels; those of `wrong_` fields contradict the bounds.
 #[derive(Debug, Default, PartialEq)]
-struct Found {
+struct Counts {
     wrong_hits: usize,
     wrong_shadows: usize,
     wrong_light: usize,
     hits: usize,
     shadows: usize,
     /// Pixels that are neither certainly in shadow nor certainly lit.
-    open: usize,
+    uncertain: usize,
 }
 
-/// Classifies all pixels; `inner` is the inscribed radius.
-fn found(form: &Form, inner: f64, normals: &str) -> Found {
-    let packed = above_floor(form, normals, OUTSIDE);
+/// Classifies all pixels; `inner_radius` is the radius of the inscribed sphere.
+fn classify(form: &Form, inner_radius: f64, normals: &str) -> Counts {
+    let packed = pack_above_floor(form, normals, OUTSIDE);
     let hits = first_hits(&packed, RenderMode::Cpu);
     let radiances: Vec<[f32; 3]> = reference(&packed).means().collect();
     let to_light = -LIGHT.normalize();
     // Maximum angle between geometric and analytic normals.
-    let lean = inner.acos();
-    let mut found = Found::default();
+    let max_angle = inner_radius.acos();
+    let mut counts = Counts::default();
     for (i, (hit, radiance)) in hits.iter().zip(radiances).enumerate() {
-        let at = glam::Vec2::new((i % 200) as f32, (i / 200) as f32) + 0.5;
-        let ray = camera_ray(&packed.camera, at);
+        let pixel = glam::Vec2::new((i % 200) as f32, (i / 200) as f32) + 0.5;
+        let ray = camera_ray(&packed.camera, pixel);
         let (origin, direction) = (ray.origin.as_dvec3() + packed.origin, ray.direction.as_dvec3());
-        let (outer, inner_t) = (entry(origin, direction, 1.0), entry(origin, direction, inner));
+        let (outer, inner_t) = (entry(origin, direction, 1.0), entry(origin, direction, inner_radius));
         let point = origin + direction * f64::from(hit.depth);
         let is_lit = radiance[0] > 0.0;
         if hit.shape == 0 {
-            found.hits += 1;
+            counts.hits += 1;
             let radial = (point - CENTER).normalize();
             let radius = point.distance(CENTER);
-            let between = radius > inner - 1e-5 && radius < 1.0 + 1e-5 && outer.is_some();
-            // At grazing incidence rounding moves the hit along the ray.
+            let is_between = radius > inner_radius - 1e-5 && radius < 1.0 + 1e-5 && outer.is_some();
+            // At grazing incidence, rounding moves the hit along the ray.
             let grazing = -radial.dot(direction);
-            let normals = (hit.shading_normal.as_dvec3() - radial).length() * grazing < 2e-5
-                && hit.normal.as_dvec3().angle_between(radial) < 1.01 * lean + 1e-4;
-            found.wrong_hits += usize::from(!(between && normals));
+            let has_valid_normals = (hit.shading_normal.as_dvec3() - radial).length() * grazing < 2e-5
+                && hit.normal.as_dvec3().angle_between(radial) < 1.01 * max_angle + 1e-4;
+            counts.wrong_hits += usize::from(!(is_between && has_valid_normals));
             let cosine = radial.dot(to_light);
             // The terminator of the mesh is the terminator of the sphere.
-            found.wrong_light += usize::from(cosine > 1e-3 && !is_lit || cosine < -1e-5 && is_lit);
+            counts.wrong_light += usize::from(cosine > 1e-3 && !is_lit || cosine < -1e-5 && is_lit);
         } else {
-            found.wrong_hits += usize::from(inner_t.is_some());
+            counts.wrong_hits += usize::from(inner_t.is_some());
             if hit.shape == 1 && hit.depth < 20.0 {
-                let [surely, maybe] = [inner, 1.0].map(|radius| entry(point, to_light, radius).is_some());
-                found.shadows += usize::from(surely);
-                found.open += usize::from(maybe && !surely);
-                found.wrong_shadows += usize::from(surely && is_lit || !maybe && !is_lit);
+                let [is_surely_occluded, is_possibly_occluded] =
+                    [inner_radius, 1.0].map(|radius| entry(point, to_light, radius).is_some());
+                counts.shadows += usize::from(is_surely_occluded);
+                counts.uncertain += usize::from(is_possibly_occluded && !is_surely_occluded);
+                counts.wrong_shadows += usize::from(is_surely_occluded && is_lit || !is_possibly_occluded && !is_lit);
             }
         }
     }
-    found
+    counts
 }
 
-fn inner(form: &Form) -> f64 {
+fn inner_radius(form: &Form) -> f64 {
     let height = |t: &[u32; 3]| {
         let [a, b, c] = t.map(|i| form.points[i as usize]);
         (b - a).cross(c - a).normalize().dot(a)
@@ -120,11 +121,11 @@ fn inner(form: &Form) -> f64 {
 fn a_fine_triangle_mesh_approximates_a_sphere() {
     let fine = Form::icosphere(6);
     assert_eq!(fine.triangles.len(), 81_920);
-    let fine_inner = inner(&fine);
-    let result = found(&fine, fine_inner, "file");
+    let fine_inner = inner_radius(&fine);
+    let result = classify(&fine, fine_inner, "file");
     println!("between the radii {fine_inner} and 1: {result:?}");
     assert!(
-        result.hits > 3000 && result.shadows > 1000 && result.open < 100,
+        result.hits > 3000 && result.shadows > 1000 && result.uncertain < 100,
         "{result:?}"
     );
     assert_eq!(
@@ -134,16 +135,16 @@ fn a_fine_triangle_mesh_approximates_a_sphere() {
     );
     // Control: a coarse mesh violates these bounds; with vertex normals it satisfies the bounds for its own size.
     let coarse = Form::icosphere(2);
-    let wrong = found(&coarse, fine_inner, "flat");
+    let coarse_counts = classify(&coarse, fine_inner, "flat");
     assert!(
-        wrong.wrong_hits > 1000 && wrong.wrong_shadows > 10 && wrong.wrong_light > 10,
-        "{wrong:?}"
+        coarse_counts.wrong_hits > 1000 && coarse_counts.wrong_shadows > 10 && coarse_counts.wrong_light > 10,
+        "{coarse_counts:?}"
     );
-    let right = found(&coarse, inner(&coarse), "file");
+    let own_bounds = classify(&coarse, inner_radius(&coarse), "file");
     assert_eq!(
-        (right.wrong_hits, right.wrong_shadows, right.wrong_light),
+        (own_bounds.wrong_hits, own_bounds.wrong_shadows, own_bounds.wrong_light),
         (0, 0, 0),
-        "{right:?}"
+        "{own_bounds:?}"
     );
 }
 
@@ -153,7 +154,7 @@ fn no_light_enters_a_closed_mesh() {
     for detail in [1, 2, 4] {
         let form = Form::icosphere(detail);
         for camera in ["[0.2, -0.5, 1.6]", "[-0.3, 0.1, 0.8]", "[0, 0.6, 1.2]"] {
-            let packed = above_floor(&form, "smooth", camera);
+            let packed = pack_above_floor(&form, "smooth", camera);
             for mode in [RenderMode::Cpu, RenderMode::Baked] {
                 let lit = render(&packed, mode)
                     .means()
@@ -162,7 +163,7 @@ fn no_light_enters_a_closed_mesh() {
                 assert_eq!(lit, 0, "{detail} {camera} {mode:?}");
             }
         }
-        let outside = above_floor(&form, "smooth", OUTSIDE);
+        let outside = pack_above_floor(&form, "smooth", OUTSIDE);
         let lit = reference(&outside).means().filter(|radiance| radiance[0] > 0.0).count();
         assert!(lit > 1000, "{detail}: {lit}");
     }

@@ -17,15 +17,15 @@ use super::forms::{HEAD, Sheet, scene};
 use crate::pictures::reference;
 use crate::textures::write_exr;
 
-/// The tangent-space normal of the map.
-const LEAN: Vec3 = Vec3::new(0.6, 0.0, 0.8);
+/// The tangent-space normal of the normal map.
+const MAP_NORMAL: Vec3 = Vec3::new(0.6, 0.0, 0.8);
 
 /// Returns a mesh with a constant, tilted normal map.
-fn leaning(obj: &str, texture: &str, shape: &str) -> Packed {
+fn pack_tilted(obj: &str, texture: &str, shape: &str) -> Packed {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("mesh.obj"), obj).unwrap();
     write_exr(&folder.path().join("lean.exr"), 2, 2, |_, _| {
-        (LEAN * 0.5 + 0.5).to_array()
+        (MAP_NORMAL * 0.5 + 0.5).to_array()
     });
     let head = HEAD.replace("width = 48, height = 36", "width = 192, height = 144");
     let head = head.replace("fov = 40", "fov = 8");
@@ -61,7 +61,7 @@ fn hit(packed: &Packed, slot: usize, barycentric: Vec2) -> Hit {
 }
 
 /// Barycentric coordinates at corners, on edges and inside.
-const PLACES: [Vec2; 7] = [
+const BARYCENTRICS: [Vec2; 7] = [
     Vec2::new(0.0, 0.0),
     Vec2::new(1.0, 0.0),
     Vec2::new(0.0, 1.0),
@@ -75,30 +75,30 @@ const PLACES: [Vec2; 7] = [
 fn errors(packed: &Packed, surface: impl Fn(f64, f64) -> Option<[DVec3; 2]>) -> [f64; 2] {
     let i = &packed.bvh.instances[0];
     let to_world = DMat3::from_cols(i.u.as_dvec3(), i.v.as_dvec3(), i.w.as_dvec3());
-    let mut worst = [0.0; 2];
+    let mut max_errors = [0.0; 2];
     for slot in 0..packed.bvh.meshes[0].triangles.len() {
-        for b in PLACES {
+        for b in BARYCENTRICS {
             let prim = fetch_hit_primitive(packed, hit(packed, slot, b));
             let uv = face_uv(&prim, b);
             let Some(exact) = surface(f64::from(uv.x), f64::from(uv.y)) else {
                 continue;
             };
-            for (worst, found) in worst.iter_mut().zip([face_frame(&prim, b), face_tangents(&prim)]) {
+            for (max_error, found) in max_errors.iter_mut().zip([face_frame(&prim, b), face_tangents(&prim)]) {
                 for (found, exact) in [found.u, found.v].into_iter().zip(exact) {
                     let angle = found.as_dvec3().angle_between(to_world * exact).to_degrees();
-                    *worst = f64::max(*worst, angle);
+                    *max_error = f64::max(*max_error, angle);
                 }
             }
         }
     }
-    worst
+    max_errors
 }
 
-fn derivatives(at: impl Fn(f64, f64) -> DVec3, u: f64, v: f64) -> [DVec3; 2] {
+fn derivatives(surface: impl Fn(f64, f64) -> DVec3, u: f64, v: f64) -> [DVec3; 2] {
     let h = 1e-5;
     [
-        (at(u + h, v) - at(u - h, v)) / (2.0 * h),
-        (at(u, v + h) - at(u, v - h)) / (2.0 * h),
+        (surface(u + h, v) - surface(u - h, v)) / (2.0 * h),
+        (surface(u, v + h) - surface(u, v - h)) / (2.0 * h),
     ]
 }
 
@@ -113,22 +113,22 @@ fn tangents_match_the_surface() {
         DVec3::new((1.0 + 0.4 * out) * cos, (1.0 + 0.4 * out) * sin, 0.4 * up)
     };
     // Tangents of an instance are derivatives of the transformed surface.
-    for (shape, most) in [
+    for (shape, max_error) in [
         ("", 1.5),
         ("matrix = [[1, 0.3, 0, 5], [-0.2, 2, 0.4, 0], [0, 0.5, -0.7, 3]]", 3.0),
         ("scale = 1e-5", 1.5),
     ] {
-        let packed = leaning(&Sheet::sphere(32, 16).obj(), "", shape);
+        let packed = pack_tilted(&Sheet::sphere(32, 16).obj(), "", shape);
         // The derivative by u vanishes at the poles.
         let found = errors(&packed, |u, v| {
             (0.12..0.88).contains(&v).then(|| derivatives(sphere, u, v))
         });
         println!("sphere, {shape}: {found:?}");
-        assert!(found[0] < most && found[1] > 10.0, "{shape}: {found:?}");
-        let packed = leaning(&Sheet::torus(40, 20).obj(), "", shape);
+        assert!(found[0] < max_error && found[1] > 10.0, "{shape}: {found:?}");
+        let packed = pack_tilted(&Sheet::torus(40, 20).obj(), "", shape);
         let found = errors(&packed, |u, v| Some(derivatives(torus, u, v)));
         println!("torus, {shape}: {found:?}");
-        assert!(found[0] < most && found[1] > 10.0, "{shape}: {found:?}");
+        assert!(found[0] < max_error && found[1] > 10.0, "{shape}: {found:?}");
     }
 }
 
@@ -145,28 +145,28 @@ fn normals(packed: &Packed, slot: usize, b: Vec2) -> [Vec3; 2] {
     let material = material_of(packed, &prim);
     let found = evaluate_material(packed, &prim, hit, material, surface, HitDifferential::default(), 1).normal;
     let Tangents { u, v } = face_tangents(&prim);
-    let by_triangle = wgray_render::cpu::surface::Surface {
+    let triangle_surface = wgray_render::cpu::surface::Surface {
         du: u,
         dv: v,
         ..surface
     };
     let texture = &packed.textures.records[packed.textures.lookups[material.lookups.x as usize].texture as usize];
-    [found, mapped_normal(by_triangle, texture, LEAN)]
+    [found, mapped_normal(triangle_surface, texture, MAP_NORMAL)]
 }
 
-/// Returns the maximum angles in degrees between normals across edges and seams (with interpolated tangents, and with
-/// tangents per triangle), and the number of edges.
-fn jumps(packed: &Packed, is_looked_at: impl Fn(Vec3) -> bool) -> ([f32; 2], usize) {
+/// Returns the maximum angles in degrees between the normals on both sides of edges and seams (with interpolated
+/// tangents, and with tangents per triangle), and the number of edges.
+fn max_normal_jumps(packed: &Packed, is_compared: impl Fn(Vec3) -> bool) -> ([f32; 2], usize) {
     let mesh = &packed.bvh.meshes[0];
     let mut sides: HashMap<_, Vec<[Vec3; 2]>> = HashMap::new();
     for (slot, triangle) in mesh.triangles.iter().enumerate() {
         let corners = [triangle.x, triangle.y, triangle.z].map(|vertex| mesh.vertices[vertex as usize].truncate());
         for (i, j) in [(0, 1), (1, 2), (2, 0)] {
-            let ends = [Vec2::ZERO, Vec2::X, Vec2::Y];
-            let mut points = [(corners[i], ends[i]), (corners[j], ends[j])];
+            let barycentrics = [Vec2::ZERO, Vec2::X, Vec2::Y];
+            let mut points = [(corners[i], barycentrics[i]), (corners[j], barycentrics[j])];
             points.sort_by_key(|(point, _)| point.to_array().map(f32::to_bits));
             let [(from, b), (to, c)] = points;
-            if is_looked_at(from) && is_looked_at(to) {
+            if is_compared(from) && is_compared(to) {
                 let key = [from, to].map(|point| point.to_array().map(f32::to_bits));
                 sides
                     .entry(key)
@@ -175,30 +175,30 @@ fn jumps(packed: &Packed, is_looked_at: impl Fn(Vec3) -> bool) -> ([f32; 2], usi
             }
         }
     }
-    let mut worst = [0.0; 2];
+    let mut max_jumps = [0.0; 2];
     let mut edges = 0;
     for normals in sides.values() {
         if let [a, b] = normals[..] {
             edges += 1;
-            for (worst, (a, b)) in worst.iter_mut().zip(a.into_iter().zip(b)) {
-                *worst = f32::max(*worst, a.angle_between(b).to_degrees());
+            for (max_jump, (a, b)) in max_jumps.iter_mut().zip(a.into_iter().zip(b)) {
+                *max_jump = f32::max(*max_jump, a.angle_between(b).to_degrees());
             }
         }
     }
-    (worst, edges)
+    (max_jumps, edges)
 }
 
 #[test]
 fn normals_do_not_jump_at_edges_and_seams() {
     let sphere = Sheet::sphere(16, 8);
-    // For any texture transform.
+    // The normals are continuous for any texture transform.
     for texture in ["", "rotate = 45", "rotate = 90\nscale = [3, 0.5]", "scale = [-1, 1]"] {
-        let packed = leaning(&sphere.obj(), texture, "");
-        let (found, edges) = jumps(&packed, |p| p.z.abs() < 0.99);
+        let packed = pack_tilted(&sphere.obj(), texture, "");
+        let (found, edges) = max_normal_jumps(&packed, |p| p.z.abs() < 0.99);
         println!("sphere, {texture}: {found:?} at {edges} edges");
         assert!(edges > 250 && found[0] < 0.05 && found[1] > 4.0, "{texture}: {found:?}");
-        let packed = leaning(&Sheet::torus(16, 12).obj(), texture, "scale = [1, 2, 1]");
-        let (found, edges) = jumps(&packed, |_| true);
+        let packed = pack_tilted(&Sheet::torus(16, 12).obj(), texture, "scale = [1, 2, 1]");
+        let (found, edges) = max_normal_jumps(&packed, |_| true);
         println!("torus, {texture}: {found:?} at {edges} edges");
         assert!(
             edges == 16 * 12 * 3 && found[0] < 0.05 && found[1] > 4.0,
@@ -207,17 +207,17 @@ fn normals_do_not_jump_at_edges_and_seams() {
     }
 }
 
-fn largest_step(packed: &Packed) -> f32 {
+fn max_pixel_step(packed: &Packed) -> f32 {
     let pixels: Vec<[f32; 3]> = reference(packed).means().collect();
     let (width, height) = (192, 144);
-    let mut largest = 0.0;
+    let mut max_step = 0.0;
     for (x, y) in (0..height - 1).flat_map(|y| (0..width - 1).map(move |x| (x, y))) {
-        let at = pixels[y * width + x][0];
-        for other in [pixels[y * width + x + 1][0], pixels[(y + 1) * width + x][0]] {
-            largest = f32::max(largest, (at - other).abs());
+        let value = pixels[y * width + x][0];
+        for neighbor in [pixels[y * width + x + 1][0], pixels[(y + 1) * width + x][0]] {
+            max_step = f32::max(max_step, (value - neighbor).abs());
         }
     }
-    largest
+    max_step
 }
 
 #[test]
@@ -225,13 +225,13 @@ fn an_image_shows_no_triangles() {
     let light = "[[lights]]\ntype = 'directional'\ndirection = [0.2, 1, -0.7]\ncolor = [1, 1, 1]";
     // The camera faces the seam.
     let shape = format!("rotate = [0, 0, -80]\n{light}");
-    let mut packed = leaning(&Sheet::sphere(16, 8).obj(), "", &shape);
-    let found = largest_step(&packed);
+    let mut packed = pack_tilted(&Sheet::sphere(16, 8).obj(), "", &shape);
+    let found = max_pixel_step(&packed);
     // Control: tangents per triangle.
     packed.bvh.instances[0].tangents = NO_INDEX;
-    let by_triangle = largest_step(&packed);
-    println!("steps of {found}, {by_triangle} without tangents");
-    assert!(found < 0.005 && by_triangle > 0.015, "{found} {by_triangle}");
+    let per_triangle = max_pixel_step(&packed);
+    println!("steps of {found}, {per_triangle} without tangents");
+    assert!(found < 0.005 && per_triangle > 0.015, "{found} {per_triangle}");
 }
 
 #[test]
@@ -242,31 +242,31 @@ fn tangents_of_mirrored_texture_coordinates_are_not_averaged() {
         let normal = DVec3::new(sin, 0.0, cos);
         [normal + DVec3::Y * (v - 0.5), normal]
     });
-    let plain = leaning(&sheet.obj(), "", "");
+    let plain = pack_tilted(&sheet.obj(), "", "");
     assert_eq!(plain.bvh.meshes[0].vertices.len(), 9 * 5);
     for uv in &mut sheet.uvs {
         uv[0] = (uv[0] - 0.5).abs();
     }
-    let packed = leaning(&sheet.obj(), "", "");
+    let packed = pack_tilted(&sheet.obj(), "", "");
     let mesh = &packed.bvh.meshes[0];
     // The shared vertices of the middle are split.
     assert_eq!(mesh.vertices.len(), 9 * 5 + 5);
     assert_eq!(mesh.attributes.len(), mesh.vertices.len());
     assert_eq!(mesh.tangents.len(), mesh.vertices.len());
     for slot in 0..mesh.triangles.len() {
-        for b in PLACES {
+        for b in BARYCENTRICS {
             let prim = fetch_hit_primitive(&packed, hit(&packed, slot, b));
-            let at = prim.primitive.anchor + prim.edge_1 * b.x + prim.edge_2 * b.y;
+            let point = prim.primitive.anchor + prim.edge_1 * b.x + prim.edge_2 * b.y;
             let middle = prim.primitive.anchor + (prim.edge_1 + prim.edge_2) / 3.0;
             // u is along x on the right, against x on the left; v is along y.
-            let right = Vec3::new(at.z, 0.0, -at.x).normalize() * middle.x.signum();
+            let tangent = Vec3::new(point.z, 0.0, -point.x).normalize() * middle.x.signum();
             let found = face_frame(&prim, b);
-            assert!(found.u.angle_between(right) < 0.01, "{at}: {} {right}", found.u);
-            assert!(found.v.angle_between(Vec3::Y) < 0.01, "{at}: {}", found.v);
+            assert!(found.u.angle_between(tangent) < 0.01, "{point}: {} {tangent}", found.u);
+            assert!(found.v.angle_between(Vec3::Y) < 0.01, "{point}: {}", found.v);
             let normal = normals(&packed, slot, b)[0];
-            let outward = Vec3::new(at.x, 0.0, at.z).normalize();
-            let expected = right * LEAN.x + outward * LEAN.z;
-            assert!(normal.angle_between(expected) < 0.01, "{at}: {normal} {expected}");
+            let outward = Vec3::new(point.x, 0.0, point.z).normalize();
+            let expected = tangent * MAP_NORMAL.x + outward * MAP_NORMAL.z;
+            assert!(normal.angle_between(expected) < 0.01, "{point}: {normal} {expected}");
         }
     }
 }
@@ -274,22 +274,22 @@ fn tangents_of_mirrored_texture_coordinates_are_not_averaged() {
 #[test]
 fn tangents_are_averaged_only_across_continuous_textures() {
     // Two sheets that meet at x = 1; the right sheet has a different texture transform.
-    let directions = |turn: f64, shift: f64| {
+    let directions = |rotation: f64, shift: f64| {
         let sheet = |left: f64| Sheet::of(2, 2, |u, v| [DVec3::new(left + u, v, 0.0), DVec3::Z]);
-        let (mut whole, right) = (sheet(0.0), sheet(1.0));
-        let (sin, cos) = turn.to_radians().sin_cos();
-        let first = whole.form.points.len() as u32;
+        let (mut joined, right) = (sheet(0.0), sheet(1.0));
+        let (sin, cos) = rotation.to_radians().sin_cos();
+        let offset = joined.form.points.len() as u32;
         for p in &right.form.points {
             let (x, y) = (p.x - 1.0, p.y - 0.5);
-            whole
+            joined
                 .uvs
                 .push([1.0 + shift + x * cos + y * sin, 0.5 + y * cos - x * sin]);
         }
-        whole.form.points.extend(right.form.points);
-        whole.normals.extend(right.normals);
+        joined.form.points.extend(right.form.points);
+        joined.normals.extend(right.normals);
         let triangles = right.form.triangles.into_iter();
-        whole.form.triangles.extend(triangles.map(|t| t.map(|i| first + i)));
-        let packed = leaning(&whole.obj(), "", "");
+        joined.form.triangles.extend(triangles.map(|t| t.map(|i| offset + i)));
+        let packed = pack_tilted(&joined.obj(), "", "");
         let mesh = &packed.bvh.meshes[0];
         let mut directions: Vec<f32> = mesh
             .vertices
@@ -309,10 +309,10 @@ fn tangents_are_averaged_only_across_continuous_textures() {
 #[test]
 fn only_smooth_meshes_with_normal_maps_have_tangents() {
     let sphere = Sheet::sphere(16, 8);
-    let (with, count) = (leaning(&sphere.obj(), "", ""), 17 * 9);
-    assert_eq!(with.bvh.meshes[0].tangents.len(), count - 2); // one vertex of each pole is unused
-    assert!(with.bvh.instances[0].tangents != NO_INDEX);
-    let flat = leaning(&sphere.obj(), "", "normals = 'flat'");
+    let (smooth, count) = (pack_tilted(&sphere.obj(), "", ""), 17 * 9);
+    assert_eq!(smooth.bvh.meshes[0].tangents.len(), count - 2); // one vertex of each pole is unused
+    assert!(smooth.bvh.instances[0].tangents != NO_INDEX);
+    let flat = pack_tilted(&sphere.obj(), "", "normals = 'flat'");
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("mesh.obj"), sphere.obj()).unwrap();
     let text = format!("{HEAD}[[shapes]]\ntype = 'mesh'\nfile = 'mesh.obj'\nmaterial = 'm'");
@@ -328,27 +328,27 @@ fn only_smooth_meshes_with_normal_maps_have_tangents() {
 /// The texture coordinates are constant, discontinuous or extreme, or the tangents of adjacent triangles cancel.
 #[test]
 fn degenerate_texture_coordinates_give_unit_normals() {
-    let size = |factor: f64| move |[u, v]: [f64; 2]| [u * factor, v * factor];
+    let scale_uv = |factor: f64| move |[u, v]: [f64; 2]| [u * factor, v * factor];
     let maps: [&dyn Fn([f64; 2]) -> [f64; 2]; 8] = [
         &|_| [0.5, 0.5],
         &|[u, _]| [u, 0.0],
         &|[u, v]| [u, v * 1e-12],
         &|[u, v]| [(7.0 * u).fract(), (5.0 * v).fract()],
         &|[u, v]| [(u * 8.0).round() / 8.0, v],
-        &size(1e-30),
-        &size(1e30),
+        &scale_uv(1e-30),
+        &scale_uv(1e30),
         &|[u, v]| [u.mul_add(91.0, v * 17.0).sin(), (u * 53.0).cos()],
     ];
-    for (number, map) in maps.into_iter().enumerate() {
+    for (case, map) in maps.into_iter().enumerate() {
         let mut sheet = Sheet::torus(16, 12);
         sheet.uvs.iter_mut().for_each(|uv| *uv = map(*uv));
-        let packed = leaning(&sheet.obj(), "rotate = 30", "scale = 1e-6");
+        let packed = pack_tilted(&sheet.obj(), "rotate = 30", "scale = 1e-6");
         for slot in 0..packed.bvh.meshes[0].triangles.len() {
-            for b in PLACES {
+            for b in BARYCENTRICS {
                 let normal = normals(&packed, slot, b)[0];
                 assert!(
                     (normal.length() - 1.0).abs() < 1e-5,
-                    "{number}: {slot}, {b}: {normal}, {:?}",
+                    "{case}: {slot}, {b}: {normal}, {:?}",
                     fetch_hit_primitive(&packed, hit(&packed, slot, b))
                 );
             }

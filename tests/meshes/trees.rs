@@ -1,5 +1,5 @@
 //! Hits and occlusion do not depend on the BVH: brute force as in `docs/decisions/trees.md`, the built BVHs and
-//! arbitrary ones give the same bits.
+//! arbitrary BVHs give the same bits.
 
 use std::sync::Arc;
 
@@ -33,26 +33,32 @@ fn corners(scene: &Packed, i: &Instance, slot: usize) -> [Vec3; 3] {
     [triangle.x, triangle.y, triangle.z].map(|vertex| mesh.vertices[vertex as usize].xyz())
 }
 
-fn room(scene: &Packed, origin: Vec3) -> f32 {
+fn padding(scene: &Packed, origin: Vec3) -> f32 {
     scene.counts.item_padding.x * (largest(origin) + scene.counts.item_padding.y)
 }
 
 /// Returns the closest hit by brute force, without culling by distance.
-fn nearest(scene: &Packed, ray: Ray, left: UVec2, wall: UVec2) -> Hit {
-    let mut hit = closest_primitive(scene, ray, standalone_prim(left), standalone_prim(wall));
-    let world = slabs(ray.origin, ray.direction, room(scene, ray.origin));
+fn brute_force_hit(scene: &Packed, ray: Ray, origin_prim: UVec2, inside_prim: UVec2) -> Hit {
+    let mut hit = closest_primitive(scene, ray, standalone_prim(origin_prim), standalone_prim(inside_prim));
+    let world = slabs(ray.origin, ray.direction, padding(scene, ray.origin));
     for item in &scene.bvh.items {
-        let passage = box_interval(item.low, item.high, world);
-        if !interval_hits(passage, INFINITE_T) {
+        let interval = box_interval(item.low, item.high, world);
+        if !interval_hits(interval, INFINITE_T) {
             continue;
         }
         let kind = item.kind & 0xff;
         if kind != INSTANCE {
-            let wall = item.index == standalone_prim(wall);
-            let met = intersect(kind, &scene.primitives[item.index as usize], wall, ray, INFINITE_T);
-            if met < INFINITE_T && item.index != standalone_prim(left) {
+            let from_inside = item.index == standalone_prim(inside_prim);
+            let t = intersect(
+                kind,
+                &scene.primitives[item.index as usize],
+                from_inside,
+                ray,
+                INFINITE_T,
+            );
+            if t < INFINITE_T && item.index != standalone_prim(origin_prim) {
                 let found = Hit {
-                    t: met.max(passage.x),
+                    t: t.max(interval.x),
                     primitive: item.index,
                     ..no_hit()
                 };
@@ -61,22 +67,22 @@ fn nearest(scene: &Packed, ray: Ray, left: UVec2, wall: UVec2) -> Hit {
             continue;
         }
         let i = &scene.bvh.instances[item.index as usize];
-        let start = passage.x.max(0.0);
+        let t_min = interval.x.max(0.0);
         let direction = vector_to_mesh(i, ray.direction);
-        let origin = point_to_mesh(i, ray.origin) + direction * start;
+        let origin = point_to_mesh(i, ray.origin) + direction * t_min;
         let s = slabs(origin, direction, mesh_pad(i, origin));
         for (slot, triangle) in scene.bvh.meshes[i.mesh as usize].triangles.iter().enumerate() {
             let [v0, v1, v2] = corners(scene, i, slot);
             let crossing = triangle_crossing(v0, v1, v2, origin, shear_of(direction), s);
             let found = Hit {
-                t: start + crossing.t.max(0.0),
+                t: t_min + crossing.t.max(0.0),
                 instance: item.index + 1,
                 primitive: triangle.w,
                 slot: slot as u32,
                 barycentric: crossing.barycentric,
             };
-            let own = left == UVec2::new(found.instance, found.primitive);
-            if crossing.is_hit && found.t > 0.0 && !own {
+            let is_own = origin_prim == UVec2::new(found.instance, found.primitive);
+            if crossing.is_hit && found.t > 0.0 && !is_own {
                 hit = nearer_hit(hit, found);
             }
         }
@@ -85,39 +91,40 @@ fn nearest(scene: &Packed, ray: Ray, left: UVec2, wall: UVec2) -> Hit {
 }
 
 /// Returns the mask of occluded samples by brute force.
-fn hidden(scene: &Packed, surface: &Surface, light: &Light, block: SampleBlock) -> u32 {
+fn brute_force_occlusion(scene: &Packed, surface: &Surface, light: &Light, block: SampleBlock) -> u32 {
     let mut bits = occluded_by_primitives(scene, surface, light, block);
     let origin = surface.ray_origin;
-    let to = segments_to_light(light, origin);
+    let segments = segments_to_light(light, origin);
     for item in scene.bvh.items.iter().filter(|item| item.kind & CASTS_SHADOW != 0) {
         for sample in 0..block.count {
-            let at = block_sample(block, sample);
-            let world = slabs(origin, segment(to, at), room(scene, origin));
+            let point = block_sample(block, sample);
+            let world = slabs(origin, segment(segments, point), padding(scene, origin));
             if !interval_hits(box_interval(item.low, item.high, world), light.t_max) {
                 continue;
             }
             let is_occluded = if item.kind & 0xff == INSTANCE {
                 let i = &scene.bvh.instances[item.index as usize];
-                let start = point_to_mesh(i, origin);
-                let [towards, u, v] = [to.towards, to.u, to.v].map(|v| vector_to_mesh(i, v));
-                let direction = segment(wgray_render::cpu::light::LightSegments { towards, u, v }, at);
-                let s = slabs(start, direction, mesh_pad(i, start));
+                let mesh_origin = point_to_mesh(i, origin);
+                let [towards, u, v] = [segments.towards, segments.u, segments.v].map(|v| vector_to_mesh(i, v));
+                let direction = segment(wgray_render::cpu::light::LightSegments { towards, u, v }, point);
+                let s = slabs(mesh_origin, direction, mesh_pad(i, mesh_origin));
                 let mesh = &scene.bvh.meshes[i.mesh as usize];
                 mesh.triangles.iter().enumerate().any(|(slot, triangle)| {
                     let group = mesh.groups.get(slot).copied().unwrap_or(0);
                     let casts = scene.bvh.group_words[(i.materials + group) as usize] & NO_SHADOW == 0;
                     let [v0, v1, v2] = corners(scene, i, slot);
-                    let crossing = triangle_crossing(v0, v1, v2, start, shear_of(direction), s);
-                    let own = surface.exclude_front == UVec2::new(item.index + 1, triangle.w);
-                    casts && !own && crossing.is_hit && crossing.t > 0.0 && crossing.t < light.t_max
+                    let crossing = triangle_crossing(v0, v1, v2, mesh_origin, shear_of(direction), s);
+                    let is_own = surface.exclude_front == UVec2::new(item.index + 1, triangle.w);
+                    casts && !is_own && crossing.is_hit && crossing.t > 0.0 && crossing.t < light.t_max
                 })
             } else {
-                let (own, wall) = (
+                let (origin_prim, from_inside) = (
                     standalone_prim(surface.exclude_front),
                     item.index == standalone_prim(surface.exclude_back),
                 );
                 let q = &scene.primitives[item.index as usize];
-                item.index != own && occlusion_mask(item.kind & 0xff, q, origin, wall, light, block) >> sample & 1 == 1
+                item.index != origin_prim
+                    && occlusion_mask(item.kind & 0xff, q, origin, from_inside, light, block) >> sample & 1 == 1
             };
             bits |= u32::from(is_occluded) << sample;
         }
@@ -126,20 +133,20 @@ fn hidden(scene: &Packed, surface: &Surface, light: &Light, block: SampleBlock) 
 }
 
 /// Random rays from and to points on triangles, edges, vertices and box corners.
-struct Aims<'a> {
+struct RaySampler<'a> {
     scene: &'a Packed,
     random: &'a Random,
     low: Vec3,
     high: Vec3,
 }
 
-impl<'a> Aims<'a> {
-    fn new(scene: &'a Packed, random: &'a Random) -> Aims<'a> {
+impl<'a> RaySampler<'a> {
+    fn new(scene: &'a Packed, random: &'a Random) -> RaySampler<'a> {
         let boxes = scene.bvh.items.iter().map(|item| (item.low, item.high));
         let (low, high) = boxes.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), (l, h)| {
             (low.min(l), high.max(h))
         });
-        Aims {
+        RaySampler {
             scene,
             random,
             low,
@@ -147,18 +154,18 @@ impl<'a> Aims<'a> {
         }
     }
 
-    fn number(&self) -> f32 {
+    fn unit(&self) -> f32 {
         self.random.unit() as f32
     }
 
-    fn anywhere(&self) -> Vec3 {
-        let middle = (self.low + self.high) * 0.5;
-        let part = Vec3::new(self.number(), self.number(), self.number()) * 2.0 - 1.0;
-        middle + part * (self.high - middle) * self.random.pick(&[1.0, 2.0, 20.0])
+    fn random_point(&self) -> Vec3 {
+        let center = (self.low + self.high) * 0.5;
+        let part = Vec3::new(self.unit(), self.unit(), self.unit()) * 2.0 - 1.0;
+        center + part * (self.high - center) * self.random.pick(&[1.0, 2.0, 20.0])
     }
 
     /// Returns a point and the triangle that it lies on, if any.
-    fn target(&self) -> (Vec3, UVec2) {
+    fn random_target(&self) -> (Vec3, UVec2) {
         let (scene, random) = (self.scene, self.random);
         let item: &BvhItem = &scene.bvh.items[random.below(scene.bvh.items.len() as u32) as usize];
         if item.kind & 0xff != INSTANCE || random.once_in(8) {
@@ -167,63 +174,67 @@ impl<'a> Aims<'a> {
                 item.low,
                 item.high,
             );
-            let at = if random.once_in(4) {
+            let point = if random.once_in(4) {
                 corner
             } else {
-                item.low + (item.high - item.low) * self.number()
+                item.low + (item.high - item.low) * self.unit()
             };
-            return (at, NO_PRIMITIVE);
+            return (point, NO_PRIMITIVE);
         }
         let i = &scene.bvh.instances[item.index as usize];
         let slot = random.below(scene.bvh.meshes[i.mesh as usize].triangles.len() as u32) as usize;
         let [a, b, c] = corners(scene, i, slot);
         let p = match random.below(4) {
             0 => a,
-            1 => a + (b - a) * self.number(),
+            1 => a + (b - a) * self.unit(),
             _ => {
-                let (x, y) = (self.number() * 0.5, self.number() * 0.5);
+                let (x, y) = (self.unit() * 0.5, self.unit() * 0.5);
                 a + (b - a) * x + (c - a) * y
             }
         };
-        let at = i.anchor + i.u * p.x + i.v * p.y + i.w * p.z;
+        let point = i.anchor + i.u * p.x + i.v * p.y + i.w * p.z;
         (
-            at,
+            point,
             UVec2::new(item.index + 1, scene.bvh.meshes[i.mesh as usize].triangles[slot].w),
         )
     }
 
     fn ray(&self) -> (Ray, UVec2) {
-        let (start, own) = if self.random.once_in(3) {
-            self.target()
+        let (start, start_prim) = if self.random.once_in(3) {
+            self.random_target()
         } else {
-            (self.anywhere(), NO_PRIMITIVE)
+            (self.random_point(), NO_PRIMITIVE)
         };
-        let (target, _) = self.target();
+        let (target, _) = self.random_target();
         let direction = match self.random.below(8) {
             0 => self.random.pick(&Vec3::AXES) * self.random.pick(&[1.0, -1.0]),
             1 => target - start,
             2 => Vec3::new(target.x - start.x, target.y - start.y, 0.0).normalize_or(Vec3::X),
             _ => (target - start).normalize_or(Vec3::X),
         };
-        let left = if self.random.once_in(2) { own } else { NO_PRIMITIVE };
+        let origin_prim = if self.random.once_in(2) {
+            start_prim
+        } else {
+            NO_PRIMITIVE
+        };
         (
             Ray {
                 origin: start,
                 direction,
             },
-            left,
+            origin_prim,
         )
     }
 
     fn shadow(&self) -> (Surface, Light, SampleBlock) {
-        let (start, own) = if self.random.once_in(2) {
-            self.target()
+        let (start, start_prim) = if self.random.once_in(2) {
+            self.random_target()
         } else {
-            (self.anywhere(), NO_PRIMITIVE)
+            (self.random_point(), NO_PRIMITIVE)
         };
-        let (end, _) = self.target();
+        let (end, _) = self.random_target();
         let size = (self.high - self.low).max_element() * self.random.pick(&[0.0, 0.1, 1.0]);
-        let edge = || (Vec3::new(self.number(), self.number(), self.number()) - 0.5) * size;
+        let edge = || (Vec3::new(self.unit(), self.unit(), self.unit()) - 0.5) * size;
         let mut light: Light = bytemuck::Zeroable::zeroed();
         light.primitive = NO_INDEX;
         (light.u, light.v) = (edge(), edge());
@@ -235,7 +246,7 @@ impl<'a> Aims<'a> {
         }
         let mut surface = unused_surface();
         surface.ray_origin = start;
-        (surface.exclude_front, surface.exclude_back) = (own, own);
+        (surface.exclude_front, surface.exclude_back) = (start_prim, start_prim);
         let key = UVec2::new(self.random.bits() as u32, self.random.bits() as u32);
         let count = self.random.pick(&[1, 7, SAMPLE_BLOCK]);
         let block = SampleBlock {
@@ -275,31 +286,31 @@ fn bits(hit: Hit) -> [u32; 5] {
     [hit.t.to_bits(), hit.instance, hit.primitive, u, v]
 }
 
-/// Returns how many rays and shadow blocks differ from brute force, and how many hit or are occluded.
+/// Returns the numbers of rays and of shadow blocks that differ from brute force, of hits and of occluded blocks.
 fn differing(scene: &Packed, rays: u32, seed: u64) -> [u32; 4] {
     let random = Random::new(seed);
-    let aims = Aims::new(scene, &random);
-    let [mut hits, mut shadows, mut met, mut dark] = [0; 4];
+    let sampler = RaySampler::new(scene, &random);
+    let [mut wrong_hits, mut wrong_shadows, mut hit_count, mut occluded_count] = [0; 4];
     for _ in 0..rays {
-        let (ray, left) = aims.ray();
-        let rule = nearest(scene, ray, left, NO_PRIMITIVE);
-        let found = closest_hit(scene, ray, left, NO_PRIMITIVE);
-        hits += u32::from(bits(rule) != bits(found) || rule.slot != found.slot);
-        met += u32::from(rule.primitive != NO_INDEX);
-        let (surface, light, block) = aims.shadow();
-        let rule = hidden(scene, &surface, &light, block);
+        let (ray, origin_prim) = sampler.ray();
+        let expected = brute_force_hit(scene, ray, origin_prim, NO_PRIMITIVE);
+        let found = closest_hit(scene, ray, origin_prim, NO_PRIMITIVE);
+        wrong_hits += u32::from(bits(expected) != bits(found) || expected.slot != found.slot);
+        hit_count += u32::from(expected.primitive != NO_INDEX);
+        let (surface, light, block) = sampler.shadow();
+        let expected = brute_force_occlusion(scene, &surface, &light, block);
         // Unlit samples are not traced.
         let unlit = random.pick(&[0, random.pick(&[0x5555_5555, 0xffff_0000, 1])]) & u32::MAX >> (32 - block.count);
-        shadows += u32::from(rule | unlit != occluded_samples(scene, &surface, &light, block, unlit));
-        dark += u32::from(rule != 0);
+        wrong_shadows += u32::from(expected | unlit != occluded_samples(scene, &surface, &light, block, unlit));
+        occluded_count += u32::from(expected != 0);
     }
-    [hits, shadows, met, dark]
+    [wrong_hits, wrong_shadows, hit_count, occluded_count]
 }
 
-/// Builds the nodes of a BVH over boxes; also returns the order of the boxes.
+/// Returns the nodes of a BVH over boxes, and the order of the boxes.
 type Builder<'a> = &'a dyn Fn(&[Aabb]) -> (Vec<bvh::Node>, Vec<u32>);
 
-fn with_trees(scene: &Packed, tree: Builder) -> Packed {
+fn with_bvhs(scene: &Packed, build: Builder) -> Packed {
     let mut scene = scene.clone();
     let boxes: Vec<Aabb> = scene
         .bvh
@@ -310,21 +321,21 @@ fn with_trees(scene: &Packed, tree: Builder) -> Packed {
             high: item.high,
         })
         .collect();
-    let (nodes, order) = tree(&boxes);
+    let (nodes, order) = build(&boxes);
     scene.bvh.nodes = bytemuck::cast_vec(nodes);
     scene.bvh.items = order.iter().map(|i| scene.bvh.items[*i as usize]).collect();
     for mesh in &mut scene.bvh.meshes {
         let mesh = Arc::make_mut(mesh);
         let position = |vertex: u32| mesh.vertices[vertex as usize].xyz();
-        let around = |t: &glam::UVec4| {
+        let bounds = |t: &glam::UVec4| {
             let [a, b, c] = [t.x, t.y, t.z].map(position);
             Aabb {
                 low: lowest(a, b, c),
                 high: highest(a, b, c),
             }
         };
-        let boxes: Vec<Aabb> = mesh.triangles.iter().map(around).collect();
-        let (nodes, order) = tree(&boxes);
+        let boxes: Vec<Aabb> = mesh.triangles.iter().map(bounds).collect();
+        let (nodes, order) = build(&boxes);
         mesh.nodes = bytemuck::cast_vec(nodes);
         mesh.triangles = order.iter().map(|i| mesh.triangles[*i as usize]).collect();
         if !mesh.groups.is_empty() {
@@ -334,19 +345,19 @@ fn with_trees(scene: &Packed, tree: Builder) -> Packed {
     scene
 }
 
-fn built(boxes: &[Aabb], most_in_leaf: u32) -> (Vec<bvh::Node>, Vec<u32>) {
-    let tree = bvh::build(boxes, most_in_leaf);
+fn build_bvh(boxes: &[Aabb], max_leaf_size: u32) -> (Vec<bvh::Node>, Vec<u32>) {
+    let tree = bvh::build(boxes, max_leaf_size);
     (tree.nodes, tree.order)
 }
 
-fn random_tree(boxes: &[Aabb], random: &Random) -> (Vec<bvh::Node>, Vec<u32>) {
+fn random_bvh(boxes: &[Aabb], random: &Random) -> (Vec<bvh::Node>, Vec<u32>) {
     let empty: bvh::Node = bytemuck::Zeroable::zeroed();
     let (mut nodes, mut order) = (vec![empty], Vec::new());
     let mut pending = std::collections::VecDeque::from([(0, (0..boxes.len() as u32).collect::<Vec<_>>())]);
-    while let Some((number, items)) = pending.pop_front() {
-        let around = |items: &[u32]| items.iter().fold(Aabb::EMPTY, |all, i| all.with(&boxes[*i as usize]));
-        let whole = around(&items);
-        let mut node = grid(&whole);
+    while let Some((node_index, items)) = pending.pop_front() {
+        let union = |items: &[u32]| items.iter().fold(Aabb::EMPTY, |all, i| all.with(&boxes[*i as usize]));
+        let bounds = union(&items);
+        let mut node = grid(&bounds);
         node.first_item = order.len() as u32;
         node.first_child = nodes.len() as u32;
         let mut parts: Vec<Vec<u32>> = vec![Vec::new(); 8];
@@ -359,7 +370,7 @@ fn random_tree(boxes: &[Aabb], random: &Random) -> (Vec<bvh::Node>, Vec<u32>) {
             if part.is_empty() {
                 continue;
             }
-            set_bounds(&mut node, slot, &around(part));
+            set_bounds(&mut node, slot, &union(part));
             if part.len() <= 1 + random.below(4) as usize {
                 node.leaves[slot] = (part.len() << 5 | (order.len() - node.first_item as usize)) as u8;
                 order.extend(part);
@@ -369,7 +380,7 @@ fn random_tree(boxes: &[Aabb], random: &Random) -> (Vec<bvh::Node>, Vec<u32>) {
                 nodes.push(empty);
             }
         }
-        nodes[number] = node;
+        nodes[node_index] = node;
     }
     (nodes, order)
 }
@@ -388,17 +399,17 @@ fn grid(bounds: &Aabb) -> bvh::Node {
 fn set_bounds(node: &mut bvh::Node, slot: usize, bounds: &Aabb) {
     for axis in 0..3 {
         let step = f32::from_bits(u32::from(node.exponents[axis]) << 23);
-        let at = |q: u8| node.base[axis] + f32::from(q) * step;
-        let low = (0..=255).rev().find(|q| at(*q) <= bounds.low[axis]);
-        let high = (0..=255).find(|q| at(*q) >= bounds.high[axis]);
-        node.low[axis][slot] = low.expect("a box in its parent's");
-        node.high[axis][slot] = high.expect("a box in its parent's");
+        let coordinate = |q: u8| node.base[axis] + f32::from(q) * step;
+        let low = (0..=255).rev().find(|q| coordinate(*q) <= bounds.low[axis]);
+        let high = (0..=255).find(|q| coordinate(*q) >= bounds.high[axis]);
+        node.low[axis][slot] = low.expect("a box inside the parent box");
+        node.high[axis][slot] = high.expect("a box inside the parent box");
     }
 }
 
 /// Returns a BVH whose upper bounds are one grid step too small.
-fn too_small(boxes: &[Aabb]) -> (Vec<bvh::Node>, Vec<u32>) {
-    let (mut nodes, order) = built(boxes, 2);
+fn build_too_small(boxes: &[Aabb]) -> (Vec<bvh::Node>, Vec<u32>) {
+    let (mut nodes, order) = build_bvh(boxes, 2);
     for node in &mut nodes {
         for (low, high) in node.low.iter().zip(&mut node.high) {
             for (low, high) in low.iter().zip(high) {
@@ -465,27 +476,30 @@ fn bvhs_miss_no_hit_and_no_shadow() {
         ("knots", scenes::packed(&scenes::scene("twisted-tube.toml")), 600),
     ] {
         assert!(!scene.bvh.items.is_empty());
-        let [hits, shadows, met, dark] = differing(&scene, rays, 1);
-        println!("{name}: {met} of {rays} rays meet something, {dark} are in some shadow");
-        assert!(met > rays / 4 && dark > rays / 10, "{name}: {met} {dark}");
-        assert_eq!((hits, shadows), (0, 0), "{name}: {rays} rays");
+        let [wrong_hits, wrong_shadows, hit_count, occluded_count] = differing(&scene, rays, 1);
+        println!("{name}: {hit_count} of {rays} rays hit, {occluded_count} shadow blocks are occluded");
+        assert!(
+            hit_count > rays / 4 && occluded_count > rays / 10,
+            "{name}: {hit_count} {occluded_count}"
+        );
+        assert_eq!((wrong_hits, wrong_shadows), (0, 0), "{name}: {rays} rays");
     }
 }
 
-/// Returns how many rays and shadow blocks differ.
+/// Returns the numbers of rays and of shadow blocks that differ between two scenes.
 fn differing_between(a: &Packed, b: &Packed, rays: u32) -> [u32; 2] {
     let random = Random::new(3);
-    let aims = Aims::new(a, &random);
-    let [mut hits, mut shadows] = [0; 2];
+    let sampler = RaySampler::new(a, &random);
+    let [mut wrong_hits, mut wrong_shadows] = [0; 2];
     for _ in 0..rays {
-        let (ray, left) = aims.ray();
-        let found = [a, b].map(|scene| bits(closest_hit(scene, ray, left, NO_PRIMITIVE)));
-        hits += u32::from(found[0] != found[1]);
-        let (surface, light, block) = aims.shadow();
+        let (ray, origin_prim) = sampler.ray();
+        let found = [a, b].map(|scene| bits(closest_hit(scene, ray, origin_prim, NO_PRIMITIVE)));
+        wrong_hits += u32::from(found[0] != found[1]);
+        let (surface, light, block) = sampler.shadow();
         let found = [a, b].map(|scene| occluded_samples(scene, &surface, &light, block, 0));
-        shadows += u32::from(found[0] != found[1]);
+        wrong_shadows += u32::from(found[0] != found[1]);
     }
-    [hits, shadows]
+    [wrong_hits, wrong_shadows]
 }
 
 #[test]
@@ -495,25 +509,25 @@ fn any_other_bvh_gives_the_same_bits() {
         ("soups", soups()),
         ("knots", scenes::packed(&scenes::scene("twisted-tube.toml"))),
     ] {
-        for most in 1..=4 {
-            let other = with_trees(&scene, &|boxes| built(boxes, most));
+        for max_leaf_size in 1..=4 {
+            let changed = with_bvhs(&scene, &|boxes| build_bvh(boxes, max_leaf_size));
             assert_eq!(
-                differing_between(&scene, &other, 4000),
+                differing_between(&scene, &changed, 4000),
                 [0, 0],
-                "{name}, {most} in a leaf"
+                "{name}, at most {max_leaf_size} per leaf"
             );
         }
-        let other = with_trees(&scene, &|boxes| random_tree(boxes, &random));
-        assert_ne!(other.bvh.nodes, scene.bvh.nodes);
-        assert_eq!(differing_between(&scene, &other, 250), [0, 0], "{name}, a random tree");
+        let changed = with_bvhs(&scene, &|boxes| random_bvh(boxes, &random));
+        assert_ne!(changed.bvh.nodes, scene.bvh.nodes);
+        assert_eq!(differing_between(&scene, &changed, 250), [0, 0], "{name}, a random BVH");
     }
 }
 
 #[test]
-fn a_bvh_with_too_small_boxes_is_found() {
+fn a_bvh_with_too_small_boxes_is_detected() {
     let scene = soups();
-    let [hits, shadows] = differing_between(&scene, &with_trees(&scene, &too_small), 20_000);
-    println!("{hits} hits and {shadows} shadows of 20000 are lost");
+    let [hits, shadows] = differing_between(&scene, &with_bvhs(&scene, &build_too_small), 20_000);
+    println!("{hits} hits and {shadows} shadow blocks of 20000 differ");
     assert!(hits > 10 && shadows > 10, "{hits} {shadows}");
 }
 
@@ -521,15 +535,15 @@ fn a_bvh_with_too_small_boxes_is_found() {
 fn bvhs_of_random_scenes_miss_nothing() {
     let mut runner = TestRunner::new_with_rng(Config::default(), TestRng::deterministic_rng(RngAlgorithm::ChaCha));
     let strategy = any_scene::description();
-    let mut with_tree = 0;
+    let mut with_bvh = 0;
     for case in 0..60 {
         let scene = any_scene::packed(&strategy.new_tree(&mut runner).expect("a scene").current());
         if scene.bvh.items.is_empty() {
             continue;
         }
-        with_tree += 1;
+        with_bvh += 1;
         let [hits, shadows, ..] = differing(&scene, 100, case);
         assert_eq!((hits, shadows), (0, 0), "random scene {case}");
     }
-    assert!(with_tree > 12, "{with_tree} scenes have a tree");
+    assert!(with_bvh > 12, "{with_bvh} scenes have a BVH");
 }

@@ -17,10 +17,10 @@ use crate::textures::{write_exr, write_png};
 /// A square from (-1, -1) to (1, 1), with texture coordinates from 0 to 1.
 const QUAD: &str = "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nvn 0 0 1\n\
                     f 1/1/1 2/2/1 3/3/1 4/4/1\n";
-/// A camera above, whose image is the square.
-const DOWN: &str =
+/// A camera above the square, whose image is the square.
+const CAMERA_ABOVE: &str =
     "camera = { type = 'orthographic', position = [0, 0, 9], look_at = [0, 0, 0], up = [0, 1, 0], height = 2 }\n";
-const ASIDE: &str = "camera = { position = [0.4, -2.2, 1.9], look_at = [0, 0, 0], fov = 60 }\n";
+const CAMERA_ASIDE: &str = "camera = { position = [0.4, -2.2, 1.9], look_at = [0, 0, 0], fov = 60 }\n";
 const SHAPE: &str = "[[shapes]]\ntype = 'mesh'\nfile = 'quad.obj'\nmaterial = 'm'\n";
 const COLORS: [[f32; 4]; 4] = [
     [1.0, 0.0, 0.25, 1.0],
@@ -41,15 +41,15 @@ fn scene(folder: &Path, samples: u32, text: &str, edit: impl Fn(&mut Mesh)) -> P
     let mut scene = scene.unwrap_or_else(|error| panic!("{error}"));
     for shape in &mut scene.shapes {
         if let Geometry::Mesh { mesh, .. } = &mut shape.geometry {
-            let mut own = (**mesh).clone();
-            edit(&mut own);
-            *mesh = Arc::new(own);
+            let mut edited = (**mesh).clone();
+            edit(&mut edited);
+            *mesh = Arc::new(edited);
         }
     }
     pack(&scene)
 }
 
-fn colored(mesh: &mut Mesh) {
+fn set_colors(mesh: &mut Mesh) {
     mesh.colors = mesh
         .positions
         .iter()
@@ -76,7 +76,7 @@ fn color_at(x: f64, y: f64) -> [f64; 4] {
 }
 
 /// Returns the center of a pixel of the camera above.
-fn place(i: usize) -> (f64, f64) {
+fn pixel_center(i: usize) -> (f64, f64) {
     ((i % 20) as f64 / 10.0 - 0.95, 0.95 - (i / 20) as f64 / 10.0)
 }
 
@@ -88,11 +88,16 @@ fn colors_of_vertices_are_interpolated() {
     let base = "environment = { color = [1, 1, 1] }\n\
                 materials.m = { type = 'principled', metallic = 0, specular = 0, vertex_colors = 'base_color' }\n";
     for (material, factor, error) in [(emission, 2.0, 0.02), (base, 1.0, 0.02)] {
-        let packed = scene(folder.path(), 64, &format!("{DOWN}{material}{SHAPE}"), colored);
-        let plain = scene(folder.path(), 64, &format!("{DOWN}{material}{SHAPE}"), |_| ());
+        let packed = scene(
+            folder.path(),
+            64,
+            &format!("{CAMERA_ABOVE}{material}{SHAPE}"),
+            set_colors,
+        );
+        let plain = scene(folder.path(), 64, &format!("{CAMERA_ABOVE}{material}{SHAPE}"), |_| ());
         for mode in both() {
             for (i, found) in means(&render(&packed, mode)).iter().enumerate() {
-                let (x, y) = place(i);
+                let (x, y) = pixel_center(i);
                 let expected = color_at(x, y);
                 for k in 0..3 {
                     let expected = factor * expected[k];
@@ -103,7 +108,7 @@ fn colors_of_vertices_are_interpolated() {
                 }
                 assert!((found[2] - 0.25 * factor).abs() < 1e-5, "{mode:?}: {found:?}");
             }
-            // Without vertex colors the emission is white.
+            // Without vertex colors, the emission is white.
             for found in means(&render(&plain, mode)) {
                 assert!(found.iter().all(|x| (x - factor).abs() < 1e-5), "{mode:?}: {found:?}");
             }
@@ -117,7 +122,7 @@ fn base_colors_above_one_are_clamped_and_emission_is_not() {
     let bright = |mesh: &mut Mesh| mesh.colors = vec![Vec4::new(4.0, 0.5, 1e6, 1.0); mesh.positions.len()];
     let material = |keys: &str| {
         format!(
-            "{DOWN}environment = {{ color = [1, 1, 1] }}\nmaterials.m = {{ type = 'principled', specular = 0, metallic = 0, {keys} }}\n{SHAPE}"
+            "{CAMERA_ABOVE}environment = {{ color = [1, 1, 1] }}\nmaterials.m = {{ type = 'principled', specular = 0, metallic = 0, {keys} }}\n{SHAPE}"
         )
     };
     let base = scene(
@@ -135,8 +140,8 @@ fn base_colors_above_one_are_clamped_and_emission_is_not() {
     for mode in both() {
         for (packed, expected) in [(&base, [1.0, 0.25, 1.0]), (&emission, [4.0, 0.5, 1e6])] {
             for found in means(&render(packed, mode)) {
-                let near = (0..3).all(|k| (found[k] / expected[k] - 1.0).abs() < 1e-4);
-                assert!(near, "{mode:?}: {found:?} {expected:?}");
+                let is_near = (0..3).all(|k| (found[k] / expected[k] - 1.0).abs() < 1e-4);
+                assert!(is_near, "{mode:?}: {found:?} {expected:?}");
             }
         }
     }
@@ -147,38 +152,38 @@ fn the_alpha_of_vertices_is_a_factor_of_alpha() {
     let folder = tempfile::tempdir().unwrap();
     let text = |colors: &str, mode: &str, alpha: f64| {
         format!(
-            "{DOWN}environment = {{ color = [1, 1, 1] }}\nmaterials.m = {{ type = 'principled', base_color = [0, 0, 0], metallic = 0, \
+            "{CAMERA_ABOVE}environment = {{ color = [1, 1, 1] }}\nmaterials.m = {{ type = 'principled', base_color = [0, 0, 0], metallic = 0, \
              specular = 0, alpha = {alpha}, alpha_mode = '{mode}', alpha_cutoff = 0.4, vertex_colors = '{colors}' }}\n{SHAPE}"
         )
     };
     for colors in ["base_color", "emission"] {
-        let blended = scene(folder.path(), 256, &text(colors, "blend", 0.8), colored);
-        let masked = scene(folder.path(), 4, &text(colors, "mask", 0.8), colored);
-        let opaque = scene(folder.path(), 4, &text(colors, "opaque", 1.0), colored);
+        let blended = scene(folder.path(), 256, &text(colors, "blend", 0.8), set_colors);
+        let masked = scene(folder.path(), 4, &text(colors, "mask", 0.8), set_colors);
+        let opaque = scene(folder.path(), 4, &text(colors, "opaque", 1.0), set_colors);
         for mode in both() {
-            let found = means(&render(&blended, mode));
-            let seen = first_hits(&blended, mode);
-            let cut = means(&render(&masked, mode));
+            let blended_means = means(&render(&blended, mode));
+            let hits = first_hits(&blended, mode);
+            let masked_means = means(&render(&masked, mode));
             for i in 0..400 {
-                let (x, y) = place(i);
+                let (x, y) = pixel_center(i);
                 let alpha = 0.8 * color_at(x, y)[3];
                 assert!(
-                    (found[i][0] - (1.0 - alpha)).abs() < 0.16,
+                    (blended_means[i][0] - (1.0 - alpha)).abs() < 0.16,
                     "{mode:?} {x} {y}: {:?} {alpha}",
-                    found[i]
+                    blended_means[i]
                 );
                 if (alpha - 0.5).abs() > 0.01 {
-                    assert_eq!(seen[i].depth > 0.0, alpha > 0.5, "{mode:?} {x} {y} {alpha}");
+                    assert_eq!(hits[i].depth > 0.0, alpha > 0.5, "{mode:?} {x} {y} {alpha}");
                 }
                 if (alpha - 0.4).abs() > 0.08 {
                     assert_eq!(
-                        cut[i][0],
+                        masked_means[i][0],
                         if alpha > 0.4 { 0.0 } else { 1.0 },
                         "{mode:?} {x} {y} {alpha}"
                     );
                 }
             }
-            let mean = found.iter().map(|pixel| pixel[0]).sum::<f64>() / 400.0;
+            let mean = blended_means.iter().map(|pixel| pixel[0]).sum::<f64>() / 400.0;
             // The mean of two triangles; both contain the ends of the diagonal.
             let alpha = 0.8 * (2.0 * (1.0 + 0.5) + 0.0 + 1.0) / 6.0;
             assert!((mean - (1.0 - alpha)).abs() < 0.01, "{mode:?}: {mean} {alpha}");
@@ -200,39 +205,39 @@ fn emission_from_vertex_colors_lights_like_plain_emission() {
              normal = [0, 0, 1]\ntangent = [1, 0, 0]\n"
         )
     };
-    let half = |mesh: &mut Mesh| mesh.colors = vec![Vec4::new(0.5, 0.25, 1.0, 0.5); mesh.positions.len()];
-    for (alpha, own_alpha) in [
+    let set_half = |mesh: &mut Mesh| mesh.colors = vec![Vec4::new(0.5, 0.25, 1.0, 0.5); mesh.positions.len()];
+    for (alpha, plain_alpha) in [
         ("", ""),
         (
             "alpha_mode = 'blend', alpha = 1, ",
             "alpha_mode = 'blend', alpha = 0.5, ",
         ),
     ] {
-        let of_vertices = scene(
+        let from_vertices = scene(
             folder.path(),
             16,
             &text(&format!("{alpha}emission = [4, 4, 4], vertex_colors = 'emission'")),
-            half,
+            set_half,
         );
-        let own = scene(
+        let plain = scene(
             folder.path(),
             16,
-            &text(&format!("{own_alpha}emission = [2, 1, 4]")),
+            &text(&format!("{plain_alpha}emission = [2, 1, 4]")),
             |_| (),
         );
-        let expected = reference(&own);
+        let expected = reference(&plain);
         assert!(means(&expected).iter().all(|pixel| pixel[0] > 0.1));
         for mode in exact_modes() {
-            let found = means(&render(&of_vertices, mode));
+            let found = means(&render(&from_vertices, mode));
             for (found, expected) in found.iter().zip(means(&expected)) {
-                let near = (0..3).all(|k| (found[k] / expected[k] - 1.0).abs() < 1e-5);
-                assert!(near, "{mode:?}: {found:?} {expected:?}");
+                let is_near = (0..3).all(|k| (found[k] / expected[k] - 1.0).abs() < 1e-5);
+                assert!(is_near, "{mode:?}: {found:?} {expected:?}");
             }
         }
     }
 }
 
-fn with_sets(mesh: &mut Mesh) {
+fn set_uv_sets(mesh: &mut Mesh) {
     let set = |map: fn(Vec2) -> Vec2| mesh.uvs.iter().copied().map(map).collect::<Vec<_>>();
     mesh.more_uvs = vec![
         set(|uv| Vec2::new(3.0 * uv.y, 0.5 + uv.x)),
@@ -253,7 +258,7 @@ fn textures_use_their_set_of_coordinates() {
     });
     let text = |set: u32, filter: &str, keys: &str| {
         format!(
-            "{ASIDE}environment = {{ color = [0.5, 0.5, 0.5] }}\n\
+            "{CAMERA_ASIDE}environment = {{ color = [0.5, 0.5, 0.5] }}\n\
              [textures.t]\ntype = 'image'\nfile = 't.exr'\nfilter = '{filter}'\nuv_set = {set}\n\
              [textures.first]\ntype = 'image'\nfile = 't.exr'\nfilter = '{filter}'\n\
              [materials.m]\ntype = 'principled'\nroughness = {{ texture = 'first', channel = 'g' }}\n{keys}\n{SHAPE}"
@@ -271,27 +276,38 @@ fn textures_use_their_set_of_coordinates() {
         (keys[2], "bilinear"),
     ] {
         let by_set: Vec<_> = (0..5)
-            .map(|set| scene(folder.path(), 4, &text(set, filter, keys), with_sets))
+            .map(|set| scene(folder.path(), 4, &text(set, filter, keys), set_uv_sets))
             .collect();
         for set in 0..4 {
-            // Compared with a mesh that has only this set. Roughness is omitted, because its texture coordinates would differ.
-            let without = |text: String| text.replace("roughness = { texture = 'first', channel = 'g' }\n", "");
-            let first = |mesh: &mut Mesh| {
-                with_sets(mesh);
+            // The control mesh has only this set. Roughness is omitted, because its texture coordinates would differ.
+            let without_roughness =
+                |text: String| text.replace("roughness = { texture = 'first', channel = 'g' }\n", "");
+            let only_set = |mesh: &mut Mesh| {
+                set_uv_sets(mesh);
                 let sets = std::mem::take(&mut mesh.more_uvs);
                 if set > 0 {
                     mesh.uvs = sets[set - 1].clone();
                 }
             };
-            let expected = reference(&scene(folder.path(), 4, &without(text(0, filter, keys)), first));
-            let found = scene(folder.path(), 4, &without(text(set as u32, filter, keys)), with_sets);
+            let expected = reference(&scene(
+                folder.path(),
+                4,
+                &without_roughness(text(0, filter, keys)),
+                only_set,
+            ));
+            let found = scene(
+                folder.path(),
+                4,
+                &without_roughness(text(set as u32, filter, keys)),
+                set_uv_sets,
+            );
             // Not bit-identical: the microfacet frame is derived from the first set.
             let found = reference(&found);
-            let near = means(&found)
+            let is_near = means(&found)
                 .iter()
                 .zip(means(&expected))
                 .all(|(a, b)| (0..3).all(|k| (a[k] - b[k]).abs() < 1e-4));
-            assert!(near, "{keys} {filter} {set}");
+            assert!(is_near, "{keys} {filter} {set}");
         }
         // Kernels with a BVH take seconds to compile.
         if filter != "nearest" && exact_modes().len() > 1 {
@@ -316,10 +332,10 @@ fn a_missing_set_of_coordinates_is_a_single_point() {
     let folder = tempfile::tempdir().unwrap();
     write_exr(&folder.path().join("t.exr"), 4, 4, |x, y| [x as f32, y as f32, 1.0]);
     let text = format!(
-        "{DOWN}[textures.t]\ntype = 'image'\nfile = 't.exr'\nfilter = 'nearest'\nuv_set = 7\n\
+        "{CAMERA_ABOVE}[textures.t]\ntype = 'image'\nfile = 't.exr'\nfilter = 'nearest'\nuv_set = 7\n\
          [materials.m]\ntype = 'principled'\nbase_color = [0, 0, 0]\nspecular = 0\nemission = {{ texture = 't' }}\n{SHAPE}"
     );
-    for edit in [with_sets, |_: &mut Mesh| ()] {
+    for edit in [set_uv_sets, |_: &mut Mesh| ()] {
         let packed = scene(folder.path(), 1, &text, edit);
         for mode in both() {
             assert!(
@@ -341,7 +357,7 @@ fn factors_are_multiplied_by_the_texels() {
         .unwrap();
     let text = |keys: &str| {
         format!(
-            "{DOWN}environment = {{ color = [1, 1, 1] }}\n\
+            "{CAMERA_ABOVE}environment = {{ color = [1, 1, 1] }}\n\
              textures.t = {{ type = 'image', file = 't.png', encoding = 'linear', factor = [0.5, 1, 0.25, 1] }}\n\
              textures.light = {{ type = 'image', file = 't.png', encoding = 'linear', factor = [20, 1000, 0, 0.5] }}\n\
              textures.a = {{ type = 'image', file = 'a.png', factor = [0, 0, 0, 0.5] }}\n\
@@ -465,40 +481,48 @@ fn only_camera_rays_skip_back_faces() {
              tangent = [1, 0, 0]\ncolor = [9, 9, 9]\n"
         )
     };
-    let turned = "rotate = [180, 0, 0]";
-    for (height, transform, seen) in [
+    let rotated = "rotate = [180, 0, 0]";
+    for (height, transform, is_visible) in [
         (5.0, "", true),
-        (5.0, turned, false),
+        (5.0, rotated, false),
         (5.0, "scale = [-1, 1, 1]", true),
         (5.0, "scale = [1, 1, -1]", false),
         (5.0, "rotate = [180, 0, 0]\nscale = [1, 1, -1]", true),
         (0.5, "", true),
     ] {
-        let find = |side: &str| scene(folder.path(), 8, &text(height, side, transform), |_| ());
-        let packed = find("double_sided = false");
-        let expected = find(if seen { "double_sided = true" } else { "visible = false" });
-        let other = find(if seen { "visible = false" } else { "double_sided = true" });
-        let ways = match transform == turned {
+        let pack_with = |side: &str| scene(folder.path(), 8, &text(height, side, transform), |_| ());
+        let packed = pack_with("double_sided = false");
+        let expected = pack_with(if is_visible {
+            "double_sided = true"
+        } else {
+            "visible = false"
+        });
+        let control = pack_with(if is_visible {
+            "visible = false"
+        } else {
+            "double_sided = true"
+        });
+        let modes = match transform == rotated {
             true => exact_modes()
                 .into_iter()
                 .filter(|mode| *mode != RenderMode::Buffers)
                 .collect(),
             false => vec![RenderMode::Cpu],
         };
-        for mode in ways {
+        for mode in modes {
             let picture = render(&packed, mode);
             assert_eq!(
                 differing(&picture, &reference(&expected)),
                 0,
                 "{height} {transform} {mode:?}"
             );
-            // Below the wall the floor is visible.
+            // A camera below the wall sees the floor.
             assert!(
-                height < 1.0 || differing(&picture, &reference(&other)) > 300,
+                height < 1.0 || differing(&picture, &reference(&control)) > 300,
                 "{height} {transform} {mode:?}"
             );
             let hits: Vec<u32> = first_hits(&packed, mode).iter().map(|hit| hit.shape).collect();
-            let shape = if seen && height > 1.0 { 0 } else { 1 };
+            let shape = if is_visible && height > 1.0 { 0 } else { 1 };
             assert_eq!(hits, vec![shape; 400], "{height} {transform} {mode:?}");
         }
     }
@@ -510,11 +534,11 @@ fn a_mesh_keeps_its_own_tangents() {
     let folder = tempfile::tempdir().unwrap();
     write_exr(&folder.path().join("n.exr"), 2, 2, |_, _| [0.8, 0.6, 0.9]);
     let text = format!(
-        "{DOWN}[textures.n]\ntype = 'image'\nfile = 'n.exr'\n\
+        "{CAMERA_ABOVE}[textures.n]\ntype = 'image'\nfile = 'n.exr'\n\
          [materials.m]\ntype = 'principled'\nmetallic = 0\nspecular = 0\nnormal_map = {{ texture = 'n' }}\n\
          [[lights]]\ntype = 'directional'\ndirection = [-0.6, 0, -0.8]\ncolor = [3, 3, 3]\n{SHAPE}"
     );
-    let with = |tangent: Vec4| move |mesh: &mut Mesh| mesh.tangents = vec![tangent; mesh.positions.len()];
+    let set_tangents = |tangent: Vec4| move |mesh: &mut Mesh| mesh.tangents = vec![tangent; mesh.positions.len()];
     let n = glam::DVec3::new(0.6, 0.2, 0.8).normalize();
     for (tangent, x) in [
         (Vec4::new(1.0, 0.0, 0.0, 1.0), n.x),
@@ -525,8 +549,8 @@ fn a_mesh_keeps_its_own_tangents() {
         (Vec4::ZERO, n.x),                     // from the texture coordinates
         (Vec4::NAN, n.x),
     ] {
-        let packed = scene(folder.path(), 1, &text, with(tangent));
-        // Lambertian with an albedo of 1, at an irradiance of 3.
+        let packed = scene(folder.path(), 1, &text, set_tangents(tangent));
+        // A Lambertian surface with an albedo of 1 and an irradiance of 3.
         let expected = 3.0 / std::f64::consts::PI * (0.6 * x + 0.8 * n.z).max(0.0);
         for mode in both() {
             for pixel in means(&render(&packed, mode)) {
@@ -560,8 +584,8 @@ fn colors_of_ply_files_are_read() {
              element face 1\nproperty list uchar int vertex_indices\nend_header\n{rows}3 0 1 2\n"
         )
     };
-    let read = |types, rows| load("a.ply", file(types, rows), None).unwrap().colors;
-    let near = |found: Vec<Vec4>, expected: [[f32; 4]; 3]| {
+    let read_colors = |types, rows| load("a.ply", file(types, rows), None).unwrap().colors;
+    let assert_near = |found: Vec<Vec4>, expected: [[f32; 4]; 3]| {
         let expected: Vec<Vec4> = expected.into_iter().map(Vec4::from_array).collect();
         assert_eq!(found.len(), 3);
         assert!(
@@ -570,23 +594,23 @@ fn colors_of_ply_files_are_read() {
         );
     };
     // IEC 61966-2-1: 188 decodes to 0.5029, 10 to 10 / 255 / 12.92.
-    near(
-        read(["uchar"; 4], ["255 188 10 51", "0 0 0 0", "300 -7 255 255"]),
+    assert_near(
+        read_colors(["uchar"; 4], ["255 188 10 51", "0 0 0 0", "300 -7 255 255"]),
         [[1.0, 0.502_886_5, 0.003_035_27, 0.2], [0.0; 4], [1.0, 0.0, 1.0, 1.0]],
     );
-    near(
-        read(["float", "float", "double", ""], ["0.5 2 0", "nan -1 1e9", "inf 1 1"]),
+    assert_near(
+        read_colors(["float", "float", "double", ""], ["0.5 2 0", "nan -1 1e9", "inf 1 1"]),
         [[0.5, 2.0, 0.0, 1.0], [1.0; 4], [1.0; 4]], // white if a component is not finite
     );
-    near(
-        read(
+    assert_near(
+        read_colors(
             ["ushort", "ushort", "ushort", "float"],
             ["65535 0 0 0.25", "0 65535 0 7", "0 0 65535 -1"],
         ),
         [[1.0, 0.0, 0.0, 0.25], [0.0, 1.0, 0.0, 1.0], [0.0, 0.0, 1.0, 0.0]],
     );
     // All three components are required.
-    assert_eq!(read(["uchar", "uchar", "", "uchar"], ["1 2 3"; 3]), vec![]);
+    assert_eq!(read_colors(["uchar", "uchar", "", "uchar"], ["1 2 3"; 3]), vec![]);
 }
 
 #[test]
@@ -594,7 +618,7 @@ fn anisotropy_directions_come_from_an_image() {
     let folder = tempfile::tempdir().unwrap();
     let text = |keys: &str| {
         format!(
-            "{ASIDE}environment = {{ color = [0.1, 0.1, 0.1] }}\n\
+            "{CAMERA_ASIDE}environment = {{ color = [0.1, 0.1, 0.1] }}\n\
              textures.d = {{ type = 'image', file = 'd.exr', factor = [1, 1, 0.8, 1], rotate = 40, filter = 'nearest' }}\n\
              [[lights]]\ntype = 'point'\nposition = [0.2, 1.5, 1]\ncolor = [1, 1, 1]\n\
              [materials.m]\ntype = 'principled'\nroughness = 0.3\n{keys}\n{SHAPE}"
@@ -604,8 +628,9 @@ fn anisotropy_directions_come_from_an_image() {
         let keys = format!("anisotropy = {{ texture = 'd', channel = 'b' }}\nanisotropy_rotation = {degrees}");
         means(&reference(&scene(folder.path(), 4, &text(&keys), |_| ())))
     };
-    let near = |a: &[[f64; 3]], b: &[[f64; 3]]| a.iter().zip(b).all(|(a, b)| (a[0] - b[0]).abs() < 1e-3 * (1.0 + a[0]));
-    for (degrees, more, length) in [
+    let is_near =
+        |a: &[[f64; 3]], b: &[[f64; 3]]| a.iter().zip(b).all(|(a, b)| (a[0] - b[0]).abs() < 1e-3 * (1.0 + a[0]));
+    for (degrees, extra_degrees, length) in [
         (0.0, 0.0, 1.0),
         (35.0, 0.0, 0.3),
         (-100.0, 20.0, 1.0),
@@ -617,19 +642,19 @@ fn anisotropy_directions_come_from_an_image() {
         });
         // Strength and direction share a lookup.
         let keys = format!(
-            "anisotropy = {{ texture = 'd', channel = 'b' }}\nanisotropy_rotation = {more}\nanisotropy_direction = {{ texture = 'd' }}"
+            "anisotropy = {{ texture = 'd', channel = 'b' }}\nanisotropy_rotation = {extra_degrees}\nanisotropy_direction = {{ texture = 'd' }}"
         );
         let packed = scene(folder.path(), 4, &text(&keys), |_| ());
         assert_eq!(packed.textures.lookups.len(), 1);
         let found = means(&reference(&packed));
-        let expected = plain(if degrees + more < -360.0 {
+        let expected = plain(if degrees + extra_degrees < -360.0 {
             degrees
         } else {
-            degrees + more
+            degrees + extra_degrees
         });
-        assert!(near(&found, &expected), "{degrees} {more}");
-        assert!(!near(&found, &plain(degrees + 90.0)), "{degrees} {more}");
-        if more != 0.0 {
+        assert!(is_near(&found, &expected), "{degrees} {extra_degrees}");
+        assert!(!is_near(&found, &plain(degrees + 90.0)), "{degrees} {extra_degrees}");
+        if extra_degrees != 0.0 {
             for mode in exact_modes().into_iter().filter(|mode| *mode == RenderMode::Baked) {
                 assert_eq!(
                     differing(&render(&packed, mode), &reference(&packed)),
@@ -656,7 +681,7 @@ fn images_without_directions_are_rejected() {
             .err()
             .map(|error| error.to_string())
     };
-    let place = "materials.m.anisotropy_direction.texture: \"t\" must";
+    let prefix = "materials.m.anisotropy_direction.texture: \"t\" must";
     for (texture, rule) in [
         ("type = 'constant', color = [1, 1, 1]", "be a texture of type \"image\""),
         (
@@ -672,7 +697,7 @@ fn images_without_directions_are_rejected() {
         assert!(
             message
                 .as_deref()
-                .is_some_and(|m| m.contains(&format!("{place} {rule}"))),
+                .is_some_and(|m| m.contains(&format!("{prefix} {rule}"))),
             "{message:?}"
         );
     }

@@ -1,4 +1,4 @@
-//! Closed meshes are watertight: no ray at an edge or a vertex passes, at any place and scale.
+//! Closed meshes are watertight: no ray at an edge or a vertex passes, at any position and scale.
 
 use glam::{DMat3, DVec3, UVec2, Vec3, Vec4Swizzles as _};
 use rayon::prelude::*;
@@ -13,7 +13,7 @@ use crate::random::Random;
 use crate::sources;
 
 /// Transforms, with distances from the origin up to 2e6 times the size.
-const PLACES: &[&str] = &[
+const TRANSFORMS: &[&str] = &[
     "",
     "rotate = [30, 40, 50]",
     "rotate = { axis = [1, 2, 3], degrees = 17 }\nscale = [1, 2.5, -0.6]",
@@ -26,11 +26,11 @@ const PLACES: &[&str] = &[
     "matrix = [[1, 0.6, 0, 0], [0, 1, 0.4, 0], [0.2, 0, 1, 3]]",
 ];
 
-fn placed(obj: &str, place: &str) -> Packed {
+fn pack_mesh(obj: &str, transform: &str) -> Packed {
     let folder = tempfile::tempdir().expect("a folder");
     std::fs::write(folder.path().join("a.obj"), obj).expect("a mesh");
     scene(
-        &format!("{HEAD}[[shapes]]\ntype = 'mesh'\nfile = 'a.obj'\nmaterial = 'm'\n{place}\n"),
+        &format!("{HEAD}[[shapes]]\ntype = 'mesh'\nfile = 'a.obj'\nmaterial = 'm'\n{transform}\n"),
         folder.path(),
     )
 }
@@ -90,22 +90,22 @@ impl Solid {
 /// Returns the number of rays that pass through a convex mesh. From outside, a ray towards the inscribed ball must hit
 /// the mesh before the point nearest to the center. From inside, a ray must hit the mesh at its target, up to the
 /// precision of slivers.
-fn passing(scene: &Packed, rays: u32, inside: bool) -> u32 {
+fn count_passing(scene: &Packed, rays: u32, from_inside: bool) -> u32 {
     let solid = Solid::new(scene);
     let chunks = (0..64u64).into_par_iter().map(|seed| {
-        let random = Random::new(seed + if inside { 100 } else { 0 });
+        let random = Random::new(seed + if from_inside { 100 } else { 0 });
         (0..rays / 64)
-            .filter(|_| passes_convex(scene, &solid, inside, &random))
+            .filter(|_| passes_convex(scene, &solid, from_inside, &random))
             .count() as u32
     });
     chunks.sum()
 }
 
-fn passes_convex(scene: &Packed, solid: &Solid, inside: bool, random: &Random) -> bool {
+fn passes_convex(scene: &Packed, solid: &Solid, from_inside: bool, random: &Random) -> bool {
     let target = solid.target(random);
     let sideways = DVec3::from_array([(); 3].map(|()| random.between(-0.3, 0.3))) * solid.radius;
     let out = target - solid.center;
-    let origin = match inside {
+    let origin = match from_inside {
         true => solid.center + sideways,
         false => target + (out - sideways) * random.magnitude(-1.0, 3.0),
     };
@@ -123,16 +123,20 @@ fn passes_convex(scene: &Packed, solid: &Solid, inside: bool, random: &Random) -
     // Ray parameters nearest to the center and to the target. Rounding may move the hit behind the target.
     let to_center = (solid.center - origin.as_dvec3()).dot(d) / d.length_squared();
     let to_target = (target - origin.as_dvec3()).dot(d) / d.length_squared();
-    let slack = 30.0 * solid.rounding / d.length();
-    let limit = if inside { to_target * 1.05 + slack } else { to_center };
+    let tolerance = 30.0 * solid.rounding / d.length();
+    let limit = if from_inside {
+        to_target * 1.05 + tolerance
+    } else {
+        to_center
+    };
     let hit = closest_hit(scene, ray, NO_PRIMITIVE, NO_PRIMITIVE);
     let casts = scene.bvh.items.iter().any(|item| item.kind & CASTS_SHADOW != 0);
-    let times = if inside { 2.0 } else { 1.0 + to_center / to_target };
-    !(f64::from(hit.t) <= limit) || casts && !is_occluded(scene, origin, direction, times)
+    let light_t = if from_inside { 2.0 } else { 1.0 + to_center / to_target };
+    !(f64::from(hit.t) <= limit) || casts && !is_occluded(scene, origin, direction, light_t)
 }
 
-/// Returns true if a point light at `origin + times * direction` is occluded.
-fn is_occluded(scene: &Packed, origin: Vec3, direction: Vec3, times: f64) -> bool {
+/// Returns true if a point light at `origin + light_t * direction` is occluded.
+fn is_occluded(scene: &Packed, origin: Vec3, direction: Vec3, light_t: f64) -> bool {
     let zero = Vec3::ZERO;
     let surface = Surface {
         position: origin,
@@ -150,7 +154,7 @@ fn is_occluded(scene: &Packed, origin: Vec3, direction: Vec3, times: f64) -> boo
         dv: zero,
     };
     let light = Light {
-        center: (origin.as_dvec3() + direction.as_dvec3() * times).as_vec3(),
+        center: (origin.as_dvec3() + direction.as_dvec3() * light_t).as_vec3(),
         finite: 1.0,
         t_max: 1.0 - 1e-5,
         primitive: NO_INDEX,
@@ -167,7 +171,7 @@ fn is_occluded(scene: &Packed, origin: Vec3, direction: Vec3, times: f64) -> boo
     occluded_samples(scene, &surface, &light, block, 0) == 1
 }
 
-fn convex() -> [(&'static str, Form); 4] {
+fn convex_forms() -> [(&'static str, Form); 4] {
     let mut slivers = Form::slivers(600, &Random::new(1));
     slivers.points.iter_mut().for_each(|p| p.z *= 0.7);
     [
@@ -181,22 +185,22 @@ fn convex() -> [(&'static str, Form); 4] {
 #[test]
 fn no_ray_passes_through_a_closed_mesh() {
     let mut total = 0;
-    for (name, form) in convex() {
+    for (name, form) in convex_forms() {
         let obj = form.obj(None, None);
-        for place in PLACES {
-            let scene = placed(&obj, place);
+        for transform in TRANSFORMS {
+            let scene = pack_mesh(&obj, transform);
             assert_eq!(
                 scene.bvh.meshes[0].triangles.len(),
                 form.triangles.len(),
                 "{name}: triangles are missing"
             );
-            for inside in [false, true] {
+            for from_inside in [false, true] {
                 let rays = 12_800;
                 total += rays;
                 assert_eq!(
-                    passing(&scene, rays, inside),
+                    count_passing(&scene, rays, from_inside),
                     0,
-                    "{name}, {place:?}, from inside: {inside}"
+                    "{name}, {transform:?}, from inside: {from_inside}"
                 );
             }
         }
@@ -207,64 +211,68 @@ fn no_ray_passes_through_a_closed_mesh() {
 
 #[test]
 fn a_hole_in_a_mesh_is_found() {
-    for (name, form) in convex() {
+    for (name, form) in convex_forms() {
         let mut open = form.clone();
         open.triangles.pop();
-        for place in PLACES {
-            let scene = placed(&open.obj(None, None), place);
-            let count = passing(&scene, 64_000, true);
-            assert!(count > 0, "{name}, {place:?}");
+        for transform in TRANSFORMS {
+            let scene = pack_mesh(&open.obj(None, None), transform);
+            let count = count_passing(&scene, 64_000, true);
+            assert!(count > 0, "{name}, {transform:?}");
         }
     }
 }
 
-/// Negative control.
+/// Negative control: triangles outside of a mesh do not share edges.
 #[test]
 fn standalone_triangles_are_not_watertight() {
     let form = Form::icosphere(2);
-    let mesh = placed(&form.obj(None, None), "rotate = [30, 40, 50]");
+    let mesh = pack_mesh(&form.obj(None, None), "rotate = [30, 40, 50]");
     let mut text = HEAD.to_string();
     for corners in Solid::new(&mesh).corners {
         let [a, b, c] = corners.map(|p| p.to_array());
         text += &format!("[[shapes]]\ntype = 'triangle'\nmaterial = 'm'\nvertices = [{a:?}, {b:?}, {c:?}]\n");
     }
-    let mut apart = scene(&text, sources::path("scenes").as_path());
-    (apart.bvh.instances, apart.bvh.meshes) = (mesh.bvh.instances.clone(), mesh.bvh.meshes.clone()); // the source of targets
-    let count = [false, true].map(|inside| passing(&apart, 64_000, inside));
+    let mut separate = scene(&text, sources::path("scenes").as_path());
+    // The mesh provides the targets of the rays.
+    (separate.bvh.instances, separate.bvh.meshes) = (mesh.bvh.instances.clone(), mesh.bvh.meshes.clone());
+    let count = [false, true].map(|from_inside| count_passing(&separate, 64_000, from_inside));
     println!("{count:?} of 64000 rays from outside and inside pass standalone triangles");
     assert!(count[0] + count[1] > 0, "{count:?}");
-    assert_eq!([false, true].map(|inside| passing(&mesh, 64_000, inside)), [0, 0]);
+    assert_eq!(
+        [false, true].map(|from_inside| count_passing(&mesh, 64_000, from_inside)),
+        [0, 0]
+    );
 }
 
-/// The knot is not convex: rays towards an edge whose triangles face the ray must hit there or before; rays from inside
-/// may hit anywhere.
+/// The knot is not convex: rays towards an edge whose triangles face the ray must hit the edge or an earlier
+/// triangle; rays from inside may hit anywhere.
 #[test]
 fn no_ray_passes_through_the_knot() {
     let knot = std::fs::read_to_string(sources::path("scenes/meshes/knot.obj")).expect("the knot");
-    for place in &PLACES[..4] {
-        let packed = placed(&knot, place);
+    for transform in &TRANSFORMS[..4] {
+        let packed = pack_mesh(&knot, transform);
         let solid = Solid::new(&packed);
         let [outside, inside] = knot_rays(&packed, &solid, 40_000);
-        println!("{place:?}: {outside:?} from outside, {inside:?} from inside");
+        println!("{transform:?}: {outside:?} from outside, {inside:?} from inside");
         assert!(
             outside.0 > 5000 && inside.0 > 20_000,
-            "{place:?}: {outside:?} {inside:?}"
+            "{transform:?}: {outside:?} {inside:?}"
         );
-        assert_eq!((outside.1, inside.1), (0, 0), "{place:?}");
+        assert_eq!((outside.1, inside.1), (0, 0), "{transform:?}");
     }
     // Control: every 50th triangle is removed.
     let mut removed = 0;
-    let few = knot.lines().filter(|line| {
+    let remaining = knot.lines().filter(|line| {
         removed += u32::from(line.starts_with("f "));
         !(line.starts_with("f ") && removed % 50 == 0)
     });
-    let packed = placed(&few.collect::<Vec<_>>().join("\n"), "");
-    let whole = Solid::new(&placed(&knot, ""));
-    let [outside, inside] = knot_rays(&packed, &whole, 40_000);
+    let packed = pack_mesh(&remaining.collect::<Vec<_>>().join("\n"), "");
+    let full_solid = Solid::new(&pack_mesh(&knot, ""));
+    let [outside, inside] = knot_rays(&packed, &full_solid, 40_000);
     assert!(outside.1 > 10 && inside.1 > 10, "{outside:?} {inside:?}");
 }
 
-/// Returns the numbers of all rays and of rays that pass through the knot: from outside, and from inside.
+/// Returns the number of rays, and of rays that pass through the knot: from outside, and from inside.
 fn knot_rays(scene: &Packed, solid: &Solid, rays: u32) -> [(u32, u32); 2] {
     let side = f64::from(scene.bvh.instances[0].side);
     let normal = |[a, b, c]: [DVec3; 3]| (b - a).cross(c - a).normalize() * side;
@@ -275,11 +283,11 @@ fn knot_rays(scene: &Packed, solid: &Solid, rays: u32) -> [(u32, u32); 2] {
         .map(|p| p.distance(solid.center))
         .fold(0.0, f64::max);
     let key = |p: DVec3| p.to_array().map(f64::to_bits);
-    let mut around = std::collections::HashMap::<_, Vec<DVec3>>::new();
+    let mut normals_at = std::collections::HashMap::<_, Vec<DVec3>>::new();
     for corners in &solid.corners {
         corners
             .iter()
-            .for_each(|p| around.entry(key(*p)).or_default().push(normal(*corners)));
+            .for_each(|p| normals_at.entry(key(*p)).or_default().push(normal(*corners)));
     }
     let random = Random::new(9);
     let [mut outside, mut inside] = [(0, 0); 2];
@@ -291,10 +299,10 @@ fn knot_rays(scene: &Packed, solid: &Solid, rays: u32) -> [(u32, u32); 2] {
             1 => a.lerp(b, 0.5),
             _ => a.lerp(b, random.unit()),
         };
-        let away = DVec3::from_array([(); 3].map(|()| random.between(-1.0, 1.0)));
-        let origin = (target + away * size * random.pick(&[0.1, 1.0, 10.0])).as_vec3();
+        let offset = DVec3::from_array([(); 3].map(|()| random.between(-1.0, 1.0)));
+        let origin = (target + offset * size * random.pick(&[0.1, 1.0, 10.0])).as_vec3();
         let direction = (target - origin.as_dvec3()).as_vec3();
-        let faces = [key(a), key(b)].into_iter().flat_map(|corner| &around[&corner]);
+        let faces = [key(a), key(b)].into_iter().flat_map(|corner| &normals_at[&corner]);
         let d = direction.as_dvec3().normalize();
         if faces.map(|n| n.dot(d)).all(|cosine| cosine < -0.2) {
             let hit = closest_hit(scene, Ray { origin, direction }, NO_PRIMITIVE, NO_PRIMITIVE);
@@ -302,11 +310,11 @@ fn knot_rays(scene: &Packed, solid: &Solid, rays: u32) -> [(u32, u32); 2] {
             outside.0 += 1;
             outside.1 += u32::from(!(f64::from(hit.t) <= limit));
         }
-        // Inside: a quarter of the distance across.
+        // The origin inside of the knot is at a quarter of the distance to the opposite side.
         let middle = (a + b + c) / 3.0;
         let inwards = -normal(corners);
         let start = (middle + inwards * 1e-4 * size).as_vec3();
-        let across = closest_hit(
+        let opposite = closest_hit(
             scene,
             Ray {
                 origin: start,
@@ -315,10 +323,10 @@ fn knot_rays(scene: &Packed, solid: &Solid, rays: u32) -> [(u32, u32); 2] {
             NO_PRIMITIVE,
             NO_PRIMITIVE,
         );
-        if across.t == INFINITE_T || f64::from(across.t) < 0.01 * size {
+        if opposite.t == INFINITE_T || f64::from(opposite.t) < 0.01 * size {
             continue;
         }
-        let origin = (middle + inwards * 0.25 * f64::from(across.t)).as_vec3();
+        let origin = (middle + inwards * 0.25 * f64::from(opposite.t)).as_vec3();
         let direction = (solid.target(&random) - origin.as_dvec3()).as_vec3();
         let hit = closest_hit(scene, Ray { origin, direction }, NO_PRIMITIVE, NO_PRIMITIVE);
         inside.0 += 1;

@@ -4,7 +4,7 @@ import assert from "node:assert/strict";
 import fs from "node:fs";
 import { after, afterEach, before, beforeEach, test } from "node:test";
 
-import { LONGEST, SCENE, Studio, choose, control, launch, listen, open, settled, visit } from "./studio.mjs";
+import { SCENE, Studio, TIMEOUT, choose, control, launch, open, recordMessages, visit, waitUntilSettled } from "./studio.mjs";
 
 let browser;
 let studio;
@@ -17,17 +17,17 @@ afterEach(async () => {
   await studio.remove();
 });
 
-async function dragged(page, dx = 60) {
+async function drag(page, dx = 60) {
   const area = await page.locator("#panels canvas").first().boundingBox();
   await page.mouse.move(area.x + area.width / 2, area.y + area.height / 2);
   await page.mouse.down();
   await page.mouse.move(area.x + area.width / 2 + dx, area.y + area.height / 2, { steps: 3 });
   await page.mouse.up();
-  await settled(page);
+  await waitUntilSettled(page);
 }
 
-async function holds(text) {
-  const deadline = Date.now() + LONGEST;
+async function waitForText(text) {
+  const deadline = Date.now() + TIMEOUT;
   while (!studio.read("scene.toml").includes(text)) {
     assert.ok(Date.now() < deadline, `no ${text} in ${studio.read("scene.toml")}`);
     await new Promise((resolve) => setTimeout(resolve, 10));
@@ -41,25 +41,25 @@ test("the wheel over a focused number box scrolls the panel and changes no value
   for (const viewport of [{ width: 1200, height: 600 }, { width: 390, height: 844 }]) {
     const page = await open(browser, studio, { viewport });
     await choose(page, "shapes[0]");
-    const sent = await listen(page, isChange);
-    const top = () => page.evaluate(() => document.querySelector("aside").scrollTop + scrollY);
+    const sent = await recordMessages(page, isChange);
+    const scrollPosition = () => page.evaluate(() => document.querySelector("aside").scrollTop + scrollY);
     for (const box of [control(page, "shapes[0].center"), page.locator("#exposure-number"), page.locator("#most-samples")]) {
       await box.scrollIntoViewIfNeeded();
       await box.click();
       assert.ok(await box.evaluate((box) => box === document.activeElement));
-      const [value, from] = [await box.inputValue(), await top()];
+      const [value, oldPosition] = [await box.inputValue(), await scrollPosition()];
       await box.hover();
-      const delta = from > 300 ? -100 : 100;
+      const delta = oldPosition > 300 ? -100 : 100;
       for (let i = 0; i < 3; i++) await page.mouse.wheel(0, delta);
-      await page.waitForFunction((from) => Math.abs(document.querySelector("aside").scrollTop + scrollY - from) > 100, from);
+      await page.waitForFunction((oldPosition) => Math.abs(document.querySelector("aside").scrollTop + scrollY - oldPosition) > 100, oldPosition);
       assert.equal(await box.inputValue(), value);
       await page.locator("#pause").focus();
       assert.equal(await box.inputValue(), value);
     }
-    await settled(page);
+    await waitUntilSettled(page);
     assert.deepEqual(await sent(), []);
     assert.equal(studio.read("scene.toml"), SCENE);
-    assert.deepEqual(page.faults, []);
+    assert.deepEqual(page.errors, []);
     await page.context().close();
   }
 });
@@ -70,10 +70,10 @@ test("a required key has no button that removes it", async () => {
   await choose(page, "camera");
   const buttons = page.locator('[data-name="camera"] > div .head button:visible');
   assert.equal(await buttons.count(), 0);
-  await choose(page, "materials.red"); // which has an optional key
+  await choose(page, "materials.red"); // a table with an optional key
   const optional = page.locator('[data-path="materials.red.shininess"] .head button');
   assert.match(await optional.getAttribute("title"), /^Remove shininess from the file/);
-  assert.deepEqual(page.faults, []);
+  assert.deepEqual(page.errors, []);
 });
 
 test("a scene that cannot be edited disables saving, shows the reason, and offers to copy the camera", async () => {
@@ -88,23 +88,23 @@ test("a scene that cannot be edited disables saving, shows the reason, and offer
   }));
   await studio.start(0, ["--size", "60x45"], "box.gltf");
   const page = await open(browser, studio);
-  await dragged(page);
+  await drag(page);
   await page.locator("#moved").waitFor();
   assert.ok(await page.locator("#save").isDisabled());
   assert.match(await page.locator("#save").getAttribute("title"), /glTF.*read-only.*wgray convert/);
   const isMain = (id) => page.locator(id).evaluate((button) => button.classList.contains("main"));
   assert.deepEqual([await isMain("#copy"), await isMain("#save")], [true, false]);
   assert.ok(await page.locator("#copy").isEnabled());
-  // Control: a TOML scene is saved.
+  // Control: a TOML scene can be saved.
   await studio.stop();
   await studio.start();
-  const other = await open(browser, studio);
-  await dragged(other);
-  assert.ok(await other.locator("#save").isEnabled());
-  assert.deepEqual([await other.locator("#copy.main").count(), await other.locator("#save.main").count()], [0, 1]);
+  const tomlPage = await open(browser, studio);
+  await drag(tomlPage);
+  assert.ok(await tomlPage.locator("#save").isEnabled());
+  assert.deepEqual([await tomlPage.locator("#copy.main").count(), await tomlPage.locator("#save.main").count()], [0, 1]);
 });
 
-test("without a connection nothing can be downloaded, and the zoom bar stays opaque", async () => {
+test("without a connection, nothing can be downloaded, and the zoom bar stays opaque", async () => {
   await studio.start();
   const page = await open(browser, studio);
   const links = ["#save-png", "#save-exr"].map((id) => page.locator(id));
@@ -120,11 +120,11 @@ test("without a connection nothing can be downloaded, and the zoom bar stays opa
   await page.locator("#zoom", { hasText: /^\d+%$/ }).waitFor();
   await studio.start(studio.port);
   await page.locator("#save-png[href]").waitFor();
-  // Disabled for another reason.
+  // These controls stay disabled for another reason.
   for (const id of ["#reset-look", "#undo-write", "#reset-sliders", "#save"]) assert.ok(await page.locator(id).isDisabled(), id);
 });
 
-test("undo shows why it is not possible after another program has changed the file", async () => {
+test("the undo button shows why undo is not possible after another program has changed the file", async () => {
   await studio.start();
   const page = await open(browser, studio);
   await choose(page, "shapes[0]");
@@ -132,7 +132,7 @@ test("undo shows why it is not possible after another program has changed the fi
   await control(page, "shapes[0].radius", 1).fill("0.25");
   await page.keyboard.press("Enter");
   await page.locator('#undo-write[title="Undo shapes[0].radius (Ctrl+Z)"]').waitFor();
-  await settled(page);
+  await waitUntilSettled(page);
   studio.edit("scene.toml", "# a small scene", "# another");
   await page.locator("#undo-write:disabled").waitFor();
   assert.match(await page.locator("#undo-write").getAttribute("title"), /^Undo is not possible: scene\.toml was changed by another program/);
@@ -143,8 +143,8 @@ test("undo shows why it is not possible after another program has changed the fi
   await control(page, "shapes[0].radius", 1).fill("0.35");
   await page.keyboard.press("Enter");
   await page.locator("#undo-write:enabled").click();
-  await holds("radius = 0.25");
-  assert.deepEqual(page.faults, []);
+  await waitForText("radius = 0.25");
+  assert.deepEqual(page.errors, []);
 });
 
 test("exposure out of range is reported, and its slider and box agree", async () => {
@@ -154,7 +154,7 @@ test("exposure out of range is reported, and its slider and box agree", async ()
   for (const [typed, shown] of [["500", "100"], ["-700", "-100"], ["500", "100"], ["12.5", "12.5"]]) {
     await box.fill(typed);
     await page.keyboard.press("Enter");
-    await settled(page);
+    await waitUntilSettled(page);
     const notice = page.locator("#notice.bad", { hasText: `from -100 to 100 stops: ${typed} became ${shown}` });
     if (typed !== shown) await notice.waitFor();
     else await page.locator("#notice").waitFor({ state: "hidden" });
@@ -162,15 +162,15 @@ test("exposure out of range is reported, and its slider and box agree", async ()
   }
   await box.fill("-0.79435");
   await page.keyboard.press("Enter");
-  await settled(page);
+  await waitUntilSettled(page);
   await page.locator("#pause").focus();
-  const room = await box.evaluate((box) => {
+  const freeWidth = await box.evaluate((box) => {
     const { font, paddingLeft, paddingRight } = getComputedStyle(box);
     const context = new OffscreenCanvas(1, 1).getContext("2d");
     context.font = font;
     return box.clientWidth - parseFloat(paddingLeft) - parseFloat(paddingRight) - context.measureText(box.value).width;
   });
-  assert.ok(room >= 0, `${room} px for the digits`);
+  assert.ok(freeWidth >= 0, `${freeWidth} px for the digits`);
 });
 
 test("once the view has moved, the camera's values are labeled as values of the file", async () => {
@@ -179,21 +179,21 @@ test("once the view has moved, the camera's values are labeled as values of the 
   await choose(page, "camera");
   const note = page.locator("#object-note");
   assert.equal(await note.textContent(), "");
-  await dragged(page);
+  await drag(page);
   await note.filter({ hasText: "The view has moved" }).waitFor();
   await page.click("#reset");
   await page.waitForFunction(() => document.getElementById("object-note").textContent === "");
-  await dragged(page);
+  await drag(page);
   await choose(page, "shapes[0]");
   await page.waitForFunction(() => document.getElementById("object-note").textContent === "");
 });
 
-test("a shader that is broken at the start is an error, not a wait", async () => {
+test("a shader that is broken at the start is reported as an error", async () => {
   studio.breakShader();
   await studio.start();
   const page = await visit(browser, studio);
   await page.locator("#badge.lost", { hasText: /^Shader error\. No image yet$/ }).waitFor();
-  studio.mendShader();
+  studio.fixShader();
   await page.locator("#badge.live").waitFor({ state: "attached" });
   assert.ok(fs.existsSync(studio.path("scene.toml")));
 });

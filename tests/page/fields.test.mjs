@@ -3,7 +3,7 @@
 import assert from "node:assert/strict";
 import { after, afterEach, before, beforeEach, test } from "node:test";
 
-import { LONGEST, SCENE, Studio, canvas, decoded, launch, open, settled, visit } from "./studio.mjs";
+import { SCENE, Studio, TIMEOUT, canvas, decode, launch, open, visit, waitUntilSettled } from "./studio.mjs";
 
 const KERNEL = "shaders/kernels/render.wgsl";
 const LEVEL = "override level: f32 = 0.5; // 0..1\n";
@@ -19,7 +19,7 @@ beforeEach(async () => {
   studio = new Studio();
   studio.edit(KERNEL, "path_value(path)", "(path_value(path) * level)");
   kernel = studio.read(KERNEL);
-  mark(LEVEL);
+  appendToKernel(LEVEL);
   await studio.start();
 });
 afterEach(async () => {
@@ -27,19 +27,19 @@ afterEach(async () => {
   await studio.remove();
 });
 
-const mark = (lines) => studio.write(KERNEL, kernel + lines);
+const appendToKernel = (lines) => studio.write(KERNEL, kernel + lines);
 const box = (page, path, nth = 0) => page.locator(`[data-control="${path} ${nth}"]`);
 const slider = (page, name) => page.getByRole("slider", { name, exact: true });
 const number = (page, name) => page.getByRole("spinbutton", { name: `${name}, as a number` });
 const isFocused = (locator) => locator.evaluate((node) => node === document.activeElement);
 
-async function says(locator, value) {
+async function waitForValue(locator, value) {
   const node = await locator.elementHandle();
   await locator.page().waitForFunction(([node, value]) => node.value === value, [node, value]);
 }
 
-async function written(text) {
-  const deadline = Date.now() + LONGEST;
+async function waitForText(text) {
+  const deadline = Date.now() + TIMEOUT;
   while (!studio.read("scene.toml").includes(text)) {
     assert.ok(Date.now() < deadline, `no ${text} in ${studio.read("scene.toml")}`);
     await new Promise((resolve) => setTimeout(resolve, 10));
@@ -52,14 +52,14 @@ async function choose(page, name) {
   await page.locator("#object-name", { hasText: name }).waitFor();
 }
 
-// Records the changes requested from now on.
-async function listen(page) {
+// Records the changes that a page requests. The returned function returns the changes since its last call.
+async function recordChanges(page) {
   await page.evaluate(() => {
     const send = WebSocket.prototype.send;
     window.sent = [];
     WebSocket.prototype.send = function (text) {
-      const asked = JSON.parse(text);
-      if (["set", "look", "slide", "view", "frame", "reset_camera"].some((name) => asked === name || asked[name] !== undefined)) window.sent.push(text);
+      const message = JSON.parse(text);
+      if (["set", "look", "slide", "view", "frame", "reset_camera"].some((name) => message === name || message[name] !== undefined)) window.sent.push(text);
       return send.call(this, text);
     };
   });
@@ -67,14 +67,14 @@ async function listen(page) {
 }
 
 test("a half-typed number stays while other controls come and go", async () => {
-  const [page, other] = [await open(browser, studio), await open(browser, studio)];
+  const [page, otherPage] = [await open(browser, studio), await open(browser, studio)];
   await choose(page, "shapes[0]");
-  await choose(other, "shapes[0]");
+  await choose(otherPage, "shapes[0]");
   const z = box(page, "shapes[0].center", 2);
   await z.focus();
   await page.keyboard.press("Control+a");
   await page.keyboard.type("0.7");
-  await box(other, "shapes[0].material").selectOption("grey");
+  await box(otherPage, "shapes[0].material").selectOption("grey");
   await box(page, "materials.grey.color").waitFor();
   assert.equal(await page.locator('[data-name="materials.red"]').count(), 0);
   assert.equal(await z.inputValue(), "0.7");
@@ -82,65 +82,65 @@ test("a half-typed number stays while other controls come and go", async () => {
   assert.ok(studio.read("scene.toml").includes("center = [0, 0, 0.5]"), "a half-typed number was written");
   await page.keyboard.type("5");
   await page.keyboard.press("Enter");
-  await written("center = [0, 0, 0.75]");
+  await waitForText("center = [0, 0, 0.75]");
   // A removed box discards its text; the keys that follow have no effect.
-  const sent = await listen(page);
+  const sent = await recordChanges(page);
   await box(page, "materials.grey.shininess", 1).focus();
   await page.keyboard.press("Control+a");
   await page.keyboard.type("3");
-  await box(other, "shapes[0].material").selectOption("red");
+  await box(otherPage, "shapes[0].material").selectOption("red");
   await page.locator('[data-name="materials.grey"]').waitFor({ state: "detached" });
   await page.keyboard.type("5r");
   assert.deepEqual(await sent(), []);
   assert.equal(studio.read("scene.toml").match(/shininess = 16/g).length, 2);
   // A number that moves from the defaults to the values of the file keeps its focus; the list stays open.
   await choose(page, "render");
-  const absent = page.locator('[data-name="render"] .absent');
-  await absent.locator("> summary").click();
-  const there = page.locator('[data-name="render"] > div [data-control="render.seed 1"]');
+  const defaults = page.locator('[data-name="render"] .absent');
+  await defaults.locator("> summary").click();
+  const seedInFile = page.locator('[data-name="render"] > div [data-control="render.seed 1"]');
   await box(page, "render.seed", 1).focus();
   await page.keyboard.type("2");
   await page.keyboard.press("Enter");
-  await there.waitFor();
-  assert.ok(await isFocused(there));
-  assert.ok(await absent.evaluate((node) => node.open));
+  await seedInFile.waitFor();
+  assert.ok(await isFocused(seedInFile));
+  assert.ok(await defaults.evaluate((node) => node.open));
   // Removing the value with a key moves the field back, with the focus.
   await page.locator('[data-path="render.seed"]').getByRole("button", { name: "default" }).focus();
   await page.keyboard.press("Enter");
-  await there.waitFor({ state: "detached" });
+  await seedInFile.waitFor({ state: "detached" });
   assert.ok(await isFocused(box(page, "render.seed")));
-  assert.deepEqual(page.faults, []);
+  assert.deepEqual(page.errors, []);
 });
 
 test("a half-typed number of a shader stays while sliders come and go, and sliders take their ranges from the file", async () => {
   const page = await open(browser, studio);
-  const sent = await listen(page);
+  const sent = await recordChanges(page);
   const level = number(page, "level");
   await level.focus();
   await page.keyboard.press("Control+a");
   await page.keyboard.type("0.2");
-  mark(`override early: f32 = 0.5; // 0..1\n${LEVEL}override wide: f32 = 5.0; // 0..1000\n`);
+  appendToKernel(`override early: f32 = 0.5; // 0..1\n${LEVEL}override wide: f32 = 5.0; // 0..1000\n`);
   await slider(page, "wide").waitFor();
   assert.equal(await level.inputValue(), "0.2");
   await page.keyboard.type("5");
   assert.deepEqual(await sent(), []);
   await page.keyboard.press("Enter");
-  await says(slider(page, "level"), "0.25");
-  await settled(page);
+  await waitForValue(slider(page, "level"), "0.25");
+  await waitUntilSettled(page);
   assert.deepEqual((await sent()).map((text) => JSON.parse(text).slide.value), [0.25]);
   // Key steps work as in any other box.
   await page.keyboard.press("ArrowUp");
-  await says(slider(page, "level"), "0.26");
+  await waitForValue(slider(page, "level"), "0.26");
   await page.keyboard.press("Control+a");
   await page.keyboard.press("Delete");
   await slider(page, "level").focus();
-  await says(level, "0.26");
+  await waitForValue(level, "0.26");
   const wide = slider(page, "wide");
   assert.equal(await wide.getAttribute("step"), "1");
-  mark(`override wide: f32 = 0.05; // 0..0.1\n${LEVEL}`);
-  await says(wide, "0.05");
+  appendToKernel(`override wide: f32 = 0.05; // 0..0.1\n${LEVEL}`);
+  await waitForValue(wide, "0.05");
   assert.deepEqual(await wide.evaluate((node) => [node.min, node.max, Number(node.step)]), ["0", "0.1", 0.0001]);
-  mark(`override wide: f32 = 0.05; // 0..0.2\n${LEVEL}`);
+  appendToKernel(`override wide: f32 = 0.05; // 0..0.2\n${LEVEL}`);
   await page.locator("#sliders input[max='0.2']").waitFor();
   assert.equal(await slider(page, "early").count(), 0);
   // A removed slider discards its half-typed number.
@@ -148,11 +148,11 @@ test("a half-typed number of a shader stays while sliders come and go, and slide
   await number(page, "wide").focus();
   await page.keyboard.press("Control+a");
   await page.keyboard.type("0.0");
-  mark(LEVEL);
+  appendToKernel(LEVEL);
   await wide.waitFor({ state: "detached" });
   await page.keyboard.type("5");
   assert.deepEqual(await sent(), []);
-  assert.deepEqual(page.faults, []);
+  assert.deepEqual(page.errors, []);
 });
 
 test("touch scrolling changes no values; dragging and tapping do", async () => {
@@ -160,18 +160,18 @@ test("touch scrolling changes no values; dragging and tapping do", async () => {
   const client = await page.context().newCDPSession(page);
   await choose(page, "shapes[0]");
   await page.evaluate(() => document.activeElement.blur());
-  const sent = await listen(page);
-  // After a swipe the page keeps scrolling for some animation frames.
-  const atRest = () => page.evaluate(async () => {
+  const sent = await recordChanges(page);
+  // After a swipe, the page keeps scrolling for a few animation frames.
+  const waitForScrollEnd = () => page.evaluate(async () => {
     let last = null;
-    for (let still = 0; still < 4; still = last === scrollY ? still + 1 : 0) {
+    for (let unchangedFrames = 0; unchangedFrames < 4; unchangedFrames = last === scrollY ? unchangedFrames + 1 : 0) {
       last = scrollY;
       await new Promise((resolve) => requestAnimationFrame(resolve));
     }
   });
   const swipe = async (control, dx, dy) => {
     await control.evaluate((node) => scrollBy(0, node.getBoundingClientRect().top - 680));
-    await atRest();
+    await waitForScrollEnd();
     const area = await control.boundingBox();
     const [x, y] = [area.x + area.width * 0.15, area.y + area.height / 2];
     const touch = (type, touchPoints) => client.send("Input.dispatchTouchEvent", { type, touchPoints });
@@ -179,7 +179,7 @@ test("touch scrolling changes no values; dragging and tapping do", async () => {
     await touch("touchStart", [{ x, y }]);
     for (let i = 1; i <= 12; i++) await touch("touchMove", [{ x: x + (dx * i) / 12, y: y + (dy * i) / 12 }]);
     await touch("touchEnd", []);
-    await atRest();
+    await waitForScrollEnd();
     return (await page.evaluate(() => scrollY)) - top;
   };
   const sliders = [box(page, "shapes[0].radius"), slider(page, "level"), page.locator("#exposure")];
@@ -191,38 +191,38 @@ test("touch scrolling changes no values; dragging and tapping do", async () => {
     assert.deepEqual(await sent(), []);
     assert.ok(Math.abs(await swipe(control, 60, 3)) < 10, "a horizontal drag scrolls");
     assert.ok((await sent()).length > 0);
-    await settled(page);
+    await waitUntilSettled(page);
     await sent();
     if (boxes.includes(control)) continue;
     await swipe(control, 0, 0);
     assert.equal((await sent()).length, 1);
-    await settled(page);
+    await waitUntilSettled(page);
   }
   // Afterwards boxes follow the file, and another object can be shown.
   const radius = box(page, "shapes[0].radius", 1);
   await swipe(radius, 5, -96);
   studio.write("scene.toml", SCENE.replace("radius = 0.5", "radius = 0.35"));
-  await says(radius, "0.35");
+  await waitForValue(radius, "0.35");
   await swipe(radius, 5, -96);
   const area = await canvas(page).boundingBox();
   await page.touchscreen.tap(area.x + area.width * 0.9, area.y + area.height * 0.6);
   await box(page, "shapes[1].point").waitFor({ state: "attached" });
-  assert.deepEqual(page.faults, []);
+  assert.deepEqual(page.errors, []);
 });
 
 test("keys act on the control that has the focus", async () => {
   const page = await open(browser, studio);
   await choose(page, "shapes[0]");
-  const sent = await listen(page);
-  for (const [control, least] of [[page.locator("#exposure"), -10], [slider(page, "level"), 0]]) {
+  const sent = await recordChanges(page);
+  for (const [control, min] of [[page.locator("#exposure"), -10], [slider(page, "level"), 0]]) {
     await control.focus();
     await page.keyboard.press("Home");
-    const [asked] = await sent();
-    const { look, slide } = JSON.parse(asked);
-    assert.equal(look?.exposure ?? slide.value, least);
+    const [change] = await sent();
+    const { look, slide } = JSON.parse(change);
+    assert.equal(look?.exposure ?? slide.value, min);
   }
   await box(page, "shapes[0].radius").focus();
-  await page.keyboard.press("Home"); // its range then follows the value
+  await page.keyboard.press("Home"); // the range of the slider then follows the value
   await page.waitForFunction(() => Number(document.querySelector('[data-control="shapes[0].radius 1"]').value) < 0.01);
   await page.locator("#object-find").focus();
   for (const key of ["Home", "r", "5", " "]) await page.keyboard.press(key);
@@ -233,7 +233,7 @@ test("keys act on the control that has the focus", async () => {
   }
   await page.locator("#exposure").focus();
   await page.keyboard.press("r");
-  await settled(page);
+  await waitUntilSettled(page);
   const kinds = (await sent()).map((text) => (typeof JSON.parse(text) === "string" ? text : Object.keys(JSON.parse(text))[0]));
   assert.deepEqual(kinds, ["set"]);
   await canvas(page).focus();
@@ -247,28 +247,28 @@ test("on a narrow or zoomed-in screen the focus is never behind the image", asyn
   for (const options of [PHONE, { viewport: { width: 600, height: 400 } }]) {
     const page = await open(browser, studio, options);
     await choose(page, "shapes[0]");
-    const stops = [];
-    const walk = async (key) => {
+    const focusStops = [];
+    const pressRepeatedly = async (key) => {
       for (let i = 0; i < 60; i++) {
         await page.keyboard.press(key);
-        const stop = await page.evaluate(() => {
+        const focusStop = await page.evaluate(() => {
           const { activeElement: node } = document;
           const [{ top, bottom }, stage] = [node.getBoundingClientRect(), document.getElementById("stage").getBoundingClientRect()];
           if (!node.closest("aside")) return null;
           const name = node.id || node.dataset.control || node.name || node.textContent.slice(0, 20);
           const isTall = bottom - top > innerHeight - stage.bottom;
           const isSeen = isTall ? bottom > stage.bottom && top < innerHeight : top > stage.bottom - 1 && bottom < innerHeight + 1;
-          return { name, isSeen, at: [top, bottom, stage.bottom] };
+          return { name, isSeen, edges: [top, bottom, stage.bottom] };
         });
-        if (stop) stops.push(stop);
+        if (focusStop) focusStops.push(focusStop);
       }
     };
     await page.evaluate(() => document.querySelector("#help summary").focus());
-    await walk("Shift+Tab");
+    await pressRepeatedly("Shift+Tab");
     await page.locator("#pause").focus();
-    await walk("Tab");
-    assert.ok(stops.length > 60, `${stops.length} stops`);
-    assert.deepEqual(stops.filter(({ isSeen }) => !isSeen), []);
+    await pressRepeatedly("Tab");
+    assert.ok(focusStops.length > 60, `${focusStops.length} focus stops`);
+    assert.deepEqual(focusStops.filter(({ isSeen }) => !isSeen), []);
   }
 });
 
@@ -279,9 +279,9 @@ test("an error disappears with its value, and an emptied box shows its value aga
   await radius.fill("-1");
   await page.keyboard.press("Enter");
   const error = page.locator('[data-path="shapes[0].radius"] .bad');
-  await error.filter({ hasText: "must be finite and greater than 0" }).waitFor();
+  await error.filter({ hasText: "must be from 1e-9 to 1e9" }).waitFor();
   studio.edit("scene.toml", "# a small scene", "# another");
-  await says(radius, "0.5");
+  await waitForValue(radius, "0.5");
   await error.waitFor({ state: "hidden" });
   for (const control of [radius, page.locator("#exposure-number")]) {
     const value = await control.inputValue();
@@ -295,46 +295,46 @@ test("an error disappears with its value, and an emptied box shows its value aga
   assert.equal(await link("/a/$$/$'.wgsl"), "x://file/a/$$/$'.wgsl:3");
 });
 
-test("a viewer beyond the limit gets a message, and a slot that becomes free", async () => {
+test("a viewer beyond the limit gets a message, and connects when a slot becomes free", async () => {
   const page = await open(browser, studio);
   await page.evaluate(async () => {
-    window.others = Array.from({ length: 15 }, () => new WebSocket(`ws://${location.host}/socket`));
-    await Promise.all(window.others.map((socket) => new Promise((resolve) => (socket.onopen = resolve))));
+    window.otherViewers = Array.from({ length: 15 }, () => new WebSocket(`ws://${location.host}/socket`));
+    await Promise.all(window.otherViewers.map((socket) => new Promise((resolve) => (socket.onopen = resolve))));
   });
-  const late = await visit(browser, studio);
-  await late.locator("#badge", { hasText: "Viewer limit reached" }).waitFor();
-  await page.evaluate(() => window.others[0].close());
-  await late.locator("#badge.live").waitFor({ state: "attached" });
+  const latePage = await visit(browser, studio);
+  await latePage.locator("#badge", { hasText: "Viewer limit reached" }).waitFor();
+  await page.evaluate(() => window.otherViewers[0].close());
+  await latePage.locator("#badge.live").waitFor({ state: "attached" });
 });
 
 test("forced colours show the progress", async () => {
   const page = await open(browser, studio, { forcedColors: "active" });
   const bar = page.locator("#bar");
   const colors = async () => {
-    const [, , bytes] = await decoded(page, [...await bar.screenshot()]);
+    const [, , bytes] = await decode(page, [...await bar.screenshot()]);
     return new Set(bytes.match(/\d+,\d+,\d+/g)).size;
   };
   await page.evaluate(() => (document.getElementById("bar").value = 0.5));
   assert.ok((await colors()) >= 3, "fewer than three colors: edge, finished part, remaining part");
 });
 
-test("a count of cells steps from square to square", async () => {
+test("the sample count of a grid steps from one square number to the next", async () => {
   const page = await open(browser, studio);
   await choose(page, "render");
-  const count = (number) => written(`count = ${number} }\nlight`);
+  const waitForCount = (number) => waitForText(`count = ${number} }\nlight`);
   const [range, field] = [0, 1].map((nth) => box(page, "render.pixel_samples.count", nth));
   await range.focus();
   await page.keyboard.press("ArrowRight");
-  await count(9);
-  await says(field, "9");
+  await waitForCount(9);
+  await waitForValue(field, "9");
   await field.focus();
   await page.keyboard.press("ArrowUp");
-  await count(16);
+  await waitForCount(16);
   await page.keyboard.press("ArrowDown");
   await page.keyboard.press("ArrowDown");
-  await count(4);
+  await waitForCount(4);
   // A drag around one position does not alternate between two squares.
-  const sent = await listen(page);
+  const sent = await recordChanges(page);
   await page.locator("#pause").focus();
   await field.scrollIntoViewIfNeeded();
   const { x, y, width, height } = await field.boundingBox();
@@ -342,13 +342,13 @@ test("a count of cells steps from square to square", async () => {
   await page.mouse.down();
   for (const dx of [20, 21, 22, 21, 22, 20]) await page.mouse.move(x + width / 2 + dx, y + height / 2);
   await page.mouse.up();
-  await count(9);
-  await settled(page);
+  await waitForCount(9);
+  await waitUntilSettled(page);
   assert.deepEqual((await sent()).map((text) => JSON.parse(text).set.value), [9]);
   await field.focus();
   await page.keyboard.press("PageUp");
-  await count(169); // ten squares up
-  // Sent as typed; the error stays until a valid one is typed.
+  await waitForCount(169); // ten squares up
+  // A typed count is sent unchanged; its error stays until a valid count is typed.
   const error = page.locator('[data-path="render.pixel_samples.count"] [role=alert]', { hasText: "square" });
   await field.fill("5");
   await page.keyboard.press("Enter");
@@ -358,35 +358,35 @@ test("a count of cells steps from square to square", async () => {
   await page.keyboard.press("Enter");
   await error.waitFor({ state: "hidden" });
   await page.locator("#notice").waitFor({ state: "hidden" });
-  await count(9);
+  await waitForCount(9);
   await page.locator("#most-samples").fill("1.5");
   await page.keyboard.press("Enter");
   await page.locator("#notice.bad", { hasText: "must be a whole number from 1 to 65,536, not 1.5" }).waitFor();
   assert.equal(await page.locator("#most-samples").inputValue(), "");
   // Other patterns accept any count.
   await box(page, "render.pixel_samples.pattern").selectOption("sobol");
-  await written('pattern = "sobol", count = 9');
+  await waitForText('pattern = "sobol", count = 9');
   await page.locator('[data-control="render.pixel_samples.count 0"][max="1000"]').waitFor();
   await field.focus();
   await page.keyboard.press("ArrowUp");
-  await count(10);
-  assert.deepEqual(page.faults, []);
+  await waitForCount(10);
+  assert.deepEqual(page.errors, []);
 });
 
 test("the focus of a control that is disabled or removed stays near, and returns with the control", async () => {
   const page = await open(browser, studio);
-  const isAround = (id) => page.evaluate((id) => document.activeElement === document.getElementById(id).parentElement, id);
+  const isParentFocused = (id) => page.evaluate((id) => document.activeElement === document.getElementById(id).parentElement, id);
   await choose(page, "shapes[0]");
   await box(page, "shapes[0].radius", 1).fill("0.4");
   await page.keyboard.press("Enter");
-  await written("radius = 0.4");
+  await waitForText("radius = 0.4");
   await page.locator("#undo-write:enabled").focus();
   await page.keyboard.press("Enter");
   await page.locator("#undo-write:disabled").waitFor();
-  assert.ok(await isAround("undo-write"));
+  assert.ok(await isParentFocused("undo-write"));
   await page.keyboard.press("Tab");
   assert.ok(await isFocused(page.locator("#redo-write")), "the focus did not move to the neighboring button");
-  // Hidden with the focus: the button beside a field, the canvas of another view.
+  // A control that has the focus can be hidden: the button beside a field, the canvas of a comparison.
   await slider(page, "level").focus();
   await page.keyboard.press("ArrowRight");
   await page.getByRole("button", { name: "Reset level" }).focus();
@@ -399,29 +399,30 @@ test("the focus of a control that is disabled or removed stays near, and returns
   await page.keyboard.press("1");
   await page.locator("[data-part=second] canvas").waitFor({ state: "hidden" });
   assert.ok(await isFocused(canvas(page)));
-  // Deleting a view that has the focus.
+  // The button that deletes a view has the focus.
   await page.keyboard.press("b");
   await page.getByRole("button", { name: "Delete view 1" }).focus();
   await page.keyboard.press("Enter");
   assert.ok(await isFocused(page.locator("#bookmarks")));
-  // Without a connection all controls are disabled; then the same control has the focus, unless the user moved it.
-  for (const [moves, wanted] of [[[], "#pause"], [["Tab"], "#save-png"]]) {
+  // Without a connection, all controls are disabled. After a reconnection, the same control has the focus, unless the
+  // user has moved the focus.
+  for (const [keys, expected] of [[[], "#pause"], [["Tab"], "#save-png"]]) {
     await page.locator("#pause").focus();
     await studio.stop();
     await page.locator("#badge.lost").waitFor();
-    assert.ok(await isAround("pause"));
-    for (const key of moves) await page.keyboard.press(key);
+    assert.ok(await isParentFocused("pause"));
+    for (const key of keys) await page.keyboard.press(key);
     await studio.start(studio.port);
     await page.locator("#badge.live").waitFor({ state: "attached" });
-    assert.ok(await isFocused(page.locator(wanted)), wanted);
+    assert.ok(await isFocused(page.locator(expected)), expected);
   }
-  // Focusing the button scrolls the panel only.
+  // Focusing the button scrolls only the panel.
   await page.evaluate(() => document.querySelectorAll("aside details").forEach((details) => (details.open = true)));
   await page.locator("#reference-file").focus();
   assert.equal(await page.evaluate(() => scrollY), 0);
   const button = await page.locator("label[for=reference-file]").boundingBox();
   assert.ok(button.y >= 0 && button.y + button.height <= 800, `${button.y}`);
-  // After a click beside all controls nothing regains focus.
+  // After a click outside of all controls, no control regains the focus.
   await page.locator("#restart").focus();
   await page.locator("h1").click();
   await studio.stop();

@@ -1,11 +1,11 @@
-// Film layers on the page equal the layers of `wgray render --aov`. A layer that a scene lacks is disabled, and the page
-// shows the reason.
+// Film layers on the page equal the layers of `wgray render --aov`. A layer that a scene lacks is disabled, and the
+// page shows the reason.
 
 import assert from "node:assert/strict";
 import fs from "node:fs";
 import { after, afterEach, before, beforeEach, test } from "node:test";
 
-import { SCENE, Studio, canvas, decoded, launch, open, same, settled, shown } from "./studio.mjs";
+import { SCENE, Studio, assertSameImage, canvas, decode, launch, open, shownImage, waitUntilSettled } from "./studio.mjs";
 
 const PATH = SCENE.replace("[render]", "[render]\nintegrator = \"path\"\nbackground = [0.1, 0.2, 0.4]");
 
@@ -20,43 +20,43 @@ afterEach(async () => {
   await studio.remove();
 });
 
-async function choose(page, view) {
+async function selectView(page, view) {
   await page.selectOption("#layers", view);
   await page.waitForFunction((view) => document.getElementById("panels").dataset.view === view, view);
-  await settled(page);
+  await waitUntilSettled(page);
 }
 
 test("film layers are views with the images and files of a render", async () => {
   studio.write("scene.toml", PATH);
   await studio.start();
   const page = await open(browser, studio);
-  const light = await shown(page);
+  const colorImage = await shownImage(page);
   const compiled = () => page.locator("#compile").innerText();
-  const first = await compiled();
+  const firstCompile = await compiled();
   const names = ["direct", "indirect", "emission", "albedo"];
   studio.renderTo(studio.path("rendered.png"), ["--aov", names.join()]);
-  const seen = new Set([String(light)]);
+  const images = new Set([String(colorImage)]);
   for (const name of names) {
-    await choose(page, name);
-    const picture = await shown(page);
-    same(picture, await decoded(page, [...fs.readFileSync(studio.path(`rendered.${name}.png`))]), name);
-    seen.add(String(picture));
+    await selectView(page, name);
+    const image = await shownImage(page);
+    assertSameImage(image, await decode(page, [...fs.readFileSync(studio.path(`rendered.${name}.png`))]), name);
+    images.add(String(image));
     const saved = await page.evaluate(async () => [...new Uint8Array(await (await fetch("/picture.exr")).arrayBuffer())]);
     const header = Buffer.from(saved.slice(0, 1000)).toString("latin1");
     assert.match(header, new RegExp(`\\0chlist\\0....${name}\\.B\\0`, "s"), "the channel is missing in the EXR header");
   }
-  assert.equal(seen.size, 5, "two layers have the same image");
+  assert.equal(images.size, 5, "two layers have the same image");
   assert.equal(await page.locator("#samples").innerText(), "4 of 4");
   await canvas(page).hover();
   await page.locator("#values", { hasText: /albedo [\d.]+ +[\d.]+ +[\d.]+.*bits.*shown/ }).waitFor();
-  const one = await compiled();
-  assert.notEqual(one, first, "the layers did not compile another kernel");
+  const layersCompile = await compiled();
+  assert.notEqual(layersCompile, firstCompile, "the layers did not compile another kernel");
   await page.keyboard.press("1");
   await page.waitForFunction(() => document.getElementById("panels").dataset.view === "color");
-  await settled(page);
-  same(await shown(page), light);
-  assert.equal(await compiled(), one, "the kernel of the light layers was compiled again");
-  assert.deepEqual(page.faults, []);
+  await waitUntilSettled(page);
+  assertSameImage(await shownImage(page), colorImage);
+  assert.equal(await compiled(), layersCompile, "the kernel of the light layers was compiled again");
+  assert.deepEqual(page.errors, []);
 });
 
 test("a layer that a scene lacks is disabled with the reason until the scene has it", async () => {
@@ -75,11 +75,11 @@ test("a layer that a scene lacks is disabled with the reason until the scene has
   await page.waitForFunction(() => !document.querySelector("#layers [value=direct]").disabled);
   assert.ok(await variance.isEnabled());
   assert.equal(await group.getAttribute("label"), "Light");
-  // The variance comes with the scale of its false colours.
-  await choose(page, "variance");
+  // A legend shows the false colours of the variance.
+  await selectView(page, "variance");
   await page.locator("#legend", { hasText: "2⁻¹²" }).waitFor();
   await canvas(page).hover();
   await page.locator("#values", { hasText: /variance .*standard error/ }).waitFor();
   assert.equal(await page.locator("#layers").evaluate((select) => select.classList.contains("chosen")), true);
-  assert.deepEqual(page.faults, []);
+  assert.deepEqual(page.errors, []);
 });

@@ -4,7 +4,7 @@
 import assert from "node:assert/strict";
 import { after, afterEach, before, beforeEach, test } from "node:test";
 
-import { Studio, canvas, finished, launch, listen, open, revision, settled, shown } from "./studio.mjs";
+import { Studio, canvas, launch, open, recordMessages, revision, shownImage, waitForImage, waitUntilSettled } from "./studio.mjs";
 
 let browser;
 let studio;
@@ -24,22 +24,22 @@ const camera = (page) => page.locator("#camera-text").innerText();
 
 test("every frame on the screen is acknowledged by its number", async () => {
   const page = await open(browser, studio);
-  const sent = await listen(page, (message) => message.shown !== undefined);
-  const old = await revision(page);
+  const sent = await recordMessages(page, (message) => message.shown !== undefined);
+  const oldRevision = await revision(page);
   await canvas(page).focus();
   await page.keyboard.press("ArrowLeft");
-  await finished(page, old);
-  await settled(page);
-  await page.waitForTimeout(100); // one more frame of the screen
+  await waitForImage(page, oldRevision);
+  await waitUntilSettled(page);
+  await page.waitForTimeout(100); // one more screen refresh
   const numbers = (await sent()).map(({ shown }) => shown);
   assert.ok(numbers.length > 0);
   assert.deepEqual(numbers, [...numbers].sort((a, b) => a - b));
-  // An answer after an acknowledgement still belongs to its request.
+  // A response that follows an acknowledgement is still matched to its request.
   await canvas(page).hover();
   await page.locator("#values", { hasText: "linear RGB" }).waitFor();
   await page.keyboard.press("ArrowRight");
-  await settled(page);
-  assert.deepEqual(page.faults, []);
+  await waitUntilSettled(page);
+  assert.deepEqual(page.errors, []);
 });
 
 test("the divider of a wipe is dragged in the image", async () => {
@@ -47,8 +47,8 @@ test("the divider of a wipe is dragged in the image", async () => {
   await page.keyboard.press("7");
   await page.locator("[data-part=second] canvas").waitFor();
   await page.getByLabel("Wipe").check();
-  await settled(page);
-  const before = await camera(page);
+  await waitUntilSettled(page);
+  const oldCamera = await camera(page);
   const area = await canvas(page, "first").boundingBox();
   const [x, y] = [area.x + area.width / 2, area.y + area.height * 0.3];
   await page.mouse.move(x + 1, y);
@@ -57,10 +57,10 @@ test("the divider of a wipe is dragged in the image", async () => {
   await page.mouse.move(area.x + area.width * 0.6, y, { steps: 4 });
   await page.mouse.move(area.x + area.width * 0.25, y + 30, { steps: 4 });
   await page.mouse.up();
-  await settled(page);
+  await waitUntilSettled(page);
   assert.ok(Math.abs(Number(await page.locator("#wipe").inputValue()) - 0.25) < 0.01, await page.locator("#wipe").inputValue());
-  assert.equal(await camera(page), before, "dragging the divider moved the camera");
-  // Beside the divider a drag orbits.
+  assert.equal(await camera(page), oldCamera, "dragging the divider moved the camera");
+  // A drag beside the divider orbits.
   await page.mouse.move(x, y);
   assert.notEqual(await canvas(page, "first").evaluate((canvas) => getComputedStyle(canvas).cursor), "ew-resize");
   await page.mouse.down();
@@ -71,24 +71,24 @@ test("the divider of a wipe is dragged in the image", async () => {
   await page.locator("#wipe").focus();
   await page.keyboard.press("Home");
   assert.equal(await page.locator("#wipe").inputValue(), "0");
-  assert.deepEqual(page.faults, []);
+  assert.deepEqual(page.errors, []);
 });
 
-const spoil = (lines) => studio.edit("shaders/kernels/render.wgsl", "film[index] = sum;", `let zero = f32(params.samples.x) * 0.0;\n${lines}\nfilm[index] = sum;`);
+const editKernel = (lines) => studio.edit("shaders/kernels/render.wgsl", "film[index] = sum;", `let zero = f32(params.samples.x) * 0.0;\n${lines}\nfilm[index] = sum;`);
 
-test("a badge on the image counts invalid pixels and leads to their numbers", async () => {
+test("a badge on the image counts invalid pixels, and a click on the badge opens the section of counts", async () => {
   const page = await open(browser, studio);
-  const seen = await shown(page);
+  const validImage = await shownImage(page);
   const badge = page.locator("#invalid");
   assert.ok(await badge.isHidden());
-  spoil("if pixel.y == 3u && pixel.x == 0u { sum.x = zero / zero; }");
+  editKernel("if pixel.y == 3u && pixel.x == 0u { sum.x = zero / zero; }");
   await badge.filter({ hasText: /^1 NaN pixel$/ }).waitFor();
   const [area, panels] = [await badge.boundingBox(), await page.locator("#panels").boundingBox()];
   assert.ok(area.x >= panels.x && area.x + area.width <= panels.x + panels.width && area.y >= panels.y, "the badge is outside of the image");
-  // A ring leads to a single pixel.
-  await settled(page);
-  const at = (image, x, y) => image[2].split(",").slice(3 * (y * 120 + x), 3 * (y * 120 + x) + 3).join();
-  assert.notEqual(at(await shown(page), 8, 3), at(seen, 8, 3));
+  // A ring marks a single pixel.
+  await waitUntilSettled(page);
+  const pixelAt = (image, x, y) => image[2].split(",").slice(3 * (y * 120 + x), 3 * (y * 120 + x) + 3).join();
+  assert.notEqual(pixelAt(await shownImage(page), 8, 3), pixelAt(validImage, 8, 3));
   await page.setViewportSize({ width: 1200, height: 420 });
   await page.locator("#display > summary").click();
   await badge.click();
@@ -97,18 +97,18 @@ test("a badge on the image counts invalid pixels and leads to their numbers", as
     return document.getElementById("display").open && top >= 0 && bottom <= innerHeight;
   });
   assert.ok(await page.locator("#faults").evaluate((node) => node === document.activeElement));
-  assert.deepEqual(page.faults, []);
+  assert.deepEqual(page.errors, []);
 });
 
 test("an image full of invalid pixels gets no rings", async () => {
   const page = await open(browser, studio);
-  spoil("sum.x = zero / zero;");
+  editKernel("sum.x = zero / zero;");
   await page.locator("#invalid", { hasText: /^10,800 NaN pixels$/ }).waitFor();
-  await settled(page);
-  assert.deepEqual([...new Set((await shown(page))[2].match(/\d+,\d+,\d+/g))], ["255,0,255"]);
+  await waitUntilSettled(page);
+  assert.deepEqual([...new Set((await shownImage(page))[2].match(/\d+,\d+,\d+/g))], ["255,0,255"]);
 });
 
-test("screen readers get the keys of the viewport while the section of keys is folded", async () => {
+test("screen readers get the keys of the viewport while the section of keys is closed", async () => {
   const page = await open(browser, studio);
   assert.equal(await page.locator("#help").evaluate((help) => help.open), false);
   const client = await page.context().newCDPSession(page);
@@ -117,27 +117,27 @@ test("screen readers get the keys of the viewport while the section of keys is f
   assert.match(viewport.description?.value ?? "", /Arrow keys orbit/);
 });
 
-test("a dolly passes the look-at point instead of sticking to it, and ends far out", async () => {
+test("a dolly passes the look-at point, and its distance is limited", async () => {
   const page = await open(browser, studio);
   await canvas(page).focus();
   const point = (text, key) => new RegExp(`${key} = \\[(.*)\\]`).exec(text)[1].split(",").map(Number);
   const distance = (text) => Math.hypot(...point(text, "position").map((v, i) => v - point(text, "look_at")[i]));
   const dolly = async (key, count) => {
     for (let i = 0; i < count; i++) await page.keyboard.press(key);
-    await settled(page);
+    await waitUntilSettled(page);
     return camera(page);
   };
   const start = await camera(page);
   const near = await dolly("PageUp", 60);
   const nearer = await dolly("PageUp", 10);
   const moved = Math.hypot(...point(nearer, "position").map((v, i) => v - point(near, "position")[i]));
-  assert.ok(moved > 0.02, `10 notches move it by ${moved}`);
+  assert.ok(moved > 0.02, `10 steps move the camera by ${moved}`);
   await page.keyboard.press("r");
   await page.locator("#reset:disabled").waitFor();
   const far = await dolly("PageDown", 100);
   assert.ok(distance(far) < 1001 * distance(start), far);
   assert.ok(distance(far) > 100 * distance(start), far);
-  assert.deepEqual(page.faults, []);
+  assert.deepEqual(page.errors, []);
 });
 
 test("on a phone the toolbar scrolls to the selected view", async () => {

@@ -3,7 +3,7 @@
 import assert from "node:assert/strict";
 import { after, afterEach, before, beforeEach, test } from "node:test";
 
-import { Studio, launch, open, same, settled, shown } from "./studio.mjs";
+import { Studio, assertSameImage, launch, open, shownImage, waitUntilSettled } from "./studio.mjs";
 
 const KERNEL = "shaders/kernels/render.wgsl";
 
@@ -24,37 +24,37 @@ afterEach(async () => {
 
 const compiled = (page) => page.locator("#compile").innerText();
 
-test("a slider changes the image without the compiler, and is copied", async () => {
+test("a slider changes the image without a compilation, and its declaration is copied", async () => {
   await studio.start();
   const page = await open(browser, studio);
-  const [first, time] = [await shown(page), await compiled(page)];
+  const [firstImage, compileTime] = [await shownImage(page), await compiled(page)];
   const slider = page.getByRole("slider", { name: "level", exact: true });
   await slider.focus();
   for (let i = 0; i < 3; i++) await page.keyboard.press("PageUp");
-  await settled(page);
+  await waitUntilSettled(page);
   const field = page.getByRole("spinbutton", { name: "level, as a number" });
   assert.equal(await slider.inputValue(), await field.inputValue());
   assert.notEqual(await slider.inputValue(), "0.5");
-  assert.notDeepEqual(await shown(page), first);
+  assert.notDeepEqual(await shownImage(page), firstImage);
   await field.fill("0.25");
   await field.press("Enter");
-  await settled(page);
+  await waitUntilSettled(page);
   assert.equal(await slider.inputValue(), "0.25");
   await page.context().grantPermissions(["clipboard-read", "clipboard-write"]);
   await page.click("#copy-sliders");
   await page.locator("#notice", { hasText: "Declarations copied" }).waitFor();
   assert.equal(await page.evaluate(() => navigator.clipboard.readText()), "override level: f32 = 0.25; // 0..1\n");
-  // A switch is shown, and can be reset.
+  // A Boolean override has a checkbox and can be reset.
   await page.getByRole("checkbox", { name: "green", exact: true }).uncheck();
-  await settled(page);
-  const green = (await shown(page))[2].split(",").filter((_, i) => i % 3 === 1);
+  await waitUntilSettled(page);
+  const green = (await shownImage(page))[2].split(",").filter((_, i) => i % 3 === 1);
   assert.ok(green.every((value) => value === "0"));
   await page.click("#reset-sliders");
-  await settled(page);
-  same(await shown(page), first);
-  assert.equal(await compiled(page), time, "a kernel was compiled");
+  await waitUntilSettled(page);
+  assertSameImage(await shownImage(page), firstImage);
+  assert.equal(await compiled(page), compileTime, "a kernel was compiled");
   await page.locator("#copy-sliders:disabled").waitFor();
-  assert.deepEqual(page.faults, []);
+  assert.deepEqual(page.errors, []);
 });
 
 test("timings of kernels and frame stages are shown", async () => {
@@ -67,7 +67,7 @@ test("timings of kernels and frame stages are shown", async () => {
     await row(part).waitFor();
     assert.match(await row(part).innerText(), /[\d.]+ (s|ms|µs)/, part);
   }
-  assert.deepEqual(page.faults, []);
+  assert.deepEqual(page.errors, []);
 });
 
 test("an error shows three lines and a link that opens the editor", async () => {
@@ -77,16 +77,16 @@ test("an error shows three lines and a link that opens the editor", async () => 
   const link = page.locator("#problem-list h2 a");
   await link.waitFor();
   const file = encodeURI(studio.path(KERNEL));
-  const line = studio.brokenLine();
+  const line = studio.errorLine();
   assert.ok((await link.getAttribute("href")).startsWith(`vscode://file${file}:${line}:`), await link.getAttribute("href"));
   const numbers = (await page.locator("#problem-list pre").innerText()).match(/^ *\d+(?= \|)/gm).map(Number);
   assert.deepEqual(numbers, [line - 1, line, line + 1]);
-  const place = page.locator("#sliders a").first();
-  assert.match(await place.getAttribute("href"), /^vscode:\/\/file\/.*render\.wgsl:\d+:1$/);
-  // Without an editor no links are shown.
+  const sliderLink = page.locator("#sliders a").first();
+  assert.match(await sliderLink.getAttribute("href"), /^vscode:\/\/file\/.*render\.wgsl:\d+:1$/);
+  // Without an editor, no links are shown.
   await studio.stop();
-  studio.mendShader();
+  studio.fixShader();
   await studio.start(0, ["--editor", "off"]);
-  const other = await open(browser, studio);
-  assert.equal(await other.locator("#sliders a").first().getAttribute("href"), null);
+  const pageWithoutEditor = await open(browser, studio);
+  assert.equal(await pageWithoutEditor.locator("#sliders a").first().getAttribute("href"), null);
 });

@@ -12,8 +12,8 @@ const ROOT = path.resolve(path.dirname(fileURLToPath(import.meta.url)), "../..")
 export const PROGRAM = process.env.WGRAY_PROGRAM;
 const { chromium } = createRequire(path.join(process.env.WGRAY_PAGE_MODULES, "/"))("playwright-core");
 
-// Timeout in milliseconds of all waits, even on a busy machine.
-export const LONGEST = 40_000;
+// Timeout of each wait in milliseconds, for a busy machine.
+export const TIMEOUT = 40_000;
 
 export const SCENE = `# a small scene
 [image]
@@ -65,7 +65,7 @@ tangent = [1, 0, 0]
 const KERNEL = "shaders/kernels/render.wgsl";
 const RADIANCE = "path_value(path)";
 
-// A folder with scene and shaders, and the program that watches it.
+// A folder with a scene and shaders, and the program that watches the folder.
 export class Studio {
   constructor() {
     this.folder = fs.mkdtempSync(path.join(os.tmpdir(), "wgray-page-"));
@@ -100,53 +100,53 @@ export class Studio {
     this.edit(KERNEL, RADIANCE, "path_value(simple)");
   }
 
-  mendShader() {
+  fixShader() {
     this.edit(KERNEL, "simple", "path");
   }
 
-  // Returns the line of the shader's error, counted from 1.
-  brokenLine() {
+  // Returns the line number of the shader error, counted from 1.
+  errorLine() {
     return this.read(KERNEL).split("\n").findIndex((line) => line.includes("simple")) + 1;
   }
 
-  // Returns the PNG bytes that `wgray render` makes.
+  // Returns the bytes of the PNG file that `wgray render` writes.
   render() {
     const out = this.path("rendered.png");
     this.renderTo(out);
     return [...fs.readFileSync(out)];
   }
 
-  renderTo(file, more = []) {
-    execFileSync(PROGRAM, ["render", this.path("scene.toml"), "--output", file, "--quiet", ...more], { stdio: "pipe" });
+  renderTo(file, extraArgs = []) {
+    execFileSync(PROGRAM, ["render", this.path("scene.toml"), "--output", file, "--quiet", ...extraArgs], { stdio: "pipe" });
   }
 
-  // Throws unless two image files have equal bits.
+  // Throws unless two image files are equal, bit for bit.
   diff(a, b) {
     execFileSync(PROGRAM, ["diff", a, b], { stdio: "pipe" });
   }
 
   // Starts the program; resolves once it has printed the address.
-  async start(port = 0, more = [], scene = "scene.toml") {
-    const args = ["dev", scene, "--shaders", "shaders", "--listen", `127.0.0.1:${port}`, ...more];
+  async start(port = 0, extraArgs = [], scene = "scene.toml") {
+    const args = ["dev", scene, "--shaders", "shaders", "--listen", `127.0.0.1:${port}`, ...extraArgs];
     this.program = spawn(PROGRAM, args, { cwd: this.folder, stdio: ["ignore", "inherit", "pipe"] });
-    this.said = "";
-    const found = new Promise((resolve, reject) => {
+    this.stderr = "";
+    const address = new Promise((resolve, reject) => {
       this.program.stderr.on("data", (data) => {
-        this.said += data;
-        const url = /http:\/\/[\d.:]+\//.exec(this.said);
+        this.stderr += data;
+        const url = /http:\/\/[\d.:]+\//.exec(this.stderr);
         if (url) resolve(url[0]);
       });
-      this.program.on("exit", () => reject(new Error(`the program ended: ${this.said}`)));
+      this.program.on("exit", () => reject(new Error(`the program exited: ${this.stderr}`)));
     });
-    this.url = await found;
+    this.url = await address;
     this.port = Number(new URL(this.url).port);
   }
 
   async stop() {
     if (this.program?.exitCode === null && this.program.signalCode === null) {
-      const ended = new Promise((resolve) => this.program.on("exit", resolve));
+      const exited = new Promise((resolve) => this.program.on("exit", resolve));
       this.program.kill("SIGKILL");
-      await ended;
+      await exited;
     }
   }
 
@@ -156,20 +156,20 @@ export class Studio {
   }
 }
 
-export function launch(more = []) {
+export function launch(extraArgs = []) {
   return chromium.launch({
     executablePath: process.env.WGRAY_CHROMIUM,
     args: [
       "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
-      "--disable-component-update", "--disable-sync", ...(process.env.WGRAY_PAGE ? ["--disable-features=LocalNetworkAccessChecks"] : []), ...more,
+      "--disable-component-update", "--disable-sync", ...(process.env.WGRAY_PAGE ? ["--disable-features=LocalNetworkAccessChecks"] : []), ...extraArgs,
     ],
   });
 }
 
-// Opens the page and waits for a finished image. `page.faults` collects its errors.
+// Opens the page and waits for a finished image. `page.errors` collects the errors of the page.
 export async function open(browser, studio, options = {}) {
   const page = await visit(browser, studio, options);
-  await finished(page);
+  await waitForImage(page);
   return page;
 }
 
@@ -177,15 +177,15 @@ export async function open(browser, studio, options = {}) {
 export async function visit(browser, studio, options = {}) {
   const context = await browser.newContext({ viewport: { width: 1200, height: 800 }, ...options });
   const page = await context.newPage();
-  page.setDefaultTimeout(LONGEST);
-  page.faults = [];
+  page.setDefaultTimeout(TIMEOUT);
+  page.errors = [];
   page.on("console", (message) => {
-    if (message.type() === "error") page.faults.push(message.text());
+    if (message.type() === "error") page.errors.push(message.text());
   });
-  page.on("pageerror", (error) => page.faults.push(error.message));
+  page.on("pageerror", (error) => page.errors.push(error.message));
   page.on("request", (request) => {
     if (!/^(data|blob):/.test(request.url()) && new URL(request.url()).port !== String(studio.port)) {
-      page.faults.push(`asks for ${request.url()}`);
+      page.errors.push(`the page requested ${request.url()}`);
     }
   });
   if (process.env.WGRAY_PAGE) await page.route(/(\.(js|css)|\/)$/, fromDisk);
@@ -199,8 +199,8 @@ function fromDisk(route) {
   return fs.existsSync(file) ? route.fulfill({ path: file }) : route.continue();
 }
 
-// Waits for a finished image later than a revision; returns its revision.
-export async function finished(page, after = 0) {
+// Waits for a finished image whose revision is greater than `after`; returns the revision of the image.
+export async function waitForImage(page, after = 0) {
   const handle = await page.waitForFunction((after) => {
     const { revision, done } = document.getElementById("panels").dataset;
     return done === "true" && Number(revision) > after ? Number(revision) : null;
@@ -208,9 +208,9 @@ export async function finished(page, after = 0) {
   return handle.jsonValue();
 }
 
-// Waits until all commands of the page, and at least `commands` of all viewers, are executed and shown; returns the
-// number of executed commands.
-export async function settled(page, commands = 0) {
+// Waits until all commands of the page, and at least `commands` commands of all viewers, are executed and shown.
+// Returns the number of executed commands.
+export async function waitUntilSettled(page, commands = 0) {
   await page.waitForFunction((commands) => window.isSettled(commands), commands);
   return page.evaluate(() => Number(document.getElementById("panels").dataset.executed));
 }
@@ -221,7 +221,7 @@ export function revision(page) {
 
 export const canvas = (page, part = "picture") => page.locator(`[data-part=${part}] canvas`);
 
-// Returns the `nth` input for a value of the selected object.
+// Returns input number `nth`, counted from 0, of a value of the selected object.
 export const control = (page, path, nth = 0) => page.locator(`[data-control="${path} ${nth}"]`);
 
 export async function choose(page, name) {
@@ -230,8 +230,8 @@ export async function choose(page, name) {
   await page.locator("#object-name", { hasText: name }).waitFor();
 }
 
-// Records the messages of a page; the returned function takes those since its last call.
-export async function listen(page, isWanted = () => true) {
+// Records the messages that a page sends. The returned function returns the relevant messages since its last call.
+export async function recordMessages(page, isRelevant = () => true) {
   await page.evaluate(() => {
     const send = WebSocket.prototype.send;
     window.sent = [];
@@ -240,11 +240,11 @@ export async function listen(page, isWanted = () => true) {
       return send.call(this, text);
     };
   });
-  return async () => (await page.evaluate(() => window.sent.splice(0))).filter(isWanted);
+  return async () => (await page.evaluate(() => window.sent.splice(0))).filter(isRelevant);
 }
 
 // Returns the pixels on the page as [width, height, RGB bytes joined by commas].
-export async function shown(page, part = "picture") {
+export async function shownImage(page, part = "picture") {
   await page.click("#zoom-one");
   await page.waitForFunction((part) => document.querySelector(`[data-part=${part}] canvas`).dataset.scale === "1", part);
   return page.evaluate(async (part) => {
@@ -257,8 +257,8 @@ export async function shown(page, part = "picture") {
   }, part);
 }
 
-// Returns the pixels of a PNG file in the same form.
-export function decoded(page, png) {
+// Returns the pixels of a PNG file in the form of `shownImage`.
+export function decode(page, png) {
   return page.evaluate(async (png) => {
     const blob = new Blob([new Uint8Array(png)], { type: "image/png" });
     const image = await createImageBitmap(blob, { colorSpaceConversion: "none" });
@@ -270,24 +270,24 @@ export function decoded(page, png) {
 }
 
 // Fails with a short message unless two images are equal.
-export function same(seen, wanted, what = "the images differ") {
-  if (String(seen) === String(wanted)) return;
-  const [a, b] = [seen, wanted].map(([, , bytes]) => bytes.split(","));
-  const places = [...a.keys()].filter((i) => a[i] !== b[i]);
-  const [first] = places;
-  assert.fail(`${what}: ${seen.slice(0, 2)} and ${wanted.slice(0, 2)} pixels, ${places.length} bytes differ, the first at ${first}: ${a[first]} and ${b[first]}`);
+export function assertSameImage(actual, expected, message = "the images differ") {
+  if (String(actual) === String(expected)) return;
+  const [a, b] = [actual, expected].map(([, , bytes]) => bytes.split(","));
+  const differing = [...a.keys()].filter((i) => a[i] !== b[i]);
+  const [position] = differing;
+  assert.fail(`${message}: sizes ${actual.slice(0, 2)} and ${expected.slice(0, 2)}; differing bytes: ${differing.length}, first at ${position}: ${a[position]} and ${b[position]}`);
 }
 
 // Waits until the page shows the image of `wgray render`.
-export async function showsRendered(page, studio) {
-  const wanted = await decoded(page, studio.render());
-  const deadline = Date.now() + LONGEST;
-  let seen;
+export async function waitForRender(page, studio) {
+  const expected = await decode(page, studio.render());
+  const deadline = Date.now() + TIMEOUT;
+  let actual;
   do {
-    await finished(page);
-    seen = await shown(page);
-    if (String(seen) === String(wanted)) return;
+    await waitForImage(page);
+    actual = await shownImage(page);
+    if (String(actual) === String(expected)) return;
     await page.waitForTimeout(50);
   } while (Date.now() < deadline);
-  same(seen, wanted, "the page does not show the rendered image");
+  assertSameImage(actual, expected, "the page does not show the rendered image");
 }

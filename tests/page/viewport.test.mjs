@@ -4,7 +4,7 @@ import assert from "node:assert/strict";
 import fs from "node:fs";
 import { after, afterEach, before, beforeEach, test } from "node:test";
 
-import { Studio, canvas, decoded, finished, launch, open, revision, same, settled, shown } from "./studio.mjs";
+import { Studio, assertSameImage, canvas, decode, launch, open, revision, shownImage, waitForImage, waitUntilSettled } from "./studio.mjs";
 
 let browser;
 let studio;
@@ -23,18 +23,18 @@ afterEach(async () => {
 const text = (page, selector) => page.locator(selector).innerText();
 const camera = (page) => text(page, "#camera-text");
 
-// Returns the window position of an image point from 0 to 1.
-async function at(page, x, y, part = "picture") {
+// Returns the window position of an image point; `x` and `y` are fractions of the image size.
+async function windowPosition(page, x, y, part = "picture") {
   const box = await canvas(page, part).boundingBox();
   const { left, top, scale } = await canvas(page, part).evaluate((canvas) => ({ ...canvas.dataset }));
   return [box.x + Number(left) + 120 * x * Number(scale), box.y + Number(top) + 90 * y * Number(scale)];
 }
 
-const moved = (page, last) =>
-  page.waitForFunction((last) => document.getElementById("camera-text").innerText !== last, last).then(() => settled(page)).then(() => camera(page));
+const waitForMove = (page, last) =>
+  page.waitForFunction((last) => document.getElementById("camera-text").innerText !== last, last).then(() => waitUntilSettled(page)).then(() => camera(page));
 
-async function dragged(page, button = "left", dx = 60) {
-  const [x, y] = await at(page, 0.5, 0.5);
+async function drag(page, button = "left", dx = 60) {
+  const [x, y] = await windowPosition(page, 0.5, 0.5);
   await page.mouse.move(x, y);
   await page.mouse.down({ button });
   await page.mouse.move(x + dx, y + 10, { steps: 3 });
@@ -44,19 +44,19 @@ async function dragged(page, button = "left", dx = 60) {
 test("the wheel dollies, the middle button pans, the right button opens the browser's menu", async () => {
   const page = await open(browser, studio);
   const start = await camera(page);
-  const [x, y] = await at(page, 0.5, 0.5);
+  const [x, y] = await windowPosition(page, 0.5, 0.5);
   await page.mouse.move(x, y);
   await page.mouse.wheel(0, -300);
-  const near = await moved(page, start);
+  const near = await waitForMove(page, start);
   const distance = (text) => Math.hypot(...["position", "look_at"].map((key) => new RegExp(`${key} = \\[(.*)\\]`).exec(text)[1].split(",").map(Number)).reduce((a, b) => a.map((v, i) => v - b[i])));
   assert.ok(Math.abs(distance(near) / distance(start) - Math.exp(-0.3)) < 1e-3, near);
-  await dragged(page, "middle");
-  const panned = await moved(page, near);
+  await drag(page, "middle");
+  const panned = await waitForMove(page, near);
   assert.ok(Math.abs(distance(panned) - distance(near)) < 1e-3, "a pan changed the distance");
   const menu = page.evaluate(() => new Promise((resolve) => document.addEventListener("contextmenu", (event) => resolve(event.defaultPrevented), { once: true })));
-  await dragged(page, "right");
+  await drag(page, "right");
   assert.equal(await menu, false, "the page suppressed the menu of the browser");
-  await settled(page);
+  await waitUntilSettled(page);
   assert.equal(await camera(page), panned, "the right button moved the camera");
 });
 
@@ -64,28 +64,28 @@ test("camera steps are undone and redone", async () => {
   const page = await open(browser, studio);
   const start = await camera(page);
   assert.ok(await page.locator("#back").isDisabled());
-  await dragged(page);
-  const first = await moved(page, start);
-  await dragged(page, "left", -90);
-  const second = await moved(page, first);
+  await drag(page);
+  const first = await waitForMove(page, start);
+  await drag(page, "left", -90);
+  const second = await waitForMove(page, first);
   await canvas(page).focus();
   await page.keyboard.press("z");
-  assert.equal(await moved(page, second), first, "a drag is not one undo step");
+  assert.equal(await waitForMove(page, second), first, "a drag is not one undo step");
   await page.keyboard.press("z");
-  assert.equal(await moved(page, first), start);
+  assert.equal(await waitForMove(page, first), start);
   assert.ok(await page.locator("#back").isDisabled());
   await page.keyboard.press("Shift+Z");
-  assert.equal(await moved(page, start), first);
+  assert.equal(await waitForMove(page, start), first);
   await page.click("#forth");
-  assert.equal(await moved(page, first), second);
+  assert.equal(await waitForMove(page, first), second);
   await canvas(page).focus();
   await page.keyboard.press("r");
-  assert.equal(await moved(page, second), start);
+  assert.equal(await waitForMove(page, second), start);
   await page.click("#back");
-  assert.equal(await moved(page, start), second, "a reset is not an undo step");
+  assert.equal(await waitForMove(page, start), second, "a reset is not an undo step");
 });
 
-test("keys fly, and drags look around", async () => {
+test("in fly mode, keys move the camera and drags turn the camera", async () => {
   const page = await open(browser, studio);
   const start = await camera(page);
   const point = (text, key) => new RegExp(`${key} = \\[(.*)\\]`).exec(text)[1].split(",").map(Number);
@@ -95,12 +95,12 @@ test("keys fly, and drags look around", async () => {
   await page.keyboard.down("w");
   await page.waitForFunction((last) => document.getElementById("camera-text").innerText !== last, start);
   await page.keyboard.up("w");
-  await settled(page);
-  const there = await camera(page);
-  assert.ok(point(there, "position")[1] > point(start, "position")[1], "the camera did not fly forwards");
-  await dragged(page);
-  const looked = await moved(page, there);
-  assert.deepEqual(point(looked, "position"), point(there, "position"));
+  await waitUntilSettled(page);
+  const flownCamera = await camera(page);
+  assert.ok(point(flownCamera, "position")[1] > point(start, "position")[1], "the camera did not fly forwards");
+  await drag(page);
+  const turnedCamera = await waitForMove(page, flownCamera);
+  assert.deepEqual(point(turnedCamera, "position"), point(flownCamera, "position"));
   await page.keyboard.press("Escape");
   assert.ok(await page.locator("input[value=orbit]").isChecked());
 });
@@ -109,32 +109,32 @@ test("the object under the pointer is framed, then all objects", async () => {
   const page = await open(browser, studio);
   const start = await camera(page);
   await canvas(page).focus();
-  const [x, y] = await at(page, 0.5, 0.5); // the sphere
+  const [x, y] = await windowPosition(page, 0.5, 0.5); // the sphere
   await page.mouse.move(x, y);
   await page.locator("#values", { hasText: "linear RGB" }).waitFor();
   await page.keyboard.press("f");
-  const framed = await moved(page, start);
-  assert.match(framed, /look_at = \[0, 0, 0\.5\]/);
+  const framedCamera = await waitForMove(page, start);
+  assert.match(framedCamera, /look_at = \[0, 0, 0\.5\]/);
   await page.keyboard.press("PageDown");
-  const away = await moved(page, framed);
+  const movedCamera = await waitForMove(page, framedCamera);
   await page.click("#frame-all"); // a plane is unbounded, so only the sphere counts
-  assert.equal(await moved(page, away), framed);
+  assert.equal(await waitForMove(page, movedCamera), framedCamera);
 });
 
 test("bookmarks are stored in the browser and restore the view", async () => {
   const page = await open(browser, studio);
-  await dragged(page);
+  await drag(page);
   await page.locator("#reset:enabled").waitFor();
-  await settled(page);
-  const marked = await camera(page);
+  await waitUntilSettled(page);
+  const bookmarkedCamera = await camera(page);
   await page.click("#bookmark");
   await page.click("#reset");
-  await moved(page, marked);
+  await waitForMove(page, bookmarkedCamera);
   await page.reload();
-  await finished(page);
+  await waitForImage(page);
   const start = await camera(page);
   await page.getByRole("button", { name: "view 1", exact: true }).click();
-  assert.equal(await moved(page, start), marked);
+  assert.equal(await waitForMove(page, start), bookmarkedCamera);
   await page.getByRole("button", { name: "Delete view 1" }).click();
   assert.equal(await page.locator("#bookmarks li").count(), 0);
 });
@@ -142,25 +142,25 @@ test("bookmarks are stored in the browser and restore the view", async () => {
 test("two fingers pan and dolly, a tap reads a pixel", async () => {
   const page = await open(browser, studio, { viewport: { width: 390, height: 844 }, hasTouch: true, isMobile: true });
   const start = await camera(page);
-  const [x, y] = await at(page, 0.5, 0.5);
+  const [x, y] = await windowPosition(page, 0.5, 0.5);
   await page.touchscreen.tap(x, y);
   await page.locator("#values", { hasText: /pixel \d+ \d+ .*linear RGB/ }).waitFor();
   assert.equal(await camera(page), start, "a tap moved the camera");
   const client = await page.context().newCDPSession(page);
-  const touch = (type, apart) => client.send("Input.dispatchTouchEvent", {
-    type, touchPoints: type === "touchEnd" ? [] : [{ x: x - apart, y, id: 1 }, { x: x + apart, y, id: 2 }],
+  const touch = (type, halfDistance) => client.send("Input.dispatchTouchEvent", {
+    type, touchPoints: type === "touchEnd" ? [] : [{ x: x - halfDistance, y, id: 1 }, { x: x + halfDistance, y, id: 2 }],
   });
   await touch("touchStart", 30);
-  for (const apart of [36, 42, 50, 60]) await touch("touchMove", apart);
+  for (const halfDistance of [36, 42, 50, 60]) await touch("touchMove", halfDistance);
   await touch("touchEnd");
-  const near = await moved(page, start);
+  const near = await waitForMove(page, start);
   const height = (text) => Number(/position = \[[^,]*, ([^,]*)/.exec(text)[1]);
   assert.ok(Math.abs(height(near)) < 0.7 * Math.abs(height(start)), near);
   // Touch targets are large enough; the image stays in view.
-  const small = await page.evaluate(() => [...document.querySelectorAll("aside button, aside select, aside summary, aside input[type=number], #toolbar span, #zooming button")]
+  const smallTargets = await page.evaluate(() => [...document.querySelectorAll("aside button, aside select, aside summary, aside input[type=number], #toolbar span, #zooming button")]
     .filter((control) => control.checkVisibility()).map((control) => [control.id || control.textContent, control.getBoundingClientRect()])
     .filter(([, box]) => box.height < 44 || box.width < 44).map(([name, box]) => `${name}: ${box.width} x ${box.height}`));
-  assert.deepEqual(small, []);
+  assert.deepEqual(smallTargets, []);
   await page.evaluate(() => scrollTo(0, document.scrollingElement.scrollHeight));
   const box = await canvas(page).boundingBox();
   assert.ok(box.y >= 0 && box.y + box.height < 844, "the image scrolled out of view");
@@ -168,7 +168,7 @@ test("two fingers pan and dolly, a tap reads a pixel", async () => {
 
 test("exposure, transform and false colours change the display, not the values", async () => {
   const page = await open(browser, studio);
-  const [x, y] = await at(page, 0.5, 0.4);
+  const [x, y] = await windowPosition(page, 0.5, 0.4);
   await page.mouse.move(x, y);
   await page.locator("#values", { hasText: "linear RGB" }).waitFor();
   const linear = async () => /linear RGB (.*?)   shown/.exec(await text(page, "#values"))[1];
@@ -176,36 +176,36 @@ test("exposure, transform and false colours change the display, not the values",
   const bits = /bits ([0-9a-f]{8})  ([0-9a-f]{8})  ([0-9a-f]{8})/.exec(value).slice(1);
   const floats = new Float32Array(new Uint32Array(bits.map((b) => parseInt(b, 16))).buffer);
   assert.deepEqual([...floats].map((v) => Math.fround(v)), value.split("   bits")[0].split("  ").map((v) => Math.fround(Number(v))));
-  const seen = [await shown(page)];
-  const look = async (act) => {
-    await act();
-    await settled(page);
-    seen.push(await shown(page));
+  const images = [await shownImage(page)];
+  const changeDisplay = async (action) => {
+    await action();
+    await waitUntilSettled(page);
+    images.push(await shownImage(page));
   };
   assert.ok(await page.locator("#reset-look").isDisabled());
   await page.fill("#exposure-number", "1.5");
-  await look(() => page.keyboard.press("Enter"));
+  await changeDisplay(() => page.keyboard.press("Enter"));
   // A render with this exposure is equal.
   studio.edit("scene.toml", "height = 90", "height = 90\nexposure = 1.5");
-  same(seen[1], await decoded(page, studio.render()));
-  await settled(page);
-  await look(() => page.selectOption("#transform", "agx"));
-  await look(() => page.check("#false-color"));
+  assertSameImage(images[1], await decode(page, studio.render()));
+  await waitUntilSettled(page);
+  await changeDisplay(() => page.selectOption("#transform", "agx"));
+  await changeDisplay(() => page.check("#false-color"));
   assert.ok(await page.locator("#legend").isVisible());
-  assert.equal(new Set(seen.map(String)).size, 4, "two displays are equal");
+  assert.equal(new Set(images.map(String)).size, 4, "two displays are equal");
   await page.click("#zoom-fit");
   await page.mouse.move(x, y);
   await page.locator("#values", { hasText: "linear RGB" }).waitFor();
   assert.equal(await linear(), value);
-  await look(() => page.click("#reset-look"));
-  same(seen[4], seen[1], "the scene has this exposure by now");
+  await changeDisplay(() => page.click("#reset-look"));
+  assertSameImage(images[4], images[1], "a reset does not restore the exposure of the scene");
   assert.match(await text(page, "#histogram-text"), /^Range 2⁻[⁰¹²³⁴-⁹]+ to 2⁻?[⁰¹²³⁴-⁹]+; [\d.]+% clipped$/);
-  assert.deepEqual(page.faults, []);
+  assert.deepEqual(page.errors, []);
 });
 
 test("a pinned pixel keeps its earlier values", async () => {
   const page = await open(browser, studio);
-  const [x, y] = await at(page, 0.5, 0.5);
+  const [x, y] = await windowPosition(page, 0.5, 0.5);
   await canvas(page).focus();
   await page.mouse.move(x, y);
   await page.locator("#values", { hasText: "linear RGB" }).waitFor();
@@ -214,7 +214,7 @@ test("a pinned pixel keeps its earlier values", async () => {
   const value = (await page.locator("#pins dd").first().innerText()).trim();
   studio.edit("scene.toml", "0.8, 0.1, 0.1", "0.1, 0.1, 0.8");
   await page.locator("#pins details").waitFor();
-  await settled(page);
+  await waitUntilSettled(page);
   await page.locator("#pins details summary", { hasText: /^1 earlier value$/ }).click();
   assert.ok((await page.locator("#pins ol li").first().innerText()).startsWith(value));
   assert.notEqual((await page.locator("#pins dd").first().innerText()).trim(), value);
@@ -224,33 +224,33 @@ test("a pinned pixel keeps its earlier values", async () => {
 
 test("the image is compared with its earlier state, with a kept image and with files", async () => {
   const page = await open(browser, studio);
-  const seen = await shown(page);
+  const oldImage = await shownImage(page);
   await page.keyboard.press("7");
   await page.getByLabel("Before the edit").check();
   await page.locator("#badge", { hasText: "no change has been saved" }).waitFor();
-  await settled(page); // switching the comparison renders again
+  await waitUntilSettled(page); // switching the comparison renders again
   studio.edit("scene.toml", "0.8, 0.1, 0.1", "0.1, 0.1, 0.8");
   await page.locator("#differing", { hasText: /^[\d,]+ pixels differ, by/ }).waitFor();
-  await settled(page);
-  same(await shown(page, "second"), seen, "the second is the image before the edit");
+  await waitUntilSettled(page);
+  assertSameImage(await shownImage(page, "second"), oldImage, "the second image is not the image before the edit");
   await page.locator("#rmse", { hasText: /^0\.\d+$/ }).waitFor();
   await page.locator("#flip", { hasText: /^0\.\d+$/ }).waitFor();
-  // In one panel: with a divider, or alternating.
+  // One panel shows both images, with a divider or alternating.
   await page.getByLabel("Wipe").check();
   assert.ok(await canvas(page, "second").isHidden());
-  const wiped = await shown(page, "first");
+  const wipedImage = await shownImage(page, "first");
   await page.locator("#wipe").fill("1");
-  const whole = await shown(page, "first");
-  assert.notDeepEqual(wiped, whole);
+  const firstImage = await shownImage(page, "first");
+  assert.notDeepEqual(wipedImage, firstImage);
   await page.locator("#wipe").fill("0");
-  same(await shown(page, "first"), seen, "all of it is the second");
+  assertSameImage(await shownImage(page, "first"), oldImage, "a divider at 0 does not show only the second image");
   await page.getByLabel("Flicker", { exact: true }).first().check();
   await page.selectOption("#pace", "0");
-  same(await shown(page, "first"), whole);
+  assertSameImage(await shownImage(page, "first"), firstImage);
   await page.keyboard.press("x");
-  same(await shown(page, "first"), seen);
+  assertSameImage(await shownImage(page, "first"), oldImage);
   await page.keyboard.press("x");
-  // An EXR file of the same scene has equal values.
+  // An EXR file of the same scene has the same values.
   await page.getByLabel("Side by side").check();
   const exr = studio.path("reference.exr");
   studio.renderTo(exr);
@@ -262,8 +262,8 @@ test("the image is compared with its earlier state, with a kept image and with f
   studio.renderTo(png);
   await page.setInputFiles("#reference-file", png);
   await page.locator("#reference-name", { hasText: "reference.png" }).waitFor();
-  await settled(page);
-  same(await shown(page, "second"), await shown(page, "first"), "of a PNG the same bytes are shown");
+  await waitUntilSettled(page);
+  assertSameImage(await shownImage(page, "second"), await shownImage(page, "first"), "the bytes of the PNG file are not shown");
   // Files of other formats or sizes are reported.
   await page.setInputFiles("#reference-file", studio.path("scene.toml"));
   await page.locator("#notice.bad", { hasText: "scene.toml" }).waitFor();
@@ -271,10 +271,10 @@ test("the image is compared with its earlier state, with a kept image and with f
   await page.setInputFiles("#reference-file", png);
   await page.locator("#badge", { hasText: /is 60 . 45/ }).waitFor();
   await page.keyboard.press("1");
-  await settled(page);
+  await waitUntilSettled(page);
   await page.keyboard.press("t");
   await page.locator("#reference-name", { hasText: /^kept / }).waitFor();
-  assert.deepEqual(page.faults.filter((fault) => !fault.includes("422")), []);
+  assert.deepEqual(page.errors.filter((error) => !error.includes("422")), []);
 });
 
 test("rendering can be paused, limited, reduced in resolution and saved as files", async () => {
@@ -282,26 +282,26 @@ test("rendering can be paused, limited, reduced in resolution and saved as files
   const page = await open(browser, studio);
   await page.fill("#most-samples", "5");
   await page.press("#most-samples", "Enter");
-  await settled(page);
+  await waitUntilSettled(page);
   await page.locator("#samples", { hasText: /^5 of 5$/ }).waitFor();
   await page.fill("#most-samples", "");
   await page.press("#most-samples", "Enter");
   await page.locator("#samples", { hasText: /^64 of 64$/ }).waitFor();
   await page.selectOption("#preview", "4");
   await page.waitForFunction(() => document.getElementById("panels").dataset.sent === "30x23");
-  await settled(page);
+  await waitUntilSettled(page);
   assert.equal(await text(page, "#smaller"), "30 × 23");
   await page.selectOption("#preview", "1");
   await page.waitForFunction(() => document.getElementById("panels").dataset.sent === "120x90");
-  await settled(page);
-  const old = await revision(page);
+  await waitUntilSettled(page);
+  const oldRevision = await revision(page);
   await page.click("#restart");
-  await finished(page, old);
-  // A saved file equals the rendered one.
-  for (const kind of ["png", "exr"]) {
-    const [download] = await Promise.all([page.waitForEvent("download"), page.click(`#save-${kind}`)]);
-    assert.equal(download.suggestedFilename(), `scene.${kind}`);
-    const [saved, rendered] = [studio.path(`saved.${kind}`), studio.path(`rendered.${kind}`)];
+  await waitForImage(page, oldRevision);
+  // A saved file equals a rendered file.
+  for (const format of ["png", "exr"]) {
+    const [download] = await Promise.all([page.waitForEvent("download"), page.click(`#save-${format}`)]);
+    assert.equal(download.suggestedFilename(), `scene.${format}`);
+    const [saved, rendered] = [studio.path(`saved.${format}`), studio.path(`rendered.${format}`)];
     await download.saveAs(saved);
     studio.renderTo(rendered);
     studio.diff(saved, rendered);
@@ -309,23 +309,23 @@ test("rendering can be paused, limited, reduced in resolution and saved as files
   assert.throws(() => {
     studio.renderTo(studio.path("other.png"), ["--light-samples", "1"]);
     studio.diff(studio.path("saved.png"), studio.path("other.png"));
-  }, "the comparison can fail");
+  }, "different images compare as equal");
   await page.click("#pause");
   await page.locator("#badge", { hasText: "paused" }).waitFor();
-  const before = await revision(page);
+  const pausedRevision = await revision(page);
   await canvas(page).focus();
   await page.keyboard.press("ArrowLeft");
-  await page.waitForFunction((before) => Number(document.getElementById("panels").dataset.revision) > before, before);
-  await settled(page); // no further frame follows
+  await page.waitForFunction((pausedRevision) => Number(document.getElementById("panels").dataset.revision) > pausedRevision, pausedRevision);
+  await waitUntilSettled(page); // no more frames follow
   assert.ok(fs.existsSync(studio.path("saved.png")));
   await page.keyboard.press("Space");
   await page.locator("#samples", { hasText: /^64 of 64$/ }).waitFor();
 });
 
-// Returns the texts with less contrast than WCAG 2.1 requires.
-const CONTRASTS = () => {
+// Returns the texts whose contrast is less than WCAG 2.1 requires.
+const LOW_CONTRASTS = () => {
   const context = new OffscreenCanvas(1, 1).getContext("2d", { willReadFrequently: true });
-  const over = (colors) => {
+  const blend = (colors) => {
     context.clearRect(0, 0, 1, 1);
     for (const color of colors) {
       context.fillStyle = color;
@@ -333,31 +333,31 @@ const CONTRASTS = () => {
     }
     return [...context.getImageData(0, 0, 1, 1).data.slice(0, 3)];
   };
-  const light = (rgb) => rgb.map((v) => v / 255).map((v) => (v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4)).reduce((sum, v, i) => sum + v * [0.2126, 0.7152, 0.0722][i], 0);
-  const faults = [];
+  const luminance = (rgb) => rgb.map((v) => v / 255).map((v) => (v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4)).reduce((sum, v, i) => sum + v * [0.2126, 0.7152, 0.0722][i], 0);
+  const failures = [];
   for (const node of document.querySelectorAll("body *")) {
-    const own = [...node.childNodes].some((child) => child.nodeType === 3 && child.textContent.trim());
-    if (!own || !node.checkVisibility() || node.closest(":disabled, [aria-disabled=true], .live")) continue;
-    const grounds = [];
-    for (let at = node; at; at = at.parentElement) grounds.unshift(getComputedStyle(at).backgroundColor);
-    const ground = ["#fff", ...grounds];
-    const [a, b] = [light(over([...ground, getComputedStyle(node).color])), light(over(ground))];
+    const hasText = [...node.childNodes].some((child) => child.nodeType === 3 && child.textContent.trim());
+    if (!hasText || !node.checkVisibility() || node.closest(":disabled, [aria-disabled=true], .live")) continue;
+    const layers = [];
+    for (let ancestor = node; ancestor; ancestor = ancestor.parentElement) layers.unshift(getComputedStyle(ancestor).backgroundColor);
+    const background = ["#fff", ...layers];
+    const [a, b] = [luminance(blend([...background, getComputedStyle(node).color])), luminance(blend(background))];
     const contrast = (Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05);
-    if (contrast < 4.5) faults.push(`${node.tagName} ${node.id} ${node.textContent.trim().slice(0, 30)}: ${contrast.toFixed(2)}`);
+    if (contrast < 4.5) failures.push(`${node.tagName} ${node.id} ${node.textContent.trim().slice(0, 30)}: ${contrast.toFixed(2)}`);
   }
-  return faults;
+  return failures;
 };
 
-test("texts have contrast in both themes, controls have names, forced colours show the selection", async () => {
+test("texts have enough contrast in both themes, controls have names, forced colours show the selection", async () => {
   for (const colorScheme of ["light", "dark"]) {
     const page = await open(browser, studio, { colorScheme });
     await page.evaluate(() => document.querySelectorAll("details").forEach((details) => (details.open = true)));
     studio.breakShader();
     await page.locator("#problems h2").waitFor();
-    assert.deepEqual(await page.evaluate(CONTRASTS), [], colorScheme);
+    assert.deepEqual(await page.evaluate(LOW_CONTRASTS), [], colorScheme);
     await page.evaluate(() => document.documentElement.style.setProperty("--quiet", "#777"));
-    assert.notDeepEqual(await page.evaluate(CONTRASTS), [], "the contrast check finds no violation");
-    studio.mendShader();
+    assert.notDeepEqual(await page.evaluate(LOW_CONTRASTS), [], "the contrast check finds no violation");
+    studio.fixShader();
     await page.locator("#problems").waitFor({ state: "hidden" });
     const snapshot = await page.locator("body").ariaSnapshot();
     assert.match(snapshot, /application "Viewport: colour of scene\.toml"/);
@@ -365,14 +365,14 @@ test("texts have contrast in both themes, controls have names, forced colours sh
     await page.context().close();
   }
   const page = await open(browser, studio, { forcedColors: "active" });
-  const grounds = await page.evaluate(() => ["input[value=color] + span", "input[value=normal] + span"].map((span) => getComputedStyle(document.querySelector(span)).backgroundColor));
-  assert.notEqual(...grounds);
+  const backgrounds = await page.evaluate(() => ["input[value=color] + span", "input[value=normal] + span"].map((span) => getComputedStyle(document.querySelector(span)).backgroundColor));
+  assert.notEqual(...backgrounds);
 });
 
-test("a drag is shown at 20 frames per second, to eleven viewers too", async (t) => {
+test("a drag is shown at an interactive rate to one viewer and to eleven viewers", async (t) => {
   studio.edit("scene.toml", "width = 120\nheight = 90", "width = 640\nheight = 480");
   const page = await open(browser, studio);
-  const [x, y] = await at(page, 0.5, 0.5);
+  const [x, y] = await windowPosition(page, 0.5, 0.5);
   await page.mouse.move(x, y);
   await page.mouse.down();
   await page.evaluate(() => {
@@ -388,15 +388,15 @@ test("a drag is shown at 20 frames per second, to eleven viewers too", async (t)
     const times = await page.evaluate(() => window.seen.map(([, time]) => time));
     const gaps = times.slice(1).map((time, i) => time - times[i]).sort((a, b) => a - b);
     const median = gaps[gaps.length >> 1];
-    t.diagnostic(`${(1000 / median).toFixed(1)} frames per second, the slowest in twenty after ${Math.round(gaps[Math.floor(gaps.length * 0.95)])} ms`);
-    // A busy machine is slower; much slower is a defect.
+    t.diagnostic(`${(1000 / median).toFixed(1)} frames per second, 95th percentile of the frame times ${Math.round(gaps[Math.floor(gaps.length * 0.95)])} ms`);
+    // The limits are loose, because the machine may be busy.
     assert.ok(gaps.length > 10 && median < 150, `${median} ms between two frames`);
   };
   await drag();
   // Ten more viewers, which draw nothing.
   await page.evaluate(() => {
-    const got = Array.from({ length: 10 }, () => ({ frames: 0 }));
-    const opened = got.map((viewer) => new Promise((resolve) => {
+    const viewers = Array.from({ length: 10 }, () => ({ frames: 0 }));
+    const opened = viewers.map((viewer) => new Promise((resolve) => {
       const socket = new WebSocket(`ws://${location.host}/socket`);
       socket.binaryType = "arraybuffer";
       socket.onmessage = ({ data }) => {
@@ -407,15 +407,15 @@ test("a drag is shown at 20 frames per second, to eleven viewers too", async (t)
         socket.send(JSON.stringify({ shown: header.number }));
       };
     }));
-    window.got = got;
+    window.viewers = viewers;
     return Promise.all(opened);
   });
-  const counts = () => page.evaluate(() => window.got.map(({ frames }) => frames));
+  const counts = () => page.evaluate(() => window.viewers.map(({ frames }) => frames));
   const before = await counts();
   const start = Date.now();
   await drag();
   const rates = (await counts()).map((count, i) => (1000 * (count - before[i])) / (Date.now() - start));
-  t.diagnostic(`with eleven viewers: each of ten got ${Math.min(...rates).toFixed(1)} to ${Math.max(...rates).toFixed(1)} frames per second`);
+  t.diagnostic(`with eleven viewers: each of ten receives ${Math.min(...rates).toFixed(1)} to ${Math.max(...rates).toFixed(1)} frames per second`);
   assert.ok(Math.min(...rates) > 5, String(rates));
   await page.mouse.up();
 });

@@ -11,8 +11,8 @@ use crate::pictures::{both, differing, exact_modes, first_hits, means, reference
 const DOWN: &str =
     "camera = { type = 'orthographic', position = [0, 0, 9], look_at = [0, 0, 0], up = [0, 1, 0], height = 2 }\n";
 
-fn black(rest: &str) -> String {
-    format!("{{ type = 'principled', base_color = [0, 0, 0], metallic = 0, specular = 0, {rest} }}")
+fn black(keys: &str) -> String {
+    format!("{{ type = 'principled', base_color = [0, 0, 0], metallic = 0, specular = 0, {keys} }}")
 }
 
 fn square(z: f64, size: f64, material: &str) -> String {
@@ -33,12 +33,12 @@ fn blended_layers_transmit_one_minus_alpha() {
         let packed = scene(256, 4, &format!("{head}{text}"));
         // Each layer independently transmits 1 - alpha.
         let expected = (1.0f64 - alpha).powi(layers);
-        for way in both() {
-            let found = mean(&render(&packed, way))[0];
+        for mode in both() {
+            let found = mean(&render(&packed, mode))[0];
             let error = (expected * (1.0 - expected) / (256.0 * 256.0)).sqrt();
             assert!(
                 (found - expected).abs() <= 5.0 * error,
-                "{alpha} {layers} {way:?}: {found} {expected}"
+                "{alpha} {layers} {mode:?}: {found} {expected}"
             );
         }
     }
@@ -53,17 +53,17 @@ fn a_blended_sphere_is_crossed_twice() {
         black("alpha = 0.5, alpha_mode = 'blend'")
     );
     let packed = scene(256, 4, &text);
-    for way in both() {
-        let found = mean(&render(&packed, way))[0];
-        assert!((found - 0.25).abs() < 0.009, "{way:?}: {found}");
+    for mode in both() {
+        let found = mean(&render(&packed, mode))[0];
+        assert!((found - 0.25).abs() < 0.009, "{mode:?}: {found}");
     }
 }
 
 #[test]
 fn shadows_scale_with_alpha() {
-    let lit = |alpha: f64, light: &str| {
+    let scene_with = |alpha: f64, light: &str| {
         let material = black(&format!("alpha = {alpha}, alpha_mode = 'blend'"));
-        // Below the surface, with its shadow on the floor.
+        // The camera is below the surface and sees the shadow on the floor.
         let text = format!(
             "camera = {{ type = 'orthographic', position = [0, 0, 0.4], look_at = [0, 0, 0], up = [0, 1, 0], height = 0.2 }}\n\
              materials.surface = {material}\nmaterials.floor = {{ type = 'diffuse', color = [0.5, 0.5, 0.5] }}\n{}{}{light}",
@@ -77,11 +77,15 @@ fn shadows_scale_with_alpha() {
         "[[lights]]\ntype = 'directional'\ndirection = [0, 0, -1]\ncolor = [1, 1, 1]\n",
         "[[lights]]\ntype = 'rectangle'\ncenter = [0, 0, 2]\nsize = [1, 1]\nnormal = [0, 0, -1]\ntangent = [1, 0, 0]\ncolor = [1, 1, 1]\n",
     ] {
-        for way in both() {
-            let found = |alpha: f64| mean(&render(&lit(alpha, light), way))[0];
-            let (none, half, all) = (found(0.0), found(0.6), found(1.0));
-            assert!(none > 0.0 && all == 0.0, "{light}: {none} {all}");
-            assert!((half / none - 0.4).abs() < 0.02, "{light} {way:?}: {}", half / none);
+        for mode in both() {
+            let found = |alpha: f64| mean(&render(&scene_with(alpha, light), mode))[0];
+            let (transparent, blended, opaque) = (found(0.0), found(0.6), found(1.0));
+            assert!(transparent > 0.0 && opaque == 0.0, "{light}: {transparent} {opaque}");
+            assert!(
+                (blended / transparent - 0.4).abs() < 0.02,
+                "{light} {mode:?}: {}",
+                blended / transparent
+            );
         }
     }
 }
@@ -89,7 +93,7 @@ fn shadows_scale_with_alpha() {
 #[test]
 fn transparent_surfaces_do_not_change_mis_weights() {
     // NEE and BSDF sampling find the light, with and without a fully transparent surface.
-    let with = |has_surface: bool| {
+    let scene_with = |has_surface: bool| {
         let shape = if has_surface {
             square(0.5, 4.0, "surface")
         } else {
@@ -104,14 +108,18 @@ fn transparent_surfaces_do_not_change_mis_weights() {
         );
         scene(1024, 1, &text)
     };
-    for way in both() {
-        let [bare, behind] = [false, true].map(|has_surface| mean(&render(&with(has_surface), way))[0]);
-        assert!((behind / bare - 1.0).abs() < 2e-3, "{way:?}: {bare} {behind}");
+    for mode in both() {
+        let [without_surface, with_surface] =
+            [false, true].map(|has_surface| mean(&render(&scene_with(has_surface), mode))[0]);
+        assert!(
+            (with_surface / without_surface - 1.0).abs() < 2e-3,
+            "{mode:?}: {without_surface} {with_surface}"
+        );
     }
 }
 
 /// Returns a quad above a floor, with a disk in its alpha channel.
-fn leaf(folder: &std::path::Path, mode: &str, way_in: &str) -> Packed {
+fn leaf(folder: &std::path::Path, mode: &str, camera: &str) -> Packed {
     let size = 64u32;
     let texel = |x: u32, y: u32| {
         let [x, y] = [x, y].map(|i| f64::from(i) + 0.5 - f64::from(size) / 2.0);
@@ -124,7 +132,7 @@ fn leaf(folder: &std::path::Path, mode: &str, way_in: &str) -> Packed {
     let quad = "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3 4/4\n";
     std::fs::write(folder.join("quad.obj"), quad).unwrap();
     let text = format!(
-        "image = {{ width = 40, height = 40 }}\n{way_in}\
+        "image = {{ width = 40, height = 40 }}\n{camera}\
          [render]\nintegrator = 'path'\nmax_depth = 3\npixel_samples = {{ count = 16 }}\n\
          [textures.leaf]\ntype = 'image'\nfile = 'leaf.png'\nfilter = 'nearest'\n\
          [materials.leaf]\ntype = 'principled'\nmetallic = 0\nroughness = 0.6\nbase_color = {{ texture = 'leaf' }}\n\
@@ -140,13 +148,13 @@ fn leaf(folder: &std::path::Path, mode: &str, way_in: &str) -> Packed {
 
 #[test]
 fn a_mask_casts_its_shadow() {
-    let place = tempfile::tempdir().unwrap();
-    let under =
+    let folder = tempfile::tempdir().unwrap();
+    let camera_below =
         "camera = { type = 'orthographic', position = [0, 0, 0.5], look_at = [0, 0, 0], up = [0, 1, 0], height = 2 }\n";
     for mode in ["mask", "blend", "opaque"] {
-        let packed = leaf(place.path(), mode, under);
-        for way in both() {
-            let found = means(&render(&packed, way));
+        let packed = leaf(folder.path(), mode, camera_below);
+        for render_mode in both() {
+            let found = means(&render(&packed, render_mode));
             for (i, pixel) in found.iter().enumerate() {
                 let [x, y] = [i % 40, i / 40].map(|i| (i as f64 + 0.5) / 20.0 - 1.0);
                 let r = x.hypot(y);
@@ -156,29 +164,36 @@ fn a_mask_casts_its_shadow() {
                     assert_eq!(
                         is_dark,
                         r < 0.5 || mode == "opaque",
-                        "{mode} {way:?} {x} {y}: {pixel:?}"
+                        "{mode} {render_mode:?} {x} {y}: {pixel:?}"
                     );
                 }
             }
         }
     }
-    let above = "camera = { position = [0.3, -2.5, 2.5], look_at = [0, 0, 0.5], fov = 45 }\n";
+    let camera_above = "camera = { position = [0.3, -2.5, 2.5], look_at = [0, 0, 0.5], fov = 45 }\n";
     for mode in ["mask", "blend"] {
-        let packed = leaf(place.path(), mode, above);
+        let packed = leaf(folder.path(), mode, camera_above);
         let expected = reference(&packed);
-        for way in exact_modes() {
-            assert_eq!(differing(&render(&packed, way), &expected), 0, "{mode} {way:?}");
+        for render_mode in exact_modes() {
+            assert_eq!(
+                differing(&render(&packed, render_mode), &expected),
+                0,
+                "{mode} {render_mode:?}"
+            );
         }
     }
-    let packed = leaf(place.path(), "mask", DOWN);
-    for way in both() {
-        let hits = first_hits(&packed, way);
+    let packed = leaf(folder.path(), "mask", DOWN);
+    for render_mode in both() {
+        let hits = first_hits(&packed, render_mode);
         for (i, hit) in hits.iter().enumerate() {
             let [x, y] = [i % 40, i / 40].map(|i| (i as f64 + 0.5) / 20.0 - 1.0);
             let r = x.hypot(y);
             if (r - 0.5).abs() > 0.08 {
                 let depth = if r < 0.5 { 8.0 } else { 9.0 };
-                assert!((f64::from(hit.depth) - depth).abs() < 1e-4, "{way:?} {x} {y}: {hit:?}");
+                assert!(
+                    (f64::from(hit.depth) - depth).abs() < 1e-4,
+                    "{render_mode:?} {x} {y}: {hit:?}"
+                );
             }
         }
     }

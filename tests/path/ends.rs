@@ -1,4 +1,4 @@
-//! Limits of the path integrator: empty, dark, huge and tiny scenes; no bounces and many; all results are finite.
+//! Limits of the path integrator: empty, dark, huge and tiny scenes, and zero or many bounces. All results are finite.
 
 use super::{mean, scene};
 use crate::pictures::{both, differing, exact_modes, reference, render};
@@ -13,13 +13,13 @@ fn an_empty_scene_shows_the_environment() {
             depth,
             &format!("{CAMERA}environment = {{ color = [0.25, 0.5, 1e6] }}\n"),
         );
-        for way in both() {
-            assert_eq!(mean(&render(&packed, way)), [0.25, 0.5, 1e6], "{way:?}");
+        for mode in both() {
+            assert_eq!(mean(&render(&packed, mode)), [0.25, 0.5, 1e6], "{mode:?}");
         }
     }
     let packed = scene(4, 3, CAMERA);
-    for way in both() {
-        assert_eq!(mean(&render(&packed, way)), [0.0; 3], "{way:?}");
+    for mode in both() {
+        assert_eq!(mean(&render(&packed, mode)), [0.0; 3], "{mode:?}");
     }
 }
 
@@ -36,17 +36,21 @@ fn without_bounces_only_emission_is_visible() {
              [[lights]]\ntype = 'point'\nposition = [0, -4, 3]\ncolor = [9, 9, 9]\n"
         ),
     );
-    for way in both() {
-        let film = render(&packed, way);
+    for mode in both() {
+        let film = render(&packed, mode);
         let colors: Vec<[f32; 3]> = film.means().collect();
-        assert_eq!(colors[8 * 16 + 4], [0.0; 3], "{way:?}: the black sphere");
-        assert_eq!(colors[8 * 16 + 12], [2.0, 3.0, 4.0], "{way:?}: the emissive sphere");
+        assert_eq!(colors[8 * 16 + 4], [0.0; 3], "{mode:?}: the black sphere emits light");
+        assert_eq!(
+            colors[8 * 16 + 12],
+            [2.0, 3.0, 4.0],
+            "{mode:?}: the emissive sphere has another radiance"
+        );
     }
 }
 
 #[test]
 fn scaling_a_scene_does_not_change_radiance() {
-    // Radiance differs only by rounded coordinates.
+    // The radiance differs only by the rounding of coordinates.
     let room = |s: f64| {
         format!(
             "camera = {{ position = [0, {}, {s}], look_at = [0, 0, {s}], fov = 40 }}\n\
@@ -67,11 +71,11 @@ fn scaling_a_scene_does_not_change_radiance() {
     let expected = mean(&reference(&scene(1024, 6, &room(1.0))));
     for s in [1e-6, 1e-3, 1e3, 1e6] {
         let packed = scene(1024, 6, &room(s));
-        for way in both() {
-            let found = mean(&render(&packed, way));
+        for mode in both() {
+            let found = mean(&render(&packed, mode));
             assert!(
                 (found[1] - expected[1]).abs() < 1e-2 * expected[1],
-                "{way:?}, {s}: {found:?} for {expected:?}"
+                "{mode:?}, {s}: {found:?}, expected {expected:?}"
             );
         }
     }
@@ -98,14 +102,14 @@ fn touching_and_grazing_lights_give_finite_values() {
     for sum in &expected.sums {
         assert!(sum.is_finite() && sum.min_element() >= 0.0, "{sum}");
     }
-    for way in exact_modes() {
-        assert_eq!(differing(&render(&packed, way), &expected), 0, "{way:?}");
+    for mode in exact_modes() {
+        assert_eq!(differing(&render(&packed, mode), &expected), 0, "{mode:?}");
     }
 }
 
 #[test]
 fn long_paths_terminate() {
-    // Without absorption each path reaches the maximum depth.
+    // Without absorption, each path reaches the maximum depth.
     let text = |color: &str| {
         format!(
             "camera = {{ position = [0.3, 0, 0], look_at = [1, 0.1, 0], fov = 40 }}\nmaterials.m = {{ type = 'mirror', tint = {color} }}\n\
@@ -114,8 +118,8 @@ fn long_paths_terminate() {
     };
     for color in ["[1, 1, 1]", "[0, 0, 0]", "[1, 1e-30, 0]"] {
         let packed = scene(1, 1024, &text(color));
-        for way in both() {
-            assert_eq!(mean(&render(&packed, way)), [0.0; 3], "{way:?}");
+        for mode in both() {
+            assert_eq!(mean(&render(&packed, mode)), [0.0; 3], "{mode:?}");
         }
     }
 }
@@ -150,21 +154,21 @@ fn reflectances_above_one_are_clamped() {
             _ => text.replace("{ texture = 'c' }", "1"),
         };
         let (body, expected) = (scene(256, 20, &text), mean(&reference(&scene(256, 20, &plain))));
-        for way in both() {
+        for mode in both() {
             assert_eq!(
-                mean(&render(&packed, way)),
+                mean(&render(&packed, mode)),
                 [0.0; 3],
-                "{way:?}: light inside a closed sphere"
+                "{mode:?}: light inside a closed sphere"
             );
-            let found = mean(&render(&body, way));
-            assert_eq!(found, expected, "{way:?}, {key}");
+            let found = mean(&render(&body, mode));
+            assert_eq!(found, expected, "{mode:?}, {key}");
         }
     }
 }
 
 #[test]
 fn glass_with_shading_normals_creates_no_energy() {
-    // White furnace: a cube and a coarse sphere of glass with smooth normals, and normal maps.
+    // White furnace: a cube and a coarse sphere of glass with smooth normals.
     let folder = tempfile::tempdir().expect("a folder");
     let cube = crate::meshes::forms::Form::cube();
     let ball = crate::meshes::forms::Form::icosphere(1);
@@ -183,13 +187,13 @@ fn glass_with_shading_normals_creates_no_energy() {
                  [[shapes]]\ntype = 'mesh'\nmaterial = 'm'\nfile = '{name}.obj'\nnormals = 'smooth'\n"
             );
             let description = wgray::scene::Description::parse(&text, "test").expect("a scene");
-            let beside = wgray::scene::Assets::beside(folder.path());
-            let packed = wgray_render::pack::pack(&description.validate_with(&beside).expect("a valid scene"));
-            for way in both() {
-                let film = render(&packed, way);
+            let assets = wgray::scene::Assets::beside(folder.path());
+            let packed = wgray_render::pack::pack(&description.validate_with(&assets).expect("a valid scene"));
+            for mode in both() {
+                let film = render(&packed, mode);
                 let found = mean(&film)[0];
                 // Some paths remain trapped by inconsistent shading normals.
-                assert!(found < 1.0 + 1e-3 && found > 0.85, "{name}, {ior}, {way:?}: {found}");
+                assert!(found < 1.0 + 1e-3 && found > 0.85, "{name}, {ior}, {mode:?}: {found}");
             }
         }
     }

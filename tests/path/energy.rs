@@ -19,8 +19,8 @@ use wgray_render::records::{METAL, Material, NO_PRIMITIVE, Packed, ROUGH_GLASS};
 
 use crate::pictures::{both, render};
 
-/// All lobes.
-const ALL: u32 = 31;
+/// The mask of all lobes.
+const ALL_LOBES: u32 = 31;
 
 fn scene_of(keys: &str) -> Packed {
     super::scene(
@@ -71,20 +71,20 @@ fn evaluated_for(packed: &Packed, material: &Material, wo: Vec3, side: f32) -> M
 
 fn mixture(packed: &Packed, material: &Material, wo: Vec3, side: f32) -> PrincipledLobes {
     let energy = principled_energy(packed, material, wo, side);
-    principled_mixture(material, wo, side > 0.0, Vec3::Z, ALL, energy)
+    principled_mixture(material, wo, side > 0.0, Vec3::Z, ALL_LOBES, energy)
 }
 
 /// Integrates `f` over reflected and, with an `ior` of the far side, refracted directions: midpoint rule over
 /// microfacet normals by the inverse CDF of their distribution (Walter et al. 2007, section 5.2). Transmitted radiance
 /// is not scaled by the squared index.
 fn furnace(alpha: Vec2, ior: Option<f64>, thin: bool, wo: Vec3, f: impl Fn(Vec3) -> f32) -> f64 {
-    // Periodic in the longitude, so few steps suffice.
+    // The integrand is periodic in the longitude, so few steps suffice.
     let (steps, turns) = (360, 120);
     let a = alpha.as_dvec2();
     let o = wo.as_dvec3();
     let mut sum = 0.0;
     for i in 0..steps {
-        // Finer at steep slopes, which grazing views see.
+        // The steps are finer at steep slopes, which are visible at grazing angles.
         let t = (f64::from(i) + 0.5) / f64::from(steps);
         let (u, du) = (1.0 - (1.0 - t) * (1.0 - t), 2.0 * (1.0 - t));
         let r = (u / (1.0 - u)).sqrt();
@@ -123,18 +123,18 @@ fn furnace(alpha: Vec2, ior: Option<f64>, thin: bool, wo: Vec3, f: impl Fn(Vec3)
 }
 
 /// Returns the total albedo: reflection and transmission.
-fn given(packed: &Packed, material: &Material, wo: Vec3, side: f32, compensated: bool) -> f64 {
+fn albedo(packed: &Packed, material: &Material, wo: Vec3, side: f32, compensated: bool) -> f64 {
     let alpha = facet_alpha(material);
-    let mut known = evaluated_for(packed, material, wo, side);
+    let mut evaluated = evaluated_for(packed, material, wo, side);
     if !compensated {
-        known.loss = 0.0;
+        evaluated.loss = 0.0;
     }
     match material.kind {
-        METAL => furnace(alpha, None, false, wo, |wi| metal_eval(&known, wo, wi).x),
-        ROUGH_GLASS => furnace(alpha, Some(f64::from(known.ior)), false, wo, |wi| {
-            rough_dielectric_eval(&known, wo, wi).x
+        METAL => furnace(alpha, None, false, wo, |wi| metal_eval(&evaluated, wo, wi).x),
+        ROUGH_GLASS => furnace(alpha, Some(f64::from(evaluated.ior)), false, wo, |wi| {
+            rough_dielectric_eval(&evaluated, wo, wi).x
         }),
-        _ => furnace(alpha, None, true, wo, |wi| thin_eval(&known, wo, wi).x),
+        _ => furnace(alpha, None, true, wo, |wi| thin_eval(&evaluated, wo, wi).x),
     }
 }
 
@@ -147,53 +147,59 @@ fn anisotropic_metal_conserves_energy() {
         ("type = 'dielectric', ior = 2.5", 0.02, true),
         ("type = 'dielectric', ior = 1.1", 0.02, true),
     ];
-    let mut off = Vec::new();
-    for (kind, most, sides) in kinds {
+    let mut deviations = Vec::new();
+    for (kind, tolerance, has_inside) in kinds {
         for roughness in [0.1, 0.3, 0.6, 1.0] {
             for anisotropy in [0.3, 0.7, 1.0] {
                 let keys = format!("{kind}, roughness = {roughness}, anisotropy = {anisotropy}");
                 let packed = scene_of(&keys);
                 let material = &packed.materials[0];
                 for wo in viewers() {
-                    for side in [1.0, -1.0].into_iter().take(1 + usize::from(sides)) {
-                        let found = given(&packed, material, wo, side, true);
-                        if !((found - 1.0).abs() < most && found < 1.005) {
-                            off.push(format!("{keys}, {wo}, {side}: {found}"));
+                    for side in [1.0, -1.0].into_iter().take(1 + usize::from(has_inside)) {
+                        let found = albedo(&packed, material, wo, side, true);
+                        if !((found - 1.0).abs() < tolerance && found < 1.005) {
+                            deviations.push(format!("{keys}, {wo}, {side}: {found}"));
                         }
                     }
                 }
             }
         }
     }
-    assert!(off.is_empty(), "{} are outside of the tolerance: {off:#?}", off.len());
+    assert!(
+        deviations.is_empty(),
+        "values outside the tolerance: {}: {deviations:#?}",
+        deviations.len()
+    );
     // Control: no compensation, as an argument and in the file.
     let packed = scene_of("type = 'conductor', roughness = 0.6, anisotropy = 0.7");
-    let lost = 1.0 - given(&packed, &packed.materials[0], direction(0.4, 0.7), 1.0, false);
-    assert!(lost > 0.1, "{lost}");
+    let loss = 1.0 - albedo(&packed, &packed.materials[0], direction(0.4, 0.7), 1.0, false);
+    assert!(loss > 0.1, "{loss}");
     let plain = scene_of("type = 'conductor', roughness = 0.6, anisotropy = 0.7, energy_compensation = false");
     assert_eq!(plain.materials[0].aniso_table, 0);
-    let same = 1.0 - given(&plain, &plain.materials[0], direction(0.4, 0.7), 1.0, true);
-    assert!((same - lost).abs() < 1e-9, "{same} {lost}");
+    let uncompensated = 1.0 - albedo(&plain, &plain.materials[0], direction(0.4, 0.7), 1.0, true);
+    assert!((uncompensated - loss).abs() < 1e-9, "{uncompensated} {loss}");
 }
 
 #[test]
 fn textured_anisotropy_nearly_conserves_energy() {
     let textures = ["{ texture = 't' }", "0.45"];
-    for rough in textures {
-        for long in textures {
-            let keys = format!("type = 'principled', metallic = 1, roughness = {rough}, anisotropy = {long}");
+    for roughness_value in textures {
+        for anisotropy_value in textures {
+            let keys = format!(
+                "type = 'principled', metallic = 1, roughness = {roughness_value}, anisotropy = {anisotropy_value}"
+            );
             let packed = scene_of(&keys);
             for (roughness, anisotropy) in [(0.45, 0.45), (0.3, 0.9), (0.85, 0.2)] {
                 let mut material = packed.materials[0];
-                if rough != "0.45" {
+                if roughness_value != "0.45" {
                     material.roughness = roughness;
                 }
-                if long != "0.45" {
+                if anisotropy_value != "0.45" {
                     material.anisotropy = anisotropy;
                 }
                 for wo in viewers() {
                     let m = mixture(&packed, &material, wo, 1.0);
-                    let found = furnace(m.alpha, None, false, wo, |wi| principled_eval(&m, wo, wi, ALL).x);
+                    let found = furnace(m.alpha, None, false, wo, |wi| principled_eval(&m, wo, wi, ALL_LOBES).x);
                     assert!(
                         (found - 1.0).abs() < 0.05,
                         "{keys}, {roughness} {anisotropy}, {wo}: {found}"
@@ -212,7 +218,7 @@ fn anisotropic_principled_metal_conserves_energy() {
             let packed = scene_of(&keys);
             for wo in viewers() {
                 let m = mixture(&packed, &packed.materials[0], wo, 1.0);
-                let found = furnace(m.alpha, None, false, wo, |wi| principled_eval(&m, wo, wi, ALL).x);
+                let found = furnace(m.alpha, None, false, wo, |wi| principled_eval(&m, wo, wi, ALL_LOBES).x);
                 assert!((found - 1.0).abs() < 0.01 && found < 1.005, "{keys}, {wo}: {found}");
             }
         }
@@ -223,8 +229,12 @@ fn anisotropic_principled_metal_conserves_energy() {
 fn fully_transmissive_principled_equals_dielectric() {
     for anisotropy in [0.0, 0.6] {
         for (ior, thin) in [(1.1, false), (1.5, false), (2.5, false), (1.5, true), (2.5, true)] {
-            let all = [0.1, 0.3, 0.6, 1.0];
-            for roughness in if anisotropy == 0.0 { &all[..] } else { &all[1..2] } {
+            let roughnesses = [0.1, 0.3, 0.6, 1.0];
+            for roughness in if anisotropy == 0.0 {
+                &roughnesses[..]
+            } else {
+                &roughnesses[1..2]
+            } {
                 let options = format!("ior = {ior}, roughness = {roughness}, anisotropy = {anisotropy}");
                 let glass = scene_of(&format!("type = 'dielectric', thin = {thin}, {options}"));
                 let thickness = if thin { 0 } else { 1 };
@@ -236,29 +246,30 @@ fn fully_transmissive_principled_equals_dielectric() {
                     for side in [1.0, -1.0] {
                         let name = format!("{options}, thin {thin}, {wo}, {side}");
                         let m = mixture(&packed, material, wo, side);
-                        let other = evaluated_for(&glass, &glass.materials[0], wo, side);
+                        let evaluated = evaluated_for(&glass, &glass.materials[0], wo, side);
                         for k in 0..64 {
                             let u = sobol_sample(k, glam::UVec2::new(1, 2));
-                            let found = principled_sample(&m, wo, u, sobol_sample(k, glam::UVec2::new(3, 4)).x, ALL);
+                            let found =
+                                principled_sample(&m, wo, u, sobol_sample(k, glam::UVec2::new(3, 4)).x, ALL_LOBES);
                             if found.pdf == 0.0 || found.wi.z.abs() < 0.02 {
                                 continue;
                             }
-                            let (wi, here) = (found.wi, principled_eval(&m, wo, found.wi, ALL).x);
-                            let (there, pdf) = if thin {
-                                (thin_eval(&other, wo, wi).x, thin_pdf(&other, wo, wi))
+                            let (wi, value) = (found.wi, principled_eval(&m, wo, found.wi, ALL_LOBES).x);
+                            let (expected, expected_pdf) = if thin {
+                                (thin_eval(&evaluated, wo, wi).x, thin_pdf(&evaluated, wo, wi))
                             } else {
                                 (
-                                    rough_dielectric_eval(&other, wo, wi).x,
-                                    rough_dielectric_pdf(&other, wo, wi),
+                                    rough_dielectric_eval(&evaluated, wo, wi).x,
+                                    rough_dielectric_pdf(&evaluated, wo, wi),
                                 )
                             };
-                            let error = (here - there).abs() / there;
-                            let density = (principled_pdf(&m, wo, wi, ALL) - pdf).abs() / pdf;
-                            assert!(error < 0.01 && density < 0.01, "{name}, {wi}: {error} {density}");
+                            let error = (value - expected).abs() / expected;
+                            let pdf_error = (principled_pdf(&m, wo, wi, ALL_LOBES) - expected_pdf).abs() / expected_pdf;
+                            assert!(error < 0.01 && pdf_error < 0.01, "{name}, {wi}: {error} {pdf_error}");
                         }
                         let n = (!thin).then(|| f64::from(1.0 / m.eta));
-                        let whole = furnace(m.alpha, n, thin, wo, |wi| principled_eval(&m, wo, wi, ALL).x);
-                        assert!((whole - 1.0).abs() < 0.01, "{name}: {whole}");
+                        let albedo = furnace(m.alpha, n, thin, wo, |wi| principled_eval(&m, wo, wi, ALL_LOBES).x);
+                        assert!((albedo - 1.0).abs() < 0.01, "{name}: {albedo}");
                     }
                 }
             }
@@ -268,9 +279,11 @@ fn fully_transmissive_principled_equals_dielectric() {
     let keys = "type = 'principled', metallic = 0, transmission = 1, thickness = 1, roughness = 1";
     let material = scene_of(keys).materials[0];
     let wo = direction(0.3, 0.0);
-    let m = principled_mixture(&material, wo, true, Vec3::Z, ALL, Vec3::ONE);
-    let kept = furnace(m.alpha, Some(1.5), false, wo, |wi| principled_eval(&m, wo, wi, ALL).x);
-    assert!((kept - 0.555).abs() < 0.01, "{kept}");
+    let m = principled_mixture(&material, wo, true, Vec3::Z, ALL_LOBES, Vec3::ONE);
+    let albedo = furnace(m.alpha, Some(1.5), false, wo, |wi| {
+        principled_eval(&m, wo, wi, ALL_LOBES).x
+    });
+    assert!((albedo - 0.555).abs() < 0.01, "{albedo}");
 }
 
 #[test]
@@ -285,7 +298,7 @@ fn mixed_principled_glass_conserves_energy() {
             for (wo, side) in viewers().into_iter().flat_map(|wo| [(wo, 1.0), (wo, -1.0)]) {
                 let m = mixture(&packed, &packed.materials[0], wo, side);
                 let specular = furnace(m.alpha, Some(f64::from(1.0 / m.eta)), false, wo, |wi| {
-                    (principled_eval(&m, wo, wi, ALL) - m.diffuse * (wi.z.max(0.0) / std::f32::consts::PI)).x
+                    (principled_eval(&m, wo, wi, ALL_LOBES) - m.diffuse * (wi.z.max(0.0) / std::f32::consts::PI)).x
                 });
                 let found = specular + f64::from(m.diffuse.x);
                 assert!((found - 1.0).abs() < 0.02, "{keys}, {wo}, {side}: {found}");
@@ -303,25 +316,25 @@ fn matched_indices_do_not_reflect() {
             )
         };
         for wo in [Vec3::Z, direction(0.3, 0.7), direction(0.02, 0.7)] {
-            let mirrored = |ior: f64| {
+            let reflected = |ior: f64| {
                 let packed = scene_of(&keys(ior));
                 let m = mixture(&packed, &packed.materials[0], wo, 1.0);
                 furnace(m.alpha, None, false, wo, |wi| {
-                    (principled_eval(&m, wo, wi, ALL) - m.diffuse * (wi.z.max(0.0) / std::f32::consts::PI)).x
+                    (principled_eval(&m, wo, wi, ALL_LOBES) - m.diffuse * (wi.z.max(0.0) / std::f32::consts::PI)).x
                 })
             };
-            let none = mirrored(1.0);
-            assert!(none.abs() < 1e-3, "{}, {wo}: {none}", keys(1.0));
+            let matched = reflected(1.0);
+            assert!(matched.abs() < 1e-3, "{}, {wo}: {matched}", keys(1.0));
             // Control: the default index reflects.
-            assert!(mirrored(1.5) > 0.03, "{wo}");
+            assert!(reflected(1.5) > 0.03, "{wo}");
         }
     }
 }
 
 #[test]
-fn glass_around_the_camera_absorbs_over_the_whole_path() {
-    // From inside, through a transparent or camera-invisible surface, to the glass boundary and an emitter: exp(-a d)
-    // times the Fresnel transmittance at normal incidence times n^2.
+fn glass_around_the_camera_absorbs_over_the_full_path() {
+    // Paths start in glass, cross transparent or camera-invisible surfaces, and reach an emitter behind the glass
+    // boundary. The radiance is exp(-a d) times the Fresnel transmittance at normal incidence times n^2.
     let (a, d) = (0.4_f64, 2.0);
     let wall = |z: f64, material: &str| {
         format!(
@@ -352,17 +365,17 @@ fn glass_around_the_camera_absorbs_over_the_whole_path() {
         wall(1.1, "absent") + &wall(0.7, "unseen") + &wall(0.3, "absent"),
     ] {
         let packed = scene(&between);
-        for way in both() {
-            let found = super::mean(&render(&packed, way))[1];
+        for mode in both() {
+            let found = super::mean(&render(&packed, mode))[1];
             // 1 of 25 paths is reflected.
             assert!(
                 (found / expected - 1.0).abs() < 2e-3,
-                "{way:?}, {between}: {found} for {expected}"
+                "{mode:?}, {between}: {found}, expected {expected}"
             );
             // Control: only absorption behind the first surface.
-            let part = (1.0 - 0.04) * (-a * 0.7).exp() * 1.5 * 1.5;
+            let partial = (1.0 - 0.04) * (-a * 0.7).exp() * 1.5 * 1.5;
             assert!(
-                (found / part - 1.0).abs() > 0.1,
+                (found / partial - 1.0).abs() > 0.1,
                 "absorption in front of the first surface has no effect"
             );
         }

@@ -29,20 +29,20 @@ fn image(width: u32, height: u32, texel: impl Fn(u32, u32) -> [f32; 3]) -> Image
     }
 }
 
-fn around(image: &Image, more: &str, (samples, depth): (u32, u32), rest: &str) -> Packed {
-    described(&format!("file = 'around'{more}"), Some(image), (samples, depth), rest)
+fn with_map(image: &Image, keys: &str, (samples, depth): (u32, u32), objects: &str) -> Packed {
+    with_environment(&format!("file = 'map'{keys}"), Some(image), (samples, depth), objects)
 }
 
-fn described(environment: &str, image: Option<&Image>, (samples, depth): (u32, u32), rest: &str) -> Packed {
+fn with_environment(environment: &str, image: Option<&Image>, (samples, depth): (u32, u32), objects: &str) -> Packed {
     let text = format!(
-        "image = {{ width = 16, height = 16 }}\n{rest}\n[environment]\n{environment}\n\
+        "image = {{ width = 16, height = 16 }}\n{objects}\n[environment]\n{environment}\n\
          [render]\nintegrator = 'path'\nmax_depth = {depth}\npixel_samples = {{ count = {samples} }}\n"
     );
     let description = Description::parse(&text, "test").unwrap_or_else(|error| panic!("{error}\n{text}"));
     let mut assets = Assets::beside(&sources::path("scenes"));
     assets
         .images
-        .extend(image.map(|image| ("around".to_owned(), Arc::new(image.clone()))));
+        .extend(image.map(|image| ("map".to_owned(), Arc::new(image.clone()))));
     pack(
         &description
             .validate_with(&assets)
@@ -57,26 +57,30 @@ fn radiance(image: &Image, u: f64, v: f64) -> DVec3 {
     };
     let (width, height) = (i64::from(image.width), i64::from(image.height));
     let texel = |x: i64, y: i64| {
-        let at = |x: i64, y: i64| DVec3::from_array(texels[(y * width + x.rem_euclid(width)) as usize].map(f64::from));
+        let wrapped_texel =
+            |x: i64, y: i64| DVec3::from_array(texels[(y * width + x.rem_euclid(width)) as usize].map(f64::from));
         if (0..height).contains(&y) {
-            return at(x, y);
+            return wrapped_texel(x, y);
         }
-        (0..width).map(|x| at(x, y.clamp(0, height - 1))).sum::<DVec3>() / width as f64
+        (0..width)
+            .map(|x| wrapped_texel(x, y.clamp(0, height - 1)))
+            .sum::<DVec3>()
+            / width as f64
     };
     let (s, t) = (u * width as f64 - 0.5, v * height as f64 - 0.5);
     let (x, y) = (s.floor(), t.floor());
-    // The pole is half a row from the texel centers.
-    let down = match t {
+    // The pole is half a row from the centers of the outermost row.
+    let row_weight = match t {
         t if t < 0.0 => 1.0 + 2.0 * t,
         t if t > height as f64 - 1.0 => 2.0 * (t - y),
         _ => t - y,
     };
-    let along = |y: i64| texel(x as i64, y).lerp(texel(x as i64 + 1, y), s - x);
-    along(y as i64).lerp(along(y as i64 + 1), down)
+    let row = |y: i64| texel(x as i64, y).lerp(texel(x as i64 + 1, y), s - x);
+    row(y as i64).lerp(row(y as i64 + 1), row_weight)
 }
 
-/// Integrates over all directions, `points` x `points` per texel.
-fn sum_over(image: &Image, points: u32, mut value: impl FnMut(DVec3, DVec3) -> DVec3) -> DVec3 {
+/// Integrates over all directions, with `points` x `points` points per texel.
+fn integrate(image: &Image, points: u32, mut value: impl FnMut(DVec3, DVec3) -> DVec3) -> DVec3 {
     let (columns, rows) = (image.width * points, image.height * points);
     let mut sum = DVec3::ZERO;
     for row in 0..rows {
@@ -94,7 +98,7 @@ fn sum_over(image: &Image, points: u32, mut value: impl FnMut(DVec3, DVec3) -> D
 }
 
 fn irradiance(image: &Image, points: u32, normal: DVec3) -> DVec3 {
-    sum_over(image, points, |direction, radiance| {
+    integrate(image, points, |direction, radiance| {
         radiance * direction.dot(normal).max(0.0)
     })
 }
@@ -114,8 +118,10 @@ fn sunny() -> Image {
     })
 }
 
-fn one_bright(width: u32, height: u32, at: (u32, u32)) -> Image {
-    image(width, height, move |x, y| [if (x, y) == at { 100.0 } else { 0.0 }; 3])
+fn one_bright_texel(width: u32, height: u32, position: (u32, u32)) -> Image {
+    image(width, height, move |x, y| {
+        [if (x, y) == position { 100.0 } else { 0.0 }; 3]
+    })
 }
 
 #[test]
@@ -125,32 +131,32 @@ fn irradiance_matches_a_sum_over_all_directions() {
         (image(2, 1, |x, _| [f32::from(x as u8), 1.0, 0.5]), 128),
         (image(2, 2, |x, y| [x as f32, y as f32, 1.0]), 64),
         (noise(33, 17), 8),
-        (one_bright(16, 8, (5, 2)), 32),
-        (one_bright(16, 8, (15, 0)), 32),
+        (one_bright_texel(16, 8, (5, 2)), 32),
+        (one_bright_texel(16, 8, (15, 0)), 32),
         (sunny(), 8),
     ];
-    // Ground normal in the space of the image.
+    // The ground normal in the space of the map.
     let sines = |degrees: f64| degrees.to_radians().sin_cos();
     let tilted = DVec3::new(sines(50.0).0, 0.0, sines(50.0).1);
     for (image, points) in &images {
-        for (turn, normal) in [
+        for (rotation, normal) in [
             ("", DVec3::Z),
-            // Rotates the normal by the inverse.
+            // The rotation of the map rotates the normal by the inverse.
             ("\nrotate = { axis = [0, 1, 0], degrees = -50 }", tilted),
             ("\nrotate = [0, 90, 0]", DVec3::NEG_X),
         ] {
             let expected = irradiance(image, *points, normal) / PI;
             for mode in both() {
-                let found = DVec3::from_array(mean(&render(&around(image, turn, (256, 1), GROUND), mode)));
+                let found = DVec3::from_array(mean(&render(&with_map(image, rotation, (256, 1), GROUND), mode)));
                 if expected == DVec3::ZERO {
-                    assert_eq!(found, expected, "a texel below the ground lights it");
+                    assert_eq!(found, expected, "a texel below the ground lights the ground");
                     continue;
                 }
                 let ratio = found / expected;
                 let size = (image.width, image.height);
                 assert!(
                     (ratio - DVec3::ONE).abs().max_element() < 0.01,
-                    "{size:?}{turn}, {mode:?}: {found} for {expected}"
+                    "{size:?}{rotation}, {mode:?}: {found}, expected {expected}"
                 );
             }
         }
@@ -179,27 +185,39 @@ fn the_map_has_the_documented_orientation() {
         (DVec3::Z, [0.0, 0.0, 1.0]),
         (DVec3::NEG_Z, [1.0, 1.0, 0.0]),
     ];
-    let seen = |direction: DVec3, turn: &str, mode: RenderMode| {
+    let color_towards = |direction: DVec3, rotation: &str, mode: RenderMode| {
         let up = if direction.z == 0.0 { DVec3::Z } else { DVec3::X };
         let (DVec3 { x, y, z }, u) = (direction, up);
         let camera = format!(
             "camera = {{ position = [0, 0, 0], look_at = [{x}, {y}, {z}], up = [{}, {}, {}], fov = 20 }}\n",
             u.x, u.y, u.z
         );
-        mean(&render(&around(&picture, turn, (4, 0), &camera), mode))
+        mean(&render(&with_map(&picture, rotation, (4, 0), &camera), mode))
     };
     for mode in both() {
         for (i, (direction, color)) in colors.into_iter().enumerate() {
-            assert_eq!(seen(direction, "", mode), color, "{direction}, {mode:?}");
+            assert_eq!(color_towards(direction, "", mode), color, "{direction}, {mode:?}");
             // Counterclockwise from above: +x moves to +y.
             if i < 4 {
-                let before = colors[(i + 3) % 4].1;
-                assert_eq!(seen(direction, "\nrotate = 90", mode), before, "{direction}, {mode:?}");
+                let rotated_color = colors[(i + 3) % 4].1;
+                assert_eq!(
+                    color_towards(direction, "\nrotate = 90", mode),
+                    rotated_color,
+                    "{direction}, {mode:?}"
+                );
             }
         }
         let about_x = "\nrotate = { axis = [1, 0, 0], degrees = 90 }";
-        assert_eq!(seen(DVec3::Z, about_x, mode), colors[1].1, "+y goes up");
-        assert_eq!(seen(DVec3::Z, "\nrotate = [90, 0, 0]", mode), colors[1].1, "+y goes up");
+        assert_eq!(
+            color_towards(DVec3::Z, about_x, mode),
+            colors[1].1,
+            "+y does not move to +z"
+        );
+        assert_eq!(
+            color_towards(DVec3::Z, "\nrotate = [90, 0, 0]", mode),
+            colors[1].1,
+            "+y does not move to +z"
+        );
     }
 }
 
@@ -212,10 +230,16 @@ fn a_white_map_equals_a_constant_color() {
                 [[shapes]]\ntype = 'sphere'\nmaterial = 'g'\ncenter = [0.6, 0, 0]\nradius = 0.5\n";
     let white = image(8, 4, |_, _| [0.5, 1.0, 1.5]);
     for mode in both() {
-        let colour = mean(&render(&described("color = [1, 2, 3]", None, (1024, 6), ball), mode));
-        let found = mean(&render(&around(&white, "\nscale = 2", (1024, 6), ball), mode));
-        for (found, colour) in found.into_iter().zip(colour) {
-            assert!((found / colour - 1.0).abs() < 2e-3, "{mode:?}: {found} for {colour}");
+        let expected = mean(&render(
+            &with_environment("color = [1, 2, 3]", None, (1024, 6), ball),
+            mode,
+        ));
+        let found = mean(&render(&with_map(&white, "\nscale = 2", (1024, 6), ball), mode));
+        for (found, expected) in found.into_iter().zip(expected) {
+            assert!(
+                (found / expected - 1.0).abs() < 2e-3,
+                "{mode:?}: {found}, expected {expected}"
+            );
         }
     }
 }
@@ -233,7 +257,7 @@ fn light_and_bsdf_sampling_of_the_map_agree() {
     if adapter::device().is_none() {
         return;
     }
-    let with = |changes: [(&str, &str, &str); 2]| {
+    let edited_shaders = |changes: [(&str, &str, &str); 2]| {
         let mut shaders = sources::shaders().clone();
         for (file, from, to) in changes {
             let text = shaders.text(file).to_owned();
@@ -242,32 +266,41 @@ fn light_and_bsdf_sampling_of_the_map_agree() {
         }
         shaders
     };
-    const PATH: &str = "integrators/path.wgsl";
-    const AFAR: &str = "environment.wgsl";
-    const OF_LIGHT: &str = "select(power_heuristic(light.pdf, reflected.pdf), 1.0, light.is_delta)";
-    const OF_RAY: &str = "select(1.0, power_heuristic(pdf, eval.pdf), pdf > 0.0)";
-    let light_alone = with([(PATH, OF_LIGHT, "1.0"), (AFAR, OF_RAY, "select(1.0, 0.0, pdf > 0.0)")]);
-    let material_alone = with([(PATH, OF_LIGHT, "0.0"), (AFAR, OF_RAY, "1.0")]);
-    let wrong = with([(PATH, OF_LIGHT, "1.1"), (AFAR, OF_RAY, "select(1.0, 0.0, pdf > 0.0)")]);
-    // Without the area light, which has its own MIS weights.
+    const PATH_FILE: &str = "integrators/path.wgsl";
+    const ENVIRONMENT_FILE: &str = "environment.wgsl";
+    const LIGHT_WEIGHT: &str = "select(power_heuristic(light.pdf, reflected.pdf), 1.0, light.is_delta)";
+    const BSDF_WEIGHT: &str = "select(1.0, power_heuristic(pdf, eval.pdf), pdf > 0.0)";
+    let light_sampling = edited_shaders([
+        (PATH_FILE, LIGHT_WEIGHT, "1.0"),
+        (ENVIRONMENT_FILE, BSDF_WEIGHT, "select(1.0, 0.0, pdf > 0.0)"),
+    ]);
+    let bsdf_sampling = edited_shaders([(PATH_FILE, LIGHT_WEIGHT, "0.0"), (ENVIRONMENT_FILE, BSDF_WEIGHT, "1.0")]);
+    let wrong = edited_shaders([
+        (PATH_FILE, LIGHT_WEIGHT, "1.1"),
+        (ENVIRONMENT_FILE, BSDF_WEIGHT, "select(1.0, 0.0, pdf > 0.0)"),
+    ]);
+    // The scene has no area light, because area lights have their own MIS weights.
     let text = EMITTERS.replace(", emission = [5, 3, 1]", "");
     for image in [
         noise(16, 8),
-        one_bright(16, 8, (4, 1)),
+        one_bright_texel(16, 8, (4, 1)),
         image(2, 1, |x, _| [x as f32, 1.0, 2.0]),
     ] {
-        let packed = around(&image, "\nvisible = false", (4096, 2), &text);
+        let packed = with_map(&image, "\nvisible = false", (4096, 2), &text);
         let found = |shaders| mean(&render_with(&packed, RenderMode::Baked, shaders));
         let both = found(sources::shaders());
-        let [light, materials, wrong] = [&light_alone, &material_alone, &wrong].map(found);
+        let [light, bsdf, wrong] = [&light_sampling, &bsdf_sampling, &wrong].map(found);
         for i in 0..3 {
             let near = |x: f64| (x - both[i]).abs() < 1e-2 * both[i];
-            assert!(near(light[i]), "light sampling alone differs: {light:?} for {both:?}");
             assert!(
-                near(materials[i]),
-                "BSDF sampling alone differs: {materials:?} for {both:?}"
+                near(light[i]),
+                "light sampling alone differs: {light:?}, expected {both:?}"
             );
-            assert!(!near(wrong[i]), "a wrong weight passes: {wrong:?} for {both:?}");
+            assert!(
+                near(bsdf[i]),
+                "BSDF sampling alone differs: {bsdf:?}, expected {both:?}"
+            );
+            assert!(!near(wrong[i]), "a wrong weight passes: {wrong:?}, expected {both:?}");
         }
     }
 }
@@ -282,17 +315,20 @@ fn the_light_of_map_and_lights_adds_up() {
     let dark = EMITTERS.replace(", emission = [5, 3, 1]", "");
     for mode in both() {
         let sum = |packed: Packed| mean(&render(&packed, mode));
-        // The rectangle of the light occludes in all three scenes.
-        let hidden = lights.split("[[lights]]").last().unwrap_or_default();
-        let plate = format!("[[lights]]{}", hidden.replace("color = [3, 3, 3]", "color = [0, 0, 0]"));
-        let of_image = sum(around(&image, "", (1024, 3), &format!("{dark}{plate}")));
-        let of_lights = sum(described("color = [0, 0, 0]", None, (1024, 3), &text));
-        let all = sum(around(&image, "", (1024, 3), &text));
+        // The rectangle of the area light occludes in all three scenes.
+        let rectangle = lights.split("[[lights]]").last().unwrap_or_default();
+        let black_rectangle = format!(
+            "[[lights]]{}",
+            rectangle.replace("color = [3, 3, 3]", "color = [0, 0, 0]")
+        );
+        let map_light = sum(with_map(&image, "", (1024, 3), &format!("{dark}{black_rectangle}")));
+        let other_light = sum(with_environment("color = [0, 0, 0]", None, (1024, 3), &text));
+        let all = sum(with_map(&image, "", (1024, 3), &text));
         for i in 0..3 {
-            let expected = of_image[i] + of_lights[i];
+            let expected = map_light[i] + other_light[i];
             assert!(
                 (all[i] / expected - 1.0).abs() < 0.01,
-                "{mode:?}: {all:?} for {of_image:?} + {of_lights:?}"
+                "{mode:?}: {all:?}, expected {map_light:?} + {other_light:?}"
             );
         }
     }
@@ -312,16 +348,19 @@ fn the_floor_occludes_light_from_below() {
                 materials.m = { type = 'diffuse', color = [1, 1, 1] }\n\
                 [[shapes]]\ntype = 'sphere'\nmaterial = 'm'\ncenter = [0, 0, 0.6]\nradius = 0.5\n";
     for mode in both() {
-        let seen = |floor: &str| {
+        let brightness = |floor: &str| {
             mean(&render(
-                &around(&below, "\nvisible = false", (64, 1), &format!("{ball}{floor}")),
+                &with_map(&below, "\nvisible = false", (64, 1), &format!("{ball}{floor}")),
                 mode,
             ))
         };
         for floor in floors {
-            assert!(seen(&format!("[[shapes]]\n{floor}\n"))[0] < 1e-3, "{floor}, {mode:?}");
+            assert!(
+                brightness(&format!("[[shapes]]\n{floor}\n"))[0] < 1e-3,
+                "{floor}, {mode:?}"
+            );
         }
-        assert!(seen("")[0] > 0.1, "the ball is dark without a floor, {mode:?}");
+        assert!(brightness("")[0] > 0.1, "the ball is dark without a floor, {mode:?}");
     }
 }
 
@@ -331,19 +370,19 @@ fn an_invisible_map_emits_and_is_reflected() {
                  materials.m = { type = 'conductor', color = [1, 1, 1] }\n\
                  [[shapes]]\ntype = 'sphere'\nmaterial = 'm'\ncenter = [0, 0, 0]\nradius = 0.7\n";
     let white = image(4, 2, |_, _| [1.0; 3]);
-    for environment in ["file = 'around'", "color = [1, 1, 1]"] {
+    for environment in ["file = 'map'", "color = [1, 1, 1]"] {
         for mode in both() {
             let picture = |visible: bool| {
                 let keys = format!("{environment}\nvisible = {visible}");
-                render(&described(&keys, Some(&white), (16, 4), balls), mode)
+                render(&with_environment(&keys, Some(&white), (16, 4), balls), mode)
             };
-            let (seen, hidden) = (picture(true), picture(false));
-            let at = |film: &wgray_render::film::Film, i: usize| film.means().nth(i).unwrap_or_default();
-            assert_eq!(at(&seen, 0), [1.0; 3], "{environment}, {mode:?}");
-            assert_eq!(at(&hidden, 0), [0.0; 3], "{environment}, {mode:?}");
-            let middle = 8 * 16 + 8;
-            for film in [&seen, &hidden] {
-                let [x, ..] = at(film, middle);
+            let (shown, hidden) = (picture(true), picture(false));
+            let pixel = |film: &wgray_render::film::Film, i: usize| film.means().nth(i).unwrap_or_default();
+            assert_eq!(pixel(&shown, 0), [1.0; 3], "{environment}, {mode:?}");
+            assert_eq!(pixel(&hidden, 0), [0.0; 3], "{environment}, {mode:?}");
+            let center = 8 * 16 + 8;
+            for film in [&shown, &hidden] {
+                let [x, ..] = pixel(film, center);
                 assert!((x - 1.0).abs() < 1e-5, "{environment}, {mode:?}: {x}");
             }
         }
@@ -356,18 +395,18 @@ fn only_the_camera_sees_the_background() {
                  materials.m = { type = 'conductor', color = [1, 1, 1] }\n\
                  [[shapes]]\ntype = 'sphere'\nmaterial = 'm'\ncenter = [0, 0, 0]\nradius = 0.7\n";
     let white = image(4, 2, |_, _| [1.0; 3]);
-    for environment in ["file = 'around'", "color = [1, 1, 1]", "color = [0, 0, 0]"] {
-        let lit = if environment.contains("[0") { 0.0 } else { 1.0 };
-        let ways = exact_modes().into_iter();
-        let films: Vec<_> = ways
+    for environment in ["file = 'map'", "color = [1, 1, 1]", "color = [0, 0, 0]"] {
+        let expected = if environment.contains("[0") { 0.0 } else { 1.0 };
+        let modes = exact_modes().into_iter();
+        let films: Vec<_> = modes
             .map(|mode| {
                 let keys = format!("{environment}\nbackground = [0.5, 0.25, 8]");
-                let film = render(&described(&keys, Some(&white), (16, 4), balls), mode);
-                let at = |i: usize| film.means().nth(i).unwrap_or_default();
-                assert_eq!(at(0), [0.5, 0.25, 8.0], "{environment}, {mode:?}");
-                let [x, ..] = at(8 * 16 + 8);
+                let film = render(&with_environment(&keys, Some(&white), (16, 4), balls), mode);
+                let pixel = |i: usize| film.means().nth(i).unwrap_or_default();
+                assert_eq!(pixel(0), [0.5, 0.25, 8.0], "{environment}, {mode:?}");
+                let [x, ..] = pixel(8 * 16 + 8);
                 assert!(
-                    (x - lit).abs() < 1e-5,
+                    (x - expected).abs() < 1e-5,
                     "the mirror does not show the environment map: {environment}, {mode:?}: {x}"
                 );
                 film
@@ -383,13 +422,13 @@ fn a_scale_of_two_doubles_every_pixel_exactly() {
     for mode in both() {
         let film = |scale: f64| {
             render(
-                &around(&noise(16, 8), &format!("\nscale = {scale}"), (16, 3), GROUND),
+                &with_map(&noise(16, 8), &format!("\nscale = {scale}"), (16, 3), GROUND),
                 mode,
             )
         };
-        let (one, two) = (film(1.0), film(2.0));
-        for (one, two) in one.means().zip(two.means()) {
-            assert_eq!(one.map(|x| 2.0 * x), two, "{mode:?}");
+        let (single, doubled) = (film(1.0), film(2.0));
+        for (single, doubled) in single.means().zip(doubled.means()) {
+            assert_eq!(single.map(|x| 2.0 * x), doubled, "{mode:?}");
         }
         assert_eq!(mean(&film(0.0)), [0.0; 3]);
         assert!(mean(&film(1e6)).iter().all(|x| x.is_finite()));
@@ -400,8 +439,8 @@ fn a_scale_of_two_doubles_every_pixel_exactly() {
 fn all_backends_give_the_same_bits() {
     let text = format!("{EMITTERS}[[lights]]\ntype = 'point'\nposition = [1, -1, 2]\ncolor = [2, 2, 2]\n");
     for image in [noise(33, 17), sunny(), image(1, 1, |_, _| [1.0; 3])] {
-        for turn in ["", "\nrotate = [10, 20, 30]"] {
-            let packed = around(&image, turn, (64, 5), &text);
+        for rotation in ["", "\nrotate = [10, 20, 30]"] {
+            let packed = with_map(&image, rotation, (64, 5), &text);
             let expected = render(&packed, RenderMode::Cpu);
             for mode in exact_modes() {
                 assert_eq!(differing(&render(&packed, mode), &expected), 0, "{mode:?}");
@@ -420,8 +459,8 @@ fn samples(packed: &Packed, normal: Vec3, count: u32) -> impl Iterator<Item = Ve
     (0..count).map(move |i| {
         let u = sobol_sample(i, UVec2::new(5, 6));
         let sample = sample_environment(packed, light, normal, u);
-        let again = environment_eval(packed, sample.to, normal);
-        assert_eq!((sample.radiance, sample.pdf), (again.radiance, again.pdf));
+        let eval = environment_eval(packed, sample.to, normal);
+        assert_eq!((sample.radiance, sample.pdf), (eval.radiance, eval.pdf));
         sample.to
     })
 }
@@ -443,16 +482,17 @@ fn sampled_directions_follow_their_pdf() {
         image(3, 5, |x, y| [(x + 2 * y) as f32; 3]),
         noise(33, 17),
         noise(130, 70),
-        one_bright(16, 8, (3, 0)),
+        one_bright_texel(16, 8, (3, 0)),
         sunny(),
     ];
     // Normal 0 selects all directions.
     let normals = [Vec3::ZERO, Vec3::Z, Vec3::new(0.6, -0.48, -0.64)];
     for (image, normal) in (images.iter()).flat_map(|image| normals.map(|normal| (image, normal))) {
-        let packed = around(image, "", (1, 1), GROUND);
+        let packed = with_map(image, "", (1, 1), GROUND);
         let mut counts = vec![0.0; COLUMNS * ROWS];
         samples(&packed, normal, COUNT).for_each(|direction| counts[bin(direction)] += 1.0);
-        // Expected counts, integrated on a grid much finer than the texels, because the bins do not align with texels.
+        // The expected counts are integrated on a grid much finer than the texels, because bins and texels do not
+        // align.
         let mut expected = [0.0, 0.08].map(|_| vec![0.0; COLUMNS * ROWS]);
         let fine = image.width.max(image.height).max(24) * 24;
         for row in 0..fine {
@@ -463,32 +503,38 @@ fn sampled_directions_follow_their_pdf() {
                 let direction = DVec3::new(sine * azimuth.cos(), sine * azimuth.sin(), cosine).as_vec3();
                 let pdf = f64::from(environment_eval(&packed, direction, normal).pdf);
                 let share = pdf * sine * PI / f64::from(fine) * TAU / f64::from(2 * fine) * f64::from(COUNT);
-                let at = bin(direction);
-                expected[0][at] += share;
-                expected[1][at] += share * if direction.x > 0.0 { 1.08 } else { 0.92 };
+                let index = bin(direction);
+                expected[0][index] += share;
+                expected[1][index] += share * if direction.x > 0.0 { 1.08 } else { 0.92 };
             }
         }
         let size = (image.width, image.height, normal);
-        let all: f64 = expected[0].iter().sum::<f64>() / f64::from(COUNT);
-        assert!((all - 1.0).abs() < 2e-3, "{size:?}: the PDF integrates to {all}");
+        let total: f64 = expected[0].iter().sum::<f64>() / f64::from(COUNT);
+        assert!((total - 1.0).abs() < 2e-3, "{size:?}: the PDF integrates to {total}");
         let statistic = |expected: &[f64]| {
-            let (mut sum, mut freedom) = (0.0, -1.0_f64);
+            let (mut sum, mut degrees_of_freedom) = (0.0, -1.0_f64);
             for (count, expected) in counts.iter().zip(expected) {
                 if *expected >= 20.0 {
                     sum += (count - expected) * (count - expected) / expected;
-                    freedom += 1.0;
+                    degrees_of_freedom += 1.0;
                 } else {
                     assert!(*count < 60.0, "{size:?}: {count} samples; expected {expected}");
                 }
             }
-            (sum, freedom)
+            (sum, degrees_of_freedom)
         };
-        let (sum, freedom) = statistic(&expected[0]);
+        let (sum, degrees_of_freedom) = statistic(&expected[0]);
         // Six standard deviations, plus the error of the grid.
-        let most = freedom + 6.0 * (2.0 * freedom).sqrt() + 20.0;
-        assert!(freedom > 2.0 && sum < most, "{size:?}: {sum} of {freedom}");
+        let max_sum = degrees_of_freedom + 6.0 * (2.0 * degrees_of_freedom).sqrt() + 20.0;
+        assert!(
+            degrees_of_freedom > 2.0 && sum < max_sum,
+            "{size:?}: {sum} of {degrees_of_freedom}"
+        );
         let (wrong, _) = statistic(&expected[1]);
-        assert!(wrong > most, "{size:?}: a wrong PDF passes: {wrong} of {freedom}");
+        assert!(
+            wrong > max_sum,
+            "{size:?}: a wrong PDF passes: {wrong} of {degrees_of_freedom}"
+        );
     }
 }
 
@@ -525,7 +571,7 @@ fn an_unoccluded_wall_has_little_noise() {
         let found = noise(normal, (64, "sobol"));
         assert!(found < 0.035, "{normal:?}: {found}");
     }
-    // Control: unstratified or few samples.
+    // Controls: unstratified samples, and few samples.
     assert!(noise([0.0, -1.0, 0.0], (64, "random")) > 0.035);
     assert!(noise([0.0, -1.0, 0.0], (4, "sobol")) > 0.035);
 }

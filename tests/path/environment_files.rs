@@ -46,8 +46,8 @@ fn images_of_every_kind_are_read() {
         assert!(scene.notes.is_empty(), "{:?}", scene.notes);
         assert!(scene.files.iter().any(|file| file.ends_with(name)), "{:?}", scene.files);
         let packed = wgray_render::pack::pack(&scene);
-        let at = packed.environment.texels as usize;
-        let value = f32::from_bits(packed.textures.texels[at]);
+        let offset = packed.environment.texels as usize;
+        let value = f32::from_bits(packed.textures.texels[offset]);
         // 188/255 in sRGB is 0.5029 linear.
         assert!((value - 0.5).abs() < 6e-3, "{name}: {value}");
     }
@@ -56,7 +56,7 @@ fn images_of_every_kind_are_read() {
     assert_eq!(
         notes,
         [
-            "environment.file: \"square.exr\" has 3 x 3 texels; equirectangular images are twice as wide as high, so it is stretched"
+            "environment.file: \"square.exr\" has 3 x 3 texels; equirectangular images are twice as wide as high, so this image is stretched"
         ]
     );
 }
@@ -80,7 +80,7 @@ fn errors_are_reported_with_their_location() {
         b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 8192 +X 16384\n",
     )
     .unwrap();
-    let rule = "the values of each must be finite, from 0 to 1e6";
+    let rule = "texel values must be from 0 to 1e6";
     for (environment, message) in [
         ("", "4: environment: must have exactly one of \"color\", \"file\" and \"name\"".to_owned()),
         (
@@ -89,15 +89,15 @@ fn errors_are_reported_with_their_location() {
         ),
         (
             "file = 'nan.exr'",
-            format!("5: environment.file: \"nan.exr\" has 1 bad texel, at (2, 1); {rule}"),
+            format!("5: environment.file: \"nan.exr\" has 1 invalid texel, at (2, 1); {rule}"),
         ),
         (
             "file = 'negative.exr'",
-            format!("5: environment.file: \"negative.exr\" has 2 bad texels, the first at (3, 0); {rule}"),
+            format!("5: environment.file: \"negative.exr\" has 2 invalid texels, the first at (3, 0); {rule}"),
         ),
         (
             "file = 'infinite.exr'",
-            format!("5: environment.file: \"infinite.exr\" has 2 bad texels, the first at (3, 0); {rule}"),
+            format!("5: environment.file: \"infinite.exr\" has 2 invalid texels, the first at (3, 0); {rule}"),
         ),
         (
             "file = 'text.exr'",
@@ -105,7 +105,7 @@ fn errors_are_reported_with_their_location() {
         ),
         (
             "file = 'huge.hdr'",
-            "5: environment.file: \"huge.hdr\" (16384 x 8192 texels) needs 2561.7 MiB and the textures before it 0.0 MiB; the \
+            "5: environment.file: \"huge.hdr\" (16384 x 8192 texels) needs 2561.7 MiB and the previous textures 0.0 MiB; the \
              limit is 1024.0 MiB"
                 .to_owned(),
         ),
@@ -156,7 +156,7 @@ fn errors_are_reported_with_their_location() {
     ] {
         assert!(error(environment).starts_with(start), "{}", error(environment));
     }
-    for good in [
+    for environment in [
         "file = 'good.exr'\nscale = 1e6\nrotate = -360\nvisible = false",
         "file = 'good.exr'\nrotate = [10, 20, 30]",
         "file = 'good.exr'\nrotate = { axis = [1, 1, 0], degrees = 20 }",
@@ -164,7 +164,7 @@ fn errors_are_reported_with_their_location() {
         "name = 'sky'\nsun_elevation = 0\nsun_azimuth = -360\nturbidity = 10",
         "name = 'sky'\nsun_elevation = 90\nturbidity = 1",
     ] {
-        load(folder.path(), good).unwrap_or_else(|error| panic!("{good}: {error}"));
+        load(folder.path(), environment).unwrap_or_else(|error| panic!("{environment}: {error}"));
     }
 }
 

@@ -5,10 +5,10 @@ use std::f64::consts::PI;
 use super::{mean, scene};
 use crate::pictures::{both, means, render};
 
-/// A camera that looks roughly along +x.
+/// A camera near the origin that looks roughly along +x.
 const INSIDE: &str = "camera = { position = [0.1, 0, 0.05], look_at = [1, 0, 0.2], fov = 60 }\n";
 
-fn above(x: f64, y: f64, z: f64, height: f64) -> String {
+fn camera_above(x: f64, y: f64, z: f64, height: f64) -> String {
     format!(
         "camera = {{ type = 'orthographic', position = [{x}, {y}, {z}], look_at = [{x}, {y}, 0], up = [0, 1, 0], height = {height} }}\n"
     )
@@ -17,13 +17,13 @@ fn above(x: f64, y: f64, z: f64, height: f64) -> String {
 const FLOOR: &str =
     "[[shapes]]\ntype = 'plane'\nmaterial = 'm'\npoint = [0, 0, 0]\nnormal = [0, 0, 1]\ntangent = [1, 0, 0]\n";
 
-fn near(found: f64, expected: f64, relative: f64) -> bool {
+fn is_near(found: f64, expected: f64, relative: f64) -> bool {
     (found - expected).abs() <= relative * expected.abs()
 }
 
 #[test]
 fn a_convex_body_in_a_furnace_shows_its_albedo() {
-    // Each sample is the albedo: zero variance.
+    // Each sample equals the albedo, so the variance is zero.
     for (material, albedo, tolerance) in [
         ("type = 'diffuse', color = [0.8, 0.5, 1]", [0.8, 0.5, 1.0], 1e-5),
         ("type = 'diffuse', color = [1, 1, 1], roughness = 1", [1.0; 3], 3e-2),
@@ -54,11 +54,11 @@ fn a_convex_body_in_a_furnace_shows_its_albedo() {
                  materials.m = {{ {material} }}\n[[shapes]]\n{shape}\n"
             );
             let packed = scene(64, 1024, &text);
-            for way in both() {
-                let found = mean(&render(&packed, way));
+            for mode in both() {
+                let found = mean(&render(&packed, mode));
                 for (found, expected) in found.into_iter().zip(albedo) {
-                    assert!(near(found, expected, tolerance), "{material}, {way:?}: {found}");
-                    assert!(!near(found, expected * 1.04, tolerance), "a wrong value passes");
+                    assert!(is_near(found, expected, tolerance), "{material}, {mode:?}: {found}");
+                    assert!(!is_near(found, expected * 1.04, tolerance), "a wrong value passes");
                 }
             }
         }
@@ -67,9 +67,9 @@ fn a_convex_body_in_a_furnace_shows_its_albedo() {
 
 #[test]
 fn bounces_in_a_closed_emitter_are_a_geometric_series() {
-    // In a closed emitter of albedo a and radiance 1, n bounces give the sum of a^k up to k = n.
+    // In a closed emitter of albedo a and emission e, n bounces give e times the sum of a^k up to k = n.
     let (albedo, emission) = (0.6, 0.5);
-    let body = [
+    let bodies = [
         "[[shapes]]\ntype = 'sphere'\nmaterial = 'm'\ncenter = [0, 0, 0]\nradius = 2\n".to_owned(),
         "[[shapes]]\ntype = 'ellipsoid'\nmaterial = 'm'\ncenter = [0, 0, 0]\na = [1.5, 0.2, 0]\nb = [0, 0.7, 0]\nc = [0, 0, 2]\n".to_owned(),
         {
@@ -89,7 +89,7 @@ fn bounces_in_a_closed_emitter_are_a_geometric_series() {
             .concat()
         },
     ];
-    for body in body {
+    for body in bodies {
         for depth in [0, 1, 2, 5, 40] {
             let text = format!(
                 "{INSIDE}materials.m = {{ type = 'diffuse', color = [{albedo}, {albedo}, {albedo}], \
@@ -97,20 +97,20 @@ fn bounces_in_a_closed_emitter_are_a_geometric_series() {
             );
             let packed = scene(256, depth, &text);
             let expected = emission * (1.0 - f64::powi(albedo, depth as i32 + 1)) / (1.0 - albedo);
-            for way in both() {
-                let found = mean(&render(&packed, way))[0];
+            for mode in both() {
+                let found = mean(&render(&packed, mode))[0];
                 assert!(
-                    near(found, expected, 4e-3),
-                    "{way:?}, {depth}: {found} for {expected}\n{body}"
+                    is_near(found, expected, 4e-3),
+                    "{mode:?}, {depth}: {found}, expected {expected}\n{body}"
                 );
-                assert!(!near(found, expected * 1.02, 4e-3), "a wrong value passes");
+                assert!(!is_near(found, expected * 1.02, 4e-3), "a wrong value passes");
             }
         }
     }
 }
 
-/// Returns the form factor of a parallel rectangle with a corner straight above, at height h: Howell, "A Catalog of
-/// Radiation Heat Transfer Configuration Factors", B-3.
+/// Returns the form factor of a parallel rectangle at height h with a corner straight above the point: Howell, "A
+/// Catalog of Radiation Heat Transfer Configuration Factors", B-3.
 fn corner_factor(a: f64, b: f64, h: f64) -> f64 {
     let (x, y) = (a / h, b / h);
     let (p, q) = ((1.0 + x * x).sqrt(), (1.0 + y * y).sqrt());
@@ -135,23 +135,26 @@ fn a_rectangle_lights_the_floor_by_its_form_factor() {
         "materials.s = {{ type = 'diffuse', color = [0, 0, 0], emission = [3, 2, 1] }}\n[[shapes]]\ntype = 'rectangle'\nmaterial = 's'\ncenter = [0, 0, {h}]\nsize = [{width}, {height}]\nnormal = [0, 0, -1]\ntangent = [1, 0, 0]\n"
     );
     for emitter in [light, shape] {
-        // Below the light, beside it, and far from it.
+        // Points below the light, beside the light, and far from the light.
         for (x, y) in [(0.0, 0.0), (0.6, 0.1), (2.0, 1.5)] {
-            let camera = above(x, y, 0.4, 0.02);
+            let camera = camera_above(x, y, 0.4, 0.02);
             let packed = scene(
                 1024,
                 1,
                 &format!("{camera}materials.m = {{ type = 'diffuse', color = [0.5, 0.5, 0.5] }}\n{emitter}{FLOOR}"),
             );
             let expected = 0.5 * factor(x, y);
-            for way in both() {
-                let found = mean(&render(&packed, way));
+            for mode in both() {
+                let found = mean(&render(&packed, mode));
                 for (found, radiance) in found.into_iter().zip([3.0, 2.0, 1.0]) {
                     assert!(
-                        near(found, expected * radiance, 2e-3),
-                        "{way:?}, {x} {y}: {found} for {expected}"
+                        is_near(found, expected * radiance, 2e-3),
+                        "{mode:?}, {x} {y}: {found}, expected {expected}"
                     );
-                    assert!(!near(found, expected * radiance * 1.01, 2e-3), "a wrong value passes");
+                    assert!(
+                        !is_near(found, expected * radiance * 1.01, 2e-3),
+                        "a wrong value passes"
+                    );
                 }
             }
         }
@@ -160,7 +163,7 @@ fn a_rectangle_lights_the_floor_by_its_form_factor() {
 
 #[test]
 fn spheres_and_disks_light_the_floor_by_their_form_factors() {
-    // Form factors straight above the floor: sphere (r / d)^2 cos, disk r^2 / (r^2 + h^2).
+    // Form factors of shapes straight above a point: sphere (r / d)^2 cos, disk r^2 / (r^2 + h^2).
     for scale in [1e-3, 1.0, 1e3] {
         for r in [1e-3, 0.3, 0.999] {
             let h = 1.0;
@@ -179,7 +182,7 @@ fn spheres_and_disks_light_the_floor_by_their_form_factors() {
                     factor_disk,
                 ),
             ] {
-                let camera = above(0.0, 0.0, 1e-4 * scale, 1e-6 * scale);
+                let camera = camera_above(0.0, 0.0, 1e-4 * scale, 1e-6 * scale);
                 let packed = scene(
                     1024,
                     1,
@@ -187,12 +190,12 @@ fn spheres_and_disks_light_the_floor_by_their_form_factors() {
                         "{camera}materials.m = {{ type = 'diffuse', color = [0.5, 0.5, 0.5] }}\nmaterials.s = {{ type = 'diffuse', color = [0, 0, 0], emission = [10, 10, 10] }}\n[[shapes]]\nmaterial = 's'\n{shape}\n{FLOOR}"
                     ),
                 );
-                for way in both() {
-                    let found = mean(&render(&packed, way))[1];
+                for mode in both() {
+                    let found = mean(&render(&packed, mode))[1];
                     let expected = 5.0 * factor;
                     assert!(
-                        near(found, expected, 3e-3),
-                        "{way:?}, {r} {scale}: {found} for {expected} {shape}"
+                        is_near(found, expected, 3e-3),
+                        "{mode:?}, {r} {scale}: {found}, expected {expected}, {shape}"
                     );
                 }
             }
@@ -200,7 +203,7 @@ fn spheres_and_disks_light_the_floor_by_their_form_factors() {
     }
 }
 
-/// Returns the form factor of a horizontal cylinder straight above: midpoint rule over its surface.
+/// Returns the form factor of a horizontal cylinder straight above a point, by the midpoint rule over the surface.
 fn cylinder_factor(height: f64, radius: f64, length: f64) -> f64 {
     let (arcs, slices) = (400, 400);
     let mut sum = 0.0;
@@ -224,7 +227,7 @@ fn cylinder_factor(height: f64, radius: f64, length: f64) -> f64 {
 #[test]
 fn cylinders_light_the_floor_by_their_form_factors() {
     // The form factor of a long cylinder is radius / height (Siegel and Howell, "Thermal Radiation Heat Transfer").
-    assert!(near(cylinder_factor(1.0, 0.3, 60.0), 0.3, 2e-3));
+    assert!(is_near(cylinder_factor(1.0, 0.3, 60.0), 0.3, 2e-3));
     for scale in [1e-3, 1.0, 1e3] {
         let shapes = [
             // An upright cylinder, of which only the cap is visible.
@@ -237,13 +240,13 @@ fn cylinders_light_the_floor_by_their_form_factors() {
                 0.01,
                 cylinder_factor(1.0, 0.01, 18.0),
             ),
-            // Inside the cylinder.
+            // The point is inside the cylinder.
             ([0.0, 0.0, -1.0], [0.0, 0.0, 2.0], 0.8, 1.0),
         ];
         for (start, end, radius, factor) in shapes {
             let [start, end] = [start, end].map(|p| p.map(|x: f64| x * scale));
             let radius = radius * scale;
-            let camera = above(0.0, 0.0, 1e-4 * scale, 1e-6 * scale);
+            let camera = camera_above(0.0, 0.0, 1e-4 * scale, 1e-6 * scale);
             let packed = scene(
                 4096,
                 1,
@@ -251,14 +254,14 @@ fn cylinders_light_the_floor_by_their_form_factors() {
                     "{camera}materials.m = {{ type = 'diffuse', color = [0.5, 0.5, 0.5] }}\nmaterials.s = {{ type = 'diffuse', color = [0, 0, 0], emission = [10, 10, 10] }}\n[[shapes]]\nmaterial = 's'\ntype = 'cylinder'\nstart = {start:?}\nend = {end:?}\nradius = {radius}\n{FLOOR}"
                 ),
             );
-            for way in both() {
-                let found = mean(&render(&packed, way))[1];
+            for mode in both() {
+                let found = mean(&render(&packed, mode))[1];
                 let expected = 5.0 * factor;
                 assert!(
-                    near(found, expected, 5e-3),
-                    "{way:?}, {start:?} {end:?} {radius}: {found} for {expected}"
+                    is_near(found, expected, 5e-3),
+                    "{mode:?}, {start:?} {end:?} {radius}: {found}, expected {expected}"
                 );
-                assert!(!near(found, expected * 1.02, 5e-3), "a wrong value passes");
+                assert!(!is_near(found, expected * 1.02, 5e-3), "a wrong value passes");
             }
         }
     }
@@ -281,12 +284,16 @@ fn point_lights_fall_off_and_directional_lights_do_not() {
             1,
             &format!(
                 "{}materials.m = {{ type = 'diffuse', color = [0.5, 0.5, 0.5] }}\n[[lights]]\n{light}\n{FLOOR}",
-                above(0.0, 0.0, 1.0, 1e-3)
+                camera_above(0.0, 0.0, 1.0, 1e-3)
             ),
         );
-        for way in both() {
-            for found in means(&render(&packed, way)) {
-                assert!(near(found[0], expected, 1e-5), "{way:?}: {} for {expected}", found[0]);
+        for mode in both() {
+            for found in means(&render(&packed, mode)) {
+                assert!(
+                    is_near(found[0], expected, 1e-5),
+                    "{mode:?}: {}, expected {expected}",
+                    found[0]
+                );
             }
         }
     }
@@ -299,7 +306,7 @@ fn a_glass_slab_transmits_by_fresnel_and_beer() {
     let r = ((n - 1.0) / (n + 1.0)).powi(2);
     for (absorption, thickness) in [(0.0, 0.5), (0.7, 0.5), (3.0, 1.0)] {
         let a = f64::exp(-absorption * thickness);
-        let passed = (1.0 - r).powi(2) * a / (1.0 - r * r * a * a);
+        let transmitted = (1.0 - r).powi(2) * a / (1.0 - r * r * a * a);
         let text = format!(
             "{}environment = {{ color = [0, 0, 0] }}\n\
              materials.m = {{ type = 'dielectric', ior = {n}, absorption = [{absorption}, {absorption}, {absorption}] }}\n\
@@ -307,27 +314,30 @@ fn a_glass_slab_transmits_by_fresnel_and_beer() {
              [[shapes]]\ntype = 'rectangle'\nmaterial = 'm'\ncenter = [0, 0, {thickness}]\nsize = [9, 9]\nnormal = [0, 0, 1]\ntangent = [1, 0, 0]\n\
              [[shapes]]\ntype = 'rectangle'\nmaterial = 'm'\ncenter = [0, 0, 0]\nsize = [9, 9]\nnormal = [0, 0, -1]\ntangent = [1, 0, 0]\n\
              [[shapes]]\ntype = 'rectangle'\nmaterial = 's'\ncenter = [0, 0, -1]\nsize = [9, 9]\nnormal = [0, 0, 1]\ntangent = [1, 0, 0]\n",
-            above(0.0, 0.0, 3.0, 1.0)
+            camera_above(0.0, 0.0, 3.0, 1.0)
         );
         let packed = scene(1024, 1000, &text);
-        for way in both() {
-            let found = mean(&render(&packed, way))[2];
-            assert!(near(found, passed, 1e-3), "{way:?}, {absorption}: {found} for {passed}");
-            assert!(!near(found, passed * 1.01, 1e-3), "a wrong value passes");
+        for mode in both() {
+            let found = mean(&render(&packed, mode))[2];
+            assert!(
+                is_near(found, transmitted, 1e-3),
+                "{mode:?}, {absorption}: {found}, expected {transmitted}"
+            );
+            assert!(!is_near(found, transmitted * 1.01, 1e-3), "a wrong value passes");
         }
     }
 }
 
 #[test]
 fn radiance_in_glass_is_the_square_of_its_index() {
-    // With radiance 1 outside, radiance in glass is n^2; internal reflections add the same.
+    // With radiance 1 outside, the radiance in glass is n^2, internal reflections included.
     let text = format!(
         "{INSIDE}environment = {{ color = [1, 1, 1] }}\nmaterials.m = {{ type = 'dielectric', ior = 1.5 }}\n\
          [[shapes]]\ntype = 'sphere'\nmaterial = 'm'\ncenter = [0, 0, 0]\nradius = 3\n"
     );
     let packed = scene(256, 1000, &text);
-    for way in both() {
-        let found = mean(&render(&packed, way))[0];
-        assert!(near(found, 2.25, 2e-3), "{way:?}: {found}");
+    for mode in both() {
+        let found = mean(&render(&packed, mode))[0];
+        assert!(is_near(found, 2.25, 2e-3), "{mode:?}: {found}");
     }
 }

@@ -7,7 +7,7 @@ use wgray_render::records::{NO_INDEX, Packed};
 use crate::pictures::{both, differing, exact_modes, means, reference, render};
 use crate::scenes;
 
-/// Returns an emitter before a wall, and a mirror of it.
+/// Returns a scene with an emitter in front of a wall, and a mirror that shows the emitter.
 fn room(integrator: &str, light: &str) -> Packed {
     let (wall, depth) = match integrator {
         "path" => ("type = 'diffuse', color = [0.5, 0.5, 0.5]", 4),
@@ -41,33 +41,37 @@ fn only_mirrors_show_camera_invisible_emitters() {
         ("path", sphere),
     ];
     for (integrator, light) in cases {
-        let (seen, hidden) = (room(integrator, &light(true)), room(integrator, &light(false)));
+        let (visible, hidden) = (room(integrator, &light(true)), room(integrator, &light(false)));
         let without = room(integrator, "");
-        let same = reference(&hidden);
-        for way in exact_modes() {
-            assert_eq!(differing(&render(&hidden, way), &same), 0, "{way:?}, {integrator}");
+        let expected = reference(&hidden);
+        for mode in exact_modes() {
+            assert_eq!(
+                differing(&render(&hidden, mode), &expected),
+                0,
+                "{mode:?}, {integrator}"
+            );
         }
-        for way in both() {
-            let (seen, hidden) = (means(&render(&seen, way)), means(&render(&hidden, way)));
-            // Pixels beside the emitter are unchanged; some show it in the mirror.
+        for mode in both() {
+            let (visible, hidden) = (means(&render(&visible, mode)), means(&render(&hidden, mode)));
+            // Pixels beside the emitter are unchanged; some of them show the emitter in the mirror.
             let covered = |i: usize| (i % 24).abs_diff(12) < 4 && (i / 24).abs_diff(12) < 4;
-            let others = || (0..24 * 24).filter(|i| !covered(*i));
-            assert!(others().all(|i| seen[i] == hidden[i]), "{way:?}, {integrator}");
-            let bright = others().filter(|i| hidden[*i][0] > 3.0).count();
+            let uncovered = || (0..24 * 24).filter(|i| !covered(*i));
+            assert!(uncovered().all(|i| visible[i] == hidden[i]), "{mode:?}, {integrator}");
+            let bright = uncovered().filter(|i| hidden[*i][0] > 3.0).count();
             assert!(
                 bright > 3,
-                "{way:?}, {integrator}: {bright} pixels of the mirror show the emitter"
+                "{mode:?}, {integrator}: {bright} pixels of the mirror show the emitter"
             );
-            // The wall.
-            let middle = 12 * 24 + 12;
+            // Behind the hidden emitter, the camera sees the wall.
+            let center = 12 * 24 + 12;
             assert!(
-                hidden[middle][0] < 3.9 && hidden[middle][0] > 0.0,
-                "{way:?}: {:?}",
-                hidden[middle]
+                hidden[center][0] < 3.9 && hidden[center][0] > 0.0,
+                "{mode:?}: {:?}",
+                hidden[center]
             );
             assert!(
-                seen[middle] != hidden[middle],
-                "{way:?}: hiding the emitter has no effect"
+                visible[center] != hidden[center],
+                "{mode:?}: the key `visible` has no effect"
             );
         }
         for i in 0..24 * 24 {
@@ -78,7 +82,7 @@ fn only_mirrors_show_camera_invisible_emitters() {
                 (a.depth - b.depth).abs() < 1e-5 && (a.normal - b.normal).length() < 1e-6,
                 "{pixel}"
             );
-            assert!((a.uv - b.uv).length() < 1e-5, "{pixel}: {} for {}", a.uv, b.uv);
+            assert!((a.uv - b.uv).length() < 1e-5, "{pixel}: {}, expected {}", a.uv, b.uv);
         }
     }
 }
@@ -91,19 +95,19 @@ fn the_camera_skips_at_most_64_surfaces() {
             f64::from(i) * 0.01
         )
     };
-    for (count, sees_it) in [(64, true), (65, false)] {
+    for (count, sees_environment) in [(64, true), (65, false)] {
         let sheets: String = (0..count).map(sheet).collect();
         let packed = scenes::parse(&format!(
             "image = {{ width = 2, height = 2 }}\ncamera = {{ position = [0, -4, 0], look_at = [0, 0, 0], fov = 20 }}\n\
              materials.h = {{ type = 'diffuse', color = [0, 0, 0], visible = false }}\nenvironment = {{ color = [1, 1, 1] }}\n\
              {sheets}[render]\nintegrator = 'path'\npixel_samples = {{ count = 4 }}\n"
         ));
-        for way in both() {
-            let found = means(&render(&packed, way));
-            let expected = if sees_it { 1.0 } else { 0.0 };
+        for mode in both() {
+            let found = means(&render(&packed, mode));
+            let expected = if sees_environment { 1.0 } else { 0.0 };
             assert!(
                 found.iter().all(|pixel| pixel[0] == expected),
-                "{way:?}, {count}: {found:?}"
+                "{mode:?}, {count}: {found:?}"
             );
         }
     }

@@ -48,25 +48,28 @@ fn selection_is_by_power_and_one_quarter_uniform() {
     assert!(chi_square < 15.0 + 6.0 * (2.0_f64 * 15.0).sqrt(), "{chi_square}");
 }
 
-/// The other light is weak and directional, or a spot light that is a million times as strong but faces away.
+/// The added light is weak and directional, or a spot light that is a million times as strong but faces away.
 #[test]
 fn lights_without_local_effect_do_not_starve_others() {
     let light = "[[lights]]\ntype = 'point'\nposition = [0, 0, 1]\ncolor = [1, 1, 1]\n";
     let pebble = "[[shapes]]\ntype = 'sphere'\nmaterial = 'm'\ncenter = [1e5, 0, 0]\nradius = 1\n";
     let sun = "[[lights]]\ntype = 'directional'\ndirection = [0, 0, -1]\ncolor = [1e-6, 1e-6, 1e-6]\n";
     let spot = "[[lights]]\ntype = 'spot'\nposition = [0, 0, 1]\ndirection = [0, 0, 1]\ncone_angle = 40\ncolor = [1e6, 1e6, 1e6]\n";
-    let brightness = |rest: &str| mean(&reference(&scene(256, 1, &format!("{CAMERA}{FLOOR}{light}{rest}"))))[1];
-    let alone = brightness("");
-    for rest in [format!("{pebble}{sun}"), spot.to_owned()] {
-        let found = brightness(&rest);
-        assert!((found / alone - 1.0).abs() < 0.05, "{found} {alone} with {rest}");
+    let brightness = |added: &str| mean(&reference(&scene(256, 1, &format!("{CAMERA}{FLOOR}{light}{added}"))))[1];
+    let expected = brightness("");
+    for added in [format!("{pebble}{sun}"), spot.to_owned()] {
+        let found = brightness(&added);
+        assert!(
+            (found / expected - 1.0).abs() < 0.05,
+            "{found}, expected {expected}, with {added}"
+        );
     }
 }
 
 #[test]
 fn all_kinds_of_emitters_light_equally() {
-    // The same square as a light, rectangle, two triangles, flat box, and with a constant texture; alone and among
-    // others.
+    // The same square as a light, as a rectangle, as a textured rectangle and as two triangles, each alone and with a
+    // distant point light.
     let square = "center = [0, 0, 1]\nsize = [1, 1]\nnormal = [0, 0, -1]\ntangent = [1, 0, 0]\n";
     let emissive = "materials.s = { type = 'diffuse', color = [0, 0, 0], emission = [4, 4, 4] }\n";
     let textured = "textures.t = { type = 'checker', even = [4, 4, 4], odd = [4, 4, 4] }\n\
@@ -80,16 +83,16 @@ fn all_kinds_of_emitters_light_equally() {
              [[shapes]]\ntype = 'triangle'\nmaterial = 's'\nvertices = [[-0.5, -0.5, 1], [0.5, 0.5, 1], [-0.5, 0.5, 1]]\n{FLOOR}"
         ),
     ];
-    let far = "[[lights]]\ntype = 'point'\nposition = [0, 500, 1e5]\ncolor = [1e3, 1e3, 1e3]\n";
+    let distant = "[[lights]]\ntype = 'point'\nposition = [0, 500, 1e5]\ncolor = [1e3, 1e3, 1e3]\n";
     let expected = mean(&render(&scene(1024, 1, &kinds[0]), both()[0]));
     for kind in &kinds {
-        for text in [kind.clone(), format!("{kind}{far}")] {
+        for text in [kind.clone(), format!("{kind}{distant}")] {
             let packed = scene(1024, 1, &text);
-            for way in both() {
-                let found = mean(&render(&packed, way));
+            for mode in both() {
+                let found = mean(&render(&packed, mode));
                 assert!(
                     (found[0] - expected[0]).abs() < 5e-3 * expected[0],
-                    "{way:?}: {found:?} for {expected:?}\n{text}"
+                    "{mode:?}: {found:?}, expected {expected:?}\n{text}"
                 );
             }
         }
@@ -104,22 +107,22 @@ fn a_rectangle_light_is_one_sided_and_occludes() {
                   materials.m = { type = 'diffuse', color = [0.5, 0.5, 0.5] }\n";
     // A rectangle light that faces away only casts a shadow.
     let packed = scene(1024, 1, &format!("{camera}{}{sun}{FLOOR}", light.replace("NZ", "1")));
-    for way in both() {
-        let found = means(&render(&packed, way));
-        let at = |x: usize, y: usize| found[y * 16 + x][0];
-        assert_eq!(at(8, 8), 0.0, "{way:?}: in the shadow");
-        let lit = at(1, 1);
+    for mode in both() {
+        let found = means(&render(&packed, mode));
+        let red = |x: usize, y: usize| found[y * 16 + x][0];
+        assert_eq!(red(8, 8), 0.0, "{mode:?}: the shadow is lit");
+        let lit = red(1, 1);
         assert!(
             (lit - 1.0 / std::f64::consts::PI).abs() < 5e-3,
-            "{way:?}: {lit} in the sun"
+            "{mode:?}: {lit} outside the shadow"
         );
     }
-    // From above: black back, bright front.
+    // From above, the back is black and the front is bright.
     for (nz, expected) in [(1.0, 4.0), (-1.0, 0.0)] {
         let camera = "camera = { type = 'orthographic', position = [0, 0, 2], look_at = [0, 0, 0], up = [0, 1, 0], height = 0.5 }\n";
         let packed = scene(4, 3, &format!("{camera}{}", light.replace("NZ", &nz.to_string())));
-        for way in both() {
-            assert_eq!(mean(&render(&packed, way))[0], expected, "{way:?}");
+        for mode in both() {
+            assert_eq!(mean(&render(&packed, mode))[0], expected, "{mode:?}");
         }
     }
 }

@@ -20,7 +20,7 @@ const FLOOR: &str =
     "[[shapes]]\ntype = 'plane'\nmaterial = 'm'\npoint = [0, 0, 0]\nnormal = [0, 0, 1]\ntangent = [1, 0, 0]\n";
 
 fn light(i: u32, random: &Random) -> String {
-    let coordinate = |scale: f64, from: f64| from + scale * random.unit();
+    let coordinate = |scale: f64, low: f64| low + scale * random.unit();
     let (x, y, z) = (coordinate(2.0, -1.0), coordinate(2.0, -1.0), coordinate(0.8, 0.2));
     let c = 0.5 + random.unit();
     match i % 5 {
@@ -68,34 +68,34 @@ fn leaves(packed: &Packed) -> Vec<Leaf> {
 
 #[test]
 fn selection_frequencies_and_hit_pdfs_match_the_tree() {
-    let sun = "[[lights]]\ntype = 'directional'\ndirection = [0, 1, -1]\ncolor = [1, 1, 1]\n";
-    for far in ["", sun] {
-        let packed = scene(1, 1, &format!("{CAMERA}{FLOOR}{far}{}", lights(60).concat()));
+    let directional_light = "[[lights]]\ntype = 'directional'\ndirection = [0, 1, -1]\ncolor = [1, 1, 1]\n";
+    for directional in ["", directional_light] {
+        let packed = scene(1, 1, &format!("{CAMERA}{FLOOR}{directional}{}", lights(60).concat()));
         let leaves = leaves(&packed);
         assert_eq!(leaves.len(), 60);
-        let of_tree = packed.lighting.emitters[0];
+        let tree_emitter = packed.lighting.emitters[0];
         assert_eq!(
-            (packed.lighting.emitters.len(), of_tree.index),
-            (1 + usize::from(!far.is_empty()), NO_INDEX)
+            (packed.lighting.emitters.len(), tree_emitter.index),
+            (1 + usize::from(!directional.is_empty()), NO_INDEX)
         );
         for (p, n) in [
             (Vec3::new(0.3, 0.2, 0.0), Vec3::Z),
             (Vec3::new(-0.9, 0.9, 0.5), Vec3::new(0.6, 0.0, -0.8)),
             (Vec3::new(5.0, 0.2, 0.1), Vec3::ZERO),
         ] {
-            let calls = 60_000;
+            let sample_count = 60_000;
             let mut counts = vec![0_u32; leaves.len()];
             let mut densities = vec![0.0_f32; leaves.len()];
-            for i in 0..calls {
+            for i in 0..sample_count {
                 let key = hash4(UVec4::new(i, 7, 8, 9));
-                let chosen = light_tree_select(&packed, of_tree, p, n, UVec2::new(key.x, key.y), i % 64);
-                let place =
-                    |leaf: &Leaf| (leaf.instance, leaf.index) == (chosen.emitter.instance, chosen.emitter.index);
-                let leaf = leaves.iter().position(place).expect("a leaf");
+                let selection = light_tree_select(&packed, tree_emitter, p, n, UVec2::new(key.x, key.y), i % 64);
+                let is_selected =
+                    |leaf: &Leaf| (leaf.instance, leaf.index) == (selection.emitter.instance, selection.emitter.index);
+                let leaf = leaves.iter().position(is_selected).expect("a leaf");
                 counts[leaf] += 1;
-                densities[leaf] = chosen.density;
+                densities[leaf] = selection.density;
             }
-            let (mut chi_square, mut kinds) = (0.0, 0.0);
+            let (mut chi_square, mut term_count) = (0.0, 0.0);
             for (i, leaf) in leaves.iter().enumerate() {
                 if counts[i] == 0 {
                     continue;
@@ -111,51 +111,56 @@ fn selection_frequencies_and_hit_pdfs_match_the_tree() {
                         barycentric: glam::Vec2::ZERO,
                     };
                     let pdf = light_tree_pdf(&packed, hit, true, p, n);
-                    assert!((pdf - densities[i]).abs() < 1e-5 * pdf, "{pdf} for {}", densities[i]);
+                    assert!(
+                        (pdf - densities[i]).abs() < 1e-5 * pdf,
+                        "{pdf}, expected {}",
+                        densities[i]
+                    );
                     assert_eq!(light_tree_pdf(&packed, hit, false, p, n), 0.0);
                 }
-                let expected = f64::from(densities[i] / leaf.density) * f64::from(calls);
+                let expected = f64::from(densities[i] / leaf.density) * f64::from(sample_count);
                 if expected > 5.0 {
                     chi_square += (f64::from(counts[i]) - expected).powi(2) / expected;
-                    kinds += 1.0;
+                    term_count += 1.0;
                 }
             }
             // Samples are stratified in groups of 64, so chi-square is well below its value for independent samples.
             assert!(
-                kinds > 5.0 && chi_square < kinds + 6.0 * (2.0_f64 * kinds).sqrt(),
-                "{chi_square} of {kinds}"
+                term_count > 5.0 && chi_square < term_count + 6.0 * (2.0_f64 * term_count).sqrt(),
+                "{chi_square} of {term_count}"
             );
         }
     }
 }
 
 #[test]
-fn many_lights_are_the_sum_of_single_ones() {
+fn many_lights_are_the_sum_of_single_lights() {
     let sun = "[[lights]]\ntype = 'directional'\ndirection = [0, 1, -1]\ncolor = [1, 1, 1]\n".to_owned();
-    for others in [vec![], vec![sun]] {
+    for added in [vec![], vec![sun]] {
         let all: Vec<String> = lights(90)
             .into_iter()
             .filter(|light| light.starts_with("[[lights]]"))
-            .chain(others)
+            .chain(added)
             .collect();
         let camera = "camera = { type = 'orthographic', position = [0, 0, 0.05], look_at = [0, 0, 0], up = [0, 1, 0], height = 3 }\n\
                       materials.m = { type = 'diffuse', color = [0.7, 0.7, 0.7] }\n";
-        // Rectangle lights occlude: single-light images would not add up.
+        // Rectangle lights are left out: they occlude, so images of single lights would not add up.
         let all: Vec<String> = all.into_iter().filter(|light| !light.contains("rectangle")).collect();
-        let of = |samples: u32, lights: &[String]| scene(samples, 1, &format!("{camera}{FLOOR}{}", lights.concat()));
+        let scene_of =
+            |samples: u32, lights: &[String]| scene(samples, 1, &format!("{camera}{FLOOR}{}", lights.concat()));
         let mut expected = [0.0; 3];
         for light in &all {
-            let found = mean(&reference(&of(64, std::slice::from_ref(light))));
+            let found = mean(&reference(&scene_of(64, std::slice::from_ref(light))));
             expected = [0, 1, 2].map(|i| expected[i] + found[i]);
         }
-        let packed = of(4096, &all);
+        let packed = scene_of(4096, &all);
         assert!(packed.specialization.light_tree == 1 && leaves(&packed).len() > 16);
-        for way in both() {
-            let found = mean(&render(&packed, way));
+        for mode in both() {
+            let found = mean(&render(&packed, mode));
             for i in 0..3 {
                 assert!(
                     (found[i] - expected[i]).abs() < 1e-2 * expected[i],
-                    "{way:?}: {found:?} for {expected:?}"
+                    "{mode:?}: {found:?}, expected {expected:?}"
                 );
             }
         }
@@ -169,8 +174,8 @@ fn many_lights_give_the_same_bits_on_all_backends() {
         let packed = scene(16, 4, &text);
         assert_eq!(packed.specialization.light_tree, u32::from(count > 16), "{count}");
         let expected = reference(&packed);
-        for way in exact_modes() {
-            assert_eq!(differing(&render(&packed, way), &expected), 0, "{way:?}, {count}");
+        for mode in exact_modes() {
+            assert_eq!(differing(&render(&packed, mode), &expected), 0, "{mode:?}, {count}");
         }
     }
 }
@@ -199,7 +204,7 @@ fn limits_of_the_ranges_give_finite_values() {
     let packed = scene(64, 6, &text);
     assert_eq!(packed.specialization.light_tree, 1);
     for node in &packed.lighting.nodes {
-        let middles = [
+        let bounds = [
             node.x,
             node.y,
             node.z,
@@ -210,7 +215,7 @@ fn limits_of_the_ranges_give_finite_values() {
         ];
         let light = [node.cosine, node.edge, node.intensity, node.density];
         assert!(
-            middles.iter().chain(&light).all(|numbers| numbers.is_finite()),
+            bounds.iter().chain(&light).all(|numbers| numbers.is_finite()),
             "{node:?}"
         );
     }
@@ -218,8 +223,8 @@ fn limits_of_the_ranges_give_finite_values() {
     for sum in &expected.sums {
         assert!(sum.is_finite() && sum.min_element() >= 0.0, "{sum}");
     }
-    for way in exact_modes() {
-        assert_eq!(differing(&render(&packed, way), &expected), 0, "{way:?}");
+    for mode in exact_modes() {
+        assert_eq!(differing(&render(&packed, mode), &expected), 0, "{mode:?}");
     }
 }
 
@@ -231,12 +236,12 @@ fn a_hundred_thousand_lights_render() {
     let mut description = Description::parse(&text, "test").expect("a scene");
     let random = Random::new(3);
     for _ in 0..100_000 {
-        let place = [
+        let position = [
             random.unit() * 20.0 - 10.0,
             random.unit() * 20.0 - 10.0,
             random.unit() * 2.0 + 0.1,
         ];
-        description = description.with_light(PointLightDescription::new(place, [1e-3; 3]));
+        description = description.with_light(PointLightDescription::new(position, [1e-3; 3]));
     }
     let started = std::time::Instant::now();
     let packed: Packed = wgray_render::pack::pack(&description.validate().expect("a valid scene"));
@@ -244,8 +249,8 @@ fn a_hundred_thousand_lights_render() {
     assert_eq!(leaves(&packed).len(), 100_000);
     let expected = reference(&packed);
     assert!(mean(&expected)[0] > 0.0);
-    for way in both() {
-        assert_eq!(differing(&render(&packed, way), &expected), 0, "{way:?}");
+    for mode in both() {
+        assert_eq!(differing(&render(&packed, mode), &expected), 0, "{mode:?}");
     }
 }
 
@@ -262,8 +267,8 @@ fn emissive_meshes_are_in_the_light_tree() {
     };
     let load = |text: &str| {
         let description = Description::parse(text, "test").expect("a scene");
-        let beside = wgray::scene::Assets::beside(folder.path());
-        wgray_render::pack::pack(&description.validate_with(&beside).expect("a valid scene"))
+        let assets = wgray::scene::Assets::beside(folder.path());
+        wgray_render::pack::pack(&description.validate_with(&assets).expect("a valid scene"))
     };
     let mesh = |material: &str, x: f64| {
         format!(
@@ -272,22 +277,22 @@ fn emissive_meshes_are_in_the_light_tree() {
     };
     let packed = load(&text(&[mesh("s", -0.7), mesh("m", 9.0), mesh("s", 0.7)].concat(), 16));
     assert_eq!(leaves(&packed).len(), 160);
-    let first: Vec<u32> = packed.bvh.instances.iter().map(|instance| instance.leaves).collect();
-    assert_eq!(first[1], NO_INDEX);
-    assert!(first[0] != NO_INDEX && first[2] != NO_INDEX);
+    let first_leaves: Vec<u32> = packed.bvh.instances.iter().map(|instance| instance.leaves).collect();
+    assert_eq!(first_leaves[1], NO_INDEX);
+    assert!(first_leaves[0] != NO_INDEX && first_leaves[2] != NO_INDEX);
     let expected = reference(&packed);
-    for way in exact_modes() {
-        assert_eq!(differing(&render(&packed, way), &expected), 0, "{way:?}");
+    for mode in exact_modes() {
+        assert_eq!(differing(&render(&packed, mode), &expected), 0, "{mode:?}");
     }
     // BSDF sampling alone gives the same mean.
     let packed = load(&text(&[mesh("s", -0.7), mesh("m", 9.0), mesh("s", 0.7)].concat(), 1024));
-    let mut without = packed.clone();
-    without.specialization.emitters = 0;
-    let (found, expected) = (mean(&reference(&packed)), mean(&reference(&without)));
+    let mut bsdf_only = packed.clone();
+    bsdf_only.specialization.emitters = 0;
+    let (found, expected) = (mean(&reference(&packed)), mean(&reference(&bsdf_only)));
     for i in 0..3 {
         assert!(
             (found[i] - expected[i]).abs() < 1e-2 * expected[i],
-            "{found:?} for {expected:?}"
+            "{found:?}, expected {expected:?}"
         );
     }
 }

@@ -18,7 +18,7 @@ struct Lobes {
     name: String,
     material: Material,
     /// True if a white material of this kind conserves energy.
-    whole: bool,
+    conserves_energy: bool,
 }
 
 /// Returns the factor that undoes the scaling of transmission by the squared index.
@@ -56,7 +56,7 @@ impl Lobes {
 
     /// Returns the material with its energy loss for wo.
     fn with_energy_loss(&self, wo: Vec3) -> Material {
-        let loss = if self.whole {
+        let loss = if self.conserves_energy {
             facet_loss(facet_alpha(&self.material), wo)
         } else {
             0.0
@@ -73,7 +73,7 @@ impl Lobes {
         }
     }
 
-    /// Samples wi; `None` below the surface.
+    /// Samples wi. Returns `None` for samples below the surface.
     fn sample(&self, wo: Vec3, u: Vec2, random: f32) -> Option<Vec3> {
         if let Some(found) = self.facet_sample(wo, u, random) {
             return (found.pdf > 0.0).then_some(found.wi);
@@ -108,7 +108,7 @@ fn all() -> Vec<Lobes> {
             roughness,
             ..Material::zeroed()
         },
-        whole: true,
+        conserves_energy: true,
     };
     let phong = |kd: f32, ks: f32, shininess: f32| Lobes {
         name: format!("phong {kd} {ks} {shininess}"),
@@ -119,7 +119,7 @@ fn all() -> Vec<Lobes> {
             shininess,
             ..Material::zeroed()
         },
-        whole: false,
+        conserves_energy: false,
     };
     let mut list = vec![
         diffuse(0.0),
@@ -141,11 +141,11 @@ fn all() -> Vec<Lobes> {
         ..Material::zeroed()
     };
     for (roughness, anisotropy) in [(0.3, 0.0), (0.6, 0.0), (1.0, 0.0), (0.4, 0.5)] {
-        for whole in [false, true] {
+        for conserves_energy in [false, true] {
             list.push(Lobes {
-                name: format!("metal, roughness {roughness} {anisotropy}, {whole}"),
+                name: format!("metal, roughness {roughness} {anisotropy}, {conserves_energy}"),
                 material: rough(METAL, roughness, anisotropy),
-                whole,
+                conserves_energy,
             });
         }
     }
@@ -156,7 +156,7 @@ fn all() -> Vec<Lobes> {
             k: Vec3::new(3.1, 2.7, 1.9),
             ..rough(METAL, 0.5, 0.0)
         },
-        whole: false,
+        conserves_energy: false,
     });
     for (ior, roughness, anisotropy) in [(1.5, 0.4, 0.0), (1.5, 1.0, 0.0), (0.7, 0.5, 0.0), (2.4, 0.5, 0.6)] {
         list.push(Lobes {
@@ -165,17 +165,17 @@ fn all() -> Vec<Lobes> {
                 ior,
                 ..rough(ROUGH_GLASS, roughness, anisotropy)
             },
-            whole: false,
+            conserves_energy: false,
         });
     }
-    for (roughness, anisotropy, whole) in [(0.4, 0.0, true), (1.0, 0.0, false), (0.5, 0.7, false)] {
+    for (roughness, anisotropy, conserves_energy) in [(0.4, 0.0, true), (1.0, 0.0, false), (0.5, 0.7, false)] {
         list.push(Lobes {
             name: format!("sheet, roughness {roughness} {anisotropy}"),
             material: Material {
                 ior: 1.5,
                 ..rough(THIN, roughness, anisotropy)
             },
-            whole,
+            conserves_energy,
         });
     }
     list
@@ -191,7 +191,7 @@ fn viewers() -> Vec<Vec3> {
     [1.0, 0.9, 0.5, 0.1, 0.01].map(|cosine| direction(cosine, 0.7)).to_vec()
 }
 
-/// Integrates over all directions, finer around the mirrored one or, for wide lobes, the normal.
+/// Integrates over all directions, with finer steps around the mirrored direction.
 fn integral(wo: Vec3, mut f: impl FnMut(Vec3) -> f64) -> f64 {
     let (rings, spokes) = (1500, 600);
     let axis = Vec3::new(-wo.x, -wo.y, wo.z).as_dvec3().normalize();
@@ -217,43 +217,46 @@ fn integral(wo: Vec3, mut f: impl FnMut(Vec3) -> f64) -> f64 {
 fn no_bsdf_gains_energy_in_a_white_furnace() {
     for lobes in all() {
         for wo in viewers() {
-            let reflected = lobes.albedo(wo);
+            let albedo = lobes.albedo(wo);
             let name = &lobes.name;
-            if lobes.whole {
+            if lobes.conserves_energy {
                 // The energy loss is a fit.
-                let off = if lobes.has_facets() { 0.01 } else { 2e-3 };
-                assert!((reflected - 1.0).abs() < off, "{name}, {wo}: {reflected}");
+                let tolerance = if lobes.has_facets() { 0.01 } else { 2e-3 };
+                assert!((albedo - 1.0).abs() < tolerance, "{name}, {wo}: {albedo}");
             } else {
-                assert!(reflected < 1.001 && reflected > 0.0, "{name}, {wo}: {reflected}");
+                assert!(albedo < 1.001 && albedo > 0.0, "{name}, {wo}: {albedo}");
             }
         }
     }
     // Control: no compensation.
-    let once = Material {
+    let single_scattering = Material {
         diffuse: Vec3::splat(1e-3),
         roughness: 1.0,
         ..Material::zeroed()
     };
     let wo = viewers()[1];
-    let lost = 1.0
+    let loss = 1.0
         - integral(wo, |wi| {
-            f64::from(rough_diffuse_eval(&once, angles_at(Vec3::Z, wo, wi)).x)
+            f64::from(rough_diffuse_eval(&single_scattering, angles_at(Vec3::Z, wo, wi)).x)
         }) / 1e-3;
-    assert!(lost > 0.05, "{lost}");
+    assert!(loss > 0.05, "{loss}");
 }
 
 #[test]
 fn reflection_is_reciprocal() {
     // Turquin's factor depends only on wo and is not reciprocal.
-    for lobes in all().into_iter().filter(|lobes| !(lobes.whole && lobes.has_facets())) {
+    for lobes in all()
+        .into_iter()
+        .filter(|lobes| !(lobes.conserves_energy && lobes.has_facets()))
+    {
         for wo in viewers() {
             for wi in [direction(0.8, 0.1), direction(0.3, 3.9), direction(0.02, 2.0)] {
                 let forward = lobes.eval(wo, wi) / wi.z;
                 let backward = lobes.eval(wi, wo) / wo.z;
                 // Fresnel reflectance is steep near the critical angle.
-                let off = if lobes.material.kind == ROUGH_GLASS { 4e-3 } else { 2e-5 };
+                let tolerance = if lobes.material.kind == ROUGH_GLASS { 4e-3 } else { 2e-5 };
                 assert!(
-                    forward.abs_diff_eq(backward, off * forward.x.max(1.0)),
+                    forward.abs_diff_eq(backward, tolerance * forward.x.max(1.0)),
                     "{}: {forward} {backward}",
                     lobes.name
                 );
@@ -267,16 +270,16 @@ fn reflection_is_reciprocal() {
 fn refraction_is_reciprocal_up_to_the_squared_index() {
     for lobes in all().iter().filter(|lobes| lobes.material.kind == ROUGH_GLASS) {
         let n = lobes.material.ior;
-        let other = Material {
+        let inverse = Material {
             ior: 1.0 / n,
             ..lobes.material
         };
-        let turned = |v: Vec3| Vec3::new(v.x, v.y, -v.z);
+        let flipped = |v: Vec3| Vec3::new(v.x, v.y, -v.z);
         let mut compared = 0;
         for wo in viewers() {
-            for wi in [direction(0.9, 3.6), direction(0.5, 4.0), direction(0.3, 2.0)].map(turned) {
+            for wi in [direction(0.9, 3.6), direction(0.5, 4.0), direction(0.3, 2.0)].map(flipped) {
                 let forward = rough_dielectric_eval(&lobes.material, wo, wi).x / -wi.z;
-                let backward = rough_dielectric_eval(&other, turned(wi), turned(wo)).x / wo.z;
+                let backward = rough_dielectric_eval(&inverse, flipped(wi), flipped(wo)).x / wo.z;
                 let expected = forward * n * n;
                 assert!(
                     (backward - expected).abs() < 4e-3 * expected.max(1e-3),
@@ -295,14 +298,14 @@ fn pdfs_integrate_to_one() {
     for lobes in all() {
         for wo in viewers() {
             let total = integral(wo, |wi| f64::from(lobes.pdf(wo, wi)));
-            // For microfacets, the fraction of valid samples.
+            // For microfacets, the PDF integrates to the fraction of valid samples.
             let count = 65_536;
-            let on = (0..count).filter(|i| {
+            let valid = (0..count).filter(|i| {
                 let u = sobol_sample(*i, glam::UVec2::new(1, 2));
                 let random = sobol_sample(*i, glam::UVec2::new(3, 4)).x;
                 !lobes.has_facets() || lobes.sample(wo, u, random).is_some()
             });
-            let expected = on.count() as f64 / f64::from(count);
+            let expected = valid.count() as f64 / f64::from(count);
             assert!(
                 (total - expected).abs() < 3e-3,
                 "{}, {wo}: {total} {expected}",
@@ -317,7 +320,7 @@ fn chi_square(lobes: &Lobes, wo: Vec3, pdf: impl Fn(Vec3) -> f64) -> (f64, f64) 
     const SAMPLES: u32 = 200_000;
     const HEIGHTS: usize = 40;
     const LONGITUDES: usize = 40;
-    // In the frame of the mirrored direction, where lobes are narrow.
+    // Cells are in the frame of the mirrored direction, around which lobes are narrow.
     let axis = Vec3::new(-wo.x, -wo.y, wo.z).as_dvec3().normalize();
     let u = axis.any_orthonormal_vector();
     let v = axis.cross(u);
@@ -352,17 +355,17 @@ fn chi_square(lobes: &Lobes, wo: Vec3, pdf: impl Fn(Vec3) -> f64) -> (f64, f64) 
             expected[cell(d)] += pdf(d.as_vec3()) * area * f64::from(SAMPLES);
         }
     }
-    let (mut sum, mut cells, mut rest) = (0.0, -1.0, (0.0, 0.0));
+    let (mut sum, mut cells, mut merged) = (0.0, -1.0, (0.0, 0.0));
     for (count, expected) in counts.iter().zip(&expected) {
         if *expected < 10.0 {
-            rest = (rest.0 + count, rest.1 + expected);
+            merged = (merged.0 + count, merged.1 + expected);
         } else {
             sum += (count - expected) * (count - expected) / expected;
             cells += 1.0;
         }
     }
-    if rest.1 > 10.0 {
-        sum += (rest.0 - rest.1) * (rest.0 - rest.1) / rest.1;
+    if merged.1 > 10.0 {
+        sum += (merged.0 - merged.1) * (merged.0 - merged.1) / merged.1;
         cells += 1.0;
     }
     (sum, cells)
@@ -372,21 +375,29 @@ fn chi_square(lobes: &Lobes, wo: Vec3, pdf: impl Fn(Vec3) -> f64) -> (f64, f64) 
 fn sampled_directions_follow_their_pdf() {
     for lobes in all() {
         for wo in [direction(0.95, 0.4), direction(0.3, 2.5)] {
-            let (sum, freedom) = chi_square(&lobes, wo, |wi| f64::from(lobes.pdf(wo, wi)));
+            let (sum, degrees_of_freedom) = chi_square(&lobes, wo, |wi| f64::from(lobes.pdf(wo, wi)));
             // Six standard deviations.
-            let most = freedom + 6.0 * (2.0 * freedom).sqrt();
-            assert!(freedom > 5.0 && sum < most, "{}, {wo}: {sum} of {freedom}", lobes.name);
+            let max_sum = degrees_of_freedom + 6.0 * (2.0 * degrees_of_freedom).sqrt();
+            assert!(
+                degrees_of_freedom > 5.0 && sum < max_sum,
+                "{}, {wo}: {sum} of {degrees_of_freedom}",
+                lobes.name
+            );
             let (wrong, _) = chi_square(&lobes, wo, |wi| {
                 f64::from(lobes.pdf(wo, wi)) * if wi.x > 0.0 { 1.08 } else { 0.92 }
             });
-            assert!(wrong > most, "{}: a wrong PDF passes: {wrong} of {freedom}", lobes.name);
+            assert!(
+                wrong > max_sum,
+                "{}: a wrong PDF passes: {wrong} of {degrees_of_freedom}",
+                lobes.name
+            );
         }
     }
 }
 
 #[test]
 fn mean_sample_weights_equal_the_albedo() {
-    // The mean of eval / pdf is the albedo by quadrature.
+    // The mean of eval / pdf equals the albedo by quadrature.
     for lobes in all() {
         for wo in viewers() {
             let expected = lobes.albedo(wo);
@@ -404,12 +415,12 @@ fn mean_sample_weights_equal_the_albedo() {
                     sum += weight * per_index(&lobes.material, wi);
                     if let Some(found) = lobes.facet_sample(wo, u, random) {
                         // Weight and PDF agree, except for rounding at grazing angles.
-                        let off = (f64::from(found.weight.x) - weight).abs() / weight.max(1e-3);
-                        let density = f64::from((found.pdf - pdf).abs() / pdf);
-                        let grazing = wi.z.abs() < 0.02 || wo.z < 0.02;
+                        let weight_error = (f64::from(found.weight.x) - weight).abs() / weight.max(1e-3);
+                        let pdf_error = f64::from((found.pdf - pdf).abs() / pdf);
+                        let is_grazing = wi.z.abs() < 0.02 || wo.z < 0.02;
                         assert!(
-                            grazing || off < 5e-3 && density < 2e-2,
-                            "{}: {wo} {wi} {off} {density}",
+                            is_grazing || weight_error < 5e-3 && pdf_error < 2e-2,
+                            "{}: {wo} {wi} {weight_error} {pdf_error}",
                             lobes.name
                         );
                     }
@@ -458,24 +469,24 @@ fn limits_of_all_ranges_give_finite_values() {
                     let lobes = Lobes {
                         name: format!("{kind} {roughness} {anisotropy} {ior} {eta} {k}"),
                         material,
-                        whole: true,
+                        conserves_energy: true,
                     };
                     for wo in directions {
                         for u in points {
                             for random in [0.0, 0.5, 1.0 - 6e-8] {
                                 let found = lobes.facet_sample(wo, u, random).unwrap();
-                                let numbers = found.weight.is_finite() && found.pdf.is_finite() && found.pdf >= 0.0;
-                                assert!(numbers && found.wi.is_finite(), "{} {wo} {u}: {found:?}", lobes.name);
+                                let is_finite = found.weight.is_finite() && found.pdf.is_finite() && found.pdf >= 0.0;
+                                assert!(is_finite && found.wi.is_finite(), "{} {wo} {u}: {found:?}", lobes.name);
                                 assert!(found.weight.min_element() >= 0.0, "{} {wo} {u}: {found:?}", lobes.name);
-                                // With compensation, a sample may exceed 1.
+                                // With compensation, the weight of a sample may exceed 1.
                                 assert!(found.weight.max_element() < 1e5, "{} {wo} {u}: {found:?}", lobes.name);
                             }
                         }
                         for wi in directions {
                             for wi in [wi, -wi] {
                                 let (value, pdf) = (lobes.eval(wo, wi), lobes.pdf(wo, wi));
-                                let numbers = value.is_finite() && pdf.is_finite() && value.min_element() >= 0.0;
-                                assert!(numbers && pdf >= 0.0, "{} {wo} {wi}: {value} {pdf}", lobes.name);
+                                let is_finite = value.is_finite() && pdf.is_finite() && value.min_element() >= 0.0;
+                                assert!(is_finite && pdf >= 0.0, "{} {wo} {wi}: {value} {pdf}", lobes.name);
                             }
                         }
                     }

@@ -18,10 +18,10 @@ use wgray_render::records::Packed;
 
 use crate::scenes;
 
-/// Returns 16 x 16 path-traced pixels with `samples` samples each; `rest` is the remaining text.
-pub fn scene(samples: u32, depth: u32, rest: &str) -> Packed {
+/// Returns a path-traced scene of 16 x 16 pixels with `samples` samples each; `text` is the rest of the scene file.
+pub fn scene(samples: u32, depth: u32, text: &str) -> Packed {
     scenes::parse(&format!(
-        "image = {{ width = 16, height = 16 }}\n{rest}\n\
+        "image = {{ width = 16, height = 16 }}\n{text}\n\
          [render]\nintegrator = 'path'\nmax_depth = {depth}\npixel_samples = {{ count = {samples} }}\n"
     ))
 }

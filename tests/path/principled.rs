@@ -13,8 +13,8 @@ use wgray_render::cpu::rng::{hash4, unit_float};
 use wgray_render::cpu::sequence::sobol_sample;
 use wgray_render::records::{DIFFUSE, Material, PRINCIPLED};
 
-/// All lobes.
-const ALL: u32 = 31;
+/// The mask of all lobes.
+const ALL_LOBES: u32 = 31;
 
 fn plain() -> Material {
     Material {
@@ -47,7 +47,7 @@ fn mixture(material: &Material, wo: Vec3) -> PrincipledLobes {
         aniso_table,
         ..*material
     };
-    principled_mixture(&material, wo, true, Vec3::Z, ALL, Vec3::new(0.95, 0.05, 1.0))
+    principled_mixture(&material, wo, true, Vec3::Z, ALL_LOBES, Vec3::new(0.95, 0.05, 1.0))
 }
 
 fn grid() -> Vec<(String, Material)> {
@@ -96,7 +96,7 @@ fn grid() -> Vec<(String, Material)> {
     all
 }
 
-/// Integrates over the sphere, finer around the mirrored and refracted directions.
+/// Integrates over the sphere, with finer steps around the mirrored and refracted directions.
 fn integral(wo: Vec3, eta: f32, f: impl Fn(Vec3) -> f64) -> f64 {
     let (rings, spokes) = (900, 240);
     let mut sum = 0.0;
@@ -137,13 +137,13 @@ fn principled_lobes_gain_no_energy_in_a_white_furnace() {
                     1.0
                 }
             };
-            let given = integral(wo, m.eta, |wi| {
-                f64::from(principled_eval(&m, wo, wi, ALL).x) * scale(wi)
+            let albedo = integral(wo, m.eta, |wi| {
+                f64::from(principled_eval(&m, wo, wi, ALL_LOBES).x) * scale(wi)
             });
-            assert!(given < 1.01 && given > 0.0, "{name}, {wo}: {given}");
-            let keeps = ["dielectric", "coated"].iter().any(|kind| name.starts_with(kind));
-            if keeps || name.starts_with("metal") {
-                assert!((given - 1.0).abs() < 0.02, "{name}, {wo}: {given}");
+            assert!(albedo < 1.01 && albedo > 0.0, "{name}, {wo}: {albedo}");
+            let is_lossless = ["dielectric", "coated"].iter().any(|kind| name.starts_with(kind));
+            if is_lossless || name.starts_with("metal") {
+                assert!((albedo - 1.0).abs() < 0.02, "{name}, {wo}: {albedo}");
             }
         }
     }
@@ -156,8 +156,8 @@ fn principled_lobes_gain_no_energy_in_a_white_furnace() {
     let wo = direction(0.5, 0.0);
     let mut m = mixture(&metal, wo);
     (m.f0, m.f90) = (Vec3::ONE, Vec3::ONE);
-    let lost = 1.0 - integral(wo, m.eta, |wi| f64::from(principled_eval(&m, wo, wi, ALL).x));
-    assert!(lost > 0.1, "{lost}");
+    let loss = 1.0 - integral(wo, m.eta, |wi| f64::from(principled_eval(&m, wo, wi, ALL_LOBES).x));
+    assert!(loss > 0.1, "{loss}");
 }
 
 #[test]
@@ -165,17 +165,20 @@ fn pdfs_integrate_to_the_fraction_of_valid_samples() {
     for (name, material) in grid() {
         for wo in [direction(0.95, 0.4), direction(0.3, 2.5)] {
             let m = mixture(&material, wo);
-            let total = integral(wo, m.eta, |wi| f64::from(principled_pdf(&m, wo, wi, ALL)));
+            let integral_of_pdf = integral(wo, m.eta, |wi| f64::from(principled_pdf(&m, wo, wi, ALL_LOBES)));
             let count = 16_384;
-            let useful = (0..count).filter(|i| {
+            let valid = (0..count).filter(|i| {
                 let u = sobol_sample(*i, UVec2::new(1, 2));
                 let random = sobol_sample(*i, UVec2::new(3, 4)).x;
-                let sample = principled_sample(&m, wo, u, random, ALL);
+                let sample = principled_sample(&m, wo, u, random, ALL_LOBES);
                 sample.pdf > 0.0 && (sample.wi.length() - 1.0).abs() < 1e-4
             });
-            let useful = useful.count() as f64 / f64::from(count);
+            let valid = valid.count() as f64 / f64::from(count);
             // Coat samples below the surface have a PDF but no weight.
-            assert!((total - useful).abs() < 0.012, "{name}, {wo}: {total} {useful}");
+            assert!(
+                (integral_of_pdf - valid).abs() < 0.012,
+                "{name}, {wo}: {integral_of_pdf} {valid}"
+            );
         }
     }
 }
@@ -185,13 +188,13 @@ fn mean_sample_weights_equal_the_principled_albedo() {
     for (name, material) in grid() {
         for wo in viewers() {
             let m = mixture(&material, wo);
-            let expected = integral(wo, m.eta, |wi| f64::from(principled_eval(&m, wo, wi, ALL).y));
+            let expected = integral(wo, m.eta, |wi| f64::from(principled_eval(&m, wo, wi, ALL_LOBES).y));
             let count = 65_536;
             let (mut sum, mut squares) = (0.0, 0.0);
             for i in 0..count {
                 let u = sobol_sample(i, UVec2::new(5, 6));
                 let random = sobol_sample(i, UVec2::new(7, 8)).x;
-                let sample = principled_sample(&m, wo, u, random, ALL);
+                let sample = principled_sample(&m, wo, u, random, ALL_LOBES);
                 assert!(
                     sample.weight.is_finite() && sample.weight.min_element() >= 0.0,
                     "{name}: {sample:?}"
@@ -224,7 +227,7 @@ fn chi_square(m: &PrincipledLobes, wo: Vec3, pdf: impl Fn(Vec3) -> f64) -> (f64,
     for i in 0..SAMPLES {
         let bits = hash4(UVec4::new(i, 17, 19, 23));
         let [a, b, c] = [bits.x, bits.y, bits.z].map(unit_float);
-        let sample = principled_sample(m, wo, Vec2::new(a, b), c, ALL);
+        let sample = principled_sample(m, wo, Vec2::new(a, b), c, ALL_LOBES);
         if sample.pdf > 0.0 {
             counts[cell(sample.wi)] += 1.0;
         }
@@ -250,19 +253,22 @@ fn chi_square(m: &PrincipledLobes, wo: Vec3, pdf: impl Fn(Vec3) -> f64) -> (f64,
 
 #[test]
 fn sampled_directions_follow_their_pdf() {
-    // Only lobes that the cells resolve.
+    // Only lobes that are wide compared with the cells.
     for (name, material) in grid().into_iter().filter(|(_, material)| material.roughness >= 0.4) {
         for wo in [direction(0.9, 0.4), direction(0.4, 2.5)] {
             let m = mixture(&material, wo);
-            let (sum, freedom) = chi_square(&m, wo, |wi| f64::from(principled_pdf(&m, wo, wi, ALL)));
-            let most = freedom + 7.0 * (2.0 * freedom).sqrt();
-            assert!(freedom > 5.0 && sum < most, "{name}, {wo}: {sum} of {freedom}");
+            let (sum, degrees_of_freedom) = chi_square(&m, wo, |wi| f64::from(principled_pdf(&m, wo, wi, ALL_LOBES)));
+            let max_sum = degrees_of_freedom + 7.0 * (2.0 * degrees_of_freedom).sqrt();
+            assert!(
+                degrees_of_freedom > 5.0 && sum < max_sum,
+                "{name}, {wo}: {sum} of {degrees_of_freedom}"
+            );
             let (wrong, _) = chi_square(&m, wo, |wi| {
-                f64::from(principled_pdf(&m, wo, wi, ALL)) * if wi.x > 0.0 { 1.1 } else { 0.9 }
+                f64::from(principled_pdf(&m, wo, wi, ALL_LOBES)) * if wi.x > 0.0 { 1.1 } else { 0.9 }
             });
             assert!(
-                wrong > most,
-                "{name}: a wrong density is not seen: {wrong} of {freedom}"
+                wrong > max_sum,
+                "{name}: a wrong PDF passes: {wrong} of {degrees_of_freedom}"
             );
         }
     }
@@ -274,7 +280,7 @@ fn each_layer_equals_its_standalone_bsdf() {
         for wi in [direction(0.9, 1.0), direction(0.4, 3.0), direction(0.05, 5.0)] {
             // Without metal and specular reflection: bit-identical to `diffuse`.
             let color = Vec3::new(0.8, 0.4, 0.1);
-            let matt = Material {
+            let matte = Material {
                 diffuse: color,
                 specular_weight: 0.0,
                 ..plain()
@@ -284,7 +290,7 @@ fn each_layer_equals_its_standalone_bsdf() {
                 diffuse: color,
                 ..Material::zeroed()
             };
-            let found = principled_eval(&mixture(&matt, wo), wo, wi, ALL);
+            let found = principled_eval(&mixture(&matte, wo), wo, wi, ALL_LOBES);
             assert_eq!(found, diffuse_eval(&diffuse, angles_at(Vec3::Z, wo, wi)));
             // Metal: uncompensated GGX with Schlick's approximation, in f64 by other formulas (Walter et al. 2007, with
             // tangents).
@@ -297,7 +303,7 @@ fn each_layer_equals_its_standalone_bsdf() {
                 };
                 let mut m = mixture(&metal, wo);
                 (m.f0, m.f90) = (color, Vec3::ONE);
-                let found = principled_eval(&m, wo, wi, ALL).as_dvec3();
+                let found = principled_eval(&m, wo, wi, ALL_LOBES).as_dvec3();
                 let expected = metal_f64(
                     color.as_dvec3(),
                     f64::from(roughness).powi(2),
@@ -334,28 +340,28 @@ fn smooth_lobes_are_deltas_and_all_values_are_finite() {
     };
     let wo = direction(0.6, 0.3);
     let m = mixture(&smooth, wo);
-    let mut passed = Vec3::ZERO;
-    let count = 4096;
-    for i in 0..count {
-        let random = (i as f32 + 0.5) / count as f32;
-        let sample = principled_sample(&m, wo, Vec2::new(0.3, 0.8), random, ALL);
+    let mut transmitted = Vec3::ZERO;
+    let sample_count = 4096;
+    for i in 0..sample_count {
+        let random = (i as f32 + 0.5) / sample_count as f32;
+        let sample = principled_sample(&m, wo, Vec2::new(0.3, 0.8), random, ALL_LOBES);
         assert!(sample.pdf == 0.0 || sample.weight == Vec3::ZERO, "{sample:?}");
         if sample.wi.z < 0.0 {
             // Snell's law.
             assert!((sample.wi.truncate() * 1.5 + wo.truncate()).length() < 1e-5);
-            passed += sample.weight / count as f32;
+            transmitted += sample.weight / sample_count as f32;
         }
     }
     // Fresnel transmittance from sines and tangents, converted to radiance in glass.
     let (i, t) = (0.6f32.acos(), (0.8f32 / 1.5).asin());
-    let share = |part: f32| 0.5 * part * part;
-    let mirrored = share((i - t).sin() / (i + t).sin()) + share((i - t).tan() / (i + t).tan());
-    let transmitted = (1.0 - mirrored) / 2.25;
-    assert!((passed.x - transmitted).abs() < 2e-3, "{passed} {transmitted}");
-    let ends = [0.0, 1e-38, 1e-20, 1e-4, 0.5, 1.0];
+    let reflectance = |ratio: f32| 0.5 * ratio * ratio;
+    let reflected = reflectance((i - t).sin() / (i + t).sin()) + reflectance((i - t).tan() / (i + t).tan());
+    let expected = (1.0 - reflected) / 2.25;
+    assert!((transmitted.x - expected).abs() < 2e-3, "{transmitted} {expected}");
+    let limits = [0.0, 1e-38, 1e-20, 1e-4, 0.5, 1.0];
     for i in 0..20_000 {
         let bits = hash4(UVec4::new(i, 1, 2, 3));
-        let pick = |k: u32| ends[(hash4(UVec4::new(i, k, 5, 6)).x % 6) as usize];
+        let pick = |k: u32| limits[(hash4(UVec4::new(i, k, 5, 6)).x % 6) as usize];
         let material = Material {
             diffuse: Vec3::new(pick(1), pick(2), pick(3)),
             specular: Vec3::new(pick(4), 1e6, pick(5)),
@@ -373,10 +379,10 @@ fn smooth_lobes_are_deltas_and_all_values_are_finite() {
             ..plain()
         };
         let wo = direction([1.0, 0.5, 1e-3, 1e-6][(bits.z % 4) as usize], f64::from(i));
-        let share = Vec3::new(pick(15), pick(16), pick(17));
-        let m = principled_mixture(&material, wo, bits.w.is_multiple_of(2), Vec3::Z, ALL, share);
+        let energy = Vec3::new(pick(15), pick(16), pick(17));
+        let m = principled_mixture(&material, wo, bits.w.is_multiple_of(2), Vec3::Z, ALL_LOBES, energy);
         let u = sobol_sample(i, UVec2::new(1, 2));
-        let sample = principled_sample(&m, wo, u, sobol_sample(i, UVec2::new(3, 4)).x, ALL);
+        let sample = principled_sample(&m, wo, u, sobol_sample(i, UVec2::new(3, 4)).x, ALL_LOBES);
         assert!(
             sample.weight.is_finite() && sample.wi.is_finite() && sample.pdf.is_finite(),
             "{material:?} {m:?} {sample:?}"
@@ -393,9 +399,9 @@ fn smooth_lobes_are_deltas_and_all_values_are_finite() {
             Vec3::Z,
             Vec3::NEG_Z,
         ] {
-            let value = principled_eval(&m, wo, wi, ALL);
+            let value = principled_eval(&m, wo, wi, ALL_LOBES);
             assert!(
-                value.is_finite() && principled_pdf(&m, wo, wi, ALL) >= 0.0,
+                value.is_finite() && principled_pdf(&m, wo, wi, ALL_LOBES) >= 0.0,
                 "{material:?} {wo} {wi}: {value}"
             );
         }
@@ -432,17 +438,17 @@ fn values_come_from_the_channels_of_a_texture() {
         let packed = picture_of(textured, texture(kind));
         // One lookup for all four values; none if constant.
         assert_eq!(packed.textures.lookups.len(), usize::from(kind == "checker"));
-        for way in crate::pictures::exact_modes() {
+        for mode in crate::pictures::exact_modes() {
             assert_eq!(
-                crate::pictures::differing(&crate::pictures::render(&packed, way), &expected),
+                crate::pictures::differing(&crate::pictures::render(&packed, mode), &expected),
                 0,
-                "{kind} {way:?}"
+                "{kind} {mode:?}"
             );
         }
     }
     // Control: another channel.
-    let other = picture_of(&textured.replace("'b'", "'g'"), texture("checker"));
-    assert!(crate::pictures::differing(&crate::pictures::reference(&other), &expected) > 20);
+    let wrong_channel = picture_of(&textured.replace("'b'", "'g'"), texture("checker"));
+    assert!(crate::pictures::differing(&crate::pictures::reference(&wrong_channel), &expected) > 20);
 }
 
 #[test]

@@ -20,23 +20,23 @@ fn floor(integrator: &str, light: &str) -> Packed {
     ))
 }
 
-/// Returns the documented formula for a spot light of color 1 above (0.2, 0.1, 0) that points down.
-fn expected(at: [f64; 2], height: f64, cone: f64, inner: f64, is_path: bool) -> f64 {
-    let (x, y) = (at[0] - 0.2, at[1] - 0.1);
+/// Evaluates the documented formula of a spot light of color 1 above (0.2, 0.1, 0) that points down.
+fn expected(point: [f64; 2], height: f64, cone: f64, inner: f64, is_path: bool) -> f64 {
+    let (x, y) = (point[0] - 0.2, point[1] - 0.1);
     let distance = (x * x + y * y + height * height).sqrt();
     let cosine = height / distance;
     let (outer, inner) = (cone.to_radians().cos(), inner.to_radians().cos());
     let ramp = ((cosine - outer) / (inner - outer)).clamp(0.0, 1.0);
-    let by_distance = if is_path {
+    let falloff = if is_path {
         distance * distance * std::f64::consts::PI
     } else {
         1.0
     };
-    ramp * ramp * cosine / by_distance
+    ramp * ramp * cosine / falloff
 }
 
 #[test]
-fn a_spot_lights_a_floor_as_documented() {
+fn a_spot_light_matches_the_documented_formula() {
     for (integrator, cone, inner) in [
         ("path", 40.0, 10.0),
         ("path", 60.0, 0.0),
@@ -49,26 +49,26 @@ fn a_spot_lights_a_floor_as_documented() {
              cone_angle = {cone}\ninner_angle = {inner}"
         );
         let packed = floor(integrator, &light);
-        for way in both() {
-            let found = means(&render(&packed, way));
-            let (mut worst, mut of_wider) = (0.0_f64, 0.0_f64);
+        for mode in both() {
+            let found = means(&render(&packed, mode));
+            let (mut error, mut wider_error) = (0.0_f64, 0.0_f64);
             for (i, pixel) in found.iter().enumerate() {
                 // Mean over 32 x 32 points of the pixel.
                 let mean = |cone: f64| {
-                    let place = |k: usize, sub: usize| (k as f64 + (sub as f64 + 0.5) / 32.0) * 3.0 / 16.0 - 1.5;
-                    let points = (0..1024).map(|k| [place(i % 16, k % 32), -place(i / 16, k / 32)]);
+                    let coordinate = |k: usize, sub: usize| (k as f64 + (sub as f64 + 0.5) / 32.0) * 3.0 / 16.0 - 1.5;
+                    let points = (0..1024).map(|k| [coordinate(i % 16, k % 32), -coordinate(i / 16, k / 32)]);
                     points
-                        .map(|at| expected(at, 0.9, cone, inner, integrator == "path"))
+                        .map(|point| expected(point, 0.9, cone, inner, integrator == "path"))
                         .sum::<f64>()
                         / 1024.0
                 };
-                worst = worst.max((pixel[0] - mean(cone)).abs());
-                of_wider = of_wider.max((pixel[0] - mean(cone + 2.0)).abs());
+                error = error.max((pixel[0] - mean(cone)).abs());
+                wider_error = wider_error.max((pixel[0] - mean(cone + 2.0)).abs());
             }
-            assert!(worst < 4e-3, "{way:?}, {integrator}, {cone}, {inner}: {worst}");
+            assert!(error < 4e-3, "{mode:?}, {integrator}, {cone}, {inner}: {error}");
             assert!(
-                of_wider > worst,
-                "{way:?}: a cone that is wider by 2 degrees is another: {of_wider}"
+                wider_error > error,
+                "{mode:?}: a cone that is wider by 2 degrees passes: {wider_error}"
             );
         }
     }
@@ -77,24 +77,31 @@ fn a_spot_lights_a_floor_as_documented() {
 #[test]
 fn a_180_degree_spot_equals_a_point_light_and_a_tiny_cone_lights_almost_nothing() {
     for integrator in ["path", "phong"] {
-        let of = |light: &str| {
+        let scene_with = |light: &str| {
             floor(
                 integrator,
                 &format!("[[lights]]\nposition = [0.2, 0.1, 0.9]\ncolor = [1, 1, 1]\n{light}"),
             )
         };
-        let point = of("type = 'point'");
-        let wide = of("type = 'spot'\ndirection = [1, 2, 3]\ncone_angle = 180\ninner_angle = 180");
-        let narrow = of("type = 'spot'\ndirection = [0, 0, -1]\ncone_angle = 0.01\ninner_angle = 0.01");
-        let away = of("type = 'spot'\ndirection = [0, 0, 1]\ncone_angle = 90");
-        for way in both() {
-            let expected = means(&render(&point, way));
-            for (a, b) in means(&render(&wide, way)).iter().zip(&expected) {
-                assert!((a[0] - b[0]).abs() < 1e-6 && a[0] > 0.0, "{way:?}: {a:?} for {b:?}");
+        let point = scene_with("type = 'point'");
+        let wide = scene_with("type = 'spot'\ndirection = [1, 2, 3]\ncone_angle = 180\ninner_angle = 180");
+        let narrow = scene_with("type = 'spot'\ndirection = [0, 0, -1]\ncone_angle = 0.01\ninner_angle = 0.01");
+        let away = scene_with("type = 'spot'\ndirection = [0, 0, 1]\ncone_angle = 90");
+        for mode in both() {
+            let expected = means(&render(&point, mode));
+            for (a, b) in means(&render(&wide, mode)).iter().zip(&expected) {
+                assert!(
+                    (a[0] - b[0]).abs() < 1e-6 && a[0] > 0.0,
+                    "{mode:?}: {a:?}, expected {b:?}"
+                );
             }
             // A disk of radius 0.00016: about 1e-8 of the floor.
-            assert!(mean(&render(&narrow, way))[0] < 1e-4, "{way:?}");
-            assert_eq!(mean(&render(&away, way)), [0.0; 3], "{way:?}: it looks away");
+            assert!(mean(&render(&narrow, mode))[0] < 1e-4, "{mode:?}");
+            assert_eq!(
+                mean(&render(&away, mode)),
+                [0.0; 3],
+                "{mode:?}: a spot light that faces away lights the floor"
+            );
         }
     }
 }

@@ -18,10 +18,11 @@ const WRONG: u32 = 3;
 const DIRECT: u32 = 4;
 
 fn shaders_with_strategies() -> Shaders {
-    const OF_LIGHT: &str = "select(power_heuristic(light.pdf, reflected.pdf), 1.0, light.is_delta)";
-    const OF_BSDF: &str = "power_heuristic(state.pdf, emitter_pdf(prim, from_previous, density, ray, surface.normal))";
+    const LIGHT_WEIGHT: &str = "select(power_heuristic(light.pdf, reflected.pdf), 1.0, light.is_delta)";
+    const BSDF_WEIGHT: &str =
+        "power_heuristic(state.pdf, emitter_pdf(prim, from_previous, density, ray, surface.normal))";
     let mut text = sources::shaders().text(FILE).to_owned();
-    for (weight, alternatives) in [(OF_LIGHT, "1.0, 0.0, 0.9"), (OF_BSDF, "0.0, 1.0, 1.0")] {
+    for (weight, alternatives) in [(LIGHT_WEIGHT, "1.0, 0.0, 0.9"), (BSDF_WEIGHT, "0.0, 1.0, 1.0")] {
         assert!(text.contains(weight), "{weight} not found");
         text = text.replace(weight, &format!("strategy_weight({weight}, {alternatives})"));
     }
@@ -40,7 +41,7 @@ fn shaders_with_strategies() -> Shaders {
 }
 
 /// Returns lights of every kind, enough for a light tree.
-fn many_lamps() -> String {
+fn many_lights() -> String {
     let light = |i: u32| {
         let [x, y, z] = [
             f64::from(i % 6) * 0.45 - 1.1,
@@ -89,15 +90,15 @@ fn light_and_bsdf_sampling_agree() {
         "[[shapes]]\ntype = 'cylinder'\nmaterial = 'source'\nstart = [-0.6, 0.3, 0.5]\nend = [0.5, -0.1, 0.8]\nradius = 0.3\n",
         "[[shapes]]\ntype = 'tetrahedron'\nmaterial = 'source'\nvertices = [[-0.5, 0, 0.3], [0.5, 0, 0.3], [0, 0.6, 0.3], [0, 0.2, 0.9]]\n",
         "[[lights]]\ntype = 'rectangle'\ncenter = [0, 0.2, 1.1]\nsize = [1, 0.5]\nnormal = [0.1, -0.3, -1]\ntangent = [10, 0, 1]\ncolor = [5, 3, 1]\n",
-        // several of different powers, one behind another
+        // Several emitters of different powers, some behind others.
         "[[shapes]]\ntype = 'sphere'\nmaterial = 'source'\ncenter = [-0.6, 0, 0.7]\nradius = 0.3\n\
          [[shapes]]\ntype = 'disk'\nmaterial = 'dim'\ncenter = [0.6, 0.4, 0.7]\nradius = 0.3\nnormal = [-1, -1, 0]\ntangent = [1, -1, 0]\n\
          [[shapes]]\ntype = 'triangle'\nmaterial = 'dim'\nvertices = [[-1, 1, 0.1], [1, 1, 0.1], [0, 1, 1.5]]\n\
          [[lights]]\ntype = 'rectangle'\ncenter = [0, 0.2, 1.3]\nsize = [1, 0.5]\nnormal = [0, 0, -1]\ntangent = [1, 0, 0]\ncolor = [2, 3, 4]\n",
     ];
-    let many = many_lamps();
+    let many = many_lights();
     // The last shape and the many lights get all materials, each other shape one.
-    let (with_one, number_of_many) = (shapes.len() - 1, shapes.len());
+    let (single_material_count, many_lights_index) = (shapes.len() - 1, shapes.len());
     let shapes = shapes.into_iter().chain([many.as_str()]);
     for (i, shape) in shapes.enumerate() {
         let materials = [
@@ -107,7 +108,7 @@ fn light_and_bsdf_sampling_agree() {
             "type = 'conductor', metal = 'copper', roughness = 0.6, anisotropy = 0.5",
             "type = 'principled', base_color = [0.7, 0.6, 0.5], metallic = 0.3, roughness = 0.6, clearcoat = 0.5, clearcoat_roughness = 0.5, sheen_color = [0.2, 0.3, 0.4], sheen_roughness = 0.5",
         ];
-        let materials = match i < with_one {
+        let materials = match i < single_material_count {
             true => &materials[i % 5..][..1],
             false => &materials[..],
         };
@@ -116,7 +117,7 @@ fn light_and_bsdf_sampling_agree() {
             let packed = scene(4096, 2, &text);
             assert_eq!(
                 packed.specialization.light_tree != 0,
-                i == number_of_many,
+                i == many_lights_index,
                 "a light tree is missing or was built over few lights"
             );
             let rendered = |strategy: u32| {
@@ -134,15 +135,15 @@ fn light_and_bsdf_sampling_agree() {
                 let near = |x: f64, relative: f64| (x - both[i]).abs() < relative * both[i];
                 assert!(
                     near(light[i], 1e-2),
-                    "light sampling alone differs: {light:?} for {both:?}\n{shape}{material}"
+                    "light sampling alone differs: {light:?}, expected {both:?}\n{shape}{material}"
                 );
                 assert!(
                     near(bsdf[i], 1e-2),
-                    "BSDF sampling alone differs: {bsdf:?} for {both:?}\n{shape}{material}"
+                    "BSDF sampling alone differs: {bsdf:?}, expected {both:?}\n{shape}{material}"
                 );
                 assert!(
                     !near(wrong[i], 1e-2),
-                    "a wrong weight passes: {wrong:?} for {both:?}\n{shape}{material}"
+                    "a wrong weight passes: {wrong:?}, expected {both:?}\n{shape}{material}"
                 );
             }
         }

@@ -1,4 +1,5 @@
-//! Proptest strategies for small valid scenes of the whole scene format.
+//! Proptest strategies for small valid scenes with all features of the scene format, except image textures and glTF
+//! files.
 
 mod files;
 mod materials;
@@ -15,7 +16,7 @@ use wgray::scene::*;
 use wgray_render::pack::pack;
 use wgray_render::records::Packed;
 
-use self::files::AROUND;
+use self::files::ENVIRONMENT_MAPS;
 pub use self::files::folder;
 use self::materials::*;
 pub use self::moved::moved;
@@ -24,12 +25,12 @@ use self::values::*;
 use crate::patterns;
 
 pub fn packed(d: &Description) -> Packed {
-    let beside = Assets::beside(folder());
-    pack(&d.validate_with(&beside).unwrap_or_else(|problem| panic!("{problem}")))
+    let assets = Assets::beside(folder());
+    pack(&d.validate_with(&assets).unwrap_or_else(|problem| panic!("{problem}")))
 }
 
 #[derive(Clone, Debug)]
-struct OfPaths {
+struct PathSettings {
     materials: [MaterialDescription; 3],
     environment: Option<EnvironmentDescription>,
     max_depth: u32,
@@ -40,15 +41,16 @@ struct OfPaths {
 
 fn environment_map_or_color() -> BoxedStrategy<EnvironmentDescription> {
     let image = (
-        select(AROUND),
+        select(ENVIRONMENT_MAPS),
         select(&[1.0, 0.3, 0.0][..]),
         prop::option::of(-180.0..180.0),
-        prop_oneof![2 => Just((true, None)), 1 => Just((false, None)), 1 => color(2.0).prop_map(|seen| (true, Some(seen)))],
+        prop_oneof![2 => Just((true, None)), 1 => Just((false, None)), 1 => color(2.0).prop_map(|background| (true, Some(background)))],
     );
-    let image = image.prop_map(|((file, ..), scale, turn, (visible, background))| {
+    let image = image.prop_map(|((file, ..), scale, degrees, (visible, background))| {
         let mut environment = EnvironmentDescription::image(file);
         environment.scale = scale;
-        environment.rotate = turn.map(|turn| EnvironmentRotation::Any(Rotation::Angles(DVec3::new(turn, 20.0, -turn))));
+        environment.rotate =
+            degrees.map(|degrees| EnvironmentRotation::Any(Rotation::Angles(DVec3::new(degrees, 20.0, -degrees))));
         environment.visible = visible;
         environment.background = background;
         environment
@@ -56,8 +58,8 @@ fn environment_map_or_color() -> BoxedStrategy<EnvironmentDescription> {
     prop_oneof![1 => color(1.0).prop_map(EnvironmentDescription::new), 1 => image].boxed()
 }
 
-fn of_paths() -> BoxedStrategy<OfPaths> {
-    let materials = [material_of_paths(), material_of_paths(), material_of_paths()];
+fn path_settings() -> BoxedStrategy<PathSettings> {
+    let materials = [path_material(), path_material(), path_material()];
     let environment = prop::option::of(environment_map_or_color());
     let depths = (
         select(&[0, 1, 2, 5, 12][..]),
@@ -66,7 +68,7 @@ fn of_paths() -> BoxedStrategy<OfPaths> {
     let clamp = prop::option::of(select(&[0.1, 2.0][..]));
     (materials, environment, depths, clamp, any::<bool>())
         .prop_map(
-            |(materials, environment, (max_depth, rr_depth), clamp, alpha)| OfPaths {
+            |(materials, environment, (max_depth, rr_depth), clamp, alpha)| PathSettings {
                 materials,
                 environment,
                 max_depth,
@@ -96,7 +98,7 @@ fn light() -> impl Strategy<Value = LightDescription> {
                 color,
             })
         });
-    let delta = (point(), color(1.0))
+    let point_light = (point(), color(1.0))
         .prop_map(|(position, color)| LightDescription::Point(PointLightDescription { position, color }));
     let directional = (direction(), color(1.0))
         .prop_map(|(direction, color)| LightDescription::Directional(DirectionalLightDescription { direction, color }));
@@ -112,53 +114,55 @@ fn light() -> impl Strategy<Value = LightDescription> {
                 inner_angle: share * cone_angle,
             })
         });
-    prop_oneof![4 => rectangle, 2 => delta, 2 => directional, 1 => spot]
+    prop_oneof![4 => rectangle, 2 => point_light, 2 => directional, 1 => spot]
 }
 
 /// Generates cameras on surfaces, inside shapes, or outside.
 fn camera() -> impl Strategy<Value = CameraDescription> {
     let position = prop_oneof![2 => point().prop_map(|p| p * 3.0 + DVec3::new(0.01, -0.02, 0.03)), 1 => point()];
     let look_at = point().prop_map(|p| p * 0.5);
-    // Pinhole, thin lens or, above the maximum number of blades, panorama.
+    // A pinhole, a thin lens, or a panorama if the number of blades exceeds the maximum.
     let lens = (
         prop_oneof![2 => Just(None), 1 => (0.0..1.0).prop_map(Some)],
         prop::option::of(0.1..8.0),
         0u32..18,
     );
     let sizes = (20.0..120.0, 0.5..6.0);
-    (position, look_at, sizes, any::<bool>(), lens).prop_map(|(position, look_at, (fov, height), parallel, lens)| {
-        let (aperture, focus_distance, blades) = lens;
-        let up = if (look_at - position).cross(DVec3::Z).length() > 0.1 {
-            DVec3::Z
-        } else {
-            DVec3::new(0.3, 1.0, 0.1)
-        };
-        if blades > 16 {
-            CameraDescription::Panorama(PanoramaDescription {
-                position,
-                look_at,
-                up,
-                path: None,
-            })
-        } else if parallel {
-            CameraDescription::Orthographic(OrthographicDescription {
-                position,
-                look_at,
-                up,
-                height,
-                path: None,
-            })
-        } else {
-            CameraDescription::Perspective(PerspectiveDescription {
-                up,
-                aperture,
-                focus_distance,
-                blades: if blades < 3 { 0 } else { blades },
-                blade_rotation: fov,
-                ..PerspectiveDescription::new(position, look_at, fov)
-            })
-        }
-    })
+    (position, look_at, sizes, any::<bool>(), lens).prop_map(
+        |(position, look_at, (fov, height), is_orthographic, lens)| {
+            let (aperture, focus_distance, blades) = lens;
+            let up = if (look_at - position).cross(DVec3::Z).length() > 0.1 {
+                DVec3::Z
+            } else {
+                DVec3::new(0.3, 1.0, 0.1)
+            };
+            if blades > 16 {
+                CameraDescription::Panorama(PanoramaDescription {
+                    position,
+                    look_at,
+                    up,
+                    path: None,
+                })
+            } else if is_orthographic {
+                CameraDescription::Orthographic(OrthographicDescription {
+                    position,
+                    look_at,
+                    up,
+                    height,
+                    path: None,
+                })
+            } else {
+                CameraDescription::Perspective(PerspectiveDescription {
+                    up,
+                    aperture,
+                    focus_distance,
+                    blades: if blades < 3 { 0 } else { blades },
+                    blade_rotation: fov,
+                    ..PerspectiveDescription::new(position, look_at, fov)
+                })
+            }
+        },
+    )
 }
 
 fn render() -> impl Strategy<Value = RenderDescription> {
@@ -179,8 +183,8 @@ fn render() -> impl Strategy<Value = RenderDescription> {
         PixelFilterKind::Mitchell,
         PixelFilterKind::BlackmanHarris,
     ];
-    let more = (any::<bool>(), 1u32..6, any::<bool>(), select(kinds), any::<bool>());
-    (color(1.0), color(1.0), epsilon, any::<u32>(), samples, more).prop_map(
+    let options = (any::<bool>(), 1u32..6, any::<bool>(), select(kinds), any::<bool>());
+    (color(1.0), color(1.0), epsilon, any::<u32>(), samples, options).prop_map(
         |(
             ambient,
             background,
@@ -212,16 +216,16 @@ fn render() -> impl Strategy<Value = RenderDescription> {
 
 /// Generates scenes of both integrators.
 pub fn description() -> impl Strategy<Value = Description> {
-    described((shapes(), meshes()), prop::option::of(of_paths()))
+    description_with((shapes(), meshes()), prop::option::of(path_settings()))
 }
 
-pub fn of_direct_light() -> impl Strategy<Value = Description> {
-    described((shapes(), meshes()), Just(None))
+pub fn direct_light_description() -> impl Strategy<Value = Description> {
+    description_with((shapes(), meshes()), Just(None))
 }
 
 /// Generates scenes with too few primitives for a BVH.
 pub fn without_trees() -> impl Strategy<Value = Description> {
-    described(
+    description_with(
         (prop::collection::vec(shape(), 0..7), Just(Default::default())),
         Just(None),
     )
@@ -232,18 +236,27 @@ type Shapes = (
     (BTreeMap<String, MeshFileDescription>, Vec<InstanceDescription>),
 );
 
-fn described(
+fn description_with(
     shapes: impl Strategy<Value = Shapes>,
-    paths: impl Strategy<Value = Option<OfPaths>> + 'static,
+    paths: impl Strategy<Value = Option<PathSettings>> + 'static,
 ) -> impl Strategy<Value = Description> {
-    // Sometimes enough for a light tree.
+    // Sometimes, the lights are enough for a light tree.
     let few = prop::collection::vec(light(), 0..4);
     let lights = prop_oneof![9 => few, 1 => prop::collection::vec(light(), 17..40)];
     let materials = [material(), material(), material()];
     let size = (1u32..25, 1u32..25);
-    let place = (select(&[1.0, 1.0, 0.001, 1000.0][..]), select(&[0.0, 0.0, 100.0][..]));
+    let placement = (select(&[1.0, 1.0, 0.001, 1000.0][..]), select(&[0.0, 0.0, 100.0][..]));
     let settings = (render().boxed(), paths.boxed());
-    (shapes, lights, materials, textures(), camera(), settings, size, place)
+    (
+        shapes,
+        lights,
+        materials,
+        textures(),
+        camera(),
+        settings,
+        size,
+        placement,
+    )
         .prop_map(
             |(
                 (shapes, (meshes, instances)),
@@ -285,5 +298,5 @@ fn described(
                 d
             },
         )
-        .prop_filter("a sound scene", |d| d.validate_with(&Assets::beside(folder())).is_ok())
+        .prop_filter("a valid scene", |d| d.validate_with(&Assets::beside(folder())).is_ok())
 }

@@ -17,7 +17,7 @@ use crate::nearly::Nearly;
 use crate::pictures::{RenderMode, differing, first_hits, reference, render_with};
 use crate::{patterns, rounding, sources};
 
-/// Number of scenes. If set, each run has different ones.
+/// Environment variable: number of scenes. If set, each run has different scenes.
 const CASES: &str = "WGRAY_TEST_CASES";
 
 fn check(d: &Description, shaders: &Shaders) -> Result<(), String> {
@@ -32,7 +32,7 @@ fn check(d: &Description, shaders: &Shaders) -> Result<(), String> {
             return Err(format!("{differ} of {} pixels differ, {mode:?}", cpu.sums.len()));
         }
     }
-    // Only some scenes, as this needs another kernel.
+    // First hits are compared only in some scenes, because they need another kernel.
     if d.render.seed.is_multiple_of(4) {
         let (gpu, cpu) = (
             first_hits(&packed, RenderMode::Buffers),
@@ -45,14 +45,14 @@ fn check(d: &Description, shaders: &Shaders) -> Result<(), String> {
     Ok(())
 }
 
-fn failing(cases: u32, shrinks: u32, always_the_same: bool, shaders: &Shaders) -> Option<(Description, String)> {
+fn find_failing(cases: u32, shrinks: u32, deterministic: bool, shaders: &Shaders) -> Option<(Description, String)> {
     let config = Config {
         cases,
         max_shrink_iters: shrinks,
         failure_persistence: None,
         ..Config::default()
     };
-    let mut runner = if always_the_same {
+    let mut runner = if deterministic {
         TestRunner::new_with_rng(config, TestRng::deterministic_rng(RngAlgorithm::ChaCha))
     } else {
         TestRunner::new(config)
@@ -70,7 +70,7 @@ fn failing(cases: u32, shrinks: u32, always_the_same: bool, shaders: &Shaders) -
 /// Saves a scene for `wgray render`.
 fn save(d: &Description, name: &str) -> PathBuf {
     let path = any_scene::folder().join(name);
-    std::fs::write(&path, toml::to_string(d).expect("a scene as TOML")).expect("a place for the scene");
+    std::fs::write(&path, toml::to_string(d).expect("a scene as TOML")).expect("a file for the scene");
     path
 }
 
@@ -80,17 +80,17 @@ fn random_scenes_are_the_same_on_gpu_and_cpu() {
         return;
     }
     let cases = std::env::var(CASES).ok();
-    let number = cases
+    let count = cases
         .as_deref()
         .map_or(12, |n| n.parse().expect("WGRAY_TEST_CASES is a number"));
-    if let Some((d, reason)) = failing(number, 300, cases.is_none(), sources::shaders()) {
+    if let Some((d, reason)) = find_failing(count, 300, cases.is_none(), sources::shaders()) {
         let path = save(&d, "failing-scene.toml");
         panic!("{reason}: wgray render {}", path.display());
     }
-    println!("{number} random scenes, each from buffers and as constants: every pixel has the same bits");
+    println!("{count} random scenes, with buffers and with constants: every pixel has the same bits");
 }
 
-/// Enough samples that some drivers would terminate the loops of a dispatch.
+/// The scenes have so many samples that some drivers would terminate the loops of a dispatch.
 #[test]
 fn random_scenes_of_many_samples_are_the_same() {
     if !adapter::device().is_some_and(bit_exact) {
@@ -117,13 +117,14 @@ fn random_scenes_of_many_samples_are_the_same() {
 }
 
 /// All scenes together are within the tolerances with plain WGSL, on devices other than software Vulkan, and with
-/// imprecise quotients and square roots. Direct light only: after a bounce, one ulp may change the path.
+/// imprecise quotients and square roots. The scenes have only direct light, because one ulp may change a path after a
+/// bounce.
 #[test]
 fn random_scenes_are_within_tolerance_without_guaranteed_bits() {
     let Some(device) = adapter::device() else { return };
     let mut runner = TestRunner::new_with_rng(Config::default(), TestRng::deterministic_rng(RngAlgorithm::ChaCha));
-    let strategy = any_scene::of_direct_light();
-    let (mut plain, mut poor, mut shifted) = (Nearly::default(), Nearly::default(), Nearly::default());
+    let strategy = any_scene::direct_light_description();
+    let (mut plain, mut imprecise, mut shifted) = (Nearly::default(), Nearly::default(), Nearly::default());
     // Three placements of each scene share its kernels.
     let placements = [
         (1.0, DVec3::ZERO),
@@ -141,14 +142,14 @@ fn random_scenes_are_within_tolerance_without_guaranteed_bits() {
     for d in scenes {
         let packed = any_scene::packed(&d);
         let cpu = reference(&packed);
-        let by_plain_wgsl = render_with(&packed, RenderMode::Plain, sources::shaders());
+        let with_plain_wgsl = render_with(&packed, RenderMode::Plain, sources::shaders());
         if bit_exact(device) {
-            plain.add(Nearly::by_plain_wgsl(&by_plain_wgsl, &cpu));
-            let found = render_with(&packed, RenderMode::Rounded, rounding::poor_shaders());
-            poor.add(Nearly::of(&packed, &found, &cpu));
+            plain.add(Nearly::by_plain_wgsl(&with_plain_wgsl, &cpu));
+            let found = render_with(&packed, RenderMode::Rounded, rounding::imprecise_shaders());
+            imprecise.add(Nearly::of(&packed, &found, &cpu));
         } else {
-            plain.add(Nearly::of(&packed, &by_plain_wgsl, &cpu));
-            poor.add(Nearly::of(
+            plain.add(Nearly::of(&packed, &with_plain_wgsl, &cpu));
+            imprecise.add(Nearly::of(
                 &packed,
                 &render_with(&packed, RenderMode::Buffers, sources::shaders()),
                 &cpu,
@@ -158,12 +159,12 @@ fn random_scenes_are_within_tolerance_without_guaranteed_bits() {
         moved.sums.rotate_right(1);
         shifted.add(Nearly::of(&packed, &moved, &cpu));
     }
-    println!("random scenes: by plain WGSL {plain}; with poor quotients {poor}");
+    println!("random scenes: with plain WGSL {plain}; with imprecise quotients {imprecise}");
     assert!(plain.judge().is_ok(), "plain WGSL: {}", plain.judge().unwrap_err());
     assert!(
-        poor.judge().is_ok(),
+        imprecise.judge().is_ok(),
         "imprecise quotients: {}",
-        poor.judge().unwrap_err()
+        imprecise.judge().unwrap_err()
     );
     assert!(shifted.judge().is_err(), "the comparison cannot fail");
 }
@@ -175,19 +176,22 @@ fn random_scenes_detect_a_difference_of_one_ulp() {
         return;
     }
     let shaders = sources::edited_shaders("camera.wgsl", "y = 1.0 - at.y", "y = 1.0000001 - at.y");
-    let (d, reason) = failing(40, 10, true, &shaders).expect("a scene that differs");
+    let (d, reason) = find_failing(40, 10, true, &shaders).expect("a scene that differs");
     assert!(reason.contains("pixels differ"), "{reason}");
     let path = save(&d, "scene-of-a-negative-control.toml");
     let scene = Scene::load(&path).unwrap_or_else(|error| panic!("{error}"));
     assert_eq!(wgray_render::pack::pack(&scene), any_scene::packed(&d));
 }
 
-/// Every type of the parser, except these.
+/// Random scenes contain every type of the parser, except `EXCLUDED`.
 #[test]
 fn random_scenes_cover_every_type() {
-    const NEVER: &[(&str, &str)] = &[
-        ("image", "files; tests/textures compares images on both paths"),
-        ("gltf", "files; tests/gltf compares what they are made of on both paths"),
+    const EXCLUDED: &[(&str, &str)] = &[
+        ("image", "needs files; tests/textures compares images on both backends"),
+        (
+            "gltf",
+            "needs files; tests/gltf compares the content of the files on both backends",
+        ),
     ];
     let mut runner = TestRunner::new_with_rng(Config::default(), TestRng::deterministic_rng(RngAlgorithm::ChaCha));
     let strategy = any_scene::description();
@@ -206,23 +210,23 @@ fn random_scenes_cover_every_type() {
                 .map(|t| t.trim_matches('"').to_string()),
         );
     }
-    let mut known: BTreeSet<String> = patterns::all().into_iter().map(|(name, _)| name).collect();
-    let parts = sources::path("crates/scene/src/description")
+    let mut types: BTreeSet<String> = patterns::all().into_iter().map(|(name, _)| name).collect();
+    let files = sources::path("crates/scene/src/description")
         .read_dir()
         .expect("the parts of a description");
-    let parts = parts.map(|entry| entry.expect("a file").path());
-    for file in parts {
+    let files = files.map(|entry| entry.expect("a file").path());
+    for file in files {
         let text = std::fs::read_to_string(file).expect("the descriptions");
         let tags = text
             .lines()
             .filter_map(|line| line.trim().strip_prefix('"')?.split_once("\" => "));
-        known.extend(
+        types.extend(
             tags.filter(|(_, variant)| variant.ends_with("Description),"))
                 .map(|(tag, _)| tag.to_string()),
         );
     }
-    assert!(known.len() > 15, "the types were not found: {known:?}");
-    known.retain(|name| !NEVER.iter().any(|(never, _)| never == name));
-    let missing: Vec<_> = known.difference(&found).collect();
+    assert!(types.len() > 15, "the types were not found: {types:?}");
+    types.retain(|name| !EXCLUDED.iter().any(|(excluded, _)| excluded == name));
+    let missing: Vec<_> = types.difference(&found).collect();
     assert!(missing.is_empty(), "no random scene has {missing:?}");
 }

@@ -13,7 +13,7 @@ use wgray_render::records::Packed;
 use super::cornell;
 use crate::pictures::{backend, crop, differing, exact_modes, film, reference, render, whole};
 
-const GOING_ON: [Pattern; 4] = [Pattern::Jittered, Pattern::Random, Pattern::Halton, Pattern::Sobol];
+const EXTENSIBLE: [Pattern; 4] = [Pattern::Jittered, Pattern::Random, Pattern::Halton, Pattern::Sobol];
 
 fn adaptive(pattern: Pattern, error: f64, max_samples: u32) -> Packed {
     cornell(pattern, 16, |description| {
@@ -24,7 +24,7 @@ fn adaptive(pattern: Pattern, error: f64, max_samples: u32) -> Packed {
 
 #[test]
 fn adaptive_images_do_not_depend_on_backend_or_work_split() {
-    for pattern in GOING_ON {
+    for pattern in EXTENSIBLE {
         for kind in [PixelFilterKind::Box, PixelFilterKind::Mitchell] {
             let packed = cornell(pattern, 16, |description| {
                 let max_samples = Some(90);
@@ -41,7 +41,7 @@ fn adaptive_images_do_not_depend_on_backend_or_work_split() {
                 variances.into_iter().all(|variance| variance >= 0.0),
                 "{pattern:?}, {kind:?}"
             );
-            for way in exact_modes() {
+            for mode in exact_modes() {
                 for (band_pixels, samples_per_dispatch, rows_per_dispatch) in [
                     (1 << 20, None, None),
                     (41 * 7, Some(5), Some(3)),
@@ -54,17 +54,17 @@ fn adaptive_images_do_not_depend_on_backend_or_work_split() {
                         samples_per_dispatch,
                         rows_per_dispatch,
                     };
-                    let found = film(&mut *backend(&packed, way), &packed, whole(&packed), &split);
+                    let found = film(&mut *backend(&packed, mode), &packed, whole(&packed), &split);
                     assert_eq!(
                         differing(&found, &expected),
                         0,
-                        "{pattern:?}, {kind:?}, {way:?}, {split:?}"
+                        "{pattern:?}, {kind:?}, {mode:?}, {split:?}"
                     );
                 }
             }
         }
     }
-    // The controls: another error, another seed.
+    // Controls: another error, and another seed.
     let [a, b] = [0.02, 0.021].map(|error| reference(&adaptive(Pattern::Sobol, error, 90)));
     assert!(differing(&a, &b) > 0);
     let mut packed = adaptive(Pattern::Sobol, 0.02, 90);
@@ -73,10 +73,10 @@ fn adaptive_images_do_not_depend_on_backend_or_work_split() {
 }
 
 #[test]
-fn a_crop_is_a_part_of_the_whole() {
+fn a_crop_is_a_part_of_the_image() {
     let packed = adaptive(Pattern::Sobol, 0.01, 100);
     let expected = reference(&packed);
-    for way in exact_modes() {
+    for mode in exact_modes() {
         for (x0, y0, x1, y1) in [
             (0, 0, 1, 1),
             (20, 13, 21, 14),
@@ -90,8 +90,8 @@ fn a_crop_is_a_part_of_the_whole() {
                     band_pixels,
                     ..WorkSplit::default()
                 };
-                let found = film(&mut *backend(&packed, way), &packed, part, &split);
-                assert_eq!(differing(&found, &crop(&expected, part)), 0, "{way:?}, {part:?}");
+                let found = film(&mut *backend(&packed, mode), &packed, part, &split);
+                assert_eq!(differing(&found, &crop(&expected, part)), 0, "{mode:?}, {part:?}");
             }
         }
     }
@@ -99,7 +99,7 @@ fn a_crop_is_a_part_of_the_whole() {
 
 /// Returns the sample count from the neighbors' pilot samples in double precision, or `None` if the count depends on
 /// rounding.
-fn wanted(packed: &Packed, pixel: UVec2, first: u32, error: f64, most: u32) -> Option<u32> {
+fn expected_count(packed: &Packed, pixel: UVec2, pilot: u32, error: f64, max_count: u32) -> Option<u32> {
     let (mut squares, mut neighbors, mut deviations, mut fourth) = (0.0, 0.0, 0.0, 0.0);
     for (dx, dy) in [(0, -1), (-1, 0), (1, 0), (0, 1)] {
         let (x, y) = (pixel.x.checked_add_signed(dx), pixel.y.checked_add_signed(dy));
@@ -109,13 +109,13 @@ fn wanted(packed: &Packed, pixel: UVec2, first: u32, error: f64, most: u32) -> O
         else {
             continue;
         };
-        let values = (0..first).map(|i| pixel_radiance(packed, UVec2::new(x, y), i).0.truncate().as_dvec3());
+        let values = (0..pilot).map(|i| pixel_radiance(packed, UVec2::new(x, y), i).0.truncate().as_dvec3());
         let (mut n, mut mean, mut sum) = (0.0, DVec3::ZERO, DVec3::ZERO);
         for value in values {
             n += 1.0;
-            let last = mean;
+            let previous_mean = mean;
             mean += (value - mean) / n;
-            let deviation = (value - last) * (value - mean);
+            let deviation = (value - previous_mean) * (value - mean);
             sum += deviation;
             deviations += deviation.element_sum();
             fourth += deviation.element_sum().powi(2);
@@ -124,39 +124,39 @@ fn wanted(packed: &Packed, pixel: UVec2, first: u32, error: f64, most: u32) -> O
         squares += (sum / (n - 1.0) * DVec3::from(slope).powf(2.0)).element_sum() / 3.0;
         neighbors += 1.0;
     }
-    let by_variance = squares / neighbors / (error * error);
-    let evidence = if fourth > 0.0 {
+    let variance_limit = squares / neighbors / (error * error);
+    let effective_samples = if fourth > 0.0 {
         deviations * deviations / fourth
     } else {
         0.0
     };
-    let by_evidence = f64::from(first) * (1.0 + evidence / 2.0);
-    let mut count = first;
-    while count < most && by_variance > f64::from(count) && by_evidence >= f64::from(2 * count) {
+    let effective_limit = f64::from(pilot) * (1.0 + effective_samples / 2.0);
+    let mut count = pilot;
+    while count < max_count && variance_limit > f64::from(count) && effective_limit >= f64::from(2 * count) {
         count *= 2;
     }
-    let close = |limit: f64| (0..20).any(|k| (limit / f64::from(first << k) - 1.0).abs() < 1e-3);
-    (!close(by_variance) && !close(by_evidence)).then_some(count.min(most))
+    let is_close = |limit: f64| (0..20).any(|k| (limit / f64::from(pilot << k) - 1.0).abs() < 1e-3);
+    (!is_close(variance_limit) && !is_close(effective_limit)).then_some(count.min(max_count))
 }
 
 #[test]
 fn sample_counts_follow_the_pilot_samples_of_neighbors() {
-    for (round, first, error, most) in [
+    for (round, pilot, error, max_count) in [
         (16, 16, 0.01, 100),
         (4, 16, 0.02, 256),
         (3, 18, 0.005, 1000),
         (1, 16, 0.03, 40),
     ] {
         let packed = cornell(Pattern::Sobol, round, |description| {
-            let max_samples = Some(most);
+            let max_samples = Some(max_count);
             description.render.adaptive = Some(AdaptiveDescription { error, max_samples });
         });
         let film = reference(&packed);
         let (mut checked, mut counts) = (0, Vec::new());
         for (pixel, count) in film.sample_counts().enumerate() {
-            let at = UVec2::new(pixel as u32 % 41, pixel as u32 / 41);
-            if let Some(expected) = wanted(&packed, at, first, error, most) {
-                assert_eq!(count, expected, "{round}, {at}");
+            let position = UVec2::new(pixel as u32 % 41, pixel as u32 / 41);
+            if let Some(expected) = expected_count(&packed, position, pilot, error, max_count) {
+                assert_eq!(count, expected, "{round}, {position}");
                 checked += 1;
             }
             counts.push(count);
@@ -164,7 +164,7 @@ fn sample_counts_follow_the_pilot_samples_of_neighbors() {
         counts.sort_unstable();
         counts.dedup();
         assert!(
-            checked > 1300 && counts.len() > 2 && counts[0] == first,
+            checked > 1300 && counts.len() > 2 && counts[0] == pilot,
             "{checked}, {counts:?}"
         );
     }
@@ -174,7 +174,7 @@ fn sample_counts_follow_the_pilot_samples_of_neighbors() {
 fn extreme_errors_give_the_minimum_or_maximum_samples() {
     let uniform = |count| {
         cornell(Pattern::Sobol, count, |description| {
-            // Light samples continue across pixel samples.
+            // Light samples continue the sequence of the previous pixel sample.
             description.render.adaptive = None;
         })
     };
@@ -187,25 +187,25 @@ fn extreme_errors_give_the_minimum_or_maximum_samples() {
 
 #[test]
 fn minimum_image_and_pilot_sizes() {
-    let counts = |width, height, round, most| {
+    let counts = |width, height, round, max_count| {
         let packed = cornell(Pattern::Random, round, |description| {
             (description.image.width, description.image.height) = (width, height);
-            let max_samples = Some(most);
+            let max_samples = Some(max_count);
             description.render.adaptive = Some(AdaptiveDescription {
                 error: 1e-4,
                 max_samples,
             });
         });
         let expected = reference(&packed);
-        for way in exact_modes() {
-            assert_eq!(differing(&render(&packed, way), &expected), 0, "{way:?}");
+        for mode in exact_modes() {
+            assert_eq!(differing(&render(&packed, mode), &expected), 0, "{mode:?}");
         }
         expected.sample_counts().collect::<Vec<u32>>()
     };
-    // Without neighbors the variance is unknown.
+    // Without neighbors, the variance is unknown.
     assert_eq!(counts(1, 1, 4, 50), [50]);
     assert!(counts(7, 1, 4, 50).iter().all(|n| [16, 32, 50].contains(n)));
-    // The maximum limits the pilot pass.
+    // The maximum also limits the number of pilot samples.
     assert_eq!(counts(3, 3, 1, 2), [2; 9]);
     assert!(counts(5, 5, 1, 17).iter().all(|n| [16, 17].contains(n)));
 }
@@ -214,9 +214,11 @@ fn minimum_image_and_pilot_sizes() {
 /// pixels.
 #[test]
 fn effective_samples_limit_the_doublings() {
-    let wanted = |looks: [f32; 4], error: f32, most| samples_wanted(Vec4::from(looks), 16, error * error, most);
-    // 4 pixels with a standard error of 0.04: 4 times the samples halve it.
-    let certain = [4.0 * 0.04 * 0.04, 1000.0, 1.0, 4.0];
+    let count_for = |pilot_sums: [f32; 4], error: f32, max_count| {
+        samples_wanted(Vec4::from(pilot_sums), 16, error * error, max_count)
+    };
+    // 4 pixels with a standard error of 0.04: 4 times the samples halve the error.
+    let no_limit = [4.0 * 0.04 * 0.04, 1000.0, 1.0, 4.0];
     for (error, count) in [
         (0.041, 16),
         (0.021, 64),
@@ -225,14 +227,14 @@ fn effective_samples_limit_the_doublings() {
         (0.001, 1000),
         (0.0, 1000),
     ] {
-        assert_eq!(wanted(certain, error, 1000), count, "{error}");
+        assert_eq!(count_for(no_limit, error, 1000), count, "{error}");
     }
-    // Effective samples limit the doublings: 2 permit one, 6 permit two.
+    // Effective samples limit the doublings: 2 permit one doubling, 6 permit two.
     for (samples, count) in [(1.0, 16), (1.9, 16), (2.0, 32), (5.9, 32), (6.0, 64), (30.0, 256)] {
-        assert_eq!(wanted([1.0, samples, samples, 4.0], 0.001, 1000), count, "{samples}");
+        assert_eq!(count_for([1.0, samples, samples, 4.0], 0.001, 1000), count, "{samples}");
     }
-    assert_eq!(wanted([0.0, 0.0, 0.0, 4.0], 0.001, 1000), 16);
-    assert_eq!(wanted([0.0, 0.0, 0.0, 0.0], 0.001, 1000), 1000);
+    assert_eq!(count_for([0.0, 0.0, 0.0, 4.0], 0.001, 1000), 16);
+    assert_eq!(count_for([0.0, 0.0, 0.0, 0.0], 0.001, 1000), 1000);
 }
 
 #[test]
@@ -240,9 +242,11 @@ fn moments_are_the_variance_of_the_samples() {
     let packed = adaptive(Pattern::Random, 0.01, 48);
     let film = reference(&packed);
     for (pixel, sum) in film.sums.iter().enumerate() {
-        let at = UVec2::new(pixel as u32 % 41, pixel as u32 / 41);
+        let position = UVec2::new(pixel as u32 % 41, pixel as u32 / 41);
         let n = film.sample_count(pixel);
-        let values: Vec<_> = (0..n).map(|i| pixel_radiance(&packed, at, i).0.as_dvec4()).collect();
+        let values: Vec<_> = (0..n)
+            .map(|i| pixel_radiance(&packed, position, i).0.as_dvec4())
+            .collect();
         let mean = values.iter().map(|v| v.truncate()).sum::<glam::DVec3>() / f64::from(n);
         let deviations: glam::DVec3 = values
             .iter()
@@ -253,7 +257,7 @@ fn moments_are_the_variance_of_the_samples() {
         let error = (found.as_dvec3() - expected).abs();
         assert!(
             (error.cmple(expected * 1e-3 + 1e-9)).all(),
-            "{at}: {found}, not {expected}"
+            "{position}: {found}, expected {expected}"
         );
         assert_eq!(found.to_array(), film.variance(pixel));
     }
@@ -268,19 +272,22 @@ fn errors_are_scaled_by_the_slope_of_the_displayed_value() {
         let slope = |v: f64| (displayed(v * 1.0001) - displayed(v * 0.9999)) / (v * 2e-4);
         let expected = slope(v.max(0.01)).powi(2);
         let found = f64::from(display_slope_squared(v as f32));
-        assert!((found / expected - 1.0).abs() < 1e-5, "{v}: {found}, not {expected}");
+        assert!(
+            (found / expected - 1.0).abs() < 1e-5,
+            "{v}: {found}, expected {expected}"
+        );
     }
-    // Below 0.01 and above 1 the slope is clamped.
+    // Below 0.01 and above 1, the slope is clamped.
     assert_eq!(display_slope_squared(-0.5), display_slope_squared(0.01));
     assert_eq!(display_slope_squared(7.0), display_slope_squared(1.0));
-    // The mean over channels, each with its slope.
+    // The mean over the channels, each scaled by the slope of the channel.
     let (sum, moments) = (Vec4::new(1.0, 2.0, 4.0, 8.0), Vec4::new(0.1, 0.4, 0.2, 8.0));
     let [x, y, z] = [(0.125, 0.1), (0.25, 0.4), (0.5, 0.2)].map(|(mean, moment): (f64, f64)| {
         let slope = displayed(mean) / (2.2 * mean);
         slope * slope * moment / 8.0 / 7.0
     });
     let (found, expected) = (f64::from(display_variance(sum, moments)), (x + y + z) / 3.0);
-    assert!((found / expected - 1.0).abs() < 1e-5, "{found}, not {expected}");
+    assert!((found / expected - 1.0).abs() < 1e-5, "{found}, expected {expected}");
 }
 
 #[test]
@@ -295,8 +302,8 @@ fn weighted_moments_of_a_constant_are_zero() {
         moments.truncate().abs().max_element() < 1e-12 && moments.w == 7.0,
         "{moments}"
     );
-    let other = moments_with(moments, sum, Vec4::new(0.3, 0.2, 0.6, 1.0));
-    assert!(other.z > 1e-3);
+    let with_deviation = moments_with(moments, sum, Vec4::new(0.3, 0.2, 0.6, 1.0));
+    assert!(with_deviation.z > 1e-3);
 }
 
 #[test]
@@ -306,10 +313,10 @@ fn the_estimate_is_an_upper_bound_on_average() {
     let truth = reference(&cornell(Pattern::Sobol, 2048, |description| {
         description.render.seed = 9
     }));
-    let display = |v: f32| f64::from(v.clamp(0.0, 1.0)).powf(1.0 / 2.2);
+    let displayed = |v: f32| f64::from(v.clamp(0.0, 1.0)).powf(1.0 / 2.2);
     let mut squares = 0.0;
     for (a, b) in film.means().zip(truth.means()) {
-        squares += (0..3).map(|c| (display(a[c]) - display(b[c])).powi(2)).sum::<f64>();
+        squares += (0..3).map(|c| (displayed(a[c]) - displayed(b[c])).powi(2)).sum::<f64>();
     }
     let error = (squares / 3.0 / film.sums.len() as f64).sqrt();
     assert!((0.0005..0.02).contains(&error), "{error}");
@@ -324,10 +331,10 @@ fn invalid_adaptive_settings_are_rejected() {
         )
     };
     let message = |render: &str, overrides: &Overrides| match Scene::parse_with(&text(render), "s.toml", overrides) {
-        Ok(_) => "sound".to_string(),
+        Ok(_) => "valid".to_string(),
         Err(error) => error.to_string(),
     };
-    let none = Overrides::default();
+    let no_overrides = Overrides::default();
     let sobol = "pixel_samples = { pattern = 'sobol', count = 8 }\n";
     for (render, expected) in [
         (
@@ -349,9 +356,9 @@ fn invalid_adaptive_settings_are_rejected() {
         ),
         (
             &format!("{sobol}adaptive = {{ error = 0.1, max_samples = 8 }}"),
-            "sound",
+            "valid",
         ),
-        (&format!("{sobol}adaptive = {{ error = 0 }}"), "sound"),
+        (&format!("{sobol}adaptive = {{ error = 0 }}"), "valid"),
         ("filter = { type = 'lanczos' }", "s.toml:4: render.filter.type: "),
         ("filter = { radius = 1 }", "s.toml:4: render.filter"),
         (
@@ -362,7 +369,7 @@ fn invalid_adaptive_settings_are_rejected() {
             "filter = { type = 'box', radius = 17 }",
             "s.toml:4: render.filter.radius: 17 must be from 0.01 to 16",
         ),
-        ("filter = { type = 'blackman_harris' }", "sound"),
+        ("filter = { type = 'blackman_harris' }", "valid"),
         (
             "pixel_samples = { pattern = 'jittered', count = 8 }",
             "s.toml:4: render.pixel_samples.count: 8 must be a square",
@@ -371,23 +378,23 @@ fn invalid_adaptive_settings_are_rejected() {
             "pixel_samples = { pattern = 'rotated_grid', count = 8 }",
             "s.toml:4: render.pixel_samples.count: 8 must be a",
         ),
-        ("pixel_samples = { pattern = 'halton', count = 8 }", "sound"),
+        ("pixel_samples = { pattern = 'halton', count = 8 }", "valid"),
     ] {
         assert!(
-            message(render, &none).starts_with(expected),
+            message(render, &no_overrides).starts_with(expected),
             "{render}: {}",
-            message(render, &none)
+            message(render, &no_overrides)
         );
     }
-    let option = |error, pattern| Overrides {
+    let overrides = |error, pattern| Overrides {
         adaptive: Some(error),
         pixel_pattern: pattern,
         ..Overrides::default()
     };
-    let grid = "adaptive: the pattern of pixel_samples, \"grid\", cannot add samples";
-    assert!(message("", &option(0.1, None)).starts_with(grid));
-    assert!(message("", &option(-0.1, Some(Pattern::Sobol))).starts_with("adaptive: -0.1 must be from 0 to 1"));
-    let scene = Scene::parse_with(&text(""), "s.toml", &option(0.1, Some(Pattern::Sobol))).expect("a valid scene");
+    let grid_message = "adaptive: the pattern of pixel_samples, \"grid\", cannot add samples";
+    assert!(message("", &overrides(0.1, None)).starts_with(grid_message));
+    assert!(message("", &overrides(-0.1, Some(Pattern::Sobol))).starts_with("adaptive: -0.1 must be from 0 to 1"));
+    let scene = Scene::parse_with(&text(""), "s.toml", &overrides(0.1, Some(Pattern::Sobol))).expect("a valid scene");
     let adaptive = scene.render.adaptive.expect("adaptive sampling");
     assert_eq!((adaptive.error, adaptive.max_samples), (0.1, 256));
 }

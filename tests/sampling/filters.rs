@@ -27,36 +27,36 @@ fn filtered_scene(kind: PixelFilterKind, radius: f64) -> Packed {
     })
 }
 
-fn checked(kind: PixelFilterKind, radius: f64) -> wgray::scene::PixelFilter {
+fn valid_filter(kind: PixelFilterKind, radius: f64) -> wgray::scene::PixelFilter {
     let mut description = scenes::scene("cornell.toml");
     let radius = Some(radius);
     description.render.filter = PixelFilterDescription { kind, radius };
-    description.validate().expect("a sound scene").render.filter
+    description.validate().expect("a valid scene").render.filter
 }
 
 /// Returns the integral of |x|^power times a filter of radius 1, computed with the midpoint rule.
 fn moment(kind: PixelFilterKind, power: i32) -> f64 {
     let steps = 200_000;
-    let filter = checked(kind, 1.0);
-    let at = |i: i32| (f64::from(i) + 0.5) / f64::from(steps);
+    let filter = valid_filter(kind, 1.0);
+    let position = |i: i32| (f64::from(i) + 0.5) / f64::from(steps);
     (0..steps)
-        .map(|i| 2.0 * height(filter, at(i)) * at(i).powi(power))
+        .map(|i| 2.0 * height(filter, position(i)) * position(i).powi(power))
         .sum::<f64>()
         / f64::from(steps)
 }
 
 #[test]
 fn filters_have_their_integrals() {
-    // Mitchell's filter has unit integral at radius 2; the window's cosines integrate to 0.
-    let gaussian = 0.833_287 - 2.0 * (-4.5f64).exp(); // sqrt(2 pi) / 3 erf(3 / sqrt 2), less the offset
+    // Mitchell's filter has unit integral at radius 2. The cosines of the Blackman-Harris window integrate to 0.
+    let gaussian = 0.833_287 - 2.0 * (-4.5f64).exp(); // sqrt(2 pi) / 3 erf(3 / sqrt 2), minus the offset
     let expected = [2.0, 1.0, gaussian, 0.5, 2.0 * 0.35875];
     for (kind, expected) in KINDS.into_iter().zip(expected) {
         let found = moment(kind, 0);
         let error = (found - expected).abs();
-        assert!(error < 1e-5, "{kind:?}: {found}, not {expected}");
+        assert!(error < 1e-5, "{kind:?}: {found}, expected {expected}");
     }
-    // With B = C = 1/3 it sums to 1 over integer offsets.
-    let mitchell = checked(PixelFilterKind::Mitchell, 2.0);
+    // Mitchell's filter with B = C = 1/3 sums to 1 over integer offsets.
+    let mitchell = valid_filter(PixelFilterKind::Mitchell, 2.0);
     for i in 0..10 {
         let sum: f64 = (-3..=3)
             .map(|k| height(mitchell, f64::from(k) + f64::from(i) / 10.0))
@@ -82,7 +82,7 @@ fn table_moment(table: &[Vec4], power: i32) -> f64 {
 fn tables_have_the_moments_of_their_filters() {
     for kind in KINDS {
         for radius in [0.3, 1.0, 2.5] {
-            let table = table(checked(kind, radius));
+            let table = table(valid_filter(kind, radius));
             assert_eq!(table.len(), FILTER_BINS_MAX as usize);
             assert_eq!(
                 (table[0].x, table[FILTER_BINS_MAX as usize - 1].y),
@@ -98,7 +98,7 @@ fn tables_have_the_moments_of_their_filters() {
                 let found = table_moment(&table, power);
                 assert!(
                     (found - expected).abs() < 3e-3 * radius.powi(power),
-                    "{kind:?} of radius {radius}, moment {power}: {found}, not {expected}"
+                    "{kind:?} of radius {radius}, moment {power}: {found}, expected {expected}"
                 );
                 // Control: another filter.
                 for other in KINDS.into_iter().filter(|other| *other != kind) {
@@ -119,18 +119,18 @@ fn positions_and_weights_have_the_moments_of_their_filters() {
         let packed = filtered_scene(kind, 1.25);
         let (mut weights, mut x2, mut y4) = (0.0, 0.0, 0.0);
         for i in 0..1 << 14 {
-            let at = filtered(&packed, sobol_sample(i, [1, 2].into())).as_dvec3();
-            let (x, y) = (at.x - 0.5, at.y - 0.5);
+            let sample = filtered(&packed, sobol_sample(i, [1, 2].into())).as_dvec3();
+            let (x, y) = (sample.x - 0.5, sample.y - 0.5);
             assert!(x.abs() <= 1.25001 && y.abs() <= 1.25001);
-            weights += at.z;
-            x2 += at.z * x.powi(2);
-            y4 += at.z * y.powi(4);
+            weights += sample.z;
+            x2 += sample.z * x.powi(2);
+            y4 += sample.z * y.powi(4);
         }
         for (found, power) in [(x2 / weights, 2), (y4 / weights, 4)] {
             let expected = moment(kind, power) / moment(kind, 0) * 1.25f64.powi(power);
             assert!(
                 (found - expected).abs() < 6e-3,
-                "{kind:?}, {power}: {found}, not {expected}"
+                "{kind:?}, {power}: {found}, expected {expected}"
             );
         }
     }
@@ -143,13 +143,13 @@ fn the_box_filter_needs_no_table_and_a_table_gives_equal_samples() {
         (plain.specialization.filter_bins, plain.sampling.filter_table.len()),
         (0, 0)
     );
-    let mut by_table = filtered_scene(PixelFilterKind::Box, 0.51);
-    by_table.sampling.filter_table = table(checked(PixelFilterKind::Box, 0.5));
-    assert_eq!(by_table.specialization.filter_bins, FILTER_BINS_MAX);
+    let mut with_table = filtered_scene(PixelFilterKind::Box, 0.51);
+    with_table.sampling.filter_table = table(valid_filter(PixelFilterKind::Box, 0.5));
+    assert_eq!(with_table.specialization.filter_bins, FILTER_BINS_MAX);
     for i in 0..1000 {
         let u = sobol_sample(i, [5, 6].into());
-        let (plain, by_table) = (filtered(&plain, u), filtered(&by_table, u));
-        assert!((plain - by_table).length() < 2e-6, "{plain} {by_table}");
+        let (plain, with_table) = (filtered(&plain, u), filtered(&with_table, u));
+        assert!((plain - with_table).length() < 2e-6, "{plain} {with_table}");
     }
 }
 

@@ -10,7 +10,7 @@ use wgray_render::records::Packed;
 
 use crate::{patterns, scenes};
 
-/// Returns a small `cornell.toml` with a pattern for all samples, after `change`.
+/// Returns a small `cornell.toml` with one pattern for pixel and light samples, modified by `change`.
 fn cornell(pattern: Pattern, count: u32, change: impl FnOnce(&mut Description)) -> Packed {
     let mut description = scenes::scene("cornell.toml");
     (description.image.width, description.image.height) = (41, 33);

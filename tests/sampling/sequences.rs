@@ -41,6 +41,7 @@ const SOBOL_POINTS: [[u32; 2]; 32] = [
     [17, 1],
     [1, 17],
 ];
+
 /// Returns the Sobol' index of scipy's point `i`; scipy generates points in Gray code order.
 fn gray(i: u32) -> u32 {
     i ^ (i >> 1)
@@ -55,7 +56,7 @@ fn keys(count: u32) -> impl Iterator<Item = UVec2> {
     (0..count).map(|i| sample_key(UVec2::new(i % 13, i / 13), 3, i % 5))
 }
 
-fn whole(x: f32) -> u32 {
+fn to_24_bits(x: f32) -> u32 {
     (x * (1 << 24) as f32) as u32
 }
 
@@ -92,11 +93,14 @@ fn the_second_sobol_coordinate_is_the_product_with_pascals_matrix() {
 /// Returns true if 2^m points are a (0, m, 2)-net in base 2: one in each elementary interval.
 fn is_net(points: &[Vec2]) -> bool {
     let m = points.len().ilog2();
-    (0..=m).all(|across| {
+    (0..=m).all(|column_bits| {
         let mut occupied = vec![false; points.len()];
         for p in points {
-            let (column, row) = (whole(p.x) >> (24 - across), whole(p.y) >> (24 - (m - across)));
-            occupied[((column << (m - across)) | row) as usize] = true;
+            let (column, row) = (
+                to_24_bits(p.x) >> (24 - column_bits),
+                to_24_bits(p.y) >> (24 - (m - column_bits)),
+            );
+            occupied[((column << (m - column_bits)) | row) as usize] = true;
         }
         occupied.into_iter().all(|occupied| occupied)
     })
@@ -108,7 +112,7 @@ fn scrambled_sobol_points_are_nets() {
         for m in 0..=8 {
             for run in [0, 1, 5, 1000] {
                 let points: Vec<Vec2> = (run << m..(run + 1) << m).map(|i| sobol_sample(i, key)).collect();
-                assert!(is_net(&points), "run {run} of 2^{m}, key {key}");
+                assert!(is_net(&points), "run {run} of 2^{m} points, key {key}");
             }
         }
     }
@@ -130,11 +134,11 @@ fn scrambled_sobol_points_are_nets() {
 fn light_samples_continue_the_sequence_of_the_previous_pixel_sample() {
     for key in keys(5) {
         for pattern in [SOBOL, HALTON] {
-            let one: Vec<Vec2> = (0..64).map(|i| sample_square(pattern, 64, i, 0, key)).collect();
+            let single: Vec<Vec2> = (0..64).map(|i| sample_square(pattern, 64, i, 0, key)).collect();
             let groups: Vec<Vec2> = (0..64)
                 .map(|i| sample_square(pattern, 16, i % 16, i / 16, key))
                 .collect();
-            assert_eq!(one, groups);
+            assert_eq!(single, groups);
         }
     }
 }
@@ -210,8 +214,8 @@ fn star_discrepancy(points: &[Vec2]) -> f64 {
         let (open, closed) = (count(&|x| x < a), count(&|x| x <= a));
         for &b in &ys {
             let below = open.partition_point(|y| *y < b) as f64 / n;
-            let at = closed.partition_point(|y| *y <= b) as f64 / n;
-            worst = worst.max(a * b - below).max(at - a * b);
+            let covered = closed.partition_point(|y| *y <= b) as f64 / n;
+            worst = worst.max(a * b - below).max(covered - a * b);
         }
     }
     worst
@@ -228,7 +232,7 @@ fn discrepancies(pattern: u32, side: u32, count: u32) -> Vec<f64> {
 
 #[test]
 fn star_discrepancies_keep_their_bounds() {
-    let most = |values: Vec<f64>| values.into_iter().fold(0.0, f64::max);
+    let max = |values: Vec<f64>| values.into_iter().fold(0.0, f64::max);
     let mean = |values: Vec<f64>| values.iter().sum::<f64>() / values.len() as f64;
     let n = 32.0;
     // Cell centers: 1/n - 1/(4 n^2), attained by the box without the last column and row.
@@ -238,12 +242,12 @@ fn star_discrepancies_keep_their_bounds() {
             .collect::<Vec<_>>(),
     );
     assert!((grid - (1.0 / n - 0.25 / (n * n))).abs() < 1e-6, "{grid}");
-    // One point per cell: each of the 2n - 1 cells that a box cuts contributes at most one.
-    assert!(most(discrepancies(JITTERED, 32, 1024)) <= (2.0 * n - 1.0) / (n * n));
+    // One point per cell: each of the 2n - 1 cells on the boundary of a box contributes at most one point.
+    assert!(max(discrepancies(JITTERED, 32, 1024)) <= (2.0 * n - 1.0) / (n * n));
     // A (0, m, 2)-net in base 2: (m + 1) / 2^m (Niederreiter, "Random Number Generation and Quasi-Monte Carlo Methods",
     // 1992, theorem 4.6).
     let bound = 11.0 / 1024.0;
-    let sobol = most(discrepancies(SOBOL, 1024, 1024));
+    let sobol = max(discrepancies(SOBOL, 1024, 1024));
     assert!(sobol <= bound, "{sobol}");
     // Independent points: about 1/sqrt(N).
     let random = mean(discrepancies(RANDOM, 32, 1024));
@@ -264,20 +268,23 @@ fn a_rotated_grid_has_more_columns_than_the_grid() {
     };
     assert_eq!((columns(GRID, 4), columns(ROTATED_GRID, 4)), (4, 10));
     assert_eq!((columns(GRID, 2), columns(ROTATED_GRID, 2)), (2, 4));
-    // Rotated, and wrapped by whole pixels.
+    // The points are rotated, and wrapped by an integer number of pixels.
     let (c, s) = (2.0 / 5f64.sqrt(), 1.0 / 5f64.sqrt());
     for side in [1, 2, 4, 7, 16] {
         for i in 0..side * side {
             let p = sample_square(ROTATED_GRID, side, i, 0, UVec2::ZERO).as_dvec2() - 0.5;
             assert!(p.x.abs() <= 0.5 && p.y.abs() <= 0.5);
             let q = sample_square(GRID, side, i, 0, UVec2::ZERO).as_dvec2() - 0.5;
-            let moved = glam::DVec2::new(c * q.x - s * q.y, s * q.x + c * q.y) - p;
-            assert!((moved - moved.round()).length() < 1e-6, "{side}, {i}: {moved}");
+            let difference = glam::DVec2::new(c * q.x - s * q.y, s * q.x + c * q.y) - p;
+            assert!(
+                (difference - difference.round()).length() < 1e-6,
+                "{side}, {i}: {difference}"
+            );
         }
     }
 }
 
-/// Returns the chi-square of 8 x 8 cells, less its mean, in standard deviations.
+/// Returns the deviation of the chi-square of 8 x 8 cells from its mean, in standard deviations.
 fn dependence(pairs: impl Iterator<Item = (f32, f32)>) -> f64 {
     let mut cells = [0.0; 64];
     for (a, b) in pairs {
@@ -291,24 +298,24 @@ fn dependence(pairs: impl Iterator<Item = (f32, f32)>) -> f64 {
 #[test]
 fn samples_of_pixels_and_lights_are_independent() {
     for pattern in [RANDOM, HALTON, SOBOL] {
-        let at = |pixel: u32, purpose, sample: u32| {
+        let sample_at = |pixel: u32, purpose, sample: u32| {
             let key = sample_key(UVec2::new(pixel % 64, pixel / 64), 1, purpose);
             sample_square(pattern, 16, sample % 16, sample / 16, key)
         };
         // Pairs of coordinates over pixels and over samples, and pairs of adjacent pixels.
-        let pixels = dependence((0..4096).map(|i| (at(i, 0, 5).x, at(i, 1, 5).x)));
-        let samples = dependence((0..4096).map(|i| (at(7, 0, i).x, at(7, 1, i).x)));
-        let crossed = dependence((0..4096).map(|i| (at(7, 0, i).y, at(7, 2, i).x)));
-        let neighbours = dependence((0..4096).map(|i| (at(i, 0, 3).x, at(i + 1, 0, 3).x)));
-        for (what, found) in [pixels, samples, crossed, neighbours].into_iter().enumerate() {
-            assert!(found < 6.0, "pattern {pattern}, pairs {what}: {found}");
+        let pixels = dependence((0..4096).map(|i| (sample_at(i, 0, 5).x, sample_at(i, 1, 5).x)));
+        let samples = dependence((0..4096).map(|i| (sample_at(7, 0, i).x, sample_at(7, 1, i).x)));
+        let crossed = dependence((0..4096).map(|i| (sample_at(7, 0, i).y, sample_at(7, 2, i).x)));
+        let neighbors = dependence((0..4096).map(|i| (sample_at(i, 0, 3).x, sample_at(i + 1, 0, 3).x)));
+        for (pair, found) in [pixels, samples, crossed, neighbors].into_iter().enumerate() {
+            assert!(found < 6.0, "pattern {pattern}, pairs {pair}: {found}");
         }
     }
-    // Control: equal order with different scrambles.
-    let one_order = |purpose| {
+    // Control: the same order with different scrambles.
+    let in_one_order = |purpose| {
         let key = sample_key(UVec2::ZERO, 1, purpose);
         move |i: u32| i.reverse_bits().wrapping_add(key.x) as f32 / 4_294_967_296.0 * 0.999_999
     };
-    let (a, b) = (one_order(0), one_order(1));
+    let (a, b) = (in_one_order(0), in_one_order(1));
     assert!(dependence((0..4096).map(|i| (a(i), b(i)))) > 100.0);
 }

@@ -35,10 +35,11 @@ fn dots(spacing: u32, sampling: Sampling) -> Packed {
     let mut content = String::new();
     for i in 0..size / spacing {
         for j in 0..size / spacing {
-            // Unrelated to the pixel grid.
+            // The positions are unrelated to the pixel grid.
             let [x, y] = [0.754877666, 0.569840291].map(|a: f64| (0.5 + a * f64::from(i * 31 + j * 17)).fract());
-            let at = |cell: u32, x: f64| f64::from(spacing) * f64::from(cell) + 0.1 + x * (f64::from(spacing) - 0.2);
-            let [x, y] = [at(i, x), at(j, y)].map(|x| x - f64::from(size) / 2.0);
+            let coordinate =
+                |cell: u32, x: f64| f64::from(spacing) * f64::from(cell) + 0.1 + x * (f64::from(spacing) - 0.2);
+            let [x, y] = [coordinate(i, x), coordinate(j, y)].map(|x| x - f64::from(size) / 2.0);
             let (material, sizes) = (
                 "material = 'white'",
                 "a = [0.1, 0, 0], b = [0, 0.1, 0], c = [0, 0, 0.1]",
@@ -159,14 +160,18 @@ fn small_rounds_have_the_same_pilot_pass() {
 /// Three standard errors contain 99.7 % of means; the seeds are fixed.
 #[test]
 fn dots_and_lines_keep_their_brightness() {
-    // Discs of radius 0.1 inside of the image.
-    let of_dots = |spacing: u32| std::f64::consts::PI * 0.01 / f64::from(spacing * spacing);
-    let truth_of_lines = brightness(&seeded(lines(uniform(4096)), 99));
-    type Make = Box<dyn Fn(Sampling) -> Packed>;
-    let cases: [(&str, f64, Make); 3] = [
-        ("dots", of_dots(4), Box::new(|sampling| dots(4, sampling))),
-        ("dense dots", of_dots(2), Box::new(|sampling| dots(2, sampling))),
-        ("lines", truth_of_lines, Box::new(lines)),
+    // Disks of radius 0.1 inside the image.
+    let brightness_of_dots = |spacing: u32| std::f64::consts::PI * 0.01 / f64::from(spacing * spacing);
+    let brightness_of_lines = brightness(&seeded(lines(uniform(4096)), 99));
+    type MakeScene = Box<dyn Fn(Sampling) -> Packed>;
+    let cases: [(&str, f64, MakeScene); 3] = [
+        ("dots", brightness_of_dots(4), Box::new(|sampling| dots(4, sampling))),
+        (
+            "dense dots",
+            brightness_of_dots(2),
+            Box::new(|sampling| dots(2, sampling)),
+        ),
+        ("lines", brightness_of_lines, Box::new(lines)),
     ];
     for (name, truth, make) in &cases {
         for (round, error) in SETTINGS {
@@ -178,23 +183,23 @@ fn dots_and_lines_keep_their_brightness() {
             let (found, deviation) = estimate(&films.iter().map(brightness).collect::<Vec<_>>());
             assert!(
                 (found - truth).abs() < 0.003 * truth + 3.0 * deviation,
-                "{name}, {sampling:?}: {found} +- {deviation}, not {truth}"
+                "{name}, {sampling:?}: {found} +- {deviation}, expected {truth}"
             );
         }
     }
-    // Control: stopping after 16 black samples.
+    // Control: a pixel stops after 16 black samples.
     let (few, many) = (dots(2, uniform(16)), dots(2, uniform(256)));
-    let own = (0..24).map(|seed| {
+    let estimates = (0..24).map(|seed| {
         let (few, many) = (seeded(few.clone(), seed), seeded(many.clone(), seed));
-        let chosen = few
+        let kept_sums = few
             .sums
             .iter()
             .zip(&many.sums)
             .map(|(few, many)| if few.x == 0.0 { few } else { many });
-        chosen.map(|sum| f64::from(mean(*sum)[0])).sum::<f64>() / few.sums.len() as f64
+        kept_sums.map(|sum| f64::from(mean(*sum)[0])).sum::<f64>() / few.sums.len() as f64
     });
-    let (found, deviation) = estimate(&own.collect::<Vec<_>>());
-    let truth = of_dots(2);
+    let (found, deviation) = estimate(&estimates.collect::<Vec<_>>());
+    let truth = brightness_of_dots(2);
     assert!(found + 3.0 * deviation < 0.8 * truth, "{found} +- {deviation}");
 }
 
@@ -204,21 +209,21 @@ fn uniform(round: u32) -> Sampling {
 
 /// Returns the RMS error of uniform sampling, interpolated between powers of two with a power law.
 fn error_of_uniform(make: &dyn Fn(Sampling) -> Packed, truth: &[f64], seeds: u32, samples: f64) -> f64 {
-    let below = samples.log2().floor().min(8.0);
-    let square = |count: f64| {
+    let lower = samples.log2().floor().min(8.0);
+    let mean_square_error = |count: f64| {
         let packed = make(uniform(count.exp2() as u32));
-        let of_seed = |seed| mean_square(&displayed(&seeded(packed.clone(), seed)), truth);
-        (0..seeds).map(of_seed).sum::<f64>() / f64::from(seeds)
+        let error_of_seed = |seed| mean_square(&displayed(&seeded(packed.clone(), seed)), truth);
+        (0..seeds).map(error_of_seed).sum::<f64>() / f64::from(seeds)
     };
-    let (a, b) = (square(below), square(below + 1.0));
-    (a.ln() + (b / a).ln() * (samples.log2() - below)).exp().sqrt()
+    let (a, b) = (mean_square_error(lower), mean_square_error(lower + 1.0));
+    (a.ln() + (b / a).ln() * (samples.log2() - lower)).exp().sqrt()
 }
 
 #[test]
 fn adaptive_errors_do_not_exceed_errors_of_uniform_sampling() {
     let seeds = 4;
-    type Make = Box<dyn Fn(Sampling) -> Packed>;
-    let cases: [(&str, Make); 5] = [
+    type MakeScene = Box<dyn Fn(Sampling) -> Packed>;
+    let cases: [(&str, MakeScene); 5] = [
         ("dots", Box::new(|sampling| dots(4, sampling))),
         ("dense dots", Box::new(|sampling| dots(2, sampling))),
         ("lines", Box::new(lines)),

@@ -41,14 +41,14 @@ fn scenes(folder: &Path) -> Vec<(String, Packed)> {
     scenes
 }
 
-/// Returns smooth meshes with normal maps: coordinates around, and mirrored.
+/// Returns smooth meshes with normal maps: with cyclic, and with mirrored texture coordinates.
 fn meshes(folder: &Path) -> String {
-    let around = Sheet::torus(12, 8);
-    let mut mirrored = around.clone();
+    let cyclic = Sheet::torus(12, 8);
+    let mut mirrored = cyclic.clone();
     for [u, v] in &mut mirrored.uvs {
         (*u, *v) = ((*u - 0.5).abs() * 3.0, *v + *u);
     }
-    for (name, sheet) in [("around.obj", around), ("mirrored.obj", mirrored)] {
+    for (name, sheet) in [("cyclic.obj", cyclic), ("mirrored.obj", mirrored)] {
         std::fs::write(folder.join(name), sheet.obj()).unwrap();
     }
     let head = every_shape("ewa", "repeat");
@@ -56,7 +56,7 @@ fn meshes(folder: &Path) -> String {
         "{head}
         [[shapes]]
         type = 'mesh'
-        file = 'around.obj'
+        file = 'cyclic.obj'
         material = 'float'
         scale = [0.5, -0.7, 0.4]
         rotate = [70, 20, 10]
@@ -156,7 +156,7 @@ fn images_are_the_same_on_gpu_and_cpu() {
         return;
     }
     let folder = tempfile::tempdir().unwrap();
-    let odd = WorkSplit {
+    let small_dispatches = WorkSplit {
         band_pixels: 700,
         samples_per_dispatch: Some(1),
         rows_per_dispatch: Some(3),
@@ -164,18 +164,21 @@ fn images_are_the_same_on_gpu_and_cpu() {
     for (name, scene) in scenes(folder.path()) {
         let expected = reference(&scene);
         let colors: BTreeSet<_> = expected.means().map(|pixel| pixel.map(f32::to_bits)).collect();
-        assert!(colors.len() > 100, "{name} shows nothing");
-        for (mode, cut) in [(RenderMode::Baked, WorkSplit::default()), (RenderMode::Buffers, odd)] {
-            let found = film(&mut *backend(&scene, mode), &scene, whole(&scene), &cut);
+        assert!(colors.len() > 100, "{name}: the image is almost constant");
+        for (mode, work_split) in [
+            (RenderMode::Baked, WorkSplit::default()),
+            (RenderMode::Buffers, small_dispatches),
+        ] {
+            let found = film(&mut *backend(&scene, mode), &scene, whole(&scene), &work_split);
             let problem = compare(mode, &scene, &found, &expected);
             assert!(problem.is_ok(), "{name}, {mode:?}: {}", problem.unwrap_err());
         }
     }
 }
 
-/// Negative control: without ray differentials.
+/// Negative control: a render without ray differentials.
 #[test]
-fn a_wrong_footprint_is_noticed() {
+fn a_wrong_footprint_is_detected() {
     let project = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
     let text = std::fs::read_to_string(project.join("textures.toml")).unwrap();
     let mut scene = scene(
@@ -184,10 +187,17 @@ fn a_wrong_footprint_is_noticed() {
             .replace("height = 300", "height = 45"),
         &project,
     );
-    let right = cpu_picture(&scene);
+    let expected = cpu_picture(&scene);
     scene.specialization.differentials = 0;
-    let wrong = cpu_picture(&scene);
-    assert!(right.iter().zip(&wrong).filter(|(a, b)| a != b).count() > 100);
+    let without_differentials = cpu_picture(&scene);
+    assert!(
+        expected
+            .iter()
+            .zip(&without_differentials)
+            .filter(|(a, b)| a != b)
+            .count()
+            > 100
+    );
 }
 
 #[test]
@@ -196,20 +206,20 @@ fn texels_in_several_buffers_give_the_same_image() {
     let folder = tempfile::tempdir().unwrap();
     let scenes = scenes(folder.path());
     let (_, scene) = scenes.iter().find(|(name, _)| name == "ewa repeat").unwrap();
-    let mut small = device.clone();
-    small.info.largest_binding = 4096;
+    let mut small_device = device.clone();
+    small_device.info.largest_binding = 4096;
     assert!(
         scene.textures.texels.len() > 3 * 1024,
         "the texels fit in fewer buffers"
     );
-    let new = |small: &Device, baked: bool| {
+    let new_gpu = |small_device: &Device, baked: bool| {
         let exact = device.info.exact.then_some(Rounding::Device);
-        Gpu::new(small, scene, sources::shaders(), Options { exact, baked })
+        Gpu::new(small_device, scene, sources::shaders(), Options { exact, baked })
     };
     let expected = reference(scene);
     for (mode, baked) in [(RenderMode::Baked, true), (RenderMode::Buffers, false)] {
         let found = film(
-            &mut new(&small, baked).unwrap(),
+            &mut new_gpu(&small_device, baked).unwrap(),
             scene,
             whole(scene),
             &WorkSplit::default(),
@@ -217,8 +227,8 @@ fn texels_in_several_buffers_give_the_same_image() {
         let problem = compare(mode, scene, &found, &expected);
         assert!(problem.is_ok(), "{mode:?}: {}", problem.unwrap_err());
     }
-    small.info.storage_buffers = 9;
-    let error = new(&small, false).err().unwrap().to_string();
+    small_device.info.storage_buffers = 9;
+    let error = new_gpu(&small_device, false).err().unwrap().to_string();
     assert!(
         error.contains("the scene's images need 0.0 MiB; the limit is 2 x 0.0 MiB"),
         "{error}"

@@ -23,15 +23,15 @@ fn load(folder: &Path, text: &str) -> Result<Scene, String> {
     };
     Scene::load_with(&path, &strict).map_err(|error| {
         let message = error.to_string();
-        let start = format!("{}:", path.display());
+        let prefix = format!("{}:", path.display());
         message
-            .strip_prefix(&start)
+            .strip_prefix(&prefix)
             .unwrap_or_else(|| panic!("{message}"))
             .to_string()
     })
 }
 
-fn files(folder: &Path) {
+fn write_files(folder: &Path) {
     let path = |name: &str| folder.join(name);
     write_png(&path("good.png"), 4, 4, |x, _| [x as u8 * 60; 3]);
     write_exr(&path("good.exr"), 4, 4, |x, _| [x as f32; 3]);
@@ -83,9 +83,13 @@ fn crc32(bytes: &[u8]) -> u32 {
 #[test]
 fn invalid_images_are_rejected() {
     let folder = tempfile::tempdir().unwrap();
-    files(folder.path());
-    for good in ["good.png", "good.exr", "inner/good.png", "inner/../good.png"] {
-        load(folder.path(), &format!("[textures.t]\ntype = 'image'\nfile = '{good}'")).unwrap();
+    write_files(folder.path());
+    for valid in ["good.png", "good.exr", "inner/good.png", "inner/../good.png"] {
+        load(
+            folder.path(),
+            &format!("[textures.t]\ntype = 'image'\nfile = '{valid}'"),
+        )
+        .unwrap();
     }
     for (file, rule) in [
         ("none.png", "cannot be read: "),
@@ -99,25 +103,25 @@ fn invalid_images_are_rejected() {
         ("empty.png", "must be a PNG, JPEG, WebP, KTX2, EXR or HDR file"),
         ("text.png", "must be a PNG, JPEG, WebP, KTX2, EXR or HDR file"),
         ("s.toml", "must be a PNG, JPEG, WebP, KTX2, EXR or HDR file"),
-        ("named.jpg", "must be what its name says; it is a file of type PNG"),
+        ("named.jpg", "must match its extension; it is a file of type PNG"),
         (
             "nan.exr",
-            "has 1 bad texel, at (2, 1); the values of each must be finite, from 0 to 1e6",
+            "has 1 invalid texel, at (2, 1); texel values must be from 0 to 1e6",
         ),
         (
             "negative.exr",
-            "has 1 bad texel, at (3, 3); the values of each must be finite, from 0 to 1e6",
+            "has 1 invalid texel, at (3, 3); texel values must be from 0 to 1e6",
         ),
         (
             "large.png",
-            "(16384 x 16384 texels) needs 1365.3 MiB and the textures before it 0.0 MiB; the limit is 1024.0 MiB",
+            "(16384 x 16384 texels) needs 1365.3 MiB and the previous textures 0.0 MiB; the limit is 1024.0 MiB",
         ),
         ("/etc/hostname", "lies outside of "),
         ("../", "lies outside of "),
     ] {
         let message = load(folder.path(), &format!("[textures.t]\ntype = 'image'\nfile = '{file}'")).unwrap_err();
-        let start = format!("5: textures.t.file: {file:?} {rule}");
-        assert!(message.starts_with(&start), "{message}\n{start}");
+        let prefix = format!("5: textures.t.file: {file:?} {rule}");
+        assert!(message.starts_with(&prefix), "{message}\n{prefix}");
     }
 }
 
@@ -125,9 +129,9 @@ fn invalid_images_are_rejected() {
 #[test]
 fn links_that_leave_the_folder_are_rejected() {
     let folder = tempfile::tempdir().unwrap();
-    let other = tempfile::tempdir().unwrap();
-    write_png(&other.path().join("good.png"), 2, 2, |_, _| [1; 3]);
-    std::os::unix::fs::symlink(other.path().join("good.png"), folder.path().join("link.png")).unwrap();
+    let outside = tempfile::tempdir().unwrap();
+    write_png(&outside.path().join("good.png"), 2, 2, |_, _| [1; 3]);
+    std::os::unix::fs::symlink(outside.path().join("good.png"), folder.path().join("link.png")).unwrap();
     let text = "[textures.t]\ntype = 'image'\nfile = 'link.png'";
     assert!(load(folder.path(), text).unwrap_err().contains("lies outside of"));
     let overrides = Overrides {
@@ -137,7 +141,7 @@ fn links_that_leave_the_folder_are_rejected() {
     Scene::load_with(folder.path().join("s.toml"), &overrides).unwrap();
 }
 
-/// Copies a PNG with another size in its header, checked before decoding.
+/// Copies a PNG with another size in its header, which is checked before decoding.
 fn forge_size(from: &Path, to: &Path, width: u32, height: u32) {
     let mut png = std::fs::read(from).unwrap();
     png[16..20].copy_from_slice(&width.to_be_bytes());
@@ -172,10 +176,10 @@ fn the_total_size_of_images_is_limited() {
     let small = texture("a", "a.png", "nearest");
     assert_eq!(
         error(&(small.clone() + &texture("b", "huge.png", "nearest"))),
-        "10: textures.b.file: \"huge.png\" (16384 x 16384 texels) needs 1024.0 MiB and the textures before it 1.0 MiB; \
+        "10: textures.b.file: \"huge.png\" (16384 x 16384 texels) needs 1024.0 MiB and the previous textures 1.0 MiB; \
          the limit is 1024.0 MiB"
     );
-    // Within the limit, so decoded, and found to be truncated.
+    // The size is within the limit, so the image is decoded, which detects the truncation.
     assert!(error(&texture("b", "fits.png", "ewa")).contains("is damaged or truncated"));
 }
 
@@ -184,26 +188,34 @@ fn files_are_loaded_once() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::create_dir(folder.path().join("inner")).unwrap();
     write_png(&folder.path().join("a.png"), 64, 32, |x, y| [x as u8, y as u8, 7]);
-    let image = |name: &str, file: &str, rest: &str| {
+    let image = |name: &str, file: &str, keys: &str| {
         format!(
-            "[textures.{name}]\ntype = 'image'\nfile = '{file}'\n{rest}\n[materials.{name}]\ntype = 'phong'\n\
+            "[textures.{name}]\ntype = 'image'\nfile = '{file}'\n{keys}\n[materials.{name}]\ntype = 'phong'\n\
              color = {{ texture = '{name}' }}\n"
         )
     };
     let packed = |text: &str| wgray_render::pack::pack(&load(folder.path(), text).unwrap());
-    let alone = packed(&image("a", "a.png", ""));
-    let three = packed(&format!(
+    let one_texture = packed(&image("a", "a.png", ""));
+    let three_textures = packed(&format!(
         "{}{}{}",
         image("a", "a.png", "filter = 'nearest'"),
         image("b", "inner/../a.png", "wrap = 'clamp'"),
         image("c", "./a.png", "filter = 'trilinear'\nencoding = 'srgb'"),
     ));
-    assert_eq!(three.textures.texels, alone.textures.texels);
-    let levels: Vec<u32> = three.textures.records.iter().map(|texture| texture.levels).collect();
-    assert_eq!((three.textures.records.len(), levels), (3, vec![1, 7, 7]));
-    // Other mip levels.
-    let two = packed(&(image("a", "a.png", "") + &image("b", "a.png", "encoding = 'linear'")));
-    assert_eq!(two.textures.texels.len(), 2 * alone.textures.texels.len());
+    assert_eq!(three_textures.textures.texels, one_texture.textures.texels);
+    let levels: Vec<u32> = three_textures
+        .textures
+        .records
+        .iter()
+        .map(|texture| texture.levels)
+        .collect();
+    assert_eq!((three_textures.textures.records.len(), levels), (3, vec![1, 7, 7]));
+    // Another encoding needs other mip levels.
+    let two_encodings = packed(&(image("a", "a.png", "") + &image("b", "a.png", "encoding = 'linear'")));
+    assert_eq!(
+        two_encodings.textures.texels.len(),
+        2 * one_texture.textures.texels.len()
+    );
 }
 
 #[test]
@@ -246,8 +258,8 @@ fn gray_palette_and_alpha_images_are_decoded() {
         assert_eq!(texels(name), texels("rgb"), "{name}");
     }
     // 16-bit channels become floats of the same value.
-    let deep = |x: u32| image::Luma([257 * (60 * x) as u16]);
-    image::ImageBuffer::from_fn(4, 4, |x, _| deep(x))
+    let gray_16_bit = |x: u32| image::Luma([257 * (60 * x) as u16]);
+    image::ImageBuffer::from_fn(4, 4, |x, _| gray_16_bit(x))
         .save(path("deep.png"))
         .unwrap();
     let red = f32::from_bits(texels("deep")[3 + 3]); // the table of three levels comes first
@@ -261,7 +273,7 @@ fn gray_palette_and_alpha_images_are_decoded() {
 #[test]
 fn invalid_values_are_rejected() {
     let folder = tempfile::tempdir().unwrap();
-    files(folder.path());
+    write_files(folder.path());
     let image = "[textures.t]\ntype = 'image'\nfile = 'good.png'\n";
     let checker = "[textures.t]\ntype = 'checker'\neven = [0, 0, 0]\nodd = [1, 1, 1]\n";
     let grid = "[textures.t]\ntype = 'grid'\ncell = [0, 0, 0]\nline = [1, 1, 1]\n";
@@ -311,15 +323,15 @@ fn invalid_values_are_rejected() {
         ),
         (
             format!("{image}scale = [1, 0]"),
-            "6: textures.t.scale: [1, 0] must be nonzero, with magnitudes from 1e-6 to 1e6",
+            "6: textures.t.scale: [1, 0] must have magnitudes from 1e-6 to 1e6",
         ),
         (
             format!("{image}scale = [inf, 1]"),
-            "6: textures.t.scale: [inf, 1] must be nonzero, with magnitudes from 1e-6 to 1e6",
+            "6: textures.t.scale: [inf, 1] must have magnitudes from 1e-6 to 1e6",
         ),
         (
             format!("{image}offset = [0, 2e6]"),
-            "6: textures.t.offset: [0, 2e6] must be finite, from -1e6 to 1e6",
+            "6: textures.t.offset: [0, 2e6] must be from -1e6 to 1e6",
         ),
         (
             format!("{image}rotate = 400"),
@@ -337,11 +349,11 @@ fn invalid_values_are_rejected() {
         ),
         (
             "[textures.t]\ntype = 'constant'\ncolor = [0, -1, 0]".into(),
-            "5: textures.t.color: -1 must be finite, from 0 to 1e6",
+            "5: textures.t.color: -1 must be from 0 to 1e6",
         ),
         (
             checker.replace("[1, 1, 1]", "[1, nan, 1]"),
-            "6: textures.t.odd: nan must be finite, from 0 to 1e6",
+            "6: textures.t.odd: nan must be from 0 to 1e6",
         ),
         (
             format!("{grid}line_width = 0"),
@@ -430,7 +442,7 @@ fn invalid_values_are_rejected() {
 #[test]
 fn the_command_line_ends_with_exit_code_3() {
     let folder = tempfile::tempdir().unwrap();
-    files(folder.path());
+    write_files(folder.path());
     let check = |text: &str| {
         let _ = load(folder.path(), text);
         Command::new(env!("CARGO_BIN_EXE_wgray"))
@@ -439,16 +451,17 @@ fn the_command_line_ends_with_exit_code_3() {
             .output()
             .unwrap()
     };
-    let bad = check("[textures.t]\ntype = 'image'\nfile = 'cut.png'");
-    assert_eq!(bad.status.code(), Some(3), "{bad:?}");
+    let rejected = check("[textures.t]\ntype = 'image'\nfile = 'cut.png'");
+    assert_eq!(rejected.status.code(), Some(3), "{rejected:?}");
     assert!(
-        String::from_utf8_lossy(&bad.stderr).contains("s.toml:5: textures.t.file: \"cut.png\" is damaged or truncated")
+        String::from_utf8_lossy(&rejected.stderr)
+            .contains("s.toml:5: textures.t.file: \"cut.png\" is damaged or truncated")
     );
-    let good = check("[textures.t]\ntype = 'image'\nfile = 'good.png'");
-    assert_eq!(good.status.code(), Some(0), "{good:?}");
+    let accepted = check("[textures.t]\ntype = 'image'\nfile = 'good.png'");
+    assert_eq!(accepted.status.code(), Some(0), "{accepted:?}");
 }
 
-/// Applies to every documented key for a texture channel.
+/// Covers every documented key for a texture channel.
 #[test]
 fn only_images_have_an_alpha_channel() {
     let folder = tempfile::tempdir().unwrap();
@@ -457,19 +470,19 @@ fn only_images_have_an_alpha_channel() {
         .unwrap();
     write_png(&folder.path().join("opaque.png"), 4, 4, |x, _| [x as u8 * 60; 3]);
     let mut keys = Vec::new();
-    for part in PAGE.split("\n### `[materials.NAME]` of type `\"").skip(1) {
-        let (kind, part) = part.split_once('"').unwrap();
-        let part = part.split("\n#").next().unwrap();
-        let needed = match kind {
+    for section in PAGE.split("\n### `[materials.NAME]` of type `\"").skip(1) {
+        let (kind, section) = section.split_once('"').unwrap();
+        let section = section.split("\n#").next().unwrap();
+        let required_keys = match kind {
             "diffuse" => "color = [1, 1, 1]",
             "dielectric" => "ior = 1.5",
             _ => "",
         };
-        for row in part.lines().filter(|row| row.contains("number or texture")) {
+        for row in section.lines().filter(|row| row.contains("number or texture")) {
             let key = row.split('`').nth(1).unwrap();
             let scene = |texture: &str| {
                 let text = format!(
-                    "render.integrator = 'path'\n[materials.m]\ntype = '{kind}'\n{needed}\n\
+                    "render.integrator = 'path'\n[materials.m]\ntype = '{kind}'\n{required_keys}\n\
                      {key} = {{ texture = 't', channel = 'a' }}\n[textures.t]\n{texture}\n"
                 );
                 load(folder.path(), &text)
@@ -503,6 +516,6 @@ fn only_images_have_an_alpha_channel() {
         "dielectric.roughness",
         "principled.alpha",
     ] {
-        assert!(keys.iter().any(|known| known == key), "{key} is not among {keys:?}");
+        assert!(keys.iter().any(|listed| listed == key), "{key} is not among {keys:?}");
     }
 }

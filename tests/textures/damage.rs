@@ -48,16 +48,21 @@ fn an_unreadable_image_is_replaced_by_its_factor() {
     let png = std::fs::read(path("good.png")).unwrap();
     std::fs::write(path("cut.png"), &png[..png.len() / 2]).unwrap();
     std::fs::write(path("empty.png"), b"").unwrap();
-    for (file, why) in [
+    for (file, reason) in [
         ("none.png", "cannot be read: "),
         ("cut.png", "is damaged or truncated: "),
         ("empty.png", "must be a PNG, JPEG, WebP, KTX2, EXR or HDR file"),
     ] {
         let text = MATERIAL.replace("FILE", file);
         let scene = load(folder.path(), &text, false).unwrap();
-        assert_eq!(scene.notes.len(), 1, "not one message for each file: {:?}", scene.notes);
+        assert_eq!(
+            scene.notes.len(),
+            1,
+            "the file needs exactly one message: {:?}",
+            scene.notes
+        );
         let note = &scene.notes[0];
-        assert!(note.message.starts_with(&format!("{file:?} {why}")), "{note}");
+        assert!(note.message.starts_with(&format!("{file:?} {reason}")), "{note}");
         assert!(
             note.message.ends_with("; the texture is replaced by its factor"),
             "{note}"
@@ -74,11 +79,11 @@ fn an_unreadable_image_is_replaced_by_its_factor() {
         assert_eq!(*kind, TextureKind::Constant(DVec3::new(0.5, 0.25, 1.0)));
         assert_eq!((material.emission, material.normal_map), (Color::BLACK, None));
         let error = load(folder.path(), &text, true).unwrap_err();
-        let line = format!("s.toml:13: textures.bumps.file: {file:?} {why}");
+        let line = format!("s.toml:13: textures.bumps.file: {file:?} {reason}");
         assert!(error.contains(&line), "{error}");
     }
-    let sound = load(folder.path(), &MATERIAL.replace("FILE", "good.png"), true).unwrap();
-    assert!(sound.notes.is_empty() && sound.materials[0].normal_map.is_some());
+    let valid = load(folder.path(), &MATERIAL.replace("FILE", "good.png"), true).unwrap();
+    assert!(valid.notes.is_empty() && valid.materials[0].normal_map.is_some());
 }
 
 #[test]
@@ -88,8 +93,8 @@ fn invalid_texels_are_clamped_and_counted() {
     write_exr(&folder.path().join("a.exr"), 6, 3, |x, _| {
         [values[x as usize], 0.5, 0.125]
     });
-    let rule = "the values of each must be finite, from 0 to 1e6";
-    let damage = format!("\"a.exr\" has 12 bad texels, the first at (0, 0); {rule}");
+    let rule = "texel values must be from 0 to 1e6";
+    let damage = format!("\"a.exr\" has 12 invalid texels, the first at (0, 0); {rule}");
     let texture = "[textures.t]\ntype = 'image'\nfile = 'a.exr'\n";
     let environment = "[environment]\nfile = 'a.exr'\n";
     for (text, key) in [(texture, "7: textures.t.file"), (environment, "6: environment.file")] {

@@ -22,7 +22,7 @@ const PERSPECTIVE: &str = "camera = { position = [0.3, -4, 1.6], look_at = [0, 0
 const ORTHOGRAPHIC: &str =
     "camera = { type = 'orthographic', position = [0.3, -4, 1.6], look_at = [0, 0, 0.6], height = 3 }";
 
-fn over_plane(camera: &str, ellipsoid: &str) -> Packed {
+fn ellipsoid_over_plane(camera: &str, ellipsoid: &str) -> Packed {
     let text = format!(
         "image = {{ width = 64, height = 48 }}
         {camera}
@@ -67,7 +67,7 @@ struct Exact<'a> {
     ellipsoid: Option<bool>, // true for glass
 }
 
-/// Rays that end at the plane, after specular bounces at the ellipsoid.
+/// Traces rays that end at the plane, after specular bounces at the ellipsoid.
 impl Exact<'_> {
     fn rows() -> (DVec3, DMat3) {
         let (a, b, c) = (
@@ -78,12 +78,12 @@ impl Exact<'_> {
         (DVec3::new(0.1, 0.2, 0.8), DMat3::from_cols(a, b, c).inverse())
     }
 
-    fn camera(&self, at: DVec2) -> (DVec3, DVec3) {
+    fn camera(&self, pixel: DVec2) -> (DVec3, DVec3) {
         let camera = &self.scene.camera;
         let [right, up, forward] = [camera.right, camera.up, camera.forward].map(Vec3::as_dvec3);
         let (x, y) = (
-            at.x * 2.0 / f64::from(camera.width) - 1.0,
-            1.0 - at.y * 2.0 / f64::from(camera.height),
+            pixel.x * 2.0 / f64::from(camera.width) - 1.0,
+            1.0 - pixel.y * 2.0 / f64::from(camera.height),
         );
         let offset = right * x + up * y;
         if camera.projection == wgray_render::records::ORTHOGRAPHIC {
@@ -100,8 +100,8 @@ impl Exact<'_> {
         [(-b - root) / a, (-b + root) / a].into_iter().find(|t| *t > 1e-4)
     }
 
-    fn end(&self, at: DVec2) -> DVec3 {
-        let (mut o, mut d) = self.camera(at);
+    fn end(&self, pixel: DVec2) -> DVec3 {
+        let (mut o, mut d) = self.camera(pixel);
         for _ in 0..8 {
             let plane = -o.z / d.z;
             let hit = self.ellipsoid.and_then(|glass| Some((glass, Self::ellipsoid(o, d)?)));
@@ -126,9 +126,9 @@ impl Exact<'_> {
 }
 
 /// Returns the first non-specular hit, with its differential and depth.
-fn arrive(scene: &Packed, at: Vec2) -> Option<(Primitive, Surface, HitDifferential, u32)> {
-    let differential = camera_differential(&scene.camera, at, 1.0);
-    let ray = camera_ray(&scene.camera, at);
+fn first_nonspecular_hit(scene: &Packed, pixel: Vec2) -> Option<(Primitive, Surface, HitDifferential, u32)> {
+    let differential = camera_differential(&scene.camera, pixel, 1.0);
+    let ray = camera_ray(&scene.camera, pixel);
     let mut path = Path {
         ray,
         differential,
@@ -149,12 +149,12 @@ fn arrive(scene: &Packed, at: Vec2) -> Option<(Primitive, Surface, HitDifferenti
             continue;
         }
         let surface = with_coordinates(surface_of(scene, &prim, hit, path.ray), &prim.primitive);
-        let at = hit_differential(scene, &prim, hit, surface, path.ray, path.differential);
-        return Some((prim.primitive, surface, at, path.depth));
+        let arrival = hit_differential(scene, &prim, hit, surface, path.ray, path.differential);
+        return Some((prim.primitive, surface, arrival, path.depth));
     }
 }
 
-fn check(scene: &Packed, glass: Option<bool>, bounces: u32) {
+fn assert_differentials(scene: &Packed, glass: Option<bool>, bounces: u32) {
     let exact = Exact {
         scene,
         ellipsoid: glass,
@@ -162,24 +162,24 @@ fn check(scene: &Packed, glass: Option<bool>, bounces: u32) {
     let mut compared = 0;
     for y in 0..48 {
         for x in 0..64 {
-            let at = Vec2::new(x as f32 + 0.5, y as f32 + 0.5);
-            let Some((_, surface, arrival, depth)) = arrive(scene, at) else {
+            let pixel = Vec2::new(x as f32 + 0.5, y as f32 + 0.5);
+            let Some((_, surface, arrival, depth)) = first_nonspecular_hit(scene, pixel) else {
                 continue;
             };
-            let end = exact.end(at.as_dvec2());
-            let known = (surface.position.as_dvec3() - end).length() < 1e-3 * end.length().max(1.0);
-            // Far away, f32 is inaccurate at grazing angles.
-            if depth != bounces || !known || end.length() > 30.0 {
+            let end = exact.end(pixel.as_dvec2());
+            let is_close = (surface.position.as_dvec3() - end).length() < 1e-3 * end.length().max(1.0);
+            // Far from the camera, f32 is inaccurate at grazing angles.
+            if depth != bounces || !is_close || end.length() > 30.0 {
                 continue;
             }
             let h = 1e-3;
             for (step, found) in [(DVec2::X, arrival.x), (DVec2::Y, arrival.y)] {
-                let neighbour = |side: f64| exact.end(at.as_dvec2() + step * (h * side));
-                let expected = (neighbour(1.0) - neighbour(-1.0)) / (2.0 * h);
+                let neighbor = |side: f64| exact.end(pixel.as_dvec2() + step * (h * side));
+                let expected = (neighbor(1.0) - neighbor(-1.0)) / (2.0 * h);
                 let error = (found.position.as_dvec3() - expected).length();
                 // Derivatives change within the step near silhouettes.
-                let bend = (neighbour(1.0) + neighbour(-1.0) - end * 2.0).length() / h;
-                if bend < 0.01 * expected.length() {
+                let curvature = (neighbor(1.0) + neighbor(-1.0) - end * 2.0).length() / h;
+                if curvature < 0.01 * expected.length() {
                     assert!(
                         error < 0.01 * expected.length(),
                         "({x}, {y}): {:?} {expected}",
@@ -196,34 +196,34 @@ fn check(scene: &Packed, glass: Option<bool>, bounces: u32) {
 #[test]
 fn differentials_on_a_plane_match_adjacent_rays() {
     for camera in [PERSPECTIVE, ORTHOGRAPHIC] {
-        check(&over_plane(camera, ""), None, 0);
+        assert_differentials(&ellipsoid_over_plane(camera, ""), None, 0);
     }
 }
 
 #[test]
 fn differentials_after_a_mirror_match_adjacent_rays() {
     for camera in [PERSPECTIVE, ORTHOGRAPHIC] {
-        check(&over_plane(camera, &ellipsoid("mirror")), Some(false), 1);
+        assert_differentials(&ellipsoid_over_plane(camera, &ellipsoid("mirror")), Some(false), 1);
     }
 }
 
 #[test]
 fn differentials_through_glass_match_adjacent_rays() {
     for camera in [PERSPECTIVE, ORTHOGRAPHIC] {
-        check(&over_plane(camera, &ellipsoid("glass")), Some(true), 2);
+        assert_differentials(&ellipsoid_over_plane(camera, &ellipsoid("glass")), Some(true), 2);
     }
 }
 
 #[test]
 fn texture_differentials_on_an_ellipsoid_match_adjacent_rays() {
-    let scene = over_plane(PERSPECTIVE, &ellipsoid("floor"));
+    let scene = ellipsoid_over_plane(PERSPECTIVE, &ellipsoid("floor"));
     let exact = Exact {
         scene: &scene,
         ellipsoid: None,
     };
     let (center, m) = Exact::rows();
-    let uv = |at: DVec2| {
-        let (o, d) = exact.camera(at);
+    let uv = |pixel: DVec2| {
+        let (o, d) = exact.camera(pixel);
         let l = m * (o + d * Exact::ellipsoid(o, d)? - center);
         Some(DVec2::new(
             l.y.atan2(l.x) / std::f64::consts::TAU,
@@ -233,8 +233,8 @@ fn texture_differentials_on_an_ellipsoid_match_adjacent_rays() {
     let mut compared = 0;
     for y in 0..48 {
         for x in 0..64 {
-            let at = Vec2::new(x as f32 + 0.5, y as f32 + 0.5);
-            let Some((q, surface, arrival, _)) = arrive(&scene, at) else {
+            let pixel = Vec2::new(x as f32 + 0.5, y as f32 + 0.5);
+            let Some((q, surface, arrival, _)) = first_nonspecular_hit(&scene, pixel) else {
                 continue;
             };
             if q.kind != wgray_render::records::ELLIPSOID {
@@ -243,8 +243,8 @@ fn texture_differentials_on_an_ellipsoid_match_adjacent_rays() {
             let found = surface_footprint(&q, surface, arrival.x.position, arrival.y.position);
             let h = 1e-3;
             for (step, found) in [(DVec2::X, found.dx), (DVec2::Y, found.dy)] {
-                let at = at.as_dvec2();
-                let (Some(after), Some(before)) = (uv(at + step * h), uv(at - step * h)) else {
+                let pixel = pixel.as_dvec2();
+                let (Some(after), Some(before)) = (uv(pixel + step * h), uv(pixel - step * h)) else {
                     continue;
                 };
                 let expected = (after - before) / (2.0 * h);
@@ -262,28 +262,29 @@ fn texture_differentials_on_an_ellipsoid_match_adjacent_rays() {
     assert!(compared > 500, "{compared}");
 }
 
-/// Control: without the derivative of the normal.
+/// Control: without the derivative of the normal, the error is large.
 #[test]
 fn a_curved_mirror_needs_its_curvature() {
-    let scene = over_plane(PERSPECTIVE, &ellipsoid("mirror"));
+    let scene = ellipsoid_over_plane(PERSPECTIVE, &ellipsoid("mirror"));
     let exact = Exact {
         scene: &scene,
         ellipsoid: Some(false),
     };
-    let at = Vec2::new(33.0, 22.0);
-    let differential = camera_differential(&scene.camera, at, 1.0);
-    let ray = camera_ray(&scene.camera, at);
+    let pixel = Vec2::new(33.0, 22.0);
+    let differential = camera_differential(&scene.camera, pixel, 1.0);
+    let ray = camera_ray(&scene.camera, pixel);
     let hit = closest_hit(&scene, ray, NO_PRIMITIVE, NO_PRIMITIVE);
     let prim = fetch_hit_primitive(&scene, hit);
     let surface = surface_of(&scene, &prim, hit, ray);
     let arrival = hit_differential(&scene, &prim, hit, surface, ray, differential);
-    let mirrored = |at: DVec2| {
-        let (o, d) = exact.camera(at);
+    let reflected = |pixel: DVec2| {
+        let (o, d) = exact.camera(pixel);
         let (center, m) = Exact::rows();
         let p = o + d * Exact::ellipsoid(o, d).unwrap();
         d.reflect((m.transpose() * (m * (p - center))).normalize())
     };
-    let expected = (mirrored(at.as_dvec2() + DVec2::X * 1e-3) - mirrored(at.as_dvec2() - DVec2::X * 1e-3)) / 2e-3;
+    let expected =
+        (reflected(pixel.as_dvec2() + DVec2::X * 1e-3) - reflected(pixel.as_dvec2() - DVec2::X * 1e-3)) / 2e-3;
     let error = |dn: Vec3| {
         let found = reflected_derivative(arrival.x, ray.direction, surface.normal, dn)
             .direction
@@ -327,16 +328,16 @@ struct Point {
     normal: DVec3,
 }
 
-/// Returns the hit with the plane of a triangle.
-fn on_triangle(sheet: &Sheet, matrix: DMat3, triangle: usize, (o, d): (DVec3, DVec3)) -> Point {
+/// Returns the intersection of a ray with the plane of a triangle.
+fn hit_triangle_plane(sheet: &Sheet, matrix: DMat3, triangle: usize, (o, d): (DVec3, DVec3)) -> Point {
     let corners = sheet.form.triangles[triangle].map(|vertex| vertex as usize);
     let [p, q, r] = corners.map(|corner| matrix * sheet.form.points[corner] + 0.1);
     let (e, f) = (q - p, r - p);
-    let across = e.cross(f);
-    let position = o + d * ((p - o).dot(across) / d.dot(across));
+    let normal_direction = e.cross(f);
+    let position = o + d * ((p - o).dot(normal_direction) / d.dot(normal_direction));
     let offset = position - p;
-    let b = offset.cross(f).dot(across) / across.length_squared();
-    let c = e.cross(offset).dot(across) / across.length_squared();
+    let b = offset.cross(f).dot(normal_direction) / normal_direction.length_squared();
+    let c = e.cross(offset).dot(normal_direction) / normal_direction.length_squared();
     let weights = [1.0 - b - c, b, c];
     let to_world = matrix.inverse().transpose();
     let [mut uv, mut normal] = [DVec3::ZERO; 2];
@@ -349,8 +350,8 @@ fn on_triangle(sheet: &Sheet, matrix: DMat3, triangle: usize, (o, d): (DVec3, DV
     Point {
         position,
         uv: uv.truncate(),
-        // Faces the viewer, like the triangle.
-        normal: if d.dot(across) * matrix.determinant() > 0.0 {
+        // The normal faces the viewer, like the triangle.
+        normal: if d.dot(normal_direction) * matrix.determinant() > 0.0 {
             -normal
         } else {
             normal
@@ -361,19 +362,19 @@ fn on_triangle(sheet: &Sheet, matrix: DMat3, triangle: usize, (o, d): (DVec3, DV
 #[test]
 fn differentials_on_a_mesh_match_adjacent_rays() {
     let sheet = Sheet::torus(12, 8);
-    let turned = DMat3::from_cols(
+    let sheared = DMat3::from_cols(
         DVec3::new(0.9, 0.3, 0.2),
         DVec3::new(-0.2, 0.5, 0.5),
         DVec3::new(0.1, -0.6, 0.8),
     );
-    let mirroring = DMat3::from_cols(turned.x_axis, turned.y_axis, -turned.z_axis);
-    // Inside the tube.
+    let mirrored = DMat3::from_cols(sheared.x_axis, sheared.y_axis, -sheared.z_axis);
+    // This camera is inside of the tube.
     let inside = "camera = { position = [1, 0.45, 0.4], look_at = [0.5, 0.75, 0.7], fov = 70 }";
     for (camera, matrix) in [
-        (PERSPECTIVE, turned),
-        (PERSPECTIVE, mirroring),
-        (ORTHOGRAPHIC, turned),
-        (inside, turned),
+        (PERSPECTIVE, sheared),
+        (PERSPECTIVE, mirrored),
+        (ORTHOGRAPHIC, sheared),
+        (inside, sheared),
     ] {
         let packed = torus(&sheet, camera, matrix);
         let exact = Exact {
@@ -382,8 +383,8 @@ fn differentials_on_a_mesh_match_adjacent_rays() {
         };
         let mut compared = 0;
         for (x, y) in (0..48).flat_map(|y| (0..64).map(move |x| (x, y))) {
-            let at = Vec2::new(x as f32 + 0.5, y as f32 + 0.5);
-            let ray = camera_ray(&packed.camera, at);
+            let pixel = Vec2::new(x as f32 + 0.5, y as f32 + 0.5);
+            let ray = camera_ray(&packed.camera, pixel);
             let hit = closest_hit(&packed, ray, NO_PRIMITIVE, NO_PRIMITIVE);
             if hit.primitive == NO_INDEX {
                 continue;
@@ -393,22 +394,22 @@ fn differentials_on_a_mesh_match_adjacent_rays() {
             if ray.direction.dot(surface.normal).abs() < 0.1 {
                 continue;
             }
-            let differential = camera_differential(&packed.camera, at, 1.0);
+            let differential = camera_differential(&packed.camera, pixel, 1.0);
             let arrival = hit_differential(&packed, &prim, hit, surface, ray, differential);
             let footprint = footprint_of(&prim, hit, surface, arrival);
-            let point = |at: DVec2| {
-                let (o, d) = exact.camera(at);
-                on_triangle(&sheet, matrix, hit.primitive as usize, (o + packed.origin, d))
+            let point = |pixel: DVec2| {
+                let (o, d) = exact.camera(pixel);
+                hit_triangle_plane(&sheet, matrix, hit.primitive as usize, (o + packed.origin, d))
             };
-            let middle = point(at.as_dvec2());
+            let center = point(pixel.as_dvec2());
             let position = surface.position.as_dvec3() + packed.origin;
             assert!(
-                (position - middle.position).length() < 1e-4,
+                (position - center.position).length() < 1e-4,
                 "({x}, {y}): {position} {}",
-                middle.position
+                center.position
             );
             assert!(
-                (surface.shading_normal.as_dvec3() - middle.normal).length() < 1e-3,
+                (surface.shading_normal.as_dvec3() - center.normal).length() < 1e-3,
                 "({x}, {y})"
             );
             let h = 1e-3;
@@ -416,14 +417,14 @@ fn differentials_on_a_mesh_match_adjacent_rays() {
                 (DVec2::X, arrival.x, footprint.dx, arrival.normal_x),
                 (DVec2::Y, arrival.y, footprint.dy, arrival.normal_y),
             ] {
-                let (after, before) = (point(at.as_dvec2() + step * h), point(at.as_dvec2() - step * h));
-                let of_position = (after.position - before.position) / (2.0 * h);
-                let of_uv = (after.uv - before.uv) / (2.0 * h);
-                let of_normal = (after.normal - before.normal) / (2.0 * h);
+                let (after, before) = (point(pixel.as_dvec2() + step * h), point(pixel.as_dvec2() - step * h));
+                let position_derivative = (after.position - before.position) / (2.0 * h);
+                let uv_derivative = (after.uv - before.uv) / (2.0 * h);
+                let normal_derivative = (after.normal - before.normal) / (2.0 * h);
                 for (name, found, expected) in [
-                    ("position", found.position.as_dvec3(), of_position),
-                    ("uv", uv.as_dvec2().extend(0.0), of_uv.extend(0.0)),
-                    ("normal", normal.as_dvec3(), of_normal),
+                    ("position", found.position.as_dvec3(), position_derivative),
+                    ("uv", uv.as_dvec2().extend(0.0), uv_derivative.extend(0.0)),
+                    ("normal", normal.as_dvec3(), normal_derivative),
                 ] {
                     assert!(
                         (found - expected).length() < 1e-3 * expected.length() && expected.length() > 1e-4,

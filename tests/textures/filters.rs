@@ -29,7 +29,7 @@ fn color(scene: &Packed, uv: Vec2, dx: Vec2, dy: Vec2) -> Vec3 {
     texture_color(scene, &scene.textures.records[0], Footprint { uv, dx, dy })
 }
 
-/// Returns footprints of all sizes and shapes, and grazing ones.
+/// Returns footprints of all sizes and shapes, including grazing footprints.
 fn footprints() -> Vec<(Vec2, Vec2, Vec2)> {
     let numbers = Random::new(1);
     let mut footprints = Vec::new();
@@ -63,7 +63,7 @@ fn a_constant_image_is_constant_under_every_filter_and_footprint() {
     write_png(&path("spot.png"), 7, 13, |x, y| {
         if (x, y) == (3, 6) { [0; 3] } else { [200, 31, 5] }
     });
-    let mut varied = 0;
+    let mut changed = 0;
     for file in ["even.png", "odd.png", "line.exr", "spot.png"] {
         for filter in FILTERS {
             for wrap in WRAPS {
@@ -73,7 +73,7 @@ fn a_constant_image_is_constant_under_every_filter_and_footprint() {
                 for (uv, dx, dy) in footprints() {
                     let found = color(&scene, uv, dx, dy);
                     if file == "spot.png" {
-                        varied += u32::from(found != expected); // control: a single texel is visible
+                        changed += u32::from(found != expected); // control: a single texel is visible
                     } else {
                         assert_eq!(found, expected, "{keys}\n{uv} {dx} {dy}");
                     }
@@ -81,8 +81,8 @@ fn a_constant_image_is_constant_under_every_filter_and_footprint() {
             }
         }
     }
-    // Clamped footprints beyond the edge do not see the texel.
-    assert!(varied > 800, "{varied}");
+    // Clamped footprints beyond the edge do not cover the texel.
+    assert!(changed > 800, "{changed}");
 }
 
 #[test]
@@ -107,8 +107,8 @@ fn cached_weights_equal_the_reference_weights() {
     .map(|keys| textured(folder.path(), &format!("type = 'image'\nfilter = 'ewa'\n{keys}")));
     let mut different = 0;
     for (uv, dx, dy) in footprints() {
-        let here = scenes.each_ref().map(|scene| color(scene, uv, dx, dy));
-        for (scene, found) in scenes.iter().zip(here) {
+        let colors = scenes.each_ref().map(|scene| color(scene, uv, dx, dy));
+        for (scene, found) in scenes.iter().zip(colors) {
             let t = &scene.textures.records[0];
             let expected = ewa_color(scene, t, texture_footprint(t, Footprint { uv, dx, dy }));
             assert_eq!(
@@ -117,7 +117,7 @@ fn cached_weights_equal_the_reference_weights() {
                 "{uv} {dx} {dy}"
             );
         }
-        different += u32::from((1..here.len()).all(|i| here[i] != here[0]));
+        different += u32::from((1..colors.len()).all(|i| colors[i] != colors[0]));
     }
     assert!(different > 100, "{different}"); // control: the lookups differ
 }
@@ -211,31 +211,32 @@ fn ewa_is_a_gaussian_mean_over_the_ellipse() {
     };
     let numbers = Random::new(9);
     let texel = 1.0 / f64::from(n);
-    // Less than three texels wide: only the finest level is used.
-    for (longest, narrowest) in [(1.0, 1.0), (6.0, 0.8), (7.0, 2.9)] {
-        let (mut narrower, mut mirrored) = (0, 0);
+    // The ellipses are less than three texels wide, so that only the finest level is used.
+    for (max_ratio, minor_axis) in [(1.0, 1.0), (6.0, 0.8), (7.0, 2.9)] {
+        let (mut changed_by_size, mut changed_by_mirroring) = (0, 0);
         for _ in 0..200 {
             let uv = Vec2::new(numbers.unit() as f32, numbers.unit() as f32);
             let axis = DVec2::from_angle(numbers.between(0.0, TAU)) * texel;
             let (dx, dy) = (
-                (axis * numbers.between(1.0, longest)).as_vec2(),
-                (axis.perp() * narrowest).as_vec2(),
+                (axis * numbers.between(1.0, max_ratio)).as_vec2(),
+                (axis.perp() * minor_axis).as_vec2(),
             );
             let found = f64::from(color(&scene, uv, dx, dy).x);
             let (uv, dx, dy) = (uv.as_dvec2(), dx.as_dvec2(), dy.as_dvec2());
             let expected = exact(uv, dx, dy);
             assert!((found - expected).abs() < 2e-5, "{uv} {dx} {dy}: {found} {expected}");
-            narrower += u32::from((found - exact(uv, dx * 0.7, dy * 0.7)).abs() > 0.01);
+            changed_by_size += u32::from((found - exact(uv, dx * 0.7, dy * 0.7)).abs() > 0.01);
             let mirror = DVec2::new(-1.0, 1.0);
-            mirrored += u32::from((found - exact(uv, dx * mirror, dy * mirror)).abs() > 0.01);
+            changed_by_mirroring += u32::from((found - exact(uv, dx * mirror, dy * mirror)).abs() > 0.01);
         }
-        assert!(narrower > 20, "{narrower}");
-        assert_eq!(mirrored > 20, longest > 1.0, "{mirrored}"); // a circle is its own mirror image
+        assert!(changed_by_size > 20, "{changed_by_size}");
+        // A circle is its own mirror image.
+        assert_eq!(changed_by_mirroring > 20, max_ratio > 1.0, "{changed_by_mirroring}");
     }
 }
 
 #[test]
-fn wide_footprints_average_the_whole_image() {
+fn wide_footprints_average_the_full_image() {
     let folder = tempfile::tempdir().unwrap();
     for (width, height) in [(32, 32), (13, 7), (1, 9)] {
         let texels = noise(folder.path(), width, height);
@@ -258,7 +259,7 @@ fn wide_footprints_average_the_whole_image() {
     }
 }
 
-/// Trilinear filtering blurs it.
+/// Trilinear filtering blurs the detail.
 #[test]
 fn ewa_keeps_detail_across_a_long_footprint() {
     let folder = tempfile::tempdir().unwrap();
@@ -299,8 +300,9 @@ fn mean_over(texels: &[f64], p: DVec2, dx: DVec2, dy: DVec2) -> f64 {
     let mut sum = 0.0;
     for i in 0..columns as u32 {
         for j in 0..rows as u32 {
-            let at = p + dx * ((f64::from(i) + 0.5) / columns - 0.5) + dy * ((f64::from(j) + 0.5) / rows - 0.5) - 0.5;
-            let (x, y, t) = (at.x.floor() as i64, at.y.floor() as i64, at - at.floor());
+            let point =
+                p + dx * ((f64::from(i) + 0.5) / columns - 0.5) + dy * ((f64::from(j) + 0.5) / rows - 0.5) - 0.5;
+            let (x, y, t) = (point.x.floor() as i64, point.y.floor() as i64, point - point.floor());
             let row = |y: i64| texel_at(texels, x, y) * (1.0 - t.x) + texel_at(texels, x + 1, y) * t.x;
             sum += row(y) * (1.0 - t.y) + row(y + 1) * t.y;
         }
@@ -311,8 +313,8 @@ fn mean_over(texels: &[f64], p: DVec2, dx: DVec2, dy: DVec2) -> f64 {
 fn finest_ewa(texels: &[f64], p: DVec2, dx: DVec2, dy: DVec2) -> f64 {
     let edges = DMat2::from_cols(dx, dy);
     let m = edges * edges.transpose() + DMat2::IDENTITY;
-    let (inverse, reach) = (m.inverse(), DVec2::new(m.x_axis.x.sqrt(), m.y_axis.y.sqrt()));
-    let (low, high) = ((p - reach - 0.5).floor(), (p + reach).ceil());
+    let (inverse, extent) = (m.inverse(), DVec2::new(m.x_axis.x.sqrt(), m.y_axis.y.sqrt()));
+    let (low, high) = ((p - extent - 0.5).floor(), (p + extent).ceil());
     let (mut sum, mut total) = (0.0, 0.0);
     for y in low.y as i64..=high.y as i64 {
         for x in low.x as i64..=high.x as i64 {
@@ -325,8 +327,8 @@ fn finest_ewa(texels: &[f64], p: DVec2, dx: DVec2, dy: DVec2) -> f64 {
     sum / total
 }
 
-/// The documented bound is 1.4 times the error of EWA over the finest level, at any aspect and angle. Control: trilinear
-/// filtering is nearly always worse.
+/// The documented bound is 1.4 times the error of EWA over the finest level, at any aspect and angle. Control:
+/// trilinear filtering is nearly always worse.
 #[test]
 fn ewa_over_the_pyramid_nearly_equals_ewa_over_the_finest_level() {
     let folder = tempfile::tempdir().unwrap();
@@ -357,7 +359,7 @@ fn ewa_over_the_pyramid_nearly_equals_ewa_over_the_finest_level() {
             gray(folder.path(), "narrow.exr", stripes(128.0 / 50.0)),
         ),
     ];
-    let (mut worst, mut worse, mut cases) = (0.0f64, 0, 0);
+    let (mut max_ratio, mut worse_cases, mut cases) = (0.0f64, 0, 0);
     for anisotropy in [1.0, 2.0, 4.0, 8.0, 16.0] {
         for width in [0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 12.0, 16.0] {
             if width * anisotropy > 64.0 {
@@ -369,35 +371,35 @@ fn ewa_over_the_pyramid_nearly_equals_ewa_over_the_finest_level() {
                 let axis = DVec2::from_angle(numbers.between(0.0, TAU)) * width;
                 let (dx, dy) = (axis, axis.perp() * anisotropy);
                 for ((_, (ewa, trilinear, texels)), errors) in textures.iter().zip(&mut errors) {
-                    let truth = mean_over(texels, p, dx, dy);
+                    let expected = mean_over(texels, p, dx, dy);
                     let [uv, du, dv] = [p, dx, dy].map(|v| (v / 128.0).as_vec2());
                     let found = |scene: &Packed| f64::from(color(scene, uv, du, dv).x);
                     let values = [found(ewa), finest_ewa(texels, p, dx, dy), found(trilinear)];
                     for (error, value) in errors.iter_mut().zip(values) {
-                        *error += (value - truth).powi(2) / 80.0;
+                        *error += (value - expected).powi(2) / 80.0;
                     }
                 }
             }
             for ((name, _), errors) in textures.iter().zip(&errors) {
                 let [ewa, finest, trilinear] = errors.map(f64::sqrt);
                 let stripes = name.ends_with("stripes");
-                // Stripes have almost no error at some sizes.
-                let bound = 1.4 * finest + if stripes { 0.05 } else { 0.0005 };
+                // At some sizes, stripes have almost no error.
+                let limit = 1.4 * finest + if stripes { 0.05 } else { 0.0005 };
                 assert!(
-                    ewa <= bound,
+                    ewa <= limit,
                     "{name} {width} x {anisotropy}: {ewa} {finest} {trilinear}"
                 );
-                worst = worst.max(if stripes { 0.0 } else { ewa / finest });
+                max_ratio = max_ratio.max(if stripes { 0.0 } else { ewa / finest });
                 cases += u32::from(!stripes);
-                worse += u32::from(!stripes && trilinear > bound);
+                worse_cases += u32::from(!stripes && trilinear > limit);
                 if (width, anisotropy, *name) == (1.0, 8.0, "noise") {
                     assert!(ewa < 0.5 * trilinear, "{ewa} {trilinear}");
                 }
             }
         }
     }
-    println!("EWA over the pyramid: at most {worst:.3} times the error of the finest level");
-    assert!(worse > cases / 2, "{worse} of {cases}");
+    println!("EWA over the pyramid: at most {max_ratio:.3} times the error of EWA over the finest level");
+    assert!(worse_cases > cases / 2, "{worse_cases} of {cases}");
 }
 
 /// The cost is bounded for any shape.
@@ -412,8 +414,8 @@ fn ewa_is_bounded_for_flat_images() {
         let numbers = Random::new(2);
         for i in 0..2000 {
             let size = 2f64.powi(i % 14) / 4096.0;
-            let edge = |other: f64| {
-                let v = DVec2::from_angle(numbers.between(0.0, TAU)) * size * other;
+            let edge = |factor: f64| {
+                let v = DVec2::from_angle(numbers.between(0.0, TAU)) * size * factor;
                 (v / DVec2::new(f64::from(width), f64::from(height)) * 4096.0).as_vec2()
             };
             let found = color(&scene, Vec2::splat(0.3), edge(1.0), edge(0.1)).x;
@@ -438,14 +440,14 @@ fn mip_levels_of_8_bit_images_keep_the_mean() {
     write_png(&folder.path().join("dark.png"), 256, 256, value);
     let ramp = |x: u32, _: u32| [x as u8, 255 - x as u8, (x / 2) as u8];
     write_png(&folder.path().join("ramp.png"), 256, 2, ramp);
-    for (encoding, decoded) in [("srgb", srgb_to_linear as fn(f32) -> f32), ("linear", |x| x)] {
+    for (encoding, decode) in [("srgb", srgb_to_linear as fn(f32) -> f32), ("linear", |x| x)] {
         let scene = |file: &str, filter: &str| {
             let keys = format!("type = 'image'\nfile = '{file}'\nfilter = '{filter}'\nencoding = '{encoding}'");
             textured(folder.path(), &keys)
         };
         let exact = scene("ramp.png", "nearest");
         for x in 0..256 {
-            let expected = ramp(x, 0).map(|byte| decoded(f32::from(byte) / 255.0));
+            let expected = ramp(x, 0).map(|byte| decode(f32::from(byte) / 255.0));
             let uv = Vec2::new((x as f32 + 0.5) / 256.0, 0.5);
             assert_eq!(color(&exact, uv, Vec2::ZERO, Vec2::ZERO).to_array(), expected);
         }
@@ -453,20 +455,25 @@ fn mip_levels_of_8_bit_images_keep_the_mean() {
         for level in 0..=8 {
             let count = 4f64.powi(level);
             let mean = [2, 0, 1].map(|byte| {
-                let background = f64::from(decoded(byte as f32 / 255.0));
+                let background = f64::from(decode(byte as f32 / 255.0));
                 background + (1.0 - background) / count
             });
             let uv = Vec2::new(
                 0.5 + f32::from((77u8 >> level) << level),
                 0.5 + (((255 - 130) >> level) << level) as f32,
             );
-            let half = (f32::powi(2.0, level) - 1.0) / 2.0;
+            let level_center = (f32::powi(2.0, level) - 1.0) / 2.0;
             let size = f32::powi(2.0, level) / 256.0;
-            let found = color(&dark, (uv + half) / 256.0, Vec2::new(size, 0.0), Vec2::new(0.0, size));
-            let brightest = mean.into_iter().fold(0.0, f64::max);
+            let found = color(
+                &dark,
+                (uv + level_center) / 256.0,
+                Vec2::new(size, 0.0),
+                Vec2::new(0.0, size),
+            );
+            let max_mean = mean.into_iter().fold(0.0, f64::max);
             for (found, mean) in found.to_array().into_iter().zip(mean) {
                 let error = (f64::from(found) - mean).abs();
-                assert!(error < 0.005 * brightest, "{encoding} {level}: {found} {mean}");
+                assert!(error < 0.005 * max_mean, "{encoding} {level}: {found} {mean}");
             }
         }
     }
@@ -508,10 +515,10 @@ fn beyond_a_clamped_edge_only_its_color_is_visible() {
     write_png(&folder.path().join("framed.png"), 64, 64, framed);
     for filter in ["bilinear", "trilinear", "ewa"] {
         for (wrap, inside) in [("clamp", 0.0), ("repeat", 1.0)] {
-            let found = |at: Vec2, size: f32| {
+            let found = |uv: Vec2, size: f32| {
                 let texture = format!("type = 'image'\nfile = 'framed.png'\nfilter = '{filter}'\nwrap = '{wrap}'");
                 let scene = textured(folder.path(), &texture);
-                color(&scene, at, Vec2::new(size, 0.0), Vec2::new(0.0, size)).x
+                color(&scene, uv, Vec2::new(size, 0.0), Vec2::new(0.0, size)).x
             };
             for size in [1e-3, 0.1, 0.4, 20.0] {
                 let far = found(Vec2::new(-3.5, 2.5), size);
@@ -520,7 +527,7 @@ fn beyond_a_clamped_edge_only_its_color_is_visible() {
                 } else {
                     assert!(
                         far > 0.5,
-                        "{filter}, {size}: a repeated texture is as dark as a clamped one: {far}"
+                        "{filter}, {size}: a repeated texture is as dark as a clamped texture: {far}"
                     );
                 }
             }

@@ -7,7 +7,7 @@ use super::write_png;
 
 const SIDE: u32 = 512;
 
-/// Returns a texel of an image of tiles, which are 64 texels wide and have dark joints and fine lines, some colored.
+/// Returns a texel of an image of tiles with dark joints and fine lines. Tiles are 64 texels wide; some are colored.
 fn grid(x: u32, y: u32) -> [u8; 3] {
     if x % 64 < 4 || y % 64 < 4 {
         return [30, 30, 40];
@@ -24,10 +24,10 @@ fn grid(x: u32, y: u32) -> [u8; 3] {
 
 const BUMP_SIDE: u32 = 64;
 
-/// Returns a normal map's texel: a low dome in a plane.
+/// Returns a texel of a normal map: a low dome on a plane.
 fn bump(x: u32, y: u32) -> [u8; 3] {
-    let at = |i: u32| (f64::from(i) + 0.5) / f64::from(BUMP_SIDE) * 2.0 - 1.0;
-    let (u, v) = (at(x), -at(y));
+    let coordinate = |i: u32| (f64::from(i) + 0.5) / f64::from(BUMP_SIDE) * 2.0 - 1.0;
+    let (u, v) = (coordinate(x), -coordinate(y));
     let (nx, ny) = if u * u + v * v < 0.64 { (u, v) } else { (0.0, 0.0) };
     let nz = (1.0 - nx * nx - ny * ny).sqrt();
     [nx, ny, nz].map(|n: f64| ((n * 0.5 + 0.5) * 255.0).round() as u8)

@@ -33,7 +33,7 @@ fn load(folder: &std::path::Path) -> std::result::Result<Texels, String> {
 }
 
 #[test]
-fn one_channel_is_gray_whatever_its_name_and_type() {
+fn a_single_channel_is_gray_for_any_name_and_type() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("t.exr");
     let gray = |first: f32| {
@@ -49,7 +49,7 @@ fn one_channel_is_gray_whatever_its_name_and_type() {
     });
     assert_eq!(load(folder.path()), gray(0.0), "half-precision values differ");
     write(&path, &["A", "Y"], FlatSamples::F32);
-    assert_eq!(load(folder.path()), gray(2.5), "opacity has no effect");
+    assert_eq!(load(folder.path()), gray(2.5), "opacity changes the image");
 }
 
 #[test]
@@ -68,7 +68,7 @@ fn unsupported_channels_and_damage_are_rejected() {
     ] {
         write(&path, &names, FlatSamples::F32);
         let message = load(folder.path()).unwrap_err();
-        let rule = "\"t.exr\" must have the channels \"R\", \"G\" and \"B\", or one alone; it has";
+        let rule = "\"t.exr\" must have the channels \"R\", \"G\" and \"B\", or a single channel; it has";
         assert!(
             message.ends_with(&format!(":5: textures.t.file: {rule} {channels}")),
             "{message}"

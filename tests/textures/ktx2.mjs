@@ -14,7 +14,7 @@ const folder = process.argv[2];
 const modules = path.join(process.cwd(), "node_modules");
 const { encodeToKTX2 } = await import(pathToFileURL(path.join(modules, "ktx2-encoder/dist/node/index.js")));
 const libraries = path.join(modules, "three/examples/jsm/libs/basis");
-// A CommonJS script in a folder of ES modules.
+// The transcoder is not imported, because it is a CommonJS script in a folder of ES modules.
 const script = fs.readFileSync(path.join(libraries, "basis_transcoder.js"), "utf8");
 const start = new Function("require", "__filename", "__dirname", `${script}; return BASIS;`);
 const transcoder = await start(createRequire(import.meta.url), libraries, libraries)({
@@ -40,7 +40,7 @@ function png(width, height, rgba) {
 	return Buffer.concat([Buffer.from("\x89PNG\r\n\x1a\n", "latin1"), ...parts]);
 }
 
-// Returns smooth colors with some noise, to use all parts of the encodings; alpha increases to the right.
+// Returns smooth colors with some noise, which use all parts of the encodings; alpha increases to the right.
 function picture(width, height, hasAlpha) {
 	let state = 1;
 	const noise = () => ((state = (Math.imul(state, 1664525) + 1013904223) >>> 0) / 2 ** 32) * 40;
@@ -53,7 +53,7 @@ function picture(width, height, hasAlpha) {
 	return { width, height, data };
 }
 
-// Returns four quarters whose colors are exact in blocks of one color.
+// Returns four quarters of one color each; the encodings store a block of one of these colors without loss.
 function quarters() {
 	const colors = [[255, 0, 0], [0, 255, 0], [0, 0, 255], [255, 255, 255]];
 	const data = new Uint8Array(16 * 16 * 4);

@@ -6,7 +6,6 @@ mod bad_input;
 mod damage;
 mod differentials;
 mod filters;
-
 mod generated;
 mod gray;
 mod normal_maps;

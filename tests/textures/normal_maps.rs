@@ -68,7 +68,7 @@ fn normal(scene: &Packed, primitive: usize, origin: Vec3, target: Vec3) -> Vec3 
     evaluate_material(scene, &prim, hit, plain, surface, HitDifferential::default(), 1).normal
 }
 
-fn near(a: Vec3, b: Vec3) -> bool {
+fn is_near(a: Vec3, b: Vec3) -> bool {
     (a - b).length() < 1e-5
 }
 
@@ -77,26 +77,26 @@ fn red_and_green_tilt_along_the_tangent_and_the_bitangent() {
     let n = Vec3::new(0.6, 0.0, 0.8);
     let map = shapes(n, "", 1.0);
     let (above, below) = (Vec3::new(0.3, 0.2, 3.0), Vec3::new(0.3, 0.2, -3.0));
-    assert!(near(normal(&map, 0, above, Vec3::ZERO), n));
+    assert!(is_near(normal(&map, 0, above, Vec3::ZERO), n));
     // From behind, the mapped normal is flipped.
-    assert!(near(normal(&map, 0, below, Vec3::ZERO), -n));
+    assert!(is_near(normal(&map, 0, below, Vec3::ZERO), -n));
     // The tangent of the plane is +y.
-    assert!(near(
+    assert!(is_near(
         normal(&map, 2, above, Vec3::new(0.0, 0.0, -5.0)),
         Vec3::new(0.0, 0.6, 0.8)
     ));
     // On the sphere, u increases to the east and v to the north.
     let equator = Vec3::new(9.0, -1.0, 0.0);
-    assert!(near(
+    assert!(is_near(
         normal(&map, 1, Vec3::new(9.0, -5.0, 0.0), equator),
         Vec3::new(0.6, -0.8, 0.0)
     ));
     let north = shapes(Vec3::new(0.0, 0.6, 0.8), "", 1.0);
-    assert!(near(
+    assert!(is_near(
         normal(&north, 1, Vec3::new(9.0, -5.0, 0.0), equator),
         Vec3::new(0.0, -0.8, 0.6)
     ));
-    assert!(near(normal(&north, 0, above, Vec3::ZERO), Vec3::new(0.0, 0.6, 0.8)));
+    assert!(is_near(normal(&north, 0, above, Vec3::ZERO), Vec3::new(0.0, 0.6, 0.8)));
 }
 
 #[test]
@@ -104,24 +104,24 @@ fn texture_rotations_rotate_the_normals() {
     let n = Vec3::new(0.6, 0.0, 0.8);
     let above = Vec3::new(0.3, 0.2, 3.0);
     // Rotated by 90 degrees, u of the texture is along -v of the surface, regardless of the scale.
-    let turned = normal(
+    let rotated = normal(
         &shapes(n, "rotate = 90\nscale = [3, 0.5]", 1.0),
         2,
         above,
         Vec3::new(0.0, 0.0, -5.0),
     );
-    assert!(near(turned, Vec3::new(0.6, 0.0, 0.8)), "{turned}"); // the bitangent of the plane is -x
+    assert!(is_near(rotated, Vec3::new(0.6, 0.0, 0.8)), "{rotated}"); // the bitangent of the plane is -x
     let mirrored = normal(&shapes(n, "scale = [-1, 1]", 1.0), 0, above, Vec3::ZERO);
-    assert!(near(mirrored, Vec3::new(-0.6, 0.0, 0.8)), "{mirrored}");
+    assert!(is_near(mirrored, Vec3::new(-0.6, 0.0, 0.8)), "{mirrored}");
 }
 
 #[test]
 fn strength_scales_the_slope() {
     let above = Vec3::new(0.3, 0.2, 3.0);
     let flat = normal(&shapes(Vec3::new(0.6, 0.0, 0.8), "", 0.0), 0, above, Vec3::ZERO);
-    assert!(near(flat, Vec3::Z));
+    assert!(is_near(flat, Vec3::Z));
     let steep = normal(&shapes(Vec3::new(0.6, 0.0, 0.8), "", 2.0), 0, above, Vec3::ZERO);
-    assert!(near(steep, Vec3::new(1.2, 0.0, 0.8).normalize()));
+    assert!(is_near(steep, Vec3::new(1.2, 0.0, 0.8).normalize()));
 }
 
 #[test]
@@ -138,7 +138,7 @@ fn a_flat_map_changes_nothing() {
             direction: (target - origin).normalize(),
         };
         let plain = surface_at(q, 0, ray, (target - origin).length(), 1e-5).normal;
-        assert!(near(normal(&flat, 1, origin, target), plain));
+        assert!(is_near(normal(&flat, 1, origin, target), plain));
     }
 }
 
@@ -151,14 +151,14 @@ fn mirrors_reject_normals_that_reflect_into_the_surface() {
         direction: Vec3::new(-5.0, 0.0, -1.0).normalize(),
     };
     let surface = surface_at(q, 0, grazing, 26f32.sqrt(), 1e-5);
-    let bent = normal(&map, 0, grazing.origin, Vec3::ZERO);
-    assert_eq!(usable_normal(surface, bent), bent);
-    let away = Vec3::new(-bent.x, 0.0, bent.z);
-    assert_eq!(usable_normal(surface, away), surface.normal);
+    let usable = normal(&map, 0, grazing.origin, Vec3::ZERO);
+    assert_eq!(usable_normal(surface, usable), usable);
+    let unusable = Vec3::new(-usable.x, 0.0, usable.z);
+    assert_eq!(usable_normal(surface, unusable), surface.normal);
 }
 
-/// A shading normal tilted towards a light behind the surface receives no light. Shadow rays cannot detect this, as a
-/// flat surface does not occlude its own points.
+/// A shading normal tilted towards a light behind the surface receives no light. Shadow rays cannot detect such a
+/// light, because a flat surface does not occlude its own points.
 #[test]
 fn tilted_shading_normals_receive_no_light_from_behind() {
     let map = shapes(Vec3::new(0.9, 0.0, 0.3).normalize(), "", 1.0);

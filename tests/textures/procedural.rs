@@ -1,4 +1,4 @@
-//! Procedural textures against numerical means.
+//! Procedural textures compared with numerical means.
 
 use std::f64::consts::TAU;
 use std::path::Path;
@@ -12,7 +12,7 @@ use wgray_render::records::{CHECKER, LINES};
 use super::filters::textured;
 use crate::random::Random;
 
-fn point(kind: u32, width: f64, u: f64, v: f64) -> f64 {
+fn pattern_value(kind: u32, width: f64, u: f64, v: f64) -> f64 {
     let share = if kind == CHECKER {
         (u.floor() + v.floor()).rem_euclid(2.0) == 1.0
     } else {
@@ -22,32 +22,32 @@ fn point(kind: u32, width: f64, u: f64, v: f64) -> f64 {
 }
 
 /// Returns the mean over the parallelogram, at n x n points.
-fn mean(kind: u32, width: f64, f: Footprint, n: i32) -> f64 {
+fn numeric_mean(kind: u32, width: f64, f: Footprint, n: i32) -> f64 {
     let mut sum = 0.0;
     for i in 0..n {
         for j in 0..n {
             let step = |k: i32| (f64::from(k) + 0.5) / f64::from(n) - 0.5;
             let p = f.uv.as_dvec2() + f.dx.as_dvec2() * step(i) + f.dy.as_dvec2() * step(j);
-            sum += point(kind, width, p.x, p.y);
+            sum += pattern_value(kind, width, p.x, p.y);
         }
     }
     sum / f64::from(n * n)
 }
 
 /// Clips to `normal . p <= limit`.
-fn clipped(polygon: &[DVec2], normal: DVec2, limit: f64) -> Vec<DVec2> {
-    let mut part = Vec::new();
+fn clip(polygon: &[DVec2], normal: DVec2, limit: f64) -> Vec<DVec2> {
+    let mut clipped_polygon = Vec::new();
     for (i, &a) in polygon.iter().enumerate() {
         let b = polygon[(i + 1) % polygon.len()];
-        let (from, to) = (normal.dot(a) - limit, normal.dot(b) - limit);
-        if from <= 0.0 {
-            part.push(a);
+        let (start, end) = (normal.dot(a) - limit, normal.dot(b) - limit);
+        if start <= 0.0 {
+            clipped_polygon.push(a);
         }
-        if (from < 0.0 && to > 0.0) || (from > 0.0 && to < 0.0) {
-            part.push(a + (b - a) * (from / (from - to)));
+        if (start < 0.0 && end > 0.0) || (start > 0.0 && end < 0.0) {
+            clipped_polygon.push(a + (b - a) * (start / (start - end)));
         }
     }
-    part
+    clipped_polygon
 }
 
 fn area(polygon: &[DVec2]) -> f64 {
@@ -56,28 +56,31 @@ fn area(polygon: &[DVec2]) -> f64 {
 }
 
 /// Clips to a strip along an axis.
-fn strip(polygon: &[DVec2], axis: DVec2, from: f64, to: f64) -> Vec<DVec2> {
-    clipped(&clipped(polygon, axis, to), -axis, -from)
+fn clip_to_strip(polygon: &[DVec2], axis: DVec2, from: f64, to: f64) -> Vec<DVec2> {
+    clip(&clip(polygon, axis, to), -axis, -from)
 }
 
 /// Returns the exact mean over the parallelogram, cell by cell.
-fn exact(kind: u32, width: f64, f: Footprint) -> f64 {
+fn exact_mean(kind: u32, width: f64, f: Footprint) -> f64 {
     let (uv, a, b) = (f.uv.as_dvec2(), f.dx.as_dvec2() / 2.0, f.dy.as_dvec2() / 2.0);
-    let whole = [uv - a - b, uv + a - b, uv + a + b, uv - a + b];
+    let parallelogram = [uv - a - b, uv + a - b, uv + a + b, uv - a + b];
     let range = |polygon: &[DVec2], axis: DVec2| {
-        let along = || polygon.iter().map(|p| axis.dot(*p));
-        let (low, high) = (along().fold(f64::MAX, f64::min), along().fold(f64::MIN, f64::max));
+        let projections = || polygon.iter().map(|p| axis.dot(*p));
+        let (low, high) = (
+            projections().fold(f64::MAX, f64::min),
+            projections().fold(f64::MIN, f64::max),
+        );
         low.floor() as i64..=high.floor() as i64
     };
     let mut sum = 0.0;
-    for i in range(&whole, DVec2::X) {
+    for i in range(&parallelogram, DVec2::X) {
         let x = i as f64;
-        let (from, to) = if kind == CHECKER {
+        let (start, end) = if kind == CHECKER {
             (x, x + 1.0)
         } else {
             (x + width / 2.0, x + 1.0 - width / 2.0)
         };
-        let column = strip(&whole, DVec2::X, from, to);
+        let column = clip_to_strip(&parallelogram, DVec2::X, start, end);
         if column.is_empty() {
             continue;
         }
@@ -85,18 +88,23 @@ fn exact(kind: u32, width: f64, f: Footprint) -> f64 {
             let y = j as f64;
             if kind == CHECKER {
                 if (i + j).rem_euclid(2) == 1 {
-                    sum += area(&strip(&column, DVec2::Y, y, y + 1.0));
+                    sum += area(&clip_to_strip(&column, DVec2::Y, y, y + 1.0));
                 }
             } else {
-                sum -= area(&strip(&column, DVec2::Y, y + width / 2.0, y + 1.0 - width / 2.0));
+                sum -= area(&clip_to_strip(
+                    &column,
+                    DVec2::Y,
+                    y + width / 2.0,
+                    y + 1.0 - width / 2.0,
+                ));
             }
         }
     }
-    sum / area(&whole) + if kind == CHECKER { 0.0 } else { 1.0 }
+    sum / area(&parallelogram) + if kind == CHECKER { 0.0 } else { 1.0 }
 }
 
-/// Returns a footprint at any angle or nearly 45 degrees, square to very thin, sheared, sometimes near a corner.
-fn slanted(size: f64, aspects: &[f64], numbers: &Random) -> Footprint {
+/// Returns a sheared footprint: at any angle or at almost 45 degrees, square to very thin, and sometimes near a corner.
+fn random_footprint(size: f64, aspects: &[f64], numbers: &Random) -> Footprint {
     let angle = if numbers.once_in(2) {
         numbers.between(0.0, TAU)
     } else {
@@ -130,23 +138,23 @@ fn footprints_of_any_size_and_angle_have_the_exact_mean() {
         for size in [
             3e-4, 1e-3, 0.016, 0.0625, 0.25, 0.5, 1.0, 1.5, 2.0, 4.0, 16.0, 31.0, 63.0, 100.0, 300.0, 2000.0,
         ] {
-            let exactly = size < if kind == CHECKER { 64.0 } else { 32.0 };
-            let (count, bound) = if exactly { (300, 0.001) } else { (30, 0.01) };
+            let is_small = size < if kind == CHECKER { 64.0 } else { 32.0 };
+            let (count, tolerance) = if is_small { (300, 0.001) } else { (30, 0.01) };
             for _ in 0..count {
                 let aspects = if size < 300.0 { &aspects } else { &aspects[3..] };
-                let f = slanted(size, aspects, &numbers);
-                let truth = exact(kind, f64::from(width), f);
-                let error = f64::from(procedural_share(kind, width, f)) - truth;
-                assert!(error.abs() < bound, "{kind} {width} {size} {f:?}: {error}");
+                let f = random_footprint(size, aspects, &numbers);
+                let expected = exact_mean(kind, f64::from(width), f);
+                let error = f64::from(procedural_share(kind, width, f)) - expected;
+                assert!(error.abs() < tolerance, "{kind} {width} {size} {f:?}: {error}");
                 let longer = Footprint { dx: f.dx * 1.2, ..f };
-                control = control.max((f64::from(procedural_share(kind, width, longer)) - truth).abs());
+                control = control.max((f64::from(procedural_share(kind, width, longer)) - expected).abs());
             }
         }
         assert!(control > 0.02, "{kind} {width}: {control}");
     }
 }
 
-/// At 45 degrees and one to two squares per pixel: no moire.
+/// At 45 degrees and with one to two squares per pixel, there is no moiré.
 #[test]
 fn slanted_checkers_have_their_contrast() {
     for size in [1.0, 1.5, 2.0] {
@@ -158,15 +166,18 @@ fn slanted_checkers_have_their_contrast() {
                 dx: edge(1.0),
                 dy: edge(3.0),
             };
-            let (share, truth) = (f64::from(procedural_share(CHECKER, 0.0, f)), exact(CHECKER, 0.0, f));
-            (low, high) = (truth.min(low), truth.max(high));
-            assert!((share - truth).abs() < 1e-5, "{size} {}: {share} {truth}", f.uv);
+            let (share, expected) = (
+                f64::from(procedural_share(CHECKER, 0.0, f)),
+                exact_mean(CHECKER, 0.0, f),
+            );
+            (low, high) = (expected.min(low), expected.max(high));
+            assert!((share - expected).abs() < 1e-5, "{size} {}: {share} {expected}", f.uv);
         }
         assert!(high - low > 0.1, "{size}: {low} to {high}");
     }
 }
 
-/// Degenerate, infinite and NaN footprints.
+/// Covers degenerate, infinite and NaN footprints.
 #[test]
 fn footprints_without_an_area_give_values_from_0_to_1() {
     let numbers = Random::new(12);
@@ -205,9 +216,10 @@ fn footprints_without_an_area_give_values_from_0_to_1() {
         }
     }
     // Segments from 0.7 to 1.6, along an axis and the diagonal.
-    let along = |uv: Vec2, dx: Vec2| f64::from(procedural_share(CHECKER, 0.0, Footprint { uv, dx, dy: Vec2::ZERO }));
-    assert!((along(Vec2::new(1.15, 0.55), Vec2::new(0.9, 0.0)) - 0.6 / 0.9).abs() < 2e-3);
-    assert!((along(Vec2::new(1.15, 0.65), Vec2::splat(0.9)) - 0.5 / 0.9).abs() < 5e-3);
+    let share_along =
+        |uv: Vec2, dx: Vec2| f64::from(procedural_share(CHECKER, 0.0, Footprint { uv, dx, dy: Vec2::ZERO }));
+    assert!((share_along(Vec2::new(1.15, 0.55), Vec2::new(0.9, 0.0)) - 0.6 / 0.9).abs() < 2e-3);
+    assert!((share_along(Vec2::new(1.15, 0.65), Vec2::splat(0.9)) - 0.5 / 0.9).abs() < 5e-3);
 }
 
 #[test]
@@ -218,7 +230,7 @@ fn axis_aligned_footprints_have_the_exact_mean() {
         let kind = [CHECKER, LINES][i % 2];
         let size = 4f64.powf(numbers.between(-3.0, 2.0)) as f32;
         let uv = Vec2::new(numbers.between(-20.0, 20.0) as f32, numbers.between(-20.0, 20.0) as f32);
-        // Some are segments, averaged along one axis only.
+        // Some footprints are segments, which are averaged along one axis only.
         let (width, height) = match i % 10 {
             4 | 5 => (size, 0.0),
             6 | 7 => (0.0, size),
@@ -227,9 +239,9 @@ fn axis_aligned_footprints_have_the_exact_mean() {
         let (dx, dy) = (Vec2::new(width, 0.0), Vec2::new(0.0, height));
         let f = Footprint { uv, dx, dy };
         let found = f64::from(procedural_share(kind, 0.2, f));
-        let exact = mean(kind, f64::from(0.2f32), f, 1000);
-        assert!((found - exact).abs() < 6e-3, "{kind} {f:?}: {found} {exact}");
-        unfiltered = unfiltered.max((point(kind, 0.2, f64::from(uv.x), f64::from(uv.y)) - exact).abs());
+        let expected = numeric_mean(kind, f64::from(0.2f32), f, 1000);
+        assert!((found - expected).abs() < 6e-3, "{kind} {f:?}: {found} {expected}");
+        unfiltered = unfiltered.max((pattern_value(kind, 0.2, f64::from(uv.x), f64::from(uv.y)) - expected).abs());
     }
     assert!(unfiltered > 0.5);
 }
@@ -251,14 +263,14 @@ fn without_a_footprint_the_pattern_is_point_sampled() {
         );
         assert_eq!(
             f64::from(share),
-            point(kind, 0.25, f64::from(uv.x), f64::from(uv.y)),
+            pattern_value(kind, 0.25, f64::from(uv.x), f64::from(uv.y)),
             "{uv}"
         );
     }
 }
 
 #[test]
-fn unbounded_footprints_average_the_whole_pattern() {
+fn unbounded_footprints_average_the_full_pattern() {
     for size in [1e4, 1e20, 1e38, f32::INFINITY, f32::NAN] {
         let (dx, dy) = (Vec2::new(size, size), Vec2::new(0.0, size));
         for uv in [Vec2::new(0.3, 0.4), Vec2::splat(1e30), Vec2::splat(f32::NAN)] {
@@ -277,7 +289,7 @@ fn textures_are_scaled_then_rotated_then_translated() {
     for i in 0..100 {
         let (u, v) = (f64::from(i) * 0.1 + 0.01, f64::from(i % 7) * 0.3 + 0.02);
         // (u, v) -> (2 u, v) -> (-v, 2 u) -> (0.5 - v, 3 + 2 u)
-        let expected = point(CHECKER, 0.0, 0.5 - v, 3.0 + 2.0 * u);
+        let expected = pattern_value(CHECKER, 0.0, 0.5 - v, 3.0 + 2.0 * u);
         let uv = Vec2::new(u as f32, v as f32);
         let found = texture_color(
             &scene,

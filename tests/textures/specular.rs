@@ -1,4 +1,4 @@
-//! Mirrors and glass: known values, energy, visible objects.
+//! Mirrors and glass: closed forms, energy conservation and visible objects.
 
 use std::path::Path;
 
@@ -34,7 +34,7 @@ fn reflectances_match_the_fresnel_equations() {
     }
 }
 
-fn ball(background: &str, material: &str, more: &str) -> Packed {
+fn ball(background: &str, material: &str, extra: &str) -> Packed {
     let text = format!(
         "image = {{ width = 40, height = 40 }}
         camera = {{ position = [0, -3, 1], look_at = [0, 0, 1], fov = 45 }}
@@ -55,7 +55,7 @@ fn ball(background: &str, material: &str, more: &str) -> Packed {
         a = [0.9, 0, 0]
         b = [0.2, 0.8, 0]
         c = [0, 0.1, 0.7]
-        {more}"
+        {extra}"
     );
     scene(&text, Path::new("."))
 }
@@ -83,7 +83,7 @@ const ROOM: &str = "
     normal = [0, 0, 1]
     tangent = [1, 0, 0]";
 
-fn farthest(a: &[[f32; 3]], b: &[[f32; 3]]) -> Vec<f32> {
+fn max_differences(a: &[[f32; 3]], b: &[[f32; 3]]) -> Vec<f32> {
     let pixels = a.iter().zip(b);
     pixels
         .map(|(a, b)| a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max))
@@ -111,20 +111,25 @@ fn a_glass_ball_in_a_uniform_environment_conserves_energy() {
 
 #[test]
 fn clear_glass_of_index_1_is_invisible() {
-    let seen = |material: &str| cpu_picture(&ball("[0.1, 0.2, 0.3]", material, ROOM));
-    let clear = seen("type = 'glass'\nior = 1");
-    let dense = seen("type = 'glass'\nior = 1.3");
-    let nothing = {
+    let render_material = |material: &str| cpu_picture(&ball("[0.1, 0.2, 0.3]", material, ROOM));
+    let clear = render_material("type = 'glass'\nior = 1");
+    let dense = render_material("type = 'glass'\nior = 1.3");
+    let without_ball = {
         let mut scene = ball("[0.1, 0.2, 0.3]", "type = 'glass'\nior = 1", ROOM);
-        let keep = scene.counts.primitives[ELLIPSOID as usize].x as usize;
-        scene.primitives.truncate(keep);
-        scene.bounds.truncate(keep);
+        let count = scene.counts.primitives[ELLIPSOID as usize].x as usize;
+        scene.primitives.truncate(count);
+        scene.bounds.truncate(count);
         scene.counts.primitives[ELLIPSOID as usize] = UVec4::ZERO;
         cpu_picture(&scene)
     };
-    let visible = |picture: &[[f32; 3]]| farthest(picture, &nothing).iter().filter(|d| **d > 1e-3).count();
-    assert!(visible(&clear) <= 2, "{}", visible(&clear)); // edges, due to ray offsets
-    assert!(visible(&dense) > 100, "{}", visible(&dense));
+    let count_visible = |picture: &[[f32; 3]]| {
+        max_differences(picture, &without_ball)
+            .iter()
+            .filter(|d| **d > 1e-3)
+            .count()
+    };
+    assert!(count_visible(&clear) <= 2, "{}", count_visible(&clear)); // edges, due to ray offsets
+    assert!(count_visible(&dense) > 100, "{}", count_visible(&dense));
 }
 
 #[test]
@@ -232,9 +237,10 @@ fn glass_casts_a_shadow_unless_it_is_transparent() {
     assert_eq!(floor("transparent", "type = 'mirror'"), 0.0);
 }
 
-/// After the last split, one branch is chosen at random; the mean is as if both branches were followed.
+/// After the last split, one branch is chosen at random. The mean equals the mean of a render that follows both
+/// branches.
 #[test]
-fn branches_chosen_at_random_have_the_right_mean() {
+fn branches_chosen_at_random_have_the_expected_mean() {
     // A geometric series of reflections between the plates.
     let text = |depth: u32| {
         format!(
@@ -275,6 +281,6 @@ fn branches_chosen_at_random_have_the_right_mean() {
     let found = f64::from(cpu_picture(&scene(&text(64), Path::new(".")))[0][0]);
     assert!((found - plate).abs() < 4e-3, "{found} {plate}");
     // Control: 3 bounces are too few.
-    let cut = f64::from(cpu_picture(&scene(&text(3), Path::new(".")))[0][0]);
-    assert!(plate - cut > 0.03, "{cut}");
+    let truncated = f64::from(cpu_picture(&scene(&text(3), Path::new(".")))[0][0]);
+    assert!(plate - truncated > 0.03, "{truncated}");
 }

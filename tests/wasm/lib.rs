@@ -24,8 +24,8 @@ pub extern "C" fn allocate(len: usize) -> *mut u8 {
     ManuallyDrop::new(vec![0; len]).as_mut_ptr()
 }
 
-/// Renders the scene whose text was written to the result of [`allocate`]. Returns the address of a count and the
-/// values after it.
+/// Renders the scene whose text was written to the result of [`allocate`]. Returns the address of the number of values,
+/// followed by the values.
 ///
 /// # Safety
 ///

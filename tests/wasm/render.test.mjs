@@ -5,12 +5,12 @@ import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import { test } from "node:test";
 
-const here = (name) => readFileSync(new URL(name, import.meta.url));
+const readFile = (name) => readFileSync(new URL(name, import.meta.url));
 const module = new WebAssembly.Module(readFileSync(process.env.WGRAY_WASM));
 
-// The module only imports the clock (crate web-time through wasm-bindgen). On web pages `wasm-bindgen` generates these
-// imports. A JavaScript object is a handle. Handles from 128 to `statics_end` are never dropped; all represent
-// `performance`.
+// The module only imports the clock (crate web-time through wasm-bindgen). On web pages, `wasm-bindgen` generates these
+// imports. Integer handles represent JavaScript objects. Handles from 128 to `statics_end` are never dropped; here, all
+// of these handles represent `performance`.
 const intrinsics = [
     [/_now_/, () => performance.now()],
     [/static_accessor|performance/, () => 1024],
@@ -19,11 +19,11 @@ const intrinsics = [
     [/describe|_ref$|table_|spawn_poll|throw/, () => assert.fail("an unexpected import was called")],
 ];
 const imports = {};
-for (const { module: from, name } of WebAssembly.Module.imports(module)) {
-    assert.match(from, /^__wbindgen_/, `an import that is not of wasm-bindgen: ${from}.${name}`);
+for (const { module: source, name } of WebAssembly.Module.imports(module)) {
+    assert.match(source, /^__wbindgen_/, `an import that wasm-bindgen does not define: ${source}.${name}`);
     const [, implementation] = intrinsics.find(([pattern]) => pattern.test(name));
-    imports[from] ??= {};
-    imports[from][name] = implementation;
+    imports[source] ??= {};
+    imports[source][name] = implementation;
 }
 
 function render(text) {
@@ -37,12 +37,12 @@ function render(text) {
 }
 
 test("a scene from bytes has the same pixels as on other machines", () => {
-    const pixels = render(here("scene.toml").toString());
+    const pixels = render(readFile("scene.toml").toString());
     assert.equal(pixels.length, 8 * 8 * 3 * 4);
-    assert.ok(pixels.equals(here("pixels.f32")));
+    assert.ok(pixels.equals(readFile("pixels.f32")));
 });
 
 test("another seed has other pixels", () => {
-    const text = here("scene.toml").toString().replace("pixel_samples = 4", "pixel_samples = 4\nseed = 1");
-    assert.ok(!render(text).equals(here("pixels.f32")));
+    const text = readFile("scene.toml").toString().replace("pixel_samples = 4", "pixel_samples = 4\nseed = 1");
+    assert.ok(!render(text).equals(readFile("pixels.f32")));
 });

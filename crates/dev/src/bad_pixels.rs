@@ -1,5 +1,4 @@
-//! Invalid pixels: NaN, infinite or negative. Displayed directly, they look black or white; here they are counted and
-//! marked.
+//! Invalid pixels (NaN, infinite or negative), which would be displayed as black or white: counts and marks.
 
 use rayon::prelude::*;
 use serde::Serialize;
@@ -31,17 +30,17 @@ impl BadPixel {
     }
 }
 
-/// Tiles along each side of an image; one location is listed per tile.
-const PARTS: usize = 8;
+/// Tiles along each side of an image; one invalid pixel per tile is listed.
+const TILES_PER_SIDE: usize = 8;
 
 /// The numbers of invalid pixels of an image.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct BadPixels {
     /// Pixels with a NaN.
     pub nan: usize,
-    /// Other pixels with an infinite value.
+    /// Pixels with an infinite value but no NaN.
     pub infinite: usize,
-    /// Other pixels with a negative value.
+    /// Pixels with a negative value but no NaN and no infinite value.
     pub negative: usize,
     /// The location of one invalid pixel per tile.
     pub places: Vec<[u32; 2]>,
@@ -52,33 +51,34 @@ impl BadPixels {
     pub fn count(faults: &[Option<BadPixel>], width: u32) -> BadPixels {
         let width = width as usize;
         let height = faults.len().div_ceil(width.max(1));
-        let mut counted = BadPixels::default();
-        let mut listed = [false; PARTS * PARTS];
+        let mut counts = BadPixels::default();
+        let mut listed = [false; TILES_PER_SIDE * TILES_PER_SIDE];
         for (i, fault) in faults.iter().enumerate() {
             match fault {
                 None => continue,
-                Some(BadPixel::Nan) => counted.nan += 1,
-                Some(BadPixel::Infinite) => counted.infinite += 1,
-                Some(BadPixel::Negative) => counted.negative += 1,
+                Some(BadPixel::Nan) => counts.nan += 1,
+                Some(BadPixel::Infinite) => counts.infinite += 1,
+                Some(BadPixel::Negative) => counts.negative += 1,
             }
             let (x, y) = (i % width, i / width);
-            let part = &mut listed[y * PARTS / height * PARTS + x * PARTS / width];
-            if !std::mem::replace(part, true) {
-                counted.places.push([x as u32, y as u32]);
+            let is_listed = &mut listed[y * TILES_PER_SIDE / height * TILES_PER_SIDE + x * TILES_PER_SIDE / width];
+            if !std::mem::replace(is_listed, true) {
+                counts.places.push([x as u32, y as u32]);
             }
         }
-        counted
+        counts
     }
 }
 
-/// Returns the kind of each invalid pixel. If `negative` is true, negative values are valid, as with filters that have
+/// Returns the kind of each invalid pixel. `allow_negative` accepts negative values, as from filters that have
 /// negative lobes.
 pub fn faults<T: Sync, const N: usize>(
     pixels: &[T],
-    negative: bool,
+    allow_negative: bool,
     values: impl Fn(&T) -> [f32; N] + Sync,
 ) -> Vec<Option<BadPixel>> {
-    let fault = |pixel: &T| BadPixel::of(&values(pixel)).filter(|fault| !(negative && *fault == BadPixel::Negative));
+    let fault =
+        |pixel: &T| BadPixel::of(&values(pixel)).filter(|fault| !(allow_negative && *fault == BadPixel::Negative));
     pixels.par_iter().with_min_len(1024).map(fault).collect()
 }
 
@@ -113,23 +113,23 @@ mod tests {
     fn faults_are_counted_and_marked() {
         let pixels = [[0.5; 3], [f32::NAN; 3], [f32::INFINITY; 3], [-1.0; 3]];
         let found = faults(&pixels, false, |color| *color);
-        let counted = BadPixels::count(&found, 2);
-        assert_eq!((counted.nan, counted.infinite, counted.negative), (1, 1, 1));
-        assert_eq!(counted.places, [[1, 0], [0, 1], [1, 1]]);
+        let counts = BadPixels::count(&found, 2);
+        assert_eq!((counts.nan, counts.infinite, counts.negative), (1, 1, 1));
+        assert_eq!(counts.places, [[1, 0], [0, 1], [1, 1]]);
         let mut rgb = [7; 12];
         mark(&mut rgb, &found);
         assert_eq!(rgb, [7, 7, 7, 255, 0, 255, 0, 255, 255, 0, 255, 0]);
-        let allowed = faults(&pixels, true, |color| *color);
-        assert_eq!(BadPixels::count(&allowed, 4).negative, 0);
+        let without_negative = faults(&pixels, true, |color| *color);
+        assert_eq!(BadPixels::count(&without_negative, 4).negative, 0);
         let mut many = [Some(BadPixel::Negative); 1000];
-        let counted = BadPixels::count(&many, 10);
-        assert_eq!((counted.negative, counted.places.len()), (1000, PARTS * PARTS));
+        let counts = BadPixels::count(&many, 10);
+        assert_eq!(
+            (counts.negative, counts.places.len()),
+            (1000, TILES_PER_SIDE * TILES_PER_SIDE)
+        );
         many[10..].fill(None);
         many[999] = Some(BadPixel::Nan);
-        let counted = BadPixels::count(&many, 10);
-        assert!(
-            counted.places.contains(&[9, 99]),
-            "an isolated invalid pixel is missing"
-        );
+        let counts = BadPixels::count(&many, 10);
+        assert!(counts.places.contains(&[9, 99]), "an isolated invalid pixel is missing");
     }
 }

@@ -22,14 +22,14 @@ pub struct Request {
     pub device: Option<Device>,
     pub packed: Packed,
     pub shaders: Arc<Shaders>,
-    /// The last shaders without errors, used if `shaders` have errors.
+    /// The last shaders without errors, which are used if `shaders` have errors.
     pub fallback: Option<Arc<Shaders>>,
     pub constants: Constants,
     /// The time when the change was noticed.
     pub noticed: Instant,
 }
 
-/// A scene on a device, and its shaders.
+/// The renderer of a scene on a device, and the shaders that it uses.
 pub type Ready = (Box<Gpu>, Arc<Shaders>);
 
 pub struct BuildResult {
@@ -38,9 +38,9 @@ pub struct BuildResult {
     pub noticed: Instant,
     /// `None` if the shaders have errors and no fallback exists.
     pub result: Option<Result<Ready, RenderError>>,
-    pub refused: Option<ShaderErrors>,
+    pub shader_errors: Option<ShaderErrors>,
     /// Time spent on checking and compiling.
-    pub took: Duration,
+    pub duration: Duration,
 }
 
 /// The compiler thread. When dropped, the thread ends after the current compilation.
@@ -69,7 +69,7 @@ impl Builder {
 
     pub fn request(&self, request: Request) {
         if let Some(requests) = &self.requests {
-            let _ = requests.send(request); // the thread lives as long as this
+            let _ = requests.send(request); // the thread receives until the builder is dropped
         }
     }
 }
@@ -103,11 +103,15 @@ fn build(choice: &AdapterChoice, times: &Times, request: Request) -> BuildResult
         noticed,
     } = request;
     let start = Instant::now();
-    // Checks all kernels, including the kernels of other views.
-    let refused = times.of("check shaders", || {
+    // Checks the kernels of all views.
+    let shader_errors = times.measure("check shaders", || {
         check_kernels(&packed, &shaders, Forms::Buffers).err()
     });
-    let usable = if refused.is_some() { fallback } else { Some(shaders) };
+    let usable = if shader_errors.is_some() {
+        fallback
+    } else {
+        Some(shaders)
+    };
     let result = usable.map(|shaders| {
         guarded(|| {
             let device = device.map_or_else(|| choose(choice), Ok)?;
@@ -116,7 +120,7 @@ fn build(choice: &AdapterChoice, times: &Times, request: Request) -> BuildResult
                 baked: false,
                 ..Options::best(&device)
             };
-            let gpu = times.of("compile", || {
+            let gpu = times.measure("compile", || {
                 let sliders = sliders(&shaders, packed.integrator, packed.sampling.adaptive);
                 let mut gpu = Gpu::with_sliders(&device, &packed, &shaders, options, sliders)?;
                 gpu.time_calls()?;
@@ -130,14 +134,14 @@ fn build(choice: &AdapterChoice, times: &Times, request: Request) -> BuildResult
         constants,
         noticed,
         result,
-        refused,
-        took: start.elapsed(),
+        shader_errors,
+        duration: start.elapsed(),
     }
 }
 
 /// Runs code that calls a driver. If wgpu panics because the device is lost, returns an error.
-pub fn guarded<T>(work: impl FnOnce() -> Result<T, RenderError>) -> Result<T, RenderError> {
-    catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| {
+pub fn guarded<T>(action: impl FnOnce() -> Result<T, RenderError>) -> Result<T, RenderError> {
+    catch_unwind(AssertUnwindSafe(action)).unwrap_or_else(|panic| {
         let message = panic.downcast_ref::<String>().map(String::as_str);
         let message = message.or_else(|| panic.downcast_ref::<&str>().copied());
         Err(RenderError::Device {

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use wgray_scene::CameraDescription;
 
-/// A move of a camera.
+/// A camera move, as the page sends it.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Move {
@@ -39,9 +39,9 @@ pub struct Viewpoint {
 impl Viewpoint {
     /// Returns the viewpoint of a camera.
     pub fn of(camera: &CameraDescription) -> Viewpoint {
-        let View {
+        let Pose {
             position, look_at, up, ..
-        } = view(camera);
+        } = pose(camera);
         let extent = match camera {
             CameraDescription::Perspective(c) => Some(c.fov),
             CameraDescription::Orthographic(c) => Some(c.height),
@@ -56,12 +56,12 @@ impl Viewpoint {
     }
 }
 
-/// Returns a camera of the same kind at the given viewpoint.
+/// Returns a camera of the same kind with another viewpoint.
 ///
 /// # Errors
 ///
 /// The rule that the resulting camera violates.
-pub fn placed(camera: &CameraDescription, viewpoint: Viewpoint) -> Result<CameraDescription, String> {
+pub fn with_viewpoint(camera: &CameraDescription, viewpoint: Viewpoint) -> Result<CameraDescription, String> {
     let Viewpoint {
         position,
         look_at,
@@ -84,10 +84,10 @@ pub fn placed(camera: &CameraDescription, viewpoint: Viewpoint) -> Result<Camera
     }
 }
 
-/// Returns a camera that sees the whole sphere from the same direction, and whose look-at point is the center of the
+/// Returns a camera that sees the full sphere from the same direction, and whose look-at point is the center of the
 /// sphere.
 pub fn framed(camera: &CameraDescription, center: DVec3, radius: f64) -> CameraDescription {
-    let View { position, look_at, .. } = view(camera);
+    let Pose { position, look_at, .. } = pose(camera);
     let back = (position - look_at).normalize_or_zero();
     let radius = radius.max(f64::MIN_POSITIVE);
     let mut viewpoint = Viewpoint::of(camera);
@@ -101,38 +101,39 @@ pub fn framed(camera: &CameraDescription, center: DVec3, radius: f64) -> CameraD
         CameraDescription::Panorama(_) => 2.0 * radius,
     };
     (viewpoint.look_at, viewpoint.position) = (rounded(center, distance), rounded(center + back * distance, distance));
-    placed(camera, viewpoint).unwrap_or_else(|_| camera.clone())
+    with_viewpoint(camera, viewpoint).unwrap_or_else(|_| camera.clone())
 }
 
 /// Minimum angle between the view direction and the vertical, in radians.
-const STEEPEST: f64 = 0.02;
+const MIN_POLE_ANGLE: f64 = 0.02;
 /// Significant digits of camera coordinates, relative to the distance. Further digits have no visible effect and make
 /// the text hard to read.
 const DIGITS: i32 = 5;
 
-/// The position, the look-at point, and the image height at the distance of the look-at point.
-struct View {
+/// Position and orientation of a camera of any kind.
+struct Pose {
     position: DVec3,
     look_at: DVec3,
     up: DVec3,
+    /// The image height at the distance of the look-at point.
     span: f64,
 }
 
-fn view(camera: &CameraDescription) -> View {
+fn pose(camera: &CameraDescription) -> Pose {
     match camera {
-        CameraDescription::Perspective(c) => View {
+        CameraDescription::Perspective(c) => Pose {
             position: c.position,
             look_at: c.look_at,
             up: c.up,
             span: 2.0 * (c.fov.to_radians() / 2.0).tan() * c.position.distance(c.look_at),
         },
-        CameraDescription::Orthographic(c) => View {
+        CameraDescription::Orthographic(c) => Pose {
             position: c.position,
             look_at: c.look_at,
             up: c.up,
             span: c.height,
         },
-        CameraDescription::Panorama(c) => View {
+        CameraDescription::Panorama(c) => Pose {
             position: c.position,
             look_at: c.look_at,
             up: c.up,
@@ -142,24 +143,24 @@ fn view(camera: &CameraDescription) -> View {
 }
 
 /// Returns the moved camera, or the unchanged camera if the moved one is invalid.
-pub fn moved(camera: &CameraDescription, by: Move) -> CameraDescription {
+pub fn moved(camera: &CameraDescription, camera_move: Move) -> CameraDescription {
     let mut new = camera.clone();
-    let View {
+    let Pose {
         mut position,
         mut look_at,
         up,
         span,
-    } = view(camera);
+    } = pose(camera);
     let up = up.normalize();
     let offset = position - look_at;
     let right = (-offset).cross(up).normalize();
-    match by {
+    match camera_move {
         Move::Orbit(x, y) => {
             let turned = DQuat::from_axis_angle(up, -x) * offset;
             let right = DQuat::from_axis_angle(up, -x) * right;
             let angle = turned.angle_between(up);
             // A higher viewpoint has a smaller angle to the vertical.
-            let new_angle = (angle - y).clamp(STEEPEST, std::f64::consts::PI - STEEPEST);
+            let new_angle = (angle - y).clamp(MIN_POLE_ANGLE, std::f64::consts::PI - MIN_POLE_ANGLE);
             position = look_at + DQuat::from_axis_angle(right, new_angle - angle) * turned;
         }
         Move::Pan(x, y) => {
@@ -168,7 +169,7 @@ pub fn moved(camera: &CameraDescription, by: Move) -> CameraDescription {
             position += shift;
             look_at += shift;
         }
-        Move::Dolly(by) => position = look_at + offset * (-by).exp(),
+        Move::Dolly(amount) => position = look_at + offset * (-amount).exp(),
         Move::Fly(x, y, z) => {
             let forwards = -offset.normalize();
             let shift = (right * x + right.cross(forwards) * y + forwards * z) * offset.length();
@@ -179,7 +180,7 @@ pub fn moved(camera: &CameraDescription, by: Move) -> CameraDescription {
             let forwards = DQuat::from_axis_angle(up, -x) * -offset;
             let right = DQuat::from_axis_angle(up, -x) * right;
             let angle = forwards.angle_between(up);
-            let new_angle = (angle - y).clamp(STEEPEST, std::f64::consts::PI - STEEPEST);
+            let new_angle = (angle - y).clamp(MIN_POLE_ANGLE, std::f64::consts::PI - MIN_POLE_ANGLE);
             look_at = position + DQuat::from_axis_angle(right, angle - new_angle) * forwards;
         }
     }
@@ -192,8 +193,9 @@ pub fn moved(camera: &CameraDescription, by: Move) -> CameraDescription {
             (c.position, c.look_at) = (rounded(position, scale), rounded(look_at, scale));
         }
         CameraDescription::Orthographic(c) => {
-            if let Move::Dolly(by) = by {
-                c.height = round(c.height * (-by).exp(), c.height); // going nearer would change nothing
+            if let Move::Dolly(amount) = camera_move {
+                // An orthographic view does not depend on the distance.
+                c.height = round(c.height * (-amount).exp(), c.height);
             } else {
                 (c.position, c.look_at) = (rounded(position, scale), rounded(look_at, scale));
             }
@@ -207,23 +209,23 @@ const DOLLY_RANGE: [f64; 2] = [0.01, 1000.0];
 
 /// Dollies like [`moved`], but within bounds. At the near bound, the look-at point moves together with the camera; at
 /// the far bound, the camera stops.
-pub fn dollied(camera: &CameraDescription, by: f64, file: &CameraDescription) -> CameraDescription {
+pub fn dollied(camera: &CameraDescription, amount: f64, file: &CameraDescription) -> CameraDescription {
     let size = |camera: &CameraDescription| match camera {
         CameraDescription::Orthographic(c) => c.height,
-        other => {
-            let View { position, look_at, .. } = view(other);
+        camera => {
+            let Pose { position, look_at, .. } = pose(camera);
             position.distance(look_at)
         }
     };
     let [near, far] = DOLLY_RANGE.map(|factor| factor * size(file));
-    let now = size(camera);
-    let wanted = now * (-by).exp();
-    let reached = wanted.max(near.min(now)).min(far.max(now));
-    let near_end = moved(camera, Move::Dolly((now / reached).ln()));
-    if wanted < reached && !matches!(camera, CameraDescription::Orthographic(_)) {
-        return moved(&near_end, Move::Fly(0.0, 0.0, 1.0 - wanted / reached));
+    let current = size(camera);
+    let requested = current * (-amount).exp();
+    let clamped = requested.max(near.min(current)).min(far.max(current));
+    let dollied = moved(camera, Move::Dolly((current / clamped).ln()));
+    if requested < clamped && !matches!(camera, CameraDescription::Orthographic(_)) {
+        return moved(&dollied, Move::Fly(0.0, 0.0, 1.0 - requested / clamped));
     }
-    near_end
+    dollied
 }
 
 /// Applies the edits of the file's camera to a moved camera; returns `None` if the result equals the file's camera.
@@ -239,10 +241,10 @@ pub fn merged(
             CameraDescription::Perspective(old),
             CameraDescription::Perspective(new),
         ) => {
-            take(&mut c.position, &old.position, &new.position);
-            take(&mut c.look_at, &old.look_at, &new.look_at);
-            take(&mut c.up, &old.up, &new.up);
-            take(&mut c.fov, &old.fov, &new.fov);
+            apply_edit(&mut c.position, &old.position, &new.position);
+            apply_edit(&mut c.look_at, &old.look_at, &new.look_at);
+            apply_edit(&mut c.up, &old.up, &new.up);
+            apply_edit(&mut c.fov, &old.fov, &new.fov);
             // Moves never change the lens, so the file's values apply.
             (c.focal_length, c.aperture, c.f_number) = (new.focal_length, new.aperture, new.f_number);
             (c.focus_distance, c.blades, c.blade_rotation) = (new.focus_distance, new.blades, new.blade_rotation);
@@ -253,24 +255,24 @@ pub fn merged(
             CameraDescription::Orthographic(old),
             CameraDescription::Orthographic(new),
         ) => {
-            take(&mut c.position, &old.position, &new.position);
-            take(&mut c.look_at, &old.look_at, &new.look_at);
-            take(&mut c.up, &old.up, &new.up);
-            take(&mut c.height, &old.height, &new.height);
+            apply_edit(&mut c.position, &old.position, &new.position);
+            apply_edit(&mut c.look_at, &old.look_at, &new.look_at);
+            apply_edit(&mut c.up, &old.up, &new.up);
+            apply_edit(&mut c.height, &old.height, &new.height);
             c.path.clone_from(&new.path);
         }
         (CameraDescription::Panorama(c), CameraDescription::Panorama(old), CameraDescription::Panorama(new)) => {
-            take(&mut c.position, &old.position, &new.position);
-            take(&mut c.look_at, &old.look_at, &new.look_at);
-            take(&mut c.up, &old.up, &new.up);
+            apply_edit(&mut c.position, &old.position, &new.position);
+            apply_edit(&mut c.look_at, &old.look_at, &new.look_at);
+            apply_edit(&mut c.up, &old.up, &new.up);
             c.path.clone_from(&new.path);
         }
-        _ => return None, // another kind of camera
+        _ => return None, // the kind of camera changed
     }
     (merged != *new && merged.validate().is_ok()).then_some(merged)
 }
 
-fn take<T: Copy + PartialEq>(value: &mut T, old: &T, new: &T) {
+fn apply_edit<T: Copy + PartialEq>(value: &mut T, old: &T, new: &T) {
     if old != new {
         *value = *new;
     }
@@ -315,7 +317,7 @@ fn settings(camera: &CameraDescription) -> Vec<(&'static str, f64)> {
     let CameraDescription::Perspective(c) = camera else {
         return Vec::new();
     };
-    let written = [
+    let settings = [
         ("focal_length", (c.focal_length != 1.0).then_some(c.focal_length)),
         ("aperture", c.aperture),
         ("f_number", c.f_number),
@@ -323,7 +325,7 @@ fn settings(camera: &CameraDescription) -> Vec<(&'static str, f64)> {
         ("blades", (c.blades != 0).then_some(c.blades.into())),
         ("blade_rotation", (c.blade_rotation != 0.0).then_some(c.blade_rotation)),
     ];
-    written
+    settings
         .into_iter()
         .filter_map(|(key, value)| Some((key, value?)))
         .collect()
@@ -364,8 +366,8 @@ mod tests {
         camera("position = [0, -4, 1]\nlook_at = [0, 0, 1]\nfov = 45")
     }
 
-    /// Returns a camera with an aperture, one with an f-number, and a panorama.
-    fn others() -> [CameraDescription; 3] {
+    /// Returns a perspective camera with an aperture, a perspective camera with an f-number, and a panorama.
+    fn lens_cameras_and_panorama() -> [CameraDescription; 3] {
         let view = "position = [0, -4, 1]\nlook_at = [0, 0, 1]\n";
         [
             camera(&format!(
@@ -384,7 +386,7 @@ mod tests {
     fn an_orbit_keeps_the_distance_and_the_look_at_point() {
         for (x, y) in [(0.3, 0.0), (0.0, 0.5), (-1.0, -0.7), (0.0, 9.0), (0.0, -9.0)] {
             for camera in [perspective(), orthographic()] {
-                let (old, new) = (view(&camera), view(&moved(&camera, Move::Orbit(x, y))));
+                let (old, new) = (pose(&camera), pose(&moved(&camera, Move::Orbit(x, y))));
                 assert_eq!(old.look_at, new.look_at);
                 let (a, b) = (old.position.distance(old.look_at), new.position.distance(new.look_at));
                 assert!((a - b).abs() < 1e-4 * a, "{x} {y}: {a} {b}");
@@ -396,18 +398,18 @@ mod tests {
     #[test]
     fn the_scene_moves_with_the_drag() {
         // A drag to the right moves the camera to the left; a drag down moves it up.
-        let right = view(&moved(&perspective(), Move::Orbit(0.1, 0.0))).position;
-        assert!(right.x < -0.3, "{right}");
-        let above = view(&moved(&perspective(), Move::Orbit(0.0, 0.1))).position;
-        assert!(above.z > 1.3, "{above}");
-        let panned = view(&moved(&perspective(), Move::Pan(0.5, 0.25)));
+        let dragged_right = pose(&moved(&perspective(), Move::Orbit(0.1, 0.0))).position;
+        assert!(dragged_right.x < -0.3, "{dragged_right}");
+        let dragged_down = pose(&moved(&perspective(), Move::Orbit(0.0, 0.1))).position;
+        assert!(dragged_down.z > 1.3, "{dragged_down}");
+        let panned = pose(&moved(&perspective(), Move::Pan(0.5, 0.25)));
         let height = 8.0 * 22.5f64.to_radians().tan();
         assert!(
             panned
                 .look_at
                 .abs_diff_eq(DVec3::new(-0.5 * height, 0.0, 1.0 - 0.25 * height), 1e-4)
         );
-        let near = view(&moved(&perspective(), Move::Dolly(2f64.ln()))).position;
+        let near = pose(&moved(&perspective(), Move::Dolly(2f64.ln()))).position;
         assert!(near.abs_diff_eq(DVec3::new(0.0, -2.0, 1.0), 1e-4), "{near}");
         let CameraDescription::Orthographic(near) = moved(&orthographic(), Move::Dolly(2f64.ln())) else {
             panic!()
@@ -418,7 +420,7 @@ mod tests {
     #[test]
     fn a_dolly_stays_within_its_distance_bounds() {
         let file = perspective();
-        let distance = |camera: &CameraDescription| view(camera).position.distance(view(camera).look_at);
+        let distance = |camera: &CameraDescription| pose(camera).position.distance(pose(camera).look_at);
         let (mut near, mut far) = (file.clone(), file.clone());
         for _ in 0..80 {
             near = dollied(&near, 0.1, &file);
@@ -426,43 +428,43 @@ mod tests {
         }
         assert!((distance(&near) - 0.04).abs() < 1e-3, "{}", distance(&near));
         let further = dollied(&near, 0.1, &file);
-        let step = view(&further).position.y - view(&near).position.y;
+        let step = pose(&further).position.y - pose(&near).position.y;
         assert!((step - 0.04 * 0.095).abs() < 1e-3, "wrong step: {step}");
         assert!((distance(&further) - distance(&near)).abs() < 1e-4);
         assert!(distance(&dollied(&near, -0.1, &file)) > distance(&near));
         assert!(distance(&far) < 4001.0, "{}", distance(&far));
         assert_eq!(distance(&dollied(&far, -0.1, &file)), distance(&far));
         assert!(distance(&dollied(&far, 0.1, &file)) < distance(&far));
-        for by in [1e9, -1e9, f64::NAN] {
-            dollied(&file, by, &file).validate().unwrap();
-            dollied(&orthographic(), by, &orthographic()).validate().unwrap();
+        for amount in [1e9, -1e9, f64::NAN] {
+            dollied(&file, amount, &file).validate().unwrap();
+            dollied(&orthographic(), amount, &orthographic()).validate().unwrap();
         }
     }
 
     #[test]
     fn flying_keeps_the_direction_and_turning_keeps_the_position() {
         for file in [perspective(), orthographic()] {
-            let old = view(&file);
-            let far = old.position.distance(old.look_at);
+            let old = pose(&file);
+            let distance = old.position.distance(old.look_at);
             for (x, y, z) in [(0.5, 0.0, 0.0), (0.0, 0.5, 0.0), (0.0, 0.0, 0.5), (-0.1, 0.2, -0.3)] {
-                let new = view(&moved(&file, Move::Fly(x, y, z)));
+                let new = pose(&moved(&file, Move::Fly(x, y, z)));
                 let shift = new.position - old.position;
                 assert!(shift.abs_diff_eq(new.look_at - old.look_at, 1e-3), "{shift}");
-                assert!((shift.length() - far * DVec3::new(x, y, z).length()).abs() < 1e-3 * far);
-                let forwards = (old.look_at - old.position) / far;
-                assert!((shift.dot(forwards) - far * z).abs() < 1e-3 * far);
-                assert!((shift.dot(forwards.cross(old.up).normalize()) - far * x).abs() < 1e-3 * far);
+                assert!((shift.length() - distance * DVec3::new(x, y, z).length()).abs() < 1e-3 * distance);
+                let forwards = (old.look_at - old.position) / distance;
+                assert!((shift.dot(forwards) - distance * z).abs() < 1e-3 * distance);
+                assert!((shift.dot(forwards.cross(old.up).normalize()) - distance * x).abs() < 1e-3 * distance);
             }
             for (x, y) in [(0.3, 0.0), (0.0, 0.2), (0.0, 9.0), (0.0, -9.0), (-0.4, 0.1)] {
-                let new = view(&moved(&file, Move::Turn(x, y)));
+                let new = pose(&moved(&file, Move::Turn(x, y)));
                 assert_eq!(new.position, old.position);
-                assert!((new.position.distance(new.look_at) - far).abs() < 1e-4 * far);
+                assert!((new.position.distance(new.look_at) - distance).abs() < 1e-4 * distance);
             }
             // Positive angles turn the view to the right and upwards.
             let right = (old.look_at - old.position).cross(old.up).normalize();
-            let new = view(&moved(&file, Move::Turn(0.2, 0.1)));
-            assert!((new.look_at - old.look_at).dot(right) > 0.1 * far);
-            assert!((new.look_at - old.look_at).dot(old.up) > 0.05 * far);
+            let new = pose(&moved(&file, Move::Turn(0.2, 0.1)));
+            assert!((new.look_at - old.look_at).dot(right) > 0.1 * distance);
+            assert!((new.look_at - old.look_at).dot(old.up) > 0.05 * distance);
         }
     }
 
@@ -472,13 +474,16 @@ mod tests {
         for radius in [1e-6, 0.5, 1e6] {
             for file in [perspective(), orthographic()] {
                 let new = framed(&file, center, radius);
-                let (old, seen) = (view(&file), view(&new));
+                let (old_pose, new_pose) = (pose(&file), pose(&new));
                 assert!(
-                    seen.look_at.abs_diff_eq(center, 1e-3 * radius.max(1e-3)),
+                    new_pose.look_at.abs_diff_eq(center, 1e-3 * radius.max(1e-3)),
                     "{radius}: {}",
-                    seen.look_at
+                    new_pose.look_at
                 );
-                let (a, b) = (old.look_at - old.position, seen.look_at - seen.position);
+                let (a, b) = (
+                    old_pose.look_at - old_pose.position,
+                    new_pose.look_at - new_pose.position,
+                );
                 assert!(a.angle_between(b) < 1e-2, "{radius}: the view direction changed");
                 match new {
                     CameraDescription::Perspective(c) => {
@@ -494,38 +499,43 @@ mod tests {
 
     #[test]
     fn a_camera_can_be_restored_from_its_viewpoint() {
-        for file in others().into_iter().chain([perspective(), orthographic()]) {
-            let away = moved(&moved(&file, Move::Orbit(0.3, 0.2)), Move::Dolly(0.4));
-            let kept = Viewpoint::of(&away);
-            let json = serde_json::to_string(&kept).unwrap();
-            assert_eq!(placed(&file, serde_json::from_str(&json).unwrap()).unwrap(), away);
+        for file in lens_cameras_and_panorama()
+            .into_iter()
+            .chain([perspective(), orthographic()])
+        {
+            let camera = moved(&moved(&file, Move::Orbit(0.3, 0.2)), Move::Dolly(0.4));
+            let json = serde_json::to_string(&Viewpoint::of(&camera)).unwrap();
+            assert_eq!(
+                with_viewpoint(&file, serde_json::from_str(&json).unwrap()).unwrap(),
+                camera
+            );
         }
-        let wrong = Viewpoint {
+        let invalid = Viewpoint {
             look_at: DVec3::new(0.0, -4.0, 1.0),
             ..Viewpoint::of(&perspective())
         };
         assert!(
-            placed(&perspective(), wrong).is_err(),
+            with_viewpoint(&perspective(), invalid).is_err(),
             "a camera at its own look-at point is accepted"
         );
     }
 
     #[test]
     fn moves_keep_the_lens_and_the_kind_of_camera() {
-        for file in others() {
-            for by in [Move::Orbit(0.3, 0.2), Move::Pan(0.1, 0.2), Move::Dolly(0.5)] {
-                let new = moved(&file, by);
-                assert_ne!(view(&new).position, view(&file).position, "{by:?}");
+        for file in lens_cameras_and_panorama() {
+            for camera_move in [Move::Orbit(0.3, 0.2), Move::Pan(0.1, 0.2), Move::Dolly(0.5)] {
+                let new = moved(&file, camera_move);
+                assert_ne!(pose(&new).position, pose(&file).position, "{camera_move:?}");
                 assert_eq!(std::mem::discriminant(&new), std::mem::discriminant(&file));
                 assert_eq!(settings(&new), settings(&file));
                 assert_eq!(merged(&new, &file, &file), Some(new));
             }
         }
-        let [wide, by_number, _] = others();
-        let turned = moved(&wide, Move::Orbit(0.3, 0.2));
-        let both = merged(&turned, &wide, &by_number).unwrap();
-        assert_eq!(settings(&both), settings(&by_number), "the edited lens is lost");
-        assert_eq!(view(&both).position, view(&turned).position);
+        let [with_aperture, with_f_number, _] = lens_cameras_and_panorama();
+        let orbited = moved(&with_aperture, Move::Orbit(0.3, 0.2));
+        let result = merged(&orbited, &with_aperture, &with_f_number).unwrap();
+        assert_eq!(settings(&result), settings(&with_f_number), "the edited lens is lost");
+        assert_eq!(pose(&result).position, pose(&orbited).position);
     }
 
     #[test]
@@ -536,8 +546,8 @@ mod tests {
             camera = moved(&camera, Move::Dolly(0.5));
             camera.validate().unwrap();
         }
-        for by in [Move::Dolly(1e9), Move::Dolly(-1e9), Move::Pan(1e300, 0.0)] {
-            moved(&camera, by).validate().unwrap();
+        for camera_move in [Move::Dolly(1e9), Move::Dolly(-1e9), Move::Pan(1e300, 0.0)] {
+            moved(&camera, camera_move).validate().unwrap();
         }
         let text = text(&moved(&perspective(), Move::Orbit(0.3, 0.2)));
         assert_eq!(
@@ -549,31 +559,31 @@ mod tests {
     #[test]
     fn edits_of_the_file_and_moves_are_merged() {
         let file = perspective();
-        let turned = moved(&file, Move::Orbit(0.3, 0.2));
+        let orbited = moved(&file, Move::Orbit(0.3, 0.2));
         let wide = camera("position = [0, -4, 1]\nlook_at = [0, 0, 1]\nfov = 60");
-        let both = merged(&turned, &file, &wide).unwrap();
-        assert_eq!(view(&both).position, view(&turned).position);
-        assert!(matches!(&both, CameraDescription::Perspective(c) if c.fov == 60.0));
+        let result = merged(&orbited, &file, &wide).unwrap();
+        assert_eq!(pose(&result).position, pose(&orbited).position);
+        assert!(matches!(&result, CameraDescription::Perspective(c) if c.fov == 60.0));
         let path = "position = [0, -4, 1]\nlook_at = [0, 0, 1]\nfov = 45\npath.keys = [{ frame = 1, fov = 40 }]";
-        let both = merged(&turned, &file, &camera(path)).unwrap();
-        assert_eq!(view(&both).position, view(&turned).position);
-        assert_eq!(both.path(), camera(path).path(), "the path of the file is lost");
-        let elsewhere = camera("position = [0, -5, 1]\nlook_at = [0, 0, 1]\nfov = 45");
+        let result = merged(&orbited, &file, &camera(path)).unwrap();
+        assert_eq!(pose(&result).position, pose(&orbited).position);
+        assert_eq!(result.path(), camera(path).path(), "the path of the file is lost");
+        let with_new_position = camera("position = [0, -5, 1]\nlook_at = [0, 0, 1]\nfov = 45");
         assert_eq!(
-            merged(&turned, &file, &elsewhere),
+            merged(&orbited, &file, &with_new_position),
             None,
             "a moved position replaces an edited position"
         );
         assert_eq!(
-            merged(&turned, &file, &turned),
+            merged(&orbited, &file, &orbited),
             None,
             "a saved camera still differs from the file"
         );
-        assert_eq!(merged(&turned, &file, &orthographic()), None);
-        let through = camera("position = [0, -4, 1]\nlook_at = [0, 0, 1]\nup = [1, 0, 0]\nfov = 45");
+        assert_eq!(merged(&orbited, &file, &orthographic()), None);
+        let along_up = camera("position = [0, -4, 1]\nlook_at = [0, 0, 1]\nup = [1, 0, 0]\nfov = 45");
         let side = camera("position = [4, 0, 1]\nlook_at = [0, 0, 1]\nfov = 45");
         assert_eq!(
-            merged(&side, &file, &through),
+            merged(&side, &file, &along_up),
             None,
             "a view along the up direction is accepted"
         );
@@ -581,7 +591,10 @@ mod tests {
 
     #[test]
     fn the_text_of_a_camera_parses_to_the_same_camera() {
-        for camera in [perspective(), orthographic()].into_iter().chain(others()) {
+        for camera in [perspective(), orthographic()]
+            .into_iter()
+            .chain(lens_cameras_and_panorama())
+        {
             let camera = moved(&camera, Move::Orbit(0.1, 0.2));
             let text = format!("image = {{ width = 4, height = 4 }}\n{}", text(&camera));
             assert_eq!(Description::parse(&text, "camera").unwrap().camera, camera);

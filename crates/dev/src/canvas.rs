@@ -21,15 +21,16 @@ use super::pixel_values::means;
 /// Target duration of a dispatch; a save or a camera move waits up to this long.
 const DISPATCH_DURATION: Duration = Duration::from_millis(30);
 /// Target render time of a coarse image; including the display time, about 20 images are shown per second.
-const COARSE: Duration = Duration::from_millis(30);
+const COARSE_DURATION: Duration = Duration::from_millis(30);
 /// Pixels of a coarse image while the speed is unknown.
 const COARSE_PIXELS: f64 = 10_000.0;
-const COARSEST: u32 = 32;
+/// Maximum scale of a coarse image.
+const MAX_SCALE: u32 = 32;
 /// Maximum number of displayed pixels, and maximum side length, because browsers do not show larger images.
 const MAX_PIXELS: u64 = 1 << 24;
 const MAX_SIDE: u32 = 1 << 14;
 /// Number of first hits per dispatch.
-const HITS_PER_CALL: u32 = 1 << 17;
+const HITS_PER_DISPATCH: u32 = 1 << 17;
 
 pub struct Canvas {
     gpu: Gpu,
@@ -38,14 +39,14 @@ pub struct Canvas {
     /// The camera of the full-size image.
     camera: Camera,
     /// The scale of the finished film; above 1 if the image is too large to display.
-    finest: u32,
+    final_scale: u32,
     /// True if the CPU also renders the image, for [`View::Compare`].
     compare: bool,
     stage: Stage,
     steps: Steps,
-    /// The most recent lower-resolution film, and the CPU's, if it renders too.
-    under: Option<(Film, Option<Film>)>,
-    /// The film of the CPU for this stage.
+    /// The most recent lower-resolution films: of the GPU, and, for [`View::Compare`], of the CPU.
+    coarser: Option<(Film, Option<Film>)>,
+    /// The CPU's film of this stage.
     cpu: Film,
     /// The first hits of the rows rendered so far, top row first.
     hits: Vec<FirstHit>,
@@ -77,7 +78,7 @@ struct Stage {
     width: u32,
     height: u32,
     /// True once a dispatch of this stage has ended.
-    begun: bool,
+    has_result: bool,
 }
 
 impl Canvas {
@@ -87,17 +88,17 @@ impl Canvas {
             scale: 1,
             width: camera.width,
             height: camera.height,
-            begun: false,
+            has_result: false,
         };
         let mut canvas = Canvas {
             gpu,
             scene,
             camera,
-            finest: 1,
+            final_scale: 1,
             compare: false,
             stage,
             steps: Steps::new(&WorkSplit::default(), DISPATCH_DURATION, Order::Pixels),
-            under: None,
+            coarser: None,
             cpu: Film::new(Region::whole(0, 0)),
             hits: Vec::new(),
             shown: false,
@@ -134,17 +135,17 @@ impl Canvas {
 
     pub fn restart(&mut self, camera: Camera, view: View) -> Result<(), RenderError> {
         self.camera = camera;
-        if self.compare != view.is_by_both() {
+        if self.compare != view.is_rendered_twice() {
             self.steps.forget_pace();
         }
-        self.compare = view.is_by_both();
-        self.under = None;
+        self.compare = view.is_rendered_twice();
+        self.coarser = None;
         self.hits.clear();
         self.shown = false;
-        let largest = self.gpu.largest_film();
-        self.finest = finest(camera.width, camera.height, largest, self.limits.scale);
-        let scale = if self.hits_of(view).is_some() {
-            self.finest
+        let largest_film = self.gpu.largest_film();
+        self.final_scale = final_scale(camera.width, camera.height, largest_film, self.limits.scale);
+        let scale = if self.hit_layer(view).is_some() {
+            self.final_scale
         } else {
             self.first_scale()
         };
@@ -152,22 +153,23 @@ impl Canvas {
     }
 
     pub fn change_view(&mut self, view: View) -> Result<(), RenderError> {
-        let film = self.hits_of(view).is_none();
-        let nothing_there = self.stage.scale == self.finest && self.steps.samples() == 0;
-        let other_film = self.compare != view.is_by_both();
-        self.shown = film && self.stage.scale == self.finest && !nothing_there; // the film already contains this view
-        if film && (other_film || nothing_there) {
+        let shows_film = self.hit_layer(view).is_none();
+        let is_empty = self.stage.scale == self.final_scale && self.steps.samples() == 0;
+        let backends_change = self.compare != view.is_rendered_twice();
+        // The film already contains this view.
+        self.shown = shows_film && self.stage.scale == self.final_scale && !is_empty;
+        if shows_film && (backends_change || is_empty) {
             self.restart(self.camera, view)
-        } else if !film && self.stage.scale > self.finest {
-            self.begin(self.finest)
+        } else if !shows_film && self.stage.scale > self.final_scale {
+            self.begin(self.final_scale)
         } else {
             Ok(())
         }
     }
 
-    /// Returns the layer of the first hits that a view shows.
-    fn hits_of(&self, view: View) -> Option<Aov> {
-        view.of_hits(self.scene.integrator)
+    /// Returns the first-hit layer that a view shows.
+    fn hit_layer(&self, view: View) -> Option<Aov> {
+        view.hit_layer(self.scene.integrator)
     }
 
     fn first_scale(&self) -> u32 {
@@ -175,11 +177,11 @@ impl Canvas {
         let affordable = self
             .steps
             .speed()
-            .map_or(COARSE_PIXELS, |speed| speed * COARSE.as_secs_f64());
+            .map_or(COARSE_PIXELS, |speed| speed * COARSE_DURATION.as_secs_f64());
         ((pixels / affordable.max(1.0)).sqrt().ceil() as u32)
             .next_power_of_two()
-            .min(COARSEST)
-            .max(self.finest)
+            .min(MAX_SCALE)
+            .max(self.final_scale)
     }
 
     fn begin(&mut self, scale: u32) -> Result<(), RenderError> {
@@ -189,7 +191,7 @@ impl Canvas {
             scale,
             width,
             height,
-            begun: false,
+            has_result: false,
         };
         self.scene.camera = Camera {
             width,
@@ -201,7 +203,7 @@ impl Canvas {
         if self.compare {
             self.cpu = Film::of(region, self.scene.film_layout());
         }
-        let samples = if scale > self.finest {
+        let samples = if scale > self.final_scale {
             1
         } else {
             self.scene.sampling.pixel_samples
@@ -212,9 +214,9 @@ impl Canvas {
     }
 
     pub fn set_limits(&mut self, limits: Limits, view: View) -> Result<(), RenderError> {
-        let (old, fewer) = (self.limits, limits.samples < self.steps.samples());
+        let (old, removes_samples) = (self.limits, limits.samples < self.steps.samples());
         self.limits = limits;
-        if limits.scale != old.scale || (fewer && self.stage.scale == self.finest) {
+        if limits.scale != old.scale || (removes_samples && self.stage.scale == self.final_scale) {
             self.restart(self.camera, view) // samples cannot be removed from a film
         } else {
             self.steps.stop_at(limits.samples);
@@ -232,18 +234,18 @@ impl Canvas {
     }
 
     pub fn is_done(&self, view: View) -> bool {
-        match self.hits_of(view) {
+        match self.hit_layer(view) {
             Some(_) => {
-                let [width, height] = self.finest_size();
+                let [width, height] = self.final_size();
                 self.hits.len() as u64 == Region::whole(width, height).pixels()
             }
-            None => self.stage.scale == self.finest && self.steps.is_done(),
+            None => self.stage.scale == self.final_scale && self.steps.is_done(),
         }
     }
 
     /// Performs one dispatch. Returns whether the result must be shown without delay.
     pub fn step(&mut self, view: View) -> Result<bool, RenderError> {
-        let show = match self.hits_of(view) {
+        let show = match self.hit_layer(view) {
             Some(_) => self.step_hits(view)?,
             None => self.step_film()?,
         };
@@ -252,9 +254,9 @@ impl Canvas {
     }
 
     fn step_hits(&mut self, view: View) -> Result<bool, RenderError> {
-        let [width, height] = self.finest_size();
+        let [width, height] = self.final_size();
         let first = (self.hits.len() / width as usize) as u32;
-        let rows = (HITS_PER_CALL / width).max(1).min(height - first);
+        let rows = (HITS_PER_DISPATCH / width).max(1).min(height - first);
         let strip = Region {
             y0: first,
             y1: first + rows,
@@ -270,21 +272,21 @@ impl Canvas {
             let film = std::mem::replace(&mut self.cpu, Film::new(Region::whole(0, 0)));
             let mut cpu = Cpu::new(&self.scene);
             cpu.resume(film)?;
-            let mut both = Both {
+            let mut backends = GpuAndCpu {
                 gpu: &mut self.gpu,
                 cpu,
             };
-            let result = self.steps.step(&mut both);
-            self.cpu = both.cpu.into_film().unwrap_or(Film::new(Region::whole(0, 0)));
+            let result = self.steps.step(&mut backends);
+            self.cpu = backends.cpu.into_film().unwrap_or(Film::new(Region::whole(0, 0)));
             result?;
         } else {
             self.steps.step(&mut self.gpu)?;
         }
-        self.stage.begun = true;
-        if self.stage.scale > self.finest && self.steps.is_done() {
+        self.stage.has_result = true;
+        if self.stage.scale > self.final_scale && self.steps.is_done() {
             let gpu = self.gpu.film()?;
-            self.under = Some((gpu, self.compare.then(|| self.cpu.clone())));
-            self.begin((self.stage.scale / 4).max(self.finest))?;
+            self.coarser = Some((gpu, self.compare.then(|| self.cpu.clone())));
+            self.begin((self.stage.scale / 4).max(self.final_scale))?;
             return Ok(true);
         }
         let first_pass = passes == 0 && self.steps.samples() > 0;
@@ -293,8 +295,8 @@ impl Canvas {
 
     /// Returns the current image with its width and height.
     pub fn content(&mut self, view: View) -> Result<(Content, [u32; 2]), RenderError> {
-        if let Some(aov) = self.hits_of(view) {
-            return Ok((self.hits_so_far(aov), self.finest_size()));
+        if let Some(aov) = self.hit_layer(view) {
+            return Ok((self.hits_so_far(aov), self.final_size()));
         }
         let size = [self.stage.width, self.stage.height];
         if view == View::Samples {
@@ -308,39 +310,39 @@ impl Canvas {
             return Ok((Content::Samples(counts, self.scene.sampling.pixel_samples), size));
         }
         let film;
-        let under = self.under.as_ref();
+        let coarser = self.coarser.as_ref();
         // Until the stage has a result, the lower-resolution film is sent.
-        let (gpu, cpu, under) = match under.filter(|_| !self.stage.begun) {
+        let (gpu, cpu, coarser) = match coarser.filter(|_| !self.stage.has_result) {
             Some((gpu, cpu)) => (gpu, cpu.as_ref(), None),
             None => {
                 film = self.gpu.film()?;
-                (&film, self.compare.then_some(&self.cpu), under)
+                (&film, self.compare.then_some(&self.cpu), coarser)
             }
         };
         let size = [gpu.region.width(), gpu.region.height()];
         let has_samples = |y| self.steps.samples_of_row(y) > 0;
-        let under_gpu = under.map(|(gpu, _)| gpu);
-        if let Some(aov) = view.of_film(self.scene.integrator) {
-            return Ok((Content::Film(FilmLayer::of(aov, gpu, under_gpu, &has_samples)), size));
+        let coarser_gpu = coarser.map(|(gpu, _)| gpu);
+        if let Some(aov) = view.film_layer(self.scene.integrator) {
+            return Ok((Content::Film(FilmLayer::of(aov, gpu, coarser_gpu, &has_samples)), size));
         }
-        let colors = means(gpu, under_gpu, &has_samples);
-        Ok(match cpu.filter(|_| view.is_by_both()) {
+        let colors = means(gpu, coarser_gpu, &has_samples);
+        Ok(match cpu.filter(|_| view.is_rendered_twice()) {
             Some(cpu) => {
-                let under = under.and_then(|(_, cpu)| cpu.as_ref());
-                (Content::Compare(colors, means(cpu, under, &has_samples)), size)
+                let coarser = coarser.and_then(|(_, cpu)| cpu.as_ref());
+                (Content::Compare(colors, means(cpu, coarser, &has_samples)), size)
             }
             None => (Content::Color(colors), size),
         })
     }
 
     fn hits_so_far(&self, aov: Aov) -> Content {
-        let nothing = FirstHit {
+        let miss = FirstHit {
             shape: wgray_render::records::NO_INDEX,
             ..bytemuck::Zeroable::zeroed()
         };
         let mut hits = self.hits.clone();
-        let [width, height] = self.finest_size();
-        hits.resize(Region::whole(width, height).pixels() as usize, nothing);
+        let [width, height] = self.final_size();
+        hits.resize(Region::whole(width, height).pixels() as usize, miss);
         Content::Hits(aov, hits)
     }
 
@@ -350,13 +352,13 @@ impl Canvas {
     }
 
     /// Returns the width and height of the finished image as displayed.
-    pub fn finest_size(&self) -> [u32; 2] {
-        self.size_at(self.finest)
+    pub fn final_size(&self) -> [u32; 2] {
+        self.size_at(self.final_scale)
     }
 
     /// Returns the current and the final number of samples per pixel.
     pub fn samples(&self) -> (u32, u32) {
-        let so_far = if self.stage.scale == self.finest {
+        let so_far = if self.stage.scale == self.final_scale {
             self.steps.samples()
         } else {
             0
@@ -364,29 +366,29 @@ impl Canvas {
         (so_far, self.scene.sampling.pixel_samples.min(self.limits.samples))
     }
 
-    /// Returns the samples per second.
+    /// Returns the number of samples per second; `None` while it is unknown.
     pub fn speed(&self) -> Option<f64> {
         self.steps.speed()
     }
 }
 
-/// Returns the smallest scale, at least `least`, at which the image can be displayed.
-fn finest(width: u32, height: u32, largest_film: u64, least: u32) -> u32 {
-    let most = largest_film.min(MAX_PIXELS);
+/// Returns the smallest scale, at least `min_scale`, at which the image can be displayed.
+fn final_scale(width: u32, height: u32, largest_film: u64, min_scale: u32) -> u32 {
+    let max_pixels = largest_film.min(MAX_PIXELS);
     let fits = |scale: &u32| {
         let (width, height) = (width.div_ceil(*scale), height.div_ceil(*scale));
-        Region::whole(width, height).pixels() <= most && width.max(height) <= MAX_SIDE
+        Region::whole(width, height).pixels() <= max_pixels && width.max(height) <= MAX_SIDE
     };
-    (least..).find(fits).unwrap_or(1) // an image of one pixel fits
+    (min_scale..).find(fits).unwrap_or(1) // an image of one pixel fits
 }
 
 /// Submits each dispatch to both the GPU and the CPU, so that their films can be compared.
-struct Both<'a> {
+struct GpuAndCpu<'a> {
     gpu: &'a mut Gpu,
-    cpu: Cpu<'a>,
+    cpu: Cpu<&'a Packed>,
 }
 
-impl Backend for Both<'_> {
+impl Backend for GpuAndCpu<'_> {
     fn begin(&mut self, region: Region) -> Result<(), RenderError> {
         self.gpu.begin(region)?;
         self.cpu.begin(region)
@@ -438,7 +440,7 @@ mod tests {
 
     #[test]
     fn large_images_get_the_smallest_scale_that_fits() {
-        for (width, height, film, scale) in [
+        for (width, height, largest_film, scale) in [
             (2048, 2048, 1 << 22, 1),
             (2049, 2048, 1 << 22, 2),
             (3000, 3000, 1 << 22, 2),
@@ -450,8 +452,12 @@ mod tests {
             (65_536, 65_536, 1 << 22, 32),
             (1, 1, 1, 1),
         ] {
-            assert_eq!(finest(width, height, film, 1), scale, "{width} x {height}");
-            assert_eq!(finest(width, height, film, 4), scale.max(4), "{width} x {height}");
+            assert_eq!(final_scale(width, height, largest_film, 1), scale, "{width} x {height}");
+            assert_eq!(
+                final_scale(width, height, largest_film, 4),
+                scale.max(4),
+                "{width} x {height}"
+            );
         }
     }
 }

@@ -50,8 +50,8 @@ impl Diagnostic {
         let shown = errors
             .iter()
             .map(|error| Diagnostic::of_value(error, text, layout.as_ref()));
-        let rest = more.map(|more| Diagnostic::plain("scene", more));
-        shown.chain(rest).collect()
+        let omitted = more.map(|message| Diagnostic::plain("scene", message));
+        shown.chain(omitted).collect()
     }
 
     /// Returns the diagnostic of an error that concerns one value or the whole file.
@@ -64,34 +64,35 @@ impl Diagnostic {
             SceneError::Read { .. } => return Diagnostic::plain("file", error.to_string()),
             _ => return Diagnostic::plain("scene", error.to_string()),
         };
-        let place = match column {
+        let location = match column {
             Some(column) => format!("{origin}:{line}:{column}"),
             None => format!("{origin}:{line}"),
         };
-        let whole = error.to_string();
-        let message = whole.strip_prefix(&format!("{place}: ")).unwrap_or(&whole).to_string();
-        let marked = match (error, column) {
+        let full_message = error.to_string();
+        let message = full_message.strip_prefix(&format!("{location}: "));
+        let message = message.unwrap_or(&full_message).to_string();
+        let mark = match (error, column) {
             (_, Some(column)) => Some((column, 1)),
             (SceneError::Invalid { problem, .. }, None) => {
                 layout.and_then(|layout| mark_of(layout, text, line, problem))
             }
             _ => None,
         };
-        let column = marked.map(|(column, _)| column);
+        let column = mark.map(|(column, _)| column);
         Diagnostic {
             kind: "scene",
-            excerpt: excerpt_of(text, line, marked).map(|excerpt| around(text, line, &excerpt)),
+            excerpt: excerpt_of(text, line, mark).map(|excerpt| with_neighbors(text, line, &excerpt)),
             place: Some(column.map_or(format!("{origin}:{line}"), |column| format!("{origin}:{line}:{column}"))),
-            file: whole_path(Path::new(origin)),
+            file: absolute_path(Path::new(origin)),
             line: Some(line),
             column,
             message,
         }
     }
 
-    /// Returns the diagnostic of an error in a shader, which is in a folder or built in.
+    /// Returns the diagnostic of an error in a shader. `folder` is the folder of the shaders, unless they are built in.
     pub fn shader(error: &ShaderError, shaders: &Shaders, folder: Option<&Path>) -> Diagnostic {
-        let mut found = Diagnostic {
+        let mut diagnostic = Diagnostic {
             place: Some(error.place.clone()),
             excerpt: error.excerpt.clone(),
             ..Diagnostic::plain("shader", error.message.clone())
@@ -100,20 +101,20 @@ impl Diagnostic {
         let (column, line, file) = (parts.next(), parts.next(), parts.next());
         let number = |part: Option<&str>| part.and_then(|part| part.parse().ok());
         let (Some(file), Some(line), Some(column)) = (file, number(line), number(column)) else {
-            return found;
+            return diagnostic;
         };
         let text = shaders.text(file);
         if text.is_empty() {
-            return found; // generated code
+            return diagnostic; // generated code
         }
-        found.excerpt = found.excerpt.map(|excerpt| around(text, line, &excerpt));
-        (found.line, found.column) = (Some(line), Some(column));
+        diagnostic.excerpt = diagnostic.excerpt.map(|excerpt| with_neighbors(text, line, &excerpt));
+        (diagnostic.line, diagnostic.column) = (Some(line), Some(column));
         if let Some(folder) = folder {
             let path = folder.join(file);
-            found.place = Some(format!("{}:{line}:{column}", path.display()));
-            found.file = whole_path(&path);
+            diagnostic.place = Some(format!("{}:{line}:{column}", path.display()));
+            diagnostic.file = absolute_path(&path);
         }
-        found
+        diagnostic
     }
 
     /// Returns the excerpt line with the error location and its mark, for a terminal.
@@ -124,16 +125,15 @@ impl Diagnostic {
     }
 }
 
-fn whole_path(path: &Path) -> Option<String> {
+fn absolute_path(path: &Path) -> Option<String> {
     absolute(path).ok()?.to_str().map(str::to_string)
 }
 
 /// Returns the excerpt of a line (counted from 1) together with its neighboring lines.
-fn around(text: &str, line: usize, excerpt: &str) -> String {
-    let numbered = |line: usize| Some((line, text.lines().nth(line.checked_sub(1)?)?));
-    let shown = |(line, content)| excerpt::numbered(line, content);
-    let before = line.checked_sub(1).and_then(numbered).map(shown);
-    let after = numbered(line + 1).map(shown);
+fn with_neighbors(text: &str, line: usize, excerpt: &str) -> String {
+    let numbered = |line: usize| Some(excerpt::numbered(line, text.lines().nth(line.checked_sub(1)?)?));
+    let before = line.checked_sub(1).and_then(numbered);
+    let after = numbered(line + 1);
     let lines = before.into_iter().chain([excerpt.to_string()]).chain(after);
     lines.collect::<Vec<_>>().join("\n")
 }
@@ -144,16 +144,18 @@ const MAX_SEARCHED_BYTES: usize = 1 << 20;
 /// Returns the column and length of the invalid value or unknown key if it is on this line.
 fn mark_of(layout: &Layout, text: &str, line: usize, problem: &Problem) -> Option<(usize, usize)> {
     let range = match (problem.is_unknown_key, problem.key.0.last()) {
-        (true, Some(Segment::Key(key))) => layout.extent(&problem.key).map(|all| all.start..all.start + key.len()),
+        (true, Some(Segment::Key(key))) => layout
+            .extent(&problem.key)
+            .map(|extent| extent.start..extent.start + key.len()),
         _ => layout.value(&problem.key),
     }?;
     let before = text.get(..range.start)?;
-    let start = before.rfind('\n').map_or(0, |at| at + 1);
-    let marked = text.get(range)?.lines().next()?.chars().count().max(1);
-    (before.matches('\n').count() + 1 == line).then_some((before[start..].chars().count() + 1, marked))
+    let start = before.rfind('\n').map_or(0, |newline| newline + 1);
+    let length = text.get(range)?.lines().next()?.chars().count().max(1);
+    (before.matches('\n').count() + 1 == line).then_some((before[start..].chars().count() + 1, length))
 }
 
-/// Formats a line (counted from 1) with its number and a mark (column and length). Without a mark, the whole line is
+/// Formats a line (counted from 1) with its number and a mark (column and length). Without a `mark`, the full line is
 /// marked.
 fn excerpt_of(text: &str, line: usize, mark: Option<(usize, usize)>) -> Option<String> {
     let content = text.lines().nth(line.checked_sub(1)?)?;
@@ -176,23 +178,29 @@ mod tests {
     use super::*;
     use wgray_scene::Scene;
 
-    fn of(error: &SceneError, text: &str) -> Diagnostic {
-        let mut shown = Diagnostic::scene(error, text);
-        assert_eq!(shown.len(), 1, "{shown:?}");
-        shown.remove(0)
+    fn single_diagnostic(error: &SceneError, text: &str) -> Diagnostic {
+        let mut diagnostics = Diagnostic::scene(error, text);
+        assert_eq!(diagnostics.len(), 1, "{diagnostics:?}");
+        diagnostics.remove(0)
     }
 
     #[test]
     fn every_error_of_a_scene_is_shown_with_its_line() {
-        let start = "[image]\nwidth = 0\nheight = 4\n[camera]\nposition = [0, 1, 0]\nlook_at = [1, 0, 0]\nfov = 190\n";
-        let shown = Diagnostic::scene(&Scene::parse(start, "s.toml").unwrap_err(), start);
-        let places: Vec<_> = shown.iter().map(|one| (one.place.as_deref(), one.column)).collect();
-        assert_eq!(places, [(Some("s.toml:2:9"), Some(9)), (Some("s.toml:7:7"), Some(7))]);
+        let text = "[image]\nwidth = 0\nheight = 4\n[camera]\nposition = [0, 1, 0]\nlook_at = [1, 0, 0]\nfov = 190\n";
+        let shown = Diagnostic::scene(&Scene::parse(text, "s.toml").unwrap_err(), text);
+        let locations: Vec<_> = shown
+            .iter()
+            .map(|error| (error.place.as_deref(), error.column))
+            .collect();
+        assert_eq!(
+            locations,
+            [(Some("s.toml:2:9"), Some(9)), (Some("s.toml:7:7"), Some(7))]
+        );
         assert_eq!(
             shown[1].marked_line().as_deref(),
             Some("    7 | fov = 190\n      |       ^^^")
         );
-        let many = format!("{start}{}", "[[lights]]\ntype = 'point'\n".repeat(30));
+        let many = format!("{text}{}", "[[lights]]\ntype = 'point'\n".repeat(30));
         let shown = Diagnostic::scene(&Scene::parse(&many, "s.toml").unwrap_err(), &many);
         assert_eq!(shown.len(), 21);
         assert_eq!(
@@ -205,7 +213,7 @@ mod tests {
     fn a_scene_error_is_shown_with_its_line() {
         let text = "[image]\nwidth = 0\nheight = 4\n[camera]\nposition = [0, 1, 0]\nlook_at = [1, 0, 0]\nfov = 40\n";
         let error = Scene::parse(text, "s.toml").unwrap_err();
-        let shown = of(&error, text);
+        let shown = single_diagnostic(&error, text);
         assert_eq!(shown.place.as_deref(), Some("s.toml:2:9"));
         assert_eq!(shown.message, "image.width: 0 must be from 1 to 65536");
         let lines = "    1 | [image]\n    2 | width = 0\n      |         ^\n    3 | height = 4";
@@ -217,7 +225,7 @@ mod tests {
         assert!(Path::new(shown.file.as_ref().unwrap()).is_absolute() && shown.file.unwrap().ends_with("s.toml"));
         assert_eq!((shown.line, shown.column), (Some(2), Some(9)));
         let unknown = text.replace("fov", "  fovv");
-        let shown = of(
+        let shown = single_diagnostic(
             &Scene::parse(&unknown.replace("= 0", "= 4"), "s.toml").unwrap_err(),
             &unknown,
         );
@@ -226,25 +234,25 @@ mod tests {
             shown.marked_line().as_deref(),
             Some("    7 |   fovv = 40\n      |   ^^^^")
         );
-        // If there is no value, the whole line is marked.
+        // An error about a missing key marks the full line.
         let missing = text.replace("width = 0\n", "");
-        let shown = of(&Scene::parse(&missing, "s.toml").unwrap_err(), &missing);
+        let shown = single_diagnostic(&Scene::parse(&missing, "s.toml").unwrap_err(), &missing);
         assert_eq!(shown.column, None);
         let text = "[image]\nwidth = = 2";
         let error = Scene::parse(text, "s.toml").unwrap_err();
-        let shown = of(&error, text);
+        let shown = single_diagnostic(&error, text);
         assert_eq!(shown.place.as_deref(), Some("s.toml:2:9"));
         let lines = "    1 | [image]\n    2 | width = = 2\n      |         ^";
         assert_eq!(
             shown.excerpt.as_deref(),
             Some(lines),
-            "there is no line behind the last"
+            "the excerpt continues after the last line"
         );
         assert_eq!((shown.line, shown.column), (Some(2), Some(9)));
     }
 
     #[test]
-    fn a_shader_error_is_shown_between_its_neighbours() {
+    fn a_shader_error_is_shown_between_its_neighboring_lines() {
         let text = "// first\n\nfn a() { b }\n| c\n";
         let shaders = Shaders::built_in().with("phong.wgsl", text.to_string());
         let error = |place: &str| ShaderError {
@@ -261,15 +269,18 @@ mod tests {
         let lines = "    2 |\n    3 | fn a() { b }\n      |          ^\n    4 | | c";
         assert_eq!(shown.excerpt.as_deref(), Some(lines));
         assert_eq!(shown.marked_line(), error("").excerpt);
-        let inside = Diagnostic::shader(&error("phong.wgsl:3:10"), &shaders, None);
-        assert_eq!((inside.place.as_deref(), inside.file), (Some("phong.wgsl:3:10"), None));
+        let built_in = Diagnostic::shader(&error("phong.wgsl:3:10"), &shaders, None);
+        assert_eq!(
+            (built_in.place.as_deref(), built_in.file),
+            (Some("phong.wgsl:3:10"), None)
+        );
         // Generated code has no file that can be opened.
-        let own = Diagnostic::shader(
+        let generated = Diagnostic::shader(
             &error("crates/render/src/records/layout.rs:3:10"),
             &shaders,
             Some(Path::new("/s")),
         );
-        assert_eq!((own.file, own.line), (None, None));
-        assert_eq!(own.excerpt, error("").excerpt);
+        assert_eq!((generated.file, generated.line), (None, None));
+        assert_eq!(generated.excerpt, error("").excerpt);
     }
 }

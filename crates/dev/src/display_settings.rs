@@ -15,7 +15,7 @@ pub struct DisplayOverrides {
     pub exposure: Option<f64>,
     /// The view transform.
     pub transform: Option<ViewTransform>,
-    /// True for false colors by luminance.
+    /// Displays the luminance as false colors.
     pub false_color: bool,
 }
 
@@ -29,7 +29,7 @@ impl DisplayOverrides {
     }
 
     /// Applies the overrides to the settings of the scene.
-    pub fn over(self, scene: ViewSettings) -> ViewSettings {
+    pub fn apply_to(self, scene: ViewSettings) -> ViewSettings {
         ViewSettings {
             transform: self.transform.unwrap_or(scene.transform),
             exposure: self.exposure.unwrap_or(scene.exposure),
@@ -44,23 +44,23 @@ pub struct DisplaySettings {
     pub gain: f32,
     /// True if invalid pixels are marked.
     pub marks: bool,
-    /// True if negative values are valid, as with filters that have negative lobes.
-    pub negative: bool,
+    /// True if negative values are valid, as from filters that have negative lobes.
+    pub allow_negative: bool,
     /// The view transform and the exposure.
     pub view: ViewSettings,
-    /// True for false colors by luminance.
+    /// Displays the luminance as false colors.
     pub false_color: bool,
 }
 
-/// Range of the false colors in stops of luminance after exposure: for radiance, and for standard errors.
-const FALSE_COLORS: [f32; 2] = [-10.0, 6.0];
-const ERRORS: [f32; 2] = [-12.0, 0.0];
+/// Ranges of the false colors in stops of luminance after exposure.
+const RADIANCE_STOPS: [f32; 2] = [-10.0, 6.0];
+const STANDARD_ERROR_STOPS: [f32; 2] = [-12.0, 0.0];
 
 impl DisplaySettings {
     /// Returns the displayed bytes of a linear color.
-    pub fn shown(&self, light: [f32; 3]) -> [u8; 3] {
+    pub fn color_bytes(&self, light: [f32; 3]) -> [u8; 3] {
         match self.false_color {
-            true => self.false_color(light, FALSE_COLORS),
+            true => self.false_color(light, RADIANCE_STOPS),
             false => self.view.rgb8(light),
         }
     }
@@ -68,15 +68,15 @@ impl DisplaySettings {
     /// Returns the displayed bytes of an image.
     pub fn bytes(&self, pixels: &Pixels) -> Vec<u8> {
         let colors = pixels.colors.par_iter().with_min_len(1024);
-        colors.flat_map_iter(|color| self.shown(*color)).collect()
+        colors.flat_map_iter(|color| self.color_bytes(*color)).collect()
     }
 
     /// Returns the false color of a standard error.
     pub fn error_color(&self, error: [f32; 3]) -> [u8; 3] {
-        self.false_color(error, ERRORS)
+        self.false_color(error, STANDARD_ERROR_STOPS)
     }
 
-    /// Uses the Rec. 709 luminance; a luminance of zero gets the first color.
+    /// Returns the false color of the Rec. 709 luminance; a luminance of zero gets the first color.
     fn false_color(&self, [r, g, b]: [f32; 3], [first, last]: [f32; 2]) -> [u8; 3] {
         let stops = (0.2126 * r + 0.7152 * g + 0.0722 * b).log2() + self.view.exposure as f32;
         color(((stops - first) / (last - first) * 255.0 + 0.5) as u8) // saturates; NaN is 0
@@ -95,15 +95,15 @@ pub struct Legend {
 impl Legend {
     /// Returns the scale of radiance for this exposure.
     pub fn of(exposure: f64) -> Legend {
-        Legend::over(FALSE_COLORS, exposure)
+        Legend::with_stops(RADIANCE_STOPS, exposure)
     }
 
     /// Returns the scale of standard errors for this exposure.
     pub fn of_errors(exposure: f64) -> Legend {
-        Legend::over(ERRORS, exposure)
+        Legend::with_stops(STANDARD_ERROR_STOPS, exposure)
     }
 
-    fn over(stops: [f32; 2], exposure: f64) -> Legend {
+    fn with_stops(stops: [f32; 2], exposure: f64) -> Legend {
         Legend {
             stops: stops.map(|stops| f64::from(stops) - exposure),
             colors: (0..=16).map(|i| color((i * 255 / 16) as u8)).collect(),
@@ -116,8 +116,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn false_colours_follow_the_stops() {
-        let look = |exposure| DisplaySettings {
+    fn false_colors_follow_the_stops() {
+        let settings = |exposure| DisplaySettings {
             view: ViewSettings {
                 exposure,
                 ..ViewSettings::default()
@@ -126,52 +126,58 @@ mod tests {
             ..DisplaySettings::default()
         };
         let grey = |stops: f32| [stops.exp2(); 3];
-        let [first, last] = FALSE_COLORS;
+        let [first, last] = RADIANCE_STOPS;
         let Legend { stops, colors: legend } = Legend::of(3.0);
         assert_eq!(stops, [-13.0, 3.0]);
-        for (i, wanted) in legend.iter().enumerate() {
+        for (i, expected) in legend.iter().enumerate() {
             let stops = first + (last - first) * i as f32 / 16.0;
-            let shown = look(0.0).shown(grey(stops));
+            let shown = settings(0.0).color_bytes(grey(stops));
             assert!(
-                shown.iter().zip(wanted).all(|(a, b)| a.abs_diff(*b) <= 2),
-                "{stops}: {shown:?} {wanted:?}"
+                shown.iter().zip(expected).all(|(a, b)| a.abs_diff(*b) <= 2),
+                "{stops}: {shown:?} {expected:?}"
             );
-            assert_eq!(look(3.0).shown(grey(stops - 3.0)), look(0.0).shown(grey(stops)));
+            assert_eq!(
+                settings(3.0).color_bytes(grey(stops - 3.0)),
+                settings(0.0).color_bytes(grey(stops))
+            );
         }
-        for (light, wanted) in [
+        for (light, expected) in [
             (0.0, legend[0]),
             (-1.0, legend[0]),
             (f32::NAN, legend[0]),
             (f32::INFINITY, legend[16]),
         ] {
-            assert_eq!(look(0.0).shown([light; 3]), wanted, "{light}");
+            assert_eq!(settings(0.0).color_bytes([light; 3]), expected, "{light}");
         }
-        assert_ne!(look(0.0).shown(grey(0.0)), look(0.0).shown(grey(-3.0)));
+        assert_ne!(
+            settings(0.0).color_bytes(grey(0.0)),
+            settings(0.0).color_bytes(grey(-3.0))
+        );
         // Standard errors have their own scale.
         let Legend { stops, colors: legend } = Legend::of_errors(3.0);
         assert_eq!(stops, [-15.0, -3.0]);
-        for (stops, wanted) in [(-15.0, legend[0]), (-9.0, legend[8]), (-3.0, legend[16])] {
-            let shown = look(3.0).error_color(grey(stops));
+        for (stops, expected) in [(-15.0, legend[0]), (-9.0, legend[8]), (-3.0, legend[16])] {
+            let shown = settings(3.0).error_color(grey(stops));
             assert!(
-                shown.iter().zip(wanted).all(|(a, b)| a.abs_diff(b) <= 2),
-                "{stops}: {shown:?} {wanted:?}"
+                shown.iter().zip(expected).all(|(a, b)| a.abs_diff(b) <= 2),
+                "{stops}: {shown:?} {expected:?}"
             );
         }
     }
 
     #[test]
-    fn chosen_settings_override_those_of_the_scene() {
+    fn overrides_replace_the_settings_of_the_scene() {
         let scene = ViewSettings {
             transform: ViewTransform::Agx,
             exposure: 2.0,
         };
-        assert_eq!(DisplayOverrides::default().over(scene), scene);
-        let chosen = DisplayOverrides {
+        assert_eq!(DisplayOverrides::default().apply_to(scene), scene);
+        let overrides = DisplayOverrides {
             exposure: Some(-1.0),
             ..DisplayOverrides::default()
         };
         assert_eq!(
-            chosen.over(scene),
+            overrides.apply_to(scene),
             ViewSettings {
                 exposure: -1.0,
                 ..scene
@@ -179,7 +185,7 @@ mod tests {
         );
         for stops in [100.5, -101.0, f64::NAN, f64::INFINITY] {
             let exposure = Some(stops);
-            assert!(DisplayOverrides { exposure, ..chosen }.checked().is_err(), "{stops}");
+            assert!(DisplayOverrides { exposure, ..overrides }.checked().is_err(), "{stops}");
         }
     }
 }

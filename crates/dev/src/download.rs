@@ -14,8 +14,8 @@ use wgray_render::output::Channel;
 /// Encodes a frame as PNG, without marks. For a comparison, encodes the first image.
 pub fn png_file(frame: &Frame) -> Vec<u8> {
     match &frame.content {
-        Content::Color(pixels) | Content::Compare(pixels, _) => png_of(pixels, frame.look),
-        Content::Film(layer) => png(layer.values.width, layer.values.height, &layer.bytes(&frame.look)),
+        Content::Color(pixels) | Content::Compare(pixels, _) => png_of(pixels, frame.display),
+        Content::Film(layer) => png(layer.values.width, layer.values.height, &layer.bytes(&frame.display)),
         content => {
             let [width, height] = frame.header.sent;
             png(width, height, &content.plain_bytes([width, height]))
@@ -50,7 +50,7 @@ pub fn exr_file(frame: &Frame) -> io::Result<Vec<u8>> {
                     Channel::ShadingNormal(_, part) => {
                         FlatSamples::F32(hits.iter().map(|hit| hit.shading_normal[*part]).collect())
                     }
-                    Channel::Mean(..) | Channel::Count(_) | Channel::Variance(..) => return None, // not of first hits
+                    Channel::Mean(..) | Channel::Count(_) | Channel::Variance(..) => return None, // channels of films
                 };
                 Some(AnyChannel::new(channel.name(), samples))
             })
@@ -106,7 +106,7 @@ mod tests {
                     height: 1,
                     colors: vec![[1.0, 2.0, -3.0], [4.0, 5.0, 6.0]],
                 },
-                covered: vec![1.0; 2],
+                hit_fractions: vec![1.0; 2],
             };
             let header = Header {
                 width: 2,
@@ -134,12 +134,16 @@ mod tests {
                 .iter()
                 .map(|channel| (channel.name.to_string(), channel.sample_data.values_as_f32().collect()))
                 .collect();
-            let mut wanted = [[1.0, 4.0], [2.0, 5.0], [-3.0, 6.0]];
+            let mut expected = [[1.0, 4.0], [2.0, 5.0], [-3.0, 6.0]];
             if names[0].ends_with('B') {
-                wanted.reverse(); // alphabetical order
+                expected.reverse(); // alphabetical order
             }
-            let wanted: Vec<_> = names.into_iter().map(String::from).zip(wanted.map(Vec::from)).collect();
-            assert_eq!(found, wanted);
+            let expected: Vec<_> = names
+                .into_iter()
+                .map(String::from)
+                .zip(expected.map(Vec::from))
+                .collect();
+            assert_eq!(found, expected);
             assert_eq!(png_file(&frame)[1..4], *b"PNG");
         }
     }

@@ -1,12 +1,15 @@
 //! Edits of single values in the text of a scene file. Only the bytes of the value change: comments, layout, line
-//! endings and a byte-order mark are preserved. An absent key is added to its table, in the style of this table.
+//! endings and a byte-order mark are preserved. A missing key is added to its table, in the style of the table's keys.
 
 use std::ops::Range;
 
 use toml::Value;
-use toml_edit::{Document, InlineTable, Item, Table, Value as Written};
+use toml_edit::{Document, InlineTable, Item, Table, Value as ParsedValue};
 
 use wgray_scene::{KeyPath, Pieces, Segment};
+
+/// The reason why a key or value without a source span cannot be edited.
+const NO_LOCATION: &str = "cannot be located in the file";
 
 /// Replacement text for a byte range.
 type Edit = (Range<usize>, String);
@@ -27,17 +30,17 @@ pub fn edited(text: &str, path: &KeyPath, value: Option<&Value>) -> Result<Strin
 /// The reason why the value cannot be set.
 pub fn edited_in(pieces: &Pieces, path: &KeyPath, value: Option<&Value>) -> Result<String, String> {
     let piece = pieces.find(path);
-    let edits = edits(&piece.text, &piece.path, value).map_err(|why| format!("{path}: {why}"))?;
-    let mut whole: Vec<Edit> = Vec::with_capacity(edits.len());
+    let edits = edits(&piece.text, &piece.path, value).map_err(|reason| format!("{path}: {reason}"))?;
+    let mut text_edits: Vec<Edit> = Vec::with_capacity(edits.len());
     for (range, new) in edits {
-        // Only the start is mapped to the whole text, because the end may belong to the next piece.
+        // Only the start is mapped to the full text, because the end may belong to the next piece.
         let start = piece.place(range.start);
-        whole.push((start..start + range.len(), new));
+        text_edits.push((start..start + range.len(), new));
     }
     // Edits are applied from the end, so that the offsets of the remaining edits stay valid.
-    whole.sort_by_key(|(range, _)| std::cmp::Reverse(range.start));
+    text_edits.sort_by_key(|(range, _)| std::cmp::Reverse(range.start));
     let mut text = pieces.whole().to_owned();
-    for (range, new) in whole {
+    for (range, new) in text_edits {
         text.replace_range(range, &new);
     }
     Ok(text)
@@ -54,24 +57,24 @@ impl<'a> Layout<'a> {
 
     /// Returns the range from the first to the last byte of all keys and values at a path.
     pub fn extent(&self, path: &KeyPath) -> Option<Range<usize>> {
-        let way = NodePath::along(self.0.as_table(), &path.0);
-        way.rest.is_empty().then_some(())?;
+        let node_path = NodePath::along(self.0.as_table(), &path.0);
+        node_path.missing.is_empty().then_some(())?;
         let mut found = None;
         // The key precedes its value; a table's header is part of the table.
-        if let Some(Node::Table(parent)) = way.nodes.iter().rev().nth(1)
+        if let Some(Node::Table(parent)) = node_path.nodes.iter().rev().nth(1)
             && let Some(Segment::Key(key)) = path.0.last()
-            && !matches!(way.nodes.last()?, Node::Table(table) if !table.is_dotted())
+            && !matches!(node_path.nodes.last()?, Node::Table(table) if !table.is_dotted())
         {
             found = parent.key(key).and_then(toml_edit::Key::span);
         }
-        cover(&mut found, *way.nodes.last()?);
+        cover(&mut found, *node_path.nodes.last()?);
         found
     }
 
     pub fn value(&self, path: &KeyPath) -> Option<Range<usize>> {
-        let way = NodePath::along(self.0.as_table(), &path.0);
-        match way.nodes.last()? {
-            Node::Value(value) if way.rest.is_empty() => value.span(),
+        let node_path = NodePath::along(self.0.as_table(), &path.0);
+        match node_path.nodes.last()? {
+            Node::Value(value) if node_path.missing.is_empty() => value.span(),
             _ => None,
         }
     }
@@ -81,7 +84,7 @@ impl<'a> Layout<'a> {
 enum Node<'a> {
     Table(&'a Table),
     Tables(&'a toml_edit::ArrayOfTables),
-    Value(&'a Written),
+    Value(&'a ParsedValue),
 }
 
 impl<'a> Node<'a> {
@@ -97,9 +100,9 @@ impl<'a> Node<'a> {
     fn step(self, segment: &Segment) -> Option<Node<'a>> {
         match (self, segment) {
             (Node::Table(table), Segment::Key(key)) => Node::of(table.get(key)?),
-            (Node::Value(Written::InlineTable(table)), Segment::Key(key)) => table.get(key).map(Node::Value),
+            (Node::Value(ParsedValue::InlineTable(table)), Segment::Key(key)) => table.get(key).map(Node::Value),
             (Node::Tables(tables), Segment::Index(i)) => tables.get(*i).map(Node::Table),
-            (Node::Value(Written::Array(list)), Segment::Index(i)) => list.get(*i).map(Node::Value),
+            (Node::Value(ParsedValue::Array(list)), Segment::Index(i)) => list.get(*i).map(Node::Value),
             _ => None,
         }
     }
@@ -125,7 +128,7 @@ impl<'a> Node<'a> {
 struct NodePath<'a, 'p> {
     nodes: Vec<Node<'a>>,
     /// The segments of the path that do not exist.
-    rest: &'p [Segment],
+    missing: &'p [Segment],
 }
 
 impl<'a, 'p> NodePath<'a, 'p> {
@@ -137,58 +140,58 @@ impl<'a, 'p> NodePath<'a, 'p> {
                 None => {
                     return NodePath {
                         nodes,
-                        rest: &path[i..],
+                        missing: &path[i..],
                     };
                 }
             }
         }
-        NodePath { nodes, rest: &[] }
+        NodePath { nodes, missing: &[] }
     }
 }
 
 fn edits(text: &str, path: &KeyPath, value: Option<&Value>) -> Result<Vec<Edit>, String> {
     let document = Document::parse(text).map_err(|error| error.message().to_owned())?;
-    let way = NodePath::along(document.as_table(), &path.0);
-    let here = *way.nodes.last().ok_or("has no place")?;
-    match (value, way.rest) {
-        (None, []) => Ok(vec![removal(text, &way, &path.0)?]),
+    let node_path = NodePath::along(document.as_table(), &path.0);
+    let node = *node_path.nodes.last().ok_or(NO_LOCATION)?;
+    match (value, node_path.missing) {
+        (None, []) => Ok(vec![removal(text, &node_path, &path.0)?]),
         (None, _) => Ok(Vec::new()),
         (Some(new), []) => {
-            let Node::Value(old) = here else {
-                return Err("is a table with a header of its own".to_owned());
+            let Node::Value(old) = node else {
+                return Err("is a table under its own header".to_owned());
             };
             let mut edits = Vec::new();
-            replacement(old, new, &mut edits).ok_or("has no place")?;
+            replacement(old, new, &mut edits).ok_or(NO_LOCATION)?;
             Ok(edits)
         }
         (Some(new), [Segment::Key(key), below @ ..]) => {
-            let mut inner = literal(new);
+            let mut new_value = literal(new);
             for segment in below.iter().rev() {
                 let Segment::Key(key) = segment else {
                     return Err("is not in the scene".to_owned());
                 };
-                inner = format!("{{ {key} = {inner} }}");
+                new_value = format!("{{ {key} = {new_value} }}");
             }
-            let known = path.0.len() - way.rest.len();
-            addition(text, &way, &path.0[..known], key, &inner).map(|edit| vec![edit])
+            let existing = path.0.len() - node_path.missing.len();
+            addition(text, &node_path, &path.0[..existing], key, &new_value).map(|edit| vec![edit])
         }
         (Some(_), [Segment::Index(_), ..]) => Err("is not in the scene".to_owned()),
     }
 }
 
 /// Adds the edits that replace the old value; no edits if the values are equal.
-fn replacement(old: &Written, new: &Value, edits: &mut Vec<Edit>) -> Option<()> {
+fn replacement(old: &ParsedValue, new: &Value, edits: &mut Vec<Edit>) -> Option<()> {
     let is_same = match (old, new) {
-        (Written::Array(before), Value::Array(after)) if before.len() == after.len() => {
+        (ParsedValue::Array(before), Value::Array(after)) if before.len() == after.len() => {
             let mut pairs = before.iter().zip(after);
             return pairs.try_for_each(|(old, new)| replacement(old, new, edits));
         }
-        (Written::String(before), Value::String(after)) => before.value() == after,
-        (Written::Boolean(before), Value::Boolean(after)) => before.value() == after,
+        (ParsedValue::String(before), Value::String(after)) => before.value() == after,
+        (ParsedValue::Boolean(before), Value::Boolean(after)) => before.value() == after,
         _ => {
-            let known = old.as_float().or(old.as_integer().map(|i| i as f64));
-            let wanted = new.as_float().or(new.as_integer().map(|i| i as f64));
-            known.is_some() && known == wanted
+            let old_number = old.as_float().or(old.as_integer().map(|i| i as f64));
+            let new_number = new.as_float().or(new.as_integer().map(|i| i as f64));
+            old_number.is_some() && old_number == new_number
         }
     };
     if !is_same {
@@ -197,139 +200,139 @@ fn replacement(old: &Written, new: &Value, edits: &mut Vec<Edit>) -> Option<()> 
     Some(())
 }
 
-/// Returns the edits that add a key to the table at the end of a path, after the table's last key.
-fn addition(text: &str, way: &NodePath, path: &[Segment], key: &str, value: &str) -> Result<Edit, String> {
-    let here = *way.nodes.last().ok_or("has no place")?;
+/// Returns the edit that adds a key to the table at the end of a path, after the table's last key.
+fn addition(text: &str, node_path: &NodePath, path: &[Segment], key: &str, value: &str) -> Result<Edit, String> {
+    let node = *node_path.nodes.last().ok_or(NO_LOCATION)?;
     // A table of dotted keys repeats the same prefix before each key.
-    let dots = way.nodes.iter().rev().take_while(|node| node.is_dotted()).count();
+    let dots = node_path.nodes.iter().rev().take_while(|node| node.is_dotted()).count();
     let prefix = KeyPath(path[path.len() - dots..].to_vec()).exact();
     let dot = if dots > 0 { "." } else { "" };
     let statement = format!("{prefix}{dot}{key} = {value}");
-    let is_root = way.nodes.len() == 1;
-    match here {
-        Node::Value(Written::InlineTable(table)) => {
+    let is_root = node_path.nodes.len() == 1;
+    match node {
+        Node::Value(ParsedValue::InlineTable(table)) => {
             let mut last = None;
-            cover(&mut last, here);
+            cover(&mut last, node);
             let values = table.iter().filter_map(|(_, value)| value.span());
             Ok(match (values.map(|span| span.end).max(), dots) {
                 (Some(end), 0) => (end..end, format!(", {statement}")),
                 (Some(_), _) => {
-                    let end = last.ok_or("has no place")?.end;
+                    let end = last.ok_or(NO_LOCATION)?.end;
                     (end..end, format!(", {statement}"))
                 }
                 (None, _) => {
-                    let start = table.span().ok_or("has no place")?.start + 1;
+                    let start = table.span().ok_or(NO_LOCATION)?.start + 1;
                     (start..start, format!(" {statement} "))
                 }
             })
         }
-        Node::Table(table) => match own(table) {
+        Node::Table(table) => match body_range(table) {
             Some(body) => {
                 let line = line_start(text, body.start);
                 let indent: String = text[line..].chars().take_while(|c| " \t".contains(*c)).collect();
-                Ok(behind_line(text, body.end, &format!("{indent}{statement}")))
+                Ok(insert_after_line(text, body.end, &format!("{indent}{statement}")))
             }
             None if is_root => Ok(new_section(text, table, key, value)),
             None if !table.is_implicit() => {
-                let header = table.span().ok_or("has no place")?;
-                Ok(behind_line(text, header.end, &statement))
+                let header = table.span().ok_or(NO_LOCATION)?;
+                Ok(insert_after_line(text, header.end, &statement))
             }
             None => {
-                let mut all = None;
-                cover(&mut all, here);
-                let at = line_start(text, all.ok_or("has no place")?.start);
-                let ends = line_break(text, at);
+                let mut extent = None;
+                cover(&mut extent, node);
+                let start = line_start(text, extent.ok_or(NO_LOCATION)?.start);
+                let newline = line_break(text, start);
                 let header = KeyPath(path.to_vec()).exact();
-                Ok((at..at, format!("[{header}]{ends}{statement}{ends}{ends}")))
+                Ok((
+                    start..start,
+                    format!("[{header}]{newline}{statement}{newline}{newline}"),
+                ))
             }
         },
-        _ => Err("is in no table".to_owned()),
+        _ => Err("does not belong to a table".to_owned()),
     }
 }
 
 /// Returns the edit that adds a missing section, after the section of the camera or of the image.
 fn new_section(text: &str, root: &Table, name: &str, value: &str) -> Edit {
-    let mut place = None;
+    let mut section = None;
     if let Some(item) = root.get("camera").or(root.get("image")) {
-        Node::of(item).into_iter().for_each(|node| cover(&mut place, node));
+        Node::of(item).into_iter().for_each(|node| cover(&mut section, node));
     }
-    let at = place.map_or(text.len(), |place| place.end);
-    let ends = line_break(text, at);
+    let end = section.map_or(text.len(), |section| section.end);
+    let newline = line_break(text, end);
     // `{ a = 1 }` becomes one line under a header.
     let inner = value
         .strip_prefix("{ ")
         .and_then(|inner| inner.strip_suffix(" }"))
         .unwrap_or(value);
-    behind_line(text, at, &format!("{ends}[{name}]{ends}{inner}"))
+    insert_after_line(text, end, &format!("{newline}[{name}]{newline}{inner}"))
 }
 
-/// Returns the edit that inserts a line after the line that contains the byte `at`.
-fn behind_line(text: &str, at: usize, line: &str) -> Edit {
-    let end = line_end(text, at);
-    (end..end, format!("{}{line}", line_break(text, at)))
+/// Returns the edit that inserts a line after the line that contains the byte `offset`.
+fn insert_after_line(text: &str, offset: usize, line: &str) -> Edit {
+    let end = line_end(text, offset);
+    (end..end, format!("{}{line}", line_break(text, offset)))
 }
 
-pub fn line_start(text: &str, at: usize) -> usize {
-    let start = text[..at].rfind('\n').map_or(0, |newline| newline + 1);
+/// Returns the start of the line that contains the byte `offset`, after a byte-order mark.
+pub fn line_start(text: &str, offset: usize) -> usize {
+    let start = text[..offset].rfind('\n').map_or(0, |newline| newline + 1);
     let mark = '\u{feff}'.len_utf8();
     if start == 0 && text.starts_with('\u{feff}') {
-        mark.min(at)
+        mark.min(offset)
     } else {
         start
     }
 }
 
-/// Returns the end of the line that contains the byte `at`, without the line break.
-pub fn line_end(text: &str, at: usize) -> usize {
-    let end = text[at..].find('\n').map_or(text.len(), |newline| at + newline);
-    if text[at..end].ends_with('\r') { end - 1 } else { end }
+/// Returns the end of the line that contains the byte `offset`, without the line break.
+pub fn line_end(text: &str, offset: usize) -> usize {
+    let end = text[offset..].find('\n').map_or(text.len(), |newline| offset + newline);
+    if text[offset..end].ends_with('\r') {
+        end - 1
+    } else {
+        end
+    }
 }
 
 /// Returns the line break of a line. For the last line, returns the line break of the first line.
-fn line_break(text: &str, at: usize) -> &'static str {
-    let own = text[at..].find('\n').map(|newline| at + newline);
-    match own.or(text.find('\n')) {
+fn line_break(text: &str, offset: usize) -> &'static str {
+    let next = text[offset..].find('\n').map(|newline| offset + newline);
+    match next.or(text.find('\n')) {
         Some(end) if text[..end].ends_with('\r') => "\r\n",
         _ => "\n",
     }
 }
 
-/// Returns the edits that remove the key at the end of a path, and its table if the table becomes empty.
-fn removal(text: &str, way: &NodePath, path: &[Segment]) -> Result<Edit, String> {
-    let refused = || Err("can only be removed in the scene file".to_owned());
+/// Returns the edit that removes the key at the end of a path, and the key's table if the table becomes empty.
+fn removal(text: &str, node_path: &NodePath, path: &[Segment]) -> Result<Edit, String> {
+    let refuse = || Err("can only be removed in the scene file".to_owned());
     let mut depth = path.len();
     loop {
-        let ([.., parent, here], Some(Segment::Key(key))) = (&way.nodes[..=depth], path.get(depth - 1)) else {
-            return refused();
+        let ([.., parent, node], Some(Segment::Key(key))) = (&node_path.nodes[..=depth], path.get(depth - 1)) else {
+            return refuse();
         };
-        let Node::Value(value) = here else { return refused() };
-        let end = value.span().ok_or("has no place")?.end;
+        let Node::Value(value) = node else { return refuse() };
+        let end = value.span().ok_or(NO_LOCATION)?.end;
         match (parent, parent.inline()) {
-            (_, Some(table)) if table.is_dotted() => return refused(),
+            (_, Some(table)) if table.is_dotted() => return refuse(),
             (_, Some(table)) if table.len() == 1 && depth > 1 => depth -= 1,
             (_, Some(table)) => {
-                let start = table
-                    .key(key)
-                    .and_then(toml_edit::Key::span)
-                    .ok_or("has no place")?
-                    .start;
-                let behind = text[end..].trim_start_matches([' ', '\t', '\r', '\n']);
+                let start = table.key(key).and_then(toml_edit::Key::span).ok_or(NO_LOCATION)?.start;
+                let after = text[end..].trim_start_matches([' ', '\t', '\r', '\n']);
                 let before = text[..start].trim_end_matches([' ', '\t', '\r', '\n']);
-                return match (behind.strip_prefix(','), before.strip_suffix(',')) {
+                return match (after.strip_prefix(','), before.strip_suffix(',')) {
                     (Some(rest), _) => Ok((
                         start..text.len() - rest.trim_start_matches([' ', '\t']).len(),
                         String::new(),
                     )),
                     (None, Some(rest)) => Ok((rest.len()..end, String::new())),
-                    _ => refused(),
+                    _ => refuse(),
                 };
             }
             (Node::Table(table), None) => {
-                let start = table
-                    .key(key)
-                    .and_then(toml_edit::Key::span)
-                    .ok_or("has no place")?
-                    .start;
+                let start = table.key(key).and_then(toml_edit::Key::span).ok_or(NO_LOCATION)?.start;
                 let (start, stop) = (line_start(text, start), line_end(text, end));
                 let comment = text[end..stop].trim_start();
                 if !comment.is_empty() {
@@ -338,66 +341,66 @@ fn removal(text: &str, way: &NodePath, path: &[Segment]) -> Result<Edit, String>
                 let next = text[stop..].find('\n').map_or(text.len(), |newline| stop + newline + 1);
                 return Ok((start..next, String::new()));
             }
-            _ => return refused(),
+            _ => return refuse(),
         }
     }
 }
 
 /// Returns the range of the keys in a table's own body, without keys under other headers.
-fn own(table: &Table) -> Option<Range<usize>> {
-    let mut found = None;
+fn body_range(table: &Table) -> Option<Range<usize>> {
+    let mut range = None;
     for (key, item) in table.iter() {
         let span = match item {
             Item::Value(value) => value.span(),
-            Item::Table(inner) if inner.is_dotted() => own(inner),
+            Item::Table(inner) if inner.is_dotted() => body_range(inner),
             _ => continue,
         };
         let key = table.key(key).and_then(toml_edit::Key::span);
         for span in [key, span].into_iter().flatten() {
-            widen(&mut found, span);
+            widen(&mut range, span);
         }
     }
-    found
+    range
 }
 
-/// Extends a range by everything that belongs to a node.
-fn cover(found: &mut Option<Range<usize>>, node: Node) {
+/// Extends `range` by everything that belongs to a node.
+fn cover(range: &mut Option<Range<usize>>, node: Node) {
     match node {
         Node::Value(value) => match value.as_inline_table().filter(|table| table.is_dotted()) {
-            Some(table) => table.iter().for_each(|(_, value)| cover(found, Node::Value(value))),
-            None => value.span().into_iter().for_each(|span| widen(found, span)),
+            Some(table) => table.iter().for_each(|(_, value)| cover(range, Node::Value(value))),
+            None => value.span().into_iter().for_each(|span| widen(range, span)),
         },
-        Node::Tables(tables) => tables.iter().for_each(|table| cover(found, Node::Table(table))),
+        Node::Tables(tables) => tables.iter().for_each(|table| cover(range, Node::Table(table))),
         Node::Table(table) => {
             if !table.is_implicit() && !table.is_dotted() {
-                table.span().into_iter().for_each(|span| widen(found, span));
+                table.span().into_iter().for_each(|span| widen(range, span));
             }
             for (key, item) in table.iter() {
                 let is_header = matches!(item, Item::Table(inner) if !inner.is_dotted()) || item.is_array_of_tables();
                 let key = table.key(key).and_then(toml_edit::Key::span).filter(|_| !is_header);
-                key.into_iter().for_each(|span| widen(found, span));
-                Node::of(item).into_iter().for_each(|node| cover(found, node));
+                key.into_iter().for_each(|span| widen(range, span));
+                Node::of(item).into_iter().for_each(|node| cover(range, node));
             }
         }
     }
 }
 
-fn widen(found: &mut Option<Range<usize>>, span: Range<usize>) {
+fn widen(range: &mut Option<Range<usize>>, span: Range<usize>) {
     if span.is_empty() {
         return; // the document's own table has no header
     }
-    *found = Some(match found.take() {
-        Some(known) => known.start.min(span.start)..known.end.max(span.end),
+    *range = Some(match range.take() {
+        Some(old) => old.start.min(span.start)..old.end.max(span.end),
         None => span,
     });
 }
 
-/// Formats a value for a scene file: whole numbers without a decimal point.
+/// Formats a value for a scene file. Integral numbers have no decimal point.
 fn literal(value: &Value) -> String {
     match value {
         Value::Float(x) if x.fract() == 0.0 && x.abs() < 1e15 => format!("{x:.0}"),
         Value::Array(list) => format!("[{}]", list.iter().map(literal).collect::<Vec<_>>().join(", ")),
-        other => other.to_string(),
+        value => value.to_string(),
     }
 }
 

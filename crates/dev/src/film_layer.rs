@@ -4,7 +4,7 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::display_settings::DisplaySettings;
-use super::pixel_values::{bits, bytes, numbers, of_film};
+use super::pixel_values::{bits, bytes, film_values, numbers};
 use wgray_image::{Pixels, to_8_bits};
 use wgray_render::film::{Film, Layer, variance_of_mean};
 use wgray_render::output::Aov;
@@ -16,15 +16,15 @@ pub struct FilmLayer {
     pub aov: Aov,
     /// Three values per pixel. The variance is 0 if there are fewer than two samples.
     pub values: Pixels,
-    /// For normals: the fraction of each pixel's samples that hit anything. Empty for other layers.
-    pub covered: Vec<f32>,
+    /// For normals: the fraction of each pixel's samples that hit a surface. Empty for other layers.
+    pub hit_fractions: Vec<f32>,
 }
 
 impl FilmLayer {
-    /// Returns a layer of a film. Rows without samples show `under`, a film of lower resolution.
-    pub fn of(aov: Aov, film: &Film, under: Option<&Film>, has_samples: &(dyn Fn(u32) -> bool + Sync)) -> FilmLayer {
-        let covered = match aov {
-            Aov::ShadingNormal => of_film(film, under, has_samples, &Film::alpha),
+    /// Returns a layer of a film. Rows without samples show `coarser`, a film of lower resolution.
+    pub fn of(aov: Aov, film: &Film, coarser: Option<&Film>, has_samples: &(dyn Fn(u32) -> bool + Sync)) -> FilmLayer {
+        let hit_fractions = match aov {
+            Aov::ShadingNormal => film_values(film, coarser, has_samples, &Film::alpha),
             _ => Vec::new(),
         };
         FilmLayer {
@@ -32,9 +32,9 @@ impl FilmLayer {
             values: Pixels {
                 width: film.region.width(),
                 height: film.region.height(),
-                colors: of_film(film, under, has_samples, &|film, i| value(aov, film, i)),
+                colors: film_values(film, coarser, has_samples, &|film, i| value(aov, film, i)),
             },
-            covered,
+            hit_fractions,
         }
     }
 
@@ -50,43 +50,50 @@ impl FilmLayer {
 
     /// Returns the displayed bytes: radiance is displayed like the image, albedo with the display's curve only, and
     /// variance as standard error in false colors.
-    pub fn bytes(&self, look: &DisplaySettings) -> Vec<u8> {
+    pub fn bytes(&self, display: &DisplaySettings) -> Vec<u8> {
         let values = &self.values.colors;
         match self.aov {
             Aov::ShadingNormal => {
-                let pairs: Vec<_> = values.iter().zip(&self.covered).collect();
-                bytes(&pairs, |(normal, covered)| Vec3::from(**normal) * 0.5 + **covered * 0.5)
+                let pairs: Vec<_> = values.iter().zip(&self.hit_fractions).collect();
+                bytes(&pairs, |(normal, hit_fraction)| {
+                    Vec3::from(**normal) * 0.5 + **hit_fraction * 0.5
+                })
             }
-            _ if self.is_light() => look.bytes(&self.values),
+            _ if self.is_light() => display.bytes(&self.values),
             _ => {
                 let values = values.par_iter().with_min_len(1024);
-                values.flat_map_iter(|value| self.shown(*value, look)).collect()
+                values
+                    .flat_map_iter(|value| self.color_bytes(*value, display))
+                    .collect()
             }
         }
     }
 
-    fn shown(&self, value: [f32; 3], look: &DisplaySettings) -> [u8; 3] {
+    fn color_bytes(&self, value: [f32; 3], display: &DisplaySettings) -> [u8; 3] {
         match self.aov {
-            Aov::Variance => look.error_color(standard_error(value)),
-            Aov::Albedo => look.view.display_share(value).map(to_8_bits),
-            _ => look.shown(value),
+            Aov::Variance => display.error_color(standard_error(value)),
+            Aov::Albedo => display.view.display_share(value).map(to_8_bits),
+            _ => display.color_bytes(value),
         }
     }
 
     /// Returns the named values of pixel `i`.
-    pub fn pixel(&self, i: usize, look: &DisplaySettings) -> Option<Vec<(&'static str, String)>> {
+    pub fn pixel(&self, i: usize, display: &DisplaySettings) -> Option<Vec<(&'static str, String)>> {
         let value = *self.values.colors.get(i)?;
         let name = match self.aov {
             Aov::ShadingNormal => "shading normal",
             aov => aov.name(),
         };
         let numbers_and_bits = [(name, numbers(value)), ("bits", bits(value))];
-        let more = match self.aov {
+        let derived = match self.aov {
             Aov::ShadingNormal => None,
             Aov::Variance => Some(("standard error", numbers(standard_error(value)))),
-            _ => Some(("shown", self.shown(value, look).map(|byte| byte.to_string()).join(" "))),
+            _ => Some((
+                "shown",
+                self.color_bytes(value, display).map(|byte| byte.to_string()).join(" "),
+            )),
         };
-        Some(numbers_and_bits.into_iter().chain(more).collect())
+        Some(numbers_and_bits.into_iter().chain(derived).collect())
     }
 }
 
@@ -99,7 +106,7 @@ fn value(aov: Aov, film: &Film, i: usize) -> [f32; 3] {
     match aov {
         Aov::Variance => match film.moments.get(i).filter(|moments| moments.w >= 2.0) {
             Some(moments) => variance_of_mean(film.sums[i], *moments).to_array(),
-            None => [0.0; 3], // unknown
+            None => [0.0; 3], // a variance needs two samples
         },
         Aov::ShadingNormal => film.layer(Layer::Normal, i),
         aov => aov.light().map_or([0.0; 3], |layer| film.layer(layer, i)),
@@ -130,7 +137,7 @@ mod tests {
 
     #[test]
     fn layers_have_their_own_values_and_variances_need_two_samples() {
-        let all = |_| true;
+        let has_samples = |_| true;
         for (aov, number) in [
             (Aov::Emission, 1.0),
             (Aov::Direct, 2.0),
@@ -138,22 +145,22 @@ mod tests {
             (Aov::Albedo, 4.0),
             (Aov::ShadingNormal, 5.0),
         ] {
-            let layer = FilmLayer::of(aov, &film(), None, &all);
+            let layer = FilmLayer::of(aov, &film(), None, &has_samples);
             assert_eq!(layer.values.colors, [[number / 4.0, 0.0, -1.0]; 2], "{aov:?}");
         }
-        let normal = FilmLayer::of(Aov::ShadingNormal, &film(), None, &all);
-        assert_eq!(normal.covered, [0.5; 2]);
+        let normal = FilmLayer::of(Aov::ShadingNormal, &film(), None, &has_samples);
+        assert_eq!(normal.hit_fractions, [0.5; 2]);
         // x: 1.25 / 2 + 0.5 / 2 = 0.875; y: 0.25; z: negative, clamped to 0.
         assert_eq!(normal.bytes(&DisplaySettings::default())[..3], [223, 64, 0]);
-        let variance = FilmLayer::of(Aov::Variance, &film(), None, &all);
+        let variance = FilmLayer::of(Aov::Variance, &film(), None, &has_samples);
         assert_eq!(variance.values.colors, [[0.25, 1.0, 0.0], [0.0; 3]]);
         let values = variance.pixel(0, &DisplaySettings::default()).unwrap();
         assert_eq!(values[2], ("standard error", "0.5  1  0".to_string()));
         assert_eq!(variance.pixel(2, &DisplaySettings::default()), None);
-        let plain = Film::new(Region::whole(1, 2));
+        let without_layers = Film::new(Region::whole(1, 2));
         for aov in [Aov::Variance, Aov::Direct] {
             assert_eq!(
-                FilmLayer::of(aov, &plain, None, &all).values.colors,
+                FilmLayer::of(aov, &without_layers, None, &has_samples).values.colors,
                 [[0.0; 3]; 2],
                 "{aov:?}"
             );
@@ -163,9 +170,9 @@ mod tests {
     #[test]
     fn the_exposure_affects_light_but_not_albedo() {
         let bytes = |aov, exposure: f64| {
-            let mut look = DisplaySettings::default();
-            look.view.exposure = exposure;
-            FilmLayer::of(aov, &film(), None, &|_| true).bytes(&look)
+            let mut display = DisplaySettings::default();
+            display.view.exposure = exposure;
+            FilmLayer::of(aov, &film(), None, &|_| true).bytes(&display)
         };
         for aov in [Aov::Emission, Aov::Direct, Aov::Indirect, Aov::Variance] {
             assert_ne!(bytes(aov, 0.0), bytes(aov, -3.0), "{aov:?}");

@@ -15,56 +15,60 @@ pub struct Guard {
 }
 
 impl Guard {
-    /// Checks a request. A request that changes anything must have an Origin.
+    /// Checks a request. `must_have_origin` is true for a request that can change the session.
     ///
     /// # Errors
     ///
     /// The reason, as text for the client.
-    pub fn check(&self, target: &Uri, headers: &HeaderMap, socket: bool) -> Result<(), &'static str> {
-        let host = one(headers, header::HOST).and_then(|host| host.parse::<Authority>().ok());
-        let host = host.filter(|host| self.knows(host)).ok_or("this Host is not allowed")?;
+    pub fn check(&self, target: &Uri, headers: &HeaderMap, must_have_origin: bool) -> Result<(), &'static str> {
+        let host = single_value(headers, header::HOST).and_then(|host| host.parse::<Authority>().ok());
+        let host = host
+            .filter(|host| self.accepts(host))
+            .ok_or("this Host is not allowed")?;
         if target.authority().is_some_and(|authority| *authority != host) {
-            return Err("this Host is not allowed"); // the target is a whole URL, of another host
+            return Err("this Host is not allowed"); // an absolute URL of another host
         }
-        match (one(headers, header::ORIGIN), headers.contains_key(header::ORIGIN)) {
+        match (
+            single_value(headers, header::ORIGIN),
+            headers.contains_key(header::ORIGIN),
+        ) {
             // The scheme is not compared, because a tunnel or a proxy may use https.
             (Some(origin), _) => {
                 let authority = origin
                     .strip_prefix("http://")
                     .or_else(|| origin.strip_prefix("https://"));
-                let same = authority.is_some_and(|authority| authority.eq_ignore_ascii_case(host.as_str()));
-                if same {
+                if authority.is_some_and(|authority| authority.eq_ignore_ascii_case(host.as_str())) {
                     Ok(())
                 } else {
                     Err("requests from other pages are not allowed")
                 }
             }
             (None, true) => Err("requests from other pages are not allowed"),
-            (None, false) if socket => Err("this request must have an Origin"),
+            (None, false) if must_have_origin => Err("this request must have an Origin"),
             (None, false) => Ok(()),
         }
     }
 
-    /// Accepts only known names, because names, unlike addresses, can be redirected. Accepts any port, for tunnels.
-    fn knows(&self, host: &Authority) -> bool {
+    /// Returns whether a host may be used: an address, `localhost` or the name of the server. Other names may be
+    /// redirected to this machine by DNS. Any port is accepted, because tunnels change the port.
+    fn accepts(&self, host: &Authority) -> bool {
         if host.as_str().contains('@') {
             return false;
         }
         let name = host.host();
-        let bare = name
+        let address = name
             .strip_prefix('[')
             .and_then(|name| name.strip_suffix(']'))
             .unwrap_or(name);
-        if let Ok(address) = bare.parse::<IpAddr>() {
+        if let Ok(address) = address.parse::<IpAddr>() {
             return !self.loopback || address.is_loopback();
         }
-        name.eq_ignore_ascii_case("localhost")
-            || self.name.as_ref().is_some_and(|known| name.eq_ignore_ascii_case(known))
+        name.eq_ignore_ascii_case("localhost") || self.name.as_ref().is_some_and(|own| name.eq_ignore_ascii_case(own))
     }
 }
 
 /// Returns the value of a header that occurs exactly once.
-fn one(headers: &HeaderMap, name: HeaderName) -> Option<&str> {
+fn single_value(headers: &HeaderMap, name: HeaderName) -> Option<&str> {
     let mut values = headers.get_all(name).iter();
     let value = values.next()?;
     values.next().is_none().then(|| value.to_str().ok()).flatten()
@@ -74,13 +78,13 @@ fn one(headers: &HeaderMap, name: HeaderName) -> Option<&str> {
 mod tests {
     use super::*;
 
-    fn checked(guard: &Guard, host: &str, origin: Option<&str>, socket: bool) -> bool {
+    fn accepts(guard: &Guard, host: &str, origin: Option<&str>, must_have_origin: bool) -> bool {
         let mut headers = HeaderMap::new();
         headers.insert(header::HOST, host.parse().unwrap());
         if let Some(origin) = origin {
             headers.insert(header::ORIGIN, origin.parse().unwrap());
         }
-        guard.check(&Uri::from_static("/"), &headers, socket).is_ok()
+        guard.check(&Uri::from_static("/"), &headers, must_have_origin).is_ok()
     }
 
     #[test]
@@ -97,7 +101,7 @@ mod tests {
             "[::1]:7878",
             "localhost:9000",
         ] {
-            assert!(checked(&guard, host, None, false), "{host}");
+            assert!(accepts(&guard, host, None, false), "{host}");
         }
         for host in [
             "evil.example:7878",
@@ -111,7 +115,7 @@ mod tests {
             "[::1",
             "0.0.0.0:7878",
         ] {
-            assert!(!checked(&guard, host, None, false), "{host}");
+            assert!(!accepts(&guard, host, None, false), "{host}");
         }
     }
 
@@ -122,10 +126,10 @@ mod tests {
             loopback: false,
         };
         for host in ["192.168.1.2:7878", "studio:7878", "[fe80::1]", "localhost"] {
-            assert!(checked(&guard, host, None, false), "{host}");
+            assert!(accepts(&guard, host, None, false), "{host}");
         }
         for host in ["studio.evil.example", "evil.example"] {
-            assert!(!checked(&guard, host, None, false), "{host}");
+            assert!(!accepts(&guard, host, None, false), "{host}");
         }
     }
 
@@ -136,10 +140,10 @@ mod tests {
             loopback: true,
         };
         let host = "localhost:7878";
-        assert!(checked(&guard, host, Some("http://localhost:7878"), true));
-        assert!(checked(&guard, host, Some("https://localhost:7878"), true));
+        assert!(accepts(&guard, host, Some("http://localhost:7878"), true));
+        assert!(accepts(&guard, host, Some("https://localhost:7878"), true));
         assert!(
-            !checked(&guard, host, None, true),
+            !accepts(&guard, host, None, true),
             "a socket without an origin is accepted"
         );
         for origin in [
@@ -150,13 +154,13 @@ mod tests {
             "",
             "file://",
         ] {
-            assert!(!checked(&guard, host, Some(origin), true), "{origin}");
-            assert!(!checked(&guard, host, Some(origin), false), "{origin}");
+            assert!(!accepts(&guard, host, Some(origin), true), "{origin}");
+            assert!(!accepts(&guard, host, Some(origin), false), "{origin}");
         }
     }
 
     #[test]
-    fn a_target_with_another_authority_is_refused() {
+    fn a_target_with_another_authority_is_rejected() {
         let guard = Guard {
             name: None,
             loopback: true,

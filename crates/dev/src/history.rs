@@ -1,16 +1,16 @@
-//! The changes that this session made to the scene file, for undo and redo.
+//! Undo and redo of the changes that this session made to the scene file.
 
 use wgray_scene::KeyPath;
 
 /// Maximum number of steps.
-const MOST: usize = 1000;
+const MAX_STEPS: usize = 1000;
 
 #[derive(Debug)]
 pub struct Step {
     /// The changed key, for display.
-    pub what: String,
+    pub key: String,
     /// The table that contains the change.
-    pub at: KeyPath,
+    pub table: KeyPath,
     /// True if the camera was saved.
     pub is_camera: bool,
     /// Changes with the same gesture number form one step.
@@ -23,10 +23,10 @@ pub struct Step {
 
 impl Step {
     /// Creates a step whose texts are not set yet.
-    pub fn new(what: String, at: KeyPath, gesture: Option<u64>) -> Step {
+    pub fn new(key: String, table: KeyPath, gesture: Option<u64>) -> Step {
         Step {
-            what,
-            at,
+            key,
+            table,
             is_camera: false,
             gesture,
             start: 0,
@@ -45,11 +45,12 @@ impl Step {
         self
     }
 
-    fn swapped(&self, text: &str, from: &[u8], to: &[u8]) -> Option<String> {
+    /// Replaces `old` by `new` at the offset of the change; `None` if the text does not contain `old` there.
+    fn replace(&self, text: &str, old: &[u8], new: &[u8]) -> Option<String> {
         let bytes = text.as_bytes();
-        let (head, rest) = bytes.split_at_checked(self.start)?;
-        let rest = rest.strip_prefix(from)?;
-        String::from_utf8([head, to, rest].concat()).ok()
+        let (before, rest) = bytes.split_at_checked(self.start)?;
+        let after = rest.strip_prefix(old)?;
+        String::from_utf8([before, new, after].concat()).ok()
     }
 }
 
@@ -63,41 +64,41 @@ pub struct History {
 impl History {
     pub fn add(&mut self, step: Step, before: &str, after: &str) {
         self.undone.clear();
-        let is_same = |last: &Step| last.gesture.is_some() && last.gesture == step.gesture && last.what == step.what;
-        let known = self.done.pop_if(|last| is_same(last));
-        let first = known.and_then(|last| last.swapped(before, &last.after, &last.before));
-        let step = step.between(first.as_deref().unwrap_or(before), after);
+        let is_same = |last: &Step| last.gesture.is_some() && last.gesture == step.gesture && last.key == step.key;
+        let merged = self.done.pop_if(|last| is_same(last));
+        let original = merged.and_then(|last| last.replace(before, &last.after, &last.before));
+        let step = step.between(original.as_deref().unwrap_or(before), after);
         if step.before != step.after {
             self.done.push(step);
         }
-        if self.done.len() > MOST {
+        if self.done.len() > MAX_STEPS {
             self.done.remove(0);
         }
     }
 
-    /// Drops all steps, because another program changed the file. Returns whether there were any steps.
+    /// Drops all steps, because another program changed the file. Returns whether any steps existed.
     pub fn forget(&mut self) -> bool {
         let History { done, undone } = std::mem::take(self);
         !(done.is_empty() && undone.is_empty())
     }
 
     /// Returns the last change, or the last change that was undone.
-    pub fn last(&self, again: bool) -> Option<&Step> {
-        if again { self.undone.last() } else { self.done.last() }
+    pub fn last(&self, redo: bool) -> Option<&Step> {
+        if redo { self.undone.last() } else { self.done.last() }
     }
 
-    /// Returns the text after undo or redo.
-    pub fn turned(&self, text: &str, again: bool) -> Option<String> {
-        let step = self.last(again)?;
-        match again {
-            false => step.swapped(text, &step.after, &step.before),
-            true => step.swapped(text, &step.before, &step.after),
+    /// Returns the text after an undo or a redo.
+    pub fn text_after(&self, text: &str, redo: bool) -> Option<String> {
+        let step = self.last(redo)?;
+        match redo {
+            false => step.replace(text, &step.after, &step.before),
+            true => step.replace(text, &step.before, &step.after),
         }
     }
 
-    /// Records that the text of [`Self::turned`] was written to the file.
-    pub fn turn(&mut self, again: bool) {
-        let (from, to) = match again {
+    /// Records that the text of [`Self::text_after`] was written to the file.
+    pub fn complete(&mut self, redo: bool) {
+        let (from, to) = match redo {
             false => (&mut self.done, &mut self.undone),
             true => (&mut self.undone, &mut self.done),
         };
@@ -115,8 +116,8 @@ impl History {
 mod tests {
     use super::*;
 
-    fn step(what: &str, gesture: Option<u64>) -> Step {
-        Step::new(what.to_owned(), KeyPath::default(), gesture)
+    fn step(key: &str, gesture: Option<u64>) -> Step {
+        Step::new(key.to_owned(), KeyPath::default(), gesture)
     }
 
     #[test]
@@ -127,26 +128,26 @@ mod tests {
             history.add(step(pair[1], None), pair[0], pair[1]);
         }
         let mut text = texts[3].to_owned();
-        for wanted in texts[..3].iter().rev() {
-            text = history.turned(&text, false).unwrap();
-            history.turn(false);
-            assert_eq!(text, *wanted);
+        for expected in texts[..3].iter().rev() {
+            text = history.text_after(&text, false).unwrap();
+            history.complete(false);
+            assert_eq!(text, *expected);
         }
         assert!(
-            history.turned(&text, false).is_none(),
+            history.text_after(&text, false).is_none(),
             "more steps were undone than exist"
         );
-        for wanted in &texts[1..3] {
-            text = history.turned(&text, true).unwrap();
-            history.turn(true);
-            assert_eq!(text, *wanted);
+        for expected in &texts[1..3] {
+            text = history.text_after(&text, true).unwrap();
+            history.complete(true);
+            assert_eq!(text, *expected);
         }
         // A new change drops the undone changes.
         history.add(step("x", None), texts[2], "x");
         assert!(history.last(true).is_none());
-        assert_eq!(history.turned("x", false).as_deref(), Some(texts[2]));
+        assert_eq!(history.text_after("x", false).as_deref(), Some(texts[2]));
         assert!(
-            history.turned("y", false).is_none(),
+            history.text_after("y", false).is_none(),
             "a change by another program was undone"
         );
     }
@@ -154,19 +155,19 @@ mod tests {
     #[test]
     fn a_gesture_is_one_step() {
         let mut history = History::default();
-        for (gesture, what, before, after) in [
+        for (gesture, key, before, after) in [
             (1, "a", "a = 1", "a = 10"),
             (1, "a", "a = 10", "a = 7"),
             (2, "a", "a = 7", "a = 8"),
             (2, "b", "a = 8", "a = 9"),
         ] {
-            history.add(step(what, Some(gesture)), before, after);
+            history.add(step(key, Some(gesture)), before, after);
         }
         let mut text = "a = 9".to_owned();
-        for wanted in ["a = 8", "a = 7", "a = 1"] {
-            text = history.turned(&text, false).unwrap();
-            history.turn(false);
-            assert_eq!(text, wanted);
+        for expected in ["a = 8", "a = 7", "a = 1"] {
+            text = history.text_after(&text, false).unwrap();
+            history.complete(false);
+            assert_eq!(text, expected);
         }
         assert!(history.last(false).is_none());
         // A gesture that ends where it began changes nothing.

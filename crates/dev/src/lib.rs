@@ -4,7 +4,7 @@
 //! ```text
 //! files ── watch ──> Snapshot ──> painter ──> builder (compiles)
 //!                                    │  ^─────────┘
-//!                       Canvas (renders, call by call)
+//!                   Canvas (renders, one dispatch at a time)
 //!                                    └──> State, Frame, SceneView ──> server ──> page
 //! ```
 
@@ -45,7 +45,7 @@ pub use histogram::Histogram;
 pub use messages::{Command, Notice, Preview, Report, Set, State};
 pub use object::{Group, Object, ObjectList, SceneView};
 pub use picture::{Against, Content, Frame, Header, View};
-pub use reference::{Apart, Reference};
+pub use reference::{ErrorMeasures, Reference};
 pub use server::Listener;
 pub use session::{Session, Settings, StartError, Viewer, Viewers};
 pub use sliders::SliderState;

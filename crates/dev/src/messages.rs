@@ -10,7 +10,7 @@ use super::camera::{Move, Viewpoint};
 use super::diagnostic::Diagnostic;
 use super::display_settings::DisplayOverrides;
 use super::picture::View;
-use super::reference::{Apart, Reference};
+use super::reference::{ErrorMeasures, Reference};
 use super::sliders::SliderState;
 use super::source::Snapshot;
 use wgray_render::gpu::sliders::Value;
@@ -22,7 +22,7 @@ pub enum Report {
     /// An error.
     Problem(Diagnostic),
     /// All errors are fixed.
-    Mended,
+    AllFixed,
     /// The first image after a save was shown.
     Reloaded {
         /// Seconds from the change to the image, including compilation.
@@ -37,12 +37,12 @@ pub enum Report {
     },
     /// A note about the scene.
     Note(String),
-    /// The image is too large to display: the full size, and the displayed size.
+    /// The image is too large to display at full size: the full size, and the displayed size.
     Smaller([u32; 2], [u32; 2]),
     /// The camera or a value was saved to the scene file, or could not be saved.
-    Wrote(String, Result<(), String>),
-    /// A change of the scene file was undone or redone, or this failed.
-    Turned(String, Result<(), String>),
+    Saved(String, Result<(), String>),
+    /// A change of the scene file was undone or redone, or the undo or redo failed.
+    UndoRedo(String, Result<(), String>),
 }
 
 /// A value for a key of the scene file.
@@ -53,7 +53,7 @@ pub struct Set {
     pub path: String,
     /// The value; null removes the key from the file.
     pub value: serde_json::Value,
-    /// Changes of the same key with the same number are one step of undo.
+    /// Changes of the same key with the same gesture number form one undo step.
     #[serde(default)]
     pub gesture: Option<u64>,
 }
@@ -110,7 +110,7 @@ pub enum Command {
     Pause(bool),
     /// Renders the image again.
     Restart,
-    /// Sets the maximum number of samples per pixel; if absent, uses the number of the scene.
+    /// Sets the maximum number of samples per pixel; if absent, the scene's number is used.
     Samples(Option<NonZeroU32>),
     /// Sets the scale of the preview.
     Preview(Preview),
@@ -168,7 +168,7 @@ pub struct State {
     pub viewpoint: Option<Viewpoint>,
     /// True if the camera differs from the camera in the file.
     pub camera_moved: bool,
-    /// Number of valid scenes so far.
+    /// Number of valid scenes read so far.
     pub scenes: u64,
     /// The last change of the scene file, which can be undone: `camera`, `materials.red.color`.
     pub undo: Option<String>,
@@ -178,7 +178,7 @@ pub struct State {
     pub read_only: Option<String>,
     /// The last change that was undone, which can be redone.
     pub redo: Option<String>,
-    /// The availability of a previous and of a next viewpoint.
+    /// Availability of a previous and of a next viewpoint.
     pub steps: [bool; 2],
     /// The display settings that the viewer overrides.
     pub look: DisplayOverrides,
@@ -186,22 +186,22 @@ pub struct State {
     pub scene_look: (f64, ViewTransform),
     /// True if rendering pauses after the first image of a change.
     pub paused: bool,
-    /// The maximum number of samples per pixel, and the number of the scene.
+    /// The viewers' maximum number of samples per pixel, if set, and the scene's number.
     pub samples: (Option<NonZeroU32>, u32),
     /// The scale of the preview.
     pub preview: Preview,
-    /// The available images to compare with, other than the CPU's: whether an image from before the last change exists,
-    /// and the name of the reference.
+    /// The images to compare with, besides the CPU's: whether an image from before the last change exists, and the
+    /// name of the reference.
     pub comparable: (bool, Option<String>),
     /// The reason if the selected comparison cannot be shown.
     pub no_comparison: Option<String>,
-    /// The difference between the two images of a comparison.
-    pub apart: Option<Apart>,
+    /// The error measures of a comparison.
+    pub apart: Option<ErrorMeasures>,
     /// The current errors.
     pub problems: Vec<Diagnostic>,
     /// The sliders of the shaders.
     pub sliders: Vec<SliderState>,
-    /// The views that the scene does not provide, each with the reason.
+    /// The views that the scene does not provide, and the reasons.
     pub missing_views: Vec<(View, &'static str)>,
     /// The template of links to an editor, with `{file}`, `{line}` and `{column}`; absent if there are no links.
     pub editor: Option<String>,
@@ -230,13 +230,13 @@ pub struct Notice {
     pub command: u64,
     /// The text; empty if the previous notice no longer applies.
     pub text: String,
-    /// True for an error.
+    /// True if the notice reports an error.
     pub bad: bool,
 }
 
 pub enum Event {
     /// The files changed: the new state, the time when the change was noticed, and the number of writes by this session
-    /// before then.
+    /// up to that time.
     Files(Box<Snapshot>, Instant, u64),
     /// Changed files of the scene are being read, or turned out to be unchanged.
     Reading(bool),
@@ -244,9 +244,11 @@ pub enum Event {
     Command(Command),
     /// A viewer uploaded an image to compare with.
     Reference(Reference),
-    Measured(Apart),
+    /// A comparison was measured.
+    Measured(ErrorMeasures),
+    /// A viewer was added.
     Viewers,
-    /// Destroys the device, as if the driver had lost it.
+    /// Destroys the device, as if the driver had lost the device.
     #[cfg(test)]
     Lose,
     Stop,

@@ -1,4 +1,4 @@
-//! The object at a pixel, and its part of the scene file: source lines, values, and allowed values.
+//! The object at a pixel or with a name, and its part of the scene file: source lines, values, and allowed values.
 
 use std::sync::Arc;
 
@@ -14,6 +14,7 @@ use wgray_scene::{Description, Field, KeyPath, Names, Pieces, Segment, ShapeDesc
 
 /// Maximum number of displayed lines per table.
 const MAX_LINES: usize = 40;
+/// Maximum number of listed objects.
 const MAX_LISTED: usize = 50;
 /// Maximum number of tables that are shown with an object: materials, textures, a mesh.
 const MAX_GROUPS: usize = 12;
@@ -39,12 +40,12 @@ pub struct Object {
     /// The material at the pixel, or the material named in the query.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub material: Option<String>,
-    /// The object and the tables it refers to: its material, and the textures of the material.
+    /// The table of the object, and the tables that it refers to: its material, and the textures of the material.
     pub groups: Vec<Group>,
-    /// A note.
+    /// A note about the object, for the user.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub note: Option<String>,
-    /// Why the selection has no object.
+    /// The reason if the selection has no object.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gone: Option<String>,
 }
@@ -58,9 +59,9 @@ pub struct Group {
     pub kind: String,
     /// The first line of the table in the file, counted from 1; 0 if the table is not in the file.
     pub line: usize,
-    /// The first lines of its source text; `more` counts the rest.
+    /// The first lines of the table's source text.
     pub text: String,
-    /// Number of further lines.
+    /// Number of lines that `text` omits.
     pub more: usize,
     /// The values of the table.
     pub fields: Vec<Field>,
@@ -69,17 +70,17 @@ pub struct Group {
 /// The objects whose names contain a text.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct ObjectList {
-    /// The text.
+    /// The text of the query.
     pub part: String,
-    /// Names, each with its type or material.
+    /// The name of each object, and its type, file or material.
     pub objects: Vec<(String, String)>,
-    /// Number of further objects.
+    /// Number of objects that `objects` omits.
     pub more: usize,
 }
 
 impl Object {
     /// Returns the answer to queries while no scene is loaded.
-    pub(super) fn none(name: &str, at: Option<[u32; 2]>) -> Object {
+    pub(super) fn without_scene(name: &str, at: Option<[u32; 2]>) -> Object {
         Object {
             name: name.to_owned(),
             file: String::new(),
@@ -97,7 +98,7 @@ impl SceneView {
     pub fn at(&self, [x, y]: [u32; 2]) -> Object {
         let mut object = match x < self.camera.width && y < self.camera.height {
             true => self.hit(UVec2::new(x, y)),
-            false => self.gone("", format!("pixel {x}, {y} is outside the image")),
+            false => self.without_groups("", format!("pixel {x}, {y} is outside the image")),
         };
         object.at = Some([x, y]);
         object
@@ -111,16 +112,16 @@ impl SceneView {
         };
         let hit = pixel_first_hit(&packed, pixel);
         if hit.shape == NO_INDEX {
-            let around = if loaded.description.environment.is_some() {
+            let section = if loaded.description.environment.is_some() {
                 "environment"
             } else {
                 "render"
             };
-            let mut object = self.object(around, None);
-            object.note = Some("Nothing here but the background".to_owned());
+            let mut object = self.object(section, None);
+            object.note = Some("The background is visible at this pixel".to_owned());
             return object;
         }
-        let (name, note) = place_of(loaded, hit.shape as usize);
+        let (name, note) = name_of_shape(loaded, hit.shape as usize);
         let material = loaded.scene.material_names.get(hit.material as usize);
         let mut object = self.object(&name, material.map(String::as_str));
         object.note = note.or(object.note);
@@ -129,24 +130,24 @@ impl SceneView {
 
     /// Returns the object with this name; `material` comes first among its materials.
     pub fn object(&self, name: &str, material: Option<&str>) -> Object {
-        let (own, brought) = match material {
+        let (own, imported) = match material {
             Some(name) if self.loaded.description.materials.contains_key(name) => (material, None),
             _ => (None, material),
         };
-        let brought = brought.map(|name| format!("the material here, {name}, is in another file"));
+        let note = imported.map(|name| format!("the material at this pixel, {name}, is in another file"));
         Object {
             material: material.map(str::to_owned),
-            note: brought,
-            ..self.described(name, own)
+            note,
+            ..self.with_groups(name, own)
         }
     }
 
     pub(super) fn names(&self) -> Names {
-        let all = &self.loaded.description;
+        let description = &self.loaded.description;
         Names {
-            materials: all.materials.keys().cloned().collect(),
-            textures: all.textures.keys().cloned().collect(),
-            meshes: all.meshes.keys().cloned().collect(),
+            materials: description.materials.keys().cloned().collect(),
+            textures: description.textures.keys().cloned().collect(),
+            meshes: description.meshes.keys().cloned().collect(),
         }
     }
 
@@ -159,22 +160,17 @@ impl SceneView {
         group.fields.into_iter().find(|field| field.path == exact)
     }
 
-    fn gone(&self, name: &str, why: String) -> Object {
+    fn without_groups(&self, name: &str, reason: String) -> Object {
         Object {
             file: self.sources.scene.display().to_string(),
-            gone: Some(why),
-            ..Object::none(name, None)
+            gone: Some(reason),
+            ..Object::without_scene(name, None)
         }
     }
 
-    fn described(&self, name: &str, material: Option<&str>) -> Object {
-        let not_there = || self.gone(name, format!("{name} is not in the scene"));
-        let Some(path) = name
-            .parse()
-            .ok()
-            .filter(|path| is_there(&self.loaded.description, path))
-        else {
-            return not_there();
+    fn with_groups(&self, name: &str, material: Option<&str>) -> Object {
+        let Some(path) = name.parse().ok().filter(|path| exists(&self.loaded.description, path)) else {
+            return self.without_groups(name, format!("{name} is not in the scene"));
         };
         let reason = match self.sources.read_only() {
             Some(reason) => reason,
@@ -182,17 +178,17 @@ impl SceneView {
                 let pieces = self.loaded.pieces();
                 let names = self.names();
                 let mut groups: Vec<Group> = self.group(&pieces, &path, &names).into_iter().collect();
-                let mut wanted: Vec<KeyPath> = material.map(|name| named("materials", name)).into_iter().collect();
-                wanted.extend(groups.iter().flat_map(named_by));
+                let mut queue: Vec<KeyPath> = material.map(|name| table_path("materials", name)).into_iter().collect();
+                queue.extend(groups.iter().flat_map(references));
                 let mut i = 0;
-                while let Some(next) = wanted.get(i).cloned() {
+                while let Some(next) = queue.get(i).cloned() {
                     i += 1;
-                    let is_known = wanted[..i - 1].contains(&next) || !is_there(&self.loaded.description, &next);
-                    if is_known || groups.len() >= MAX_GROUPS {
+                    let is_excluded = queue[..i - 1].contains(&next) || !exists(&self.loaded.description, &next);
+                    if is_excluded || groups.len() >= MAX_GROUPS {
                         continue;
                     }
                     if let Some(group) = self.group(&pieces, &next, &names) {
-                        wanted.extend(named_by(&group));
+                        queue.extend(references(&group));
                         groups.push(group);
                     }
                 }
@@ -200,21 +196,21 @@ impl SceneView {
                 return Object {
                     groups,
                     gone,
-                    ..self.gone(name, String::new())
+                    ..self.without_groups(name, String::new())
                 };
             }
         };
-        self.gone(name, reason)
+        self.without_groups(name, reason)
     }
 
     fn group(&self, pieces: &Pieces, path: &KeyPath, names: &Names) -> Option<Group> {
         let piece = pieces.find(path);
-        let whole: Table = toml::from_str(piece.text.trim_start_matches('\u{feff}')).ok()?;
+        let document: Table = toml::from_str(piece.text.trim_start_matches('\u{feff}')).ok()?;
         let table = piece
             .path
             .0
             .iter()
-            .try_fold(Value::Table(whole), |value, segment| match (value, segment) {
+            .try_fold(Value::Table(document), |value, segment| match (value, segment) {
                 (Value::Table(mut table), Segment::Key(key)) => table.remove(key),
                 (Value::Array(mut list), Segment::Index(i)) if *i < list.len() => Some(list.swap_remove(*i)),
                 _ => None,
@@ -235,21 +231,21 @@ impl SceneView {
         ];
         for field in &mut fields {
             let path = field.path.strip_suffix(".count").unwrap_or(&field.path);
-            let samples = counts.iter().find(|(own, _)| *own == path);
+            let samples = counts.iter().find(|(key, _)| *key == path);
             field.squares = samples.is_some_and(|(_, samples)| samples.pattern(integrator).needs_square());
-            let of_field = field.path.parse().ok();
-            if let Some(option) = of_field.and_then(|path| self.sources.overrides.in_place_of(&path)) {
+            let field_path = field.path.parse().ok();
+            if let Some(option) = field_path.and_then(|path| self.sources.overrides.in_place_of(&path)) {
                 field.fixed = Some(format!("{option} overrides the value of the file"));
             }
         }
         // Keys of the file come first, in the order of the file.
-        let place = |field: &Field| {
+        let offset = |field: &Field| {
             let path: KeyPath = field.path.parse().ok()?;
-            let below = path.0.get(path_len(path.0.len(), field)..)?.to_vec();
-            let inner = KeyPath(piece.path.0.iter().cloned().chain(below).collect());
-            layout.extent(&inner).map(|range| range.start)
+            let keys = path.0.get(object_path_len(path.0.len(), field)..)?.to_vec();
+            let path_in_piece = KeyPath(piece.path.0.iter().cloned().chain(keys).collect());
+            layout.extent(&path_in_piece).map(|range| range.start)
         };
-        fields.sort_by_cached_key(|field| (field.value.is_none(), place(field)));
+        fields.sort_by_cached_key(|field| (field.value.is_none(), offset(field)));
         let kind = table.get("type").and_then(Value::as_str).unwrap_or_default().to_owned();
         Some(Group {
             name: path.exact(),
@@ -263,56 +259,56 @@ impl SceneView {
 
     /// Returns the objects whose names contain a text, in the order of the file's sections.
     pub fn objects(&self, part: &str) -> ObjectList {
-        let all = &self.loaded.description;
-        let wanted = part.to_lowercase();
-        let mut listed = ObjectList {
+        let description = &self.loaded.description;
+        let lowercase_part = part.to_lowercase();
+        let mut list = ObjectList {
             part: part.to_owned(),
             objects: Vec::new(),
             more: 0,
         };
-        let mut add = |name: &dyn Fn() -> String, about: String| {
+        let mut add = |name: &dyn Fn() -> String, details: String| {
             let name = name();
-            if format!("{name} {about}").to_lowercase().contains(&wanted) {
-                match listed.objects.len() < MAX_LISTED {
-                    true => listed.objects.push((name, about)),
-                    false => listed.more += 1,
+            if format!("{name} {details}").to_lowercase().contains(&lowercase_part) {
+                match list.objects.len() < MAX_LISTED {
+                    true => list.objects.push((name, details)),
+                    false => list.more += 1,
                 }
             }
         };
         for section in ["image", "camera", "render", "environment"] {
-            if section != "environment" || all.environment.is_some() {
+            if section != "environment" || description.environment.is_some() {
                 add(&|| section.to_owned(), String::new());
             }
         }
         let maps = [
-            ("materials", all.materials.keys().collect::<Vec<_>>()),
-            ("textures", all.textures.keys().collect()),
-            ("meshes", all.meshes.keys().collect()),
+            ("materials", description.materials.keys().collect::<Vec<_>>()),
+            ("textures", description.textures.keys().collect()),
+            ("meshes", description.meshes.keys().collect()),
         ];
         for (section, keys) in maps {
             keys.into_iter()
-                .for_each(|key| add(&|| named(section, key).exact(), String::new()));
+                .for_each(|key| add(&|| table_path(section, key).exact(), String::new()));
         }
-        for i in 0..all.lights.len() {
+        for i in 0..description.lights.len() {
             add(&|| format!("lights[{i}]"), String::new());
         }
-        for (i, shape) in all.shapes.iter().enumerate() {
-            add(&|| format!("shapes[{i}]"), description_of(shape));
+        for (i, shape) in description.shapes.iter().enumerate() {
+            add(&|| format!("shapes[{i}]"), shape_details(shape));
         }
-        for (i, instance) in all.instances.iter().enumerate() {
+        for (i, instance) in description.instances.iter().enumerate() {
             add(&|| format!("instances[{i}]"), instance.mesh.clone());
         }
-        listed
+        list
     }
 }
 
-/// Returns the number of path segments of a field's object.
-fn path_len(whole: usize, field: &Field) -> usize {
-    let below = field.name.parse::<KeyPath>().map_or(0, |name| name.0.len());
-    whole.saturating_sub(below)
+/// Returns the number of path segments of the object that contains a field, whose path has `path_len` segments.
+fn object_path_len(path_len: usize, field: &Field) -> usize {
+    let name_len = field.name.parse::<KeyPath>().map_or(0, |name| name.0.len());
+    path_len.saturating_sub(name_len)
 }
 
-fn named(section: &str, name: &str) -> KeyPath {
+fn table_path(section: &str, name: &str) -> KeyPath {
     KeyPath([section, name].map(Segment::from).to_vec())
 }
 
@@ -325,23 +321,23 @@ pub(super) fn object_of(path: &KeyPath) -> Option<KeyPath> {
     path.0.get(..length).map(|object| KeyPath(object.to_vec()))
 }
 
-fn is_there(all: &Description, path: &KeyPath) -> bool {
+fn exists(description: &Description, path: &KeyPath) -> bool {
     match path.0.as_slice() {
         [Segment::Key(section)] => match section.as_str() {
             "image" | "camera" | "render" => true,
-            "environment" => all.environment.is_some(),
+            "environment" => description.environment.is_some(),
             _ => false,
         },
         [Segment::Key(section), Segment::Key(name)] => match section.as_str() {
-            "materials" => all.materials.contains_key(name),
-            "textures" => all.textures.contains_key(name),
-            "meshes" => all.meshes.contains_key(name),
+            "materials" => description.materials.contains_key(name),
+            "textures" => description.textures.contains_key(name),
+            "meshes" => description.meshes.contains_key(name),
             _ => false,
         },
         [Segment::Key(section), Segment::Index(i)] => match section.as_str() {
-            "shapes" => *i < all.shapes.len(),
-            "lights" => *i < all.lights.len(),
-            "instances" => *i < all.instances.len(),
+            "shapes" => *i < description.shapes.len(),
+            "lights" => *i < description.lights.len(),
+            "instances" => *i < description.instances.len(),
             _ => false,
         },
         _ => false,
@@ -349,8 +345,8 @@ fn is_there(all: &Description, path: &KeyPath) -> bool {
 }
 
 /// Returns the paths of the objects that a table refers to: materials, textures, a mesh.
-fn named_by(group: &Group) -> Vec<KeyPath> {
-    let mut found = Vec::new();
+fn references(group: &Group) -> Vec<KeyPath> {
+    let mut paths = Vec::new();
     for field in &group.fields {
         let (Some(section), Some(text)) = (
             field
@@ -362,9 +358,9 @@ fn named_by(group: &Group) -> Vec<KeyPath> {
         ) else {
             continue;
         };
-        found.push(named(section, text));
+        paths.push(table_path(section, text));
     }
-    found
+    paths
 }
 
 /// Returns the lines of a range, including the comments directly above: the first line number, the text, and the number
@@ -378,64 +374,68 @@ fn lines(text: &str, start: usize, end: usize) -> (usize, String, usize) {
         }
         start = line;
     }
-    let whole = &text[start..line_end(text, end)];
+    let range = &text[start..line_end(text, end)];
     let number = 1 + text.as_bytes()[..start].iter().filter(|byte| **byte == b'\n').count();
-    let shown: Vec<&str> = whole.lines().take(MAX_LINES).collect();
-    (number, shown.join("\n"), whole.lines().count() - shown.len())
+    let first_lines: Vec<&str> = range.lines().take(MAX_LINES).collect();
+    (
+        number,
+        first_lines.join("\n"),
+        range.lines().count() - first_lines.len(),
+    )
 }
 
 /// Returns the name of the object in the file that contains the scene's shape with this index, and a note.
-fn place_of(loaded: &Loaded, number: usize) -> (String, Option<String>) {
-    let all = &loaded.description;
-    let gltf: Vec<(usize, bool)> = (all.shapes.iter().enumerate())
+fn name_of_shape(loaded: &Loaded, index: usize) -> (String, Option<String>) {
+    let description = &loaded.description;
+    let gltf: Vec<(usize, bool)> = (description.shapes.iter().enumerate())
         .filter_map(|(i, shape)| match shape {
             ShapeDescription::Gltf(gltf) => Some((i, gltf.lights)),
             _ => None,
         })
         .collect();
-    let brought = |mut number: usize, count: &dyn Fn(usize, bool) -> usize| {
+    let gltf_shape = |mut index: usize, count: &dyn Fn(usize, bool) -> usize| {
         for (file, (shape, lights)) in gltf.iter().enumerate() {
-            match number.checked_sub(count(file, *lights)) {
-                Some(rest) => number = rest,
+            match index.checked_sub(count(file, *lights)) {
+                Some(remaining) => index = remaining,
                 None => return format!("shapes[{shape}]"),
             }
         }
-        "render".to_owned() // unreachable: every imported part is from a file
+        "render".to_owned() // unreachable: every imported object is from a file
     };
     let imported = |file: usize| loaded.scene.imported.get(file);
-    let plain = all.shapes.len() - gltf.len();
-    let of_gltf = "part of this glTF file, which is read-only here. Run `wgray convert` for an editable scene.";
-    if number < plain {
-        let mut plain = all
+    let own_shapes = description.shapes.len() - gltf.len();
+    let note = "The object is part of a glTF file, which is read-only here. Run `wgray convert` for an editable scene.";
+    if index < own_shapes {
+        let mut shapes = description
             .shapes
             .iter()
             .enumerate()
             .filter(|(_, shape)| !matches!(shape, ShapeDescription::Gltf(_)));
-        let place = plain.nth(number).map_or(number, |(i, _)| i);
-        return (format!("shapes[{place}]"), None);
+        let file_index = shapes.nth(index).map_or(index, |(i, _)| i);
+        return (format!("shapes[{file_index}]"), None);
     }
-    let Some(light) = number.checked_sub(loaded.scene.shapes.len()) else {
-        let instance = number - plain;
-        return match instance.checked_sub(all.instances.len()) {
+    let Some(light) = index.checked_sub(loaded.scene.shapes.len()) else {
+        let instance = index - own_shapes;
+        return match instance.checked_sub(description.instances.len()) {
             None => (format!("instances[{instance}]"), None),
-            Some(rest) => {
+            Some(imported_index) => {
                 let count = |file: usize, _| imported(file).map_or(0, |file| file.instances.len());
-                (brought(rest, &count), Some(of_gltf.to_owned()))
+                (gltf_shape(imported_index, &count), Some(note.to_owned()))
             }
         };
     };
-    match light.checked_sub(all.lights.len()) {
+    match light.checked_sub(description.lights.len()) {
         None => (format!("lights[{light}]"), None),
-        Some(rest) => {
+        Some(imported_index) => {
             let count =
                 |file: usize, lights: bool| imported(file).map_or(0, |file| if lights { file.lights.len() } else { 0 });
-            (brought(rest, &count), Some(of_gltf.to_owned()))
+            (gltf_shape(imported_index, &count), Some(note.to_owned()))
         }
     }
 }
 
-/// Describes a shape: its type, and its file or material.
-fn description_of(shape: &ShapeDescription) -> String {
+/// Returns the type of a shape, and its file or material.
+fn shape_details(shape: &ShapeDescription) -> String {
     let table = serde_json::to_value(shape).unwrap_or_default();
     let text = |key: &str| table[key].as_str();
     let name = text("file").or(text("material")).unwrap_or_default();

@@ -14,7 +14,7 @@ use wgray_render::output::{self as image, Aov, AovSource};
 use wgray_render::records::{FirstHit, NO_INDEX};
 use wgray_scene::Integrator;
 
-/// The view of the scene.
+/// The view that is selected on the page.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum View {
@@ -23,19 +23,19 @@ pub enum View {
     Color,
     /// The normal of the first hit.
     Normal,
-    /// The shading normal of the first hit; with the integrator `path` the mean over the samples.
+    /// The shading normal of the first hit; with the integrator `path`, its mean over the samples.
     ShadingNormal,
     /// The distance of the first hit.
     Depth,
     /// The texture coordinates of the first hit.
     Uv,
-    /// The shape or triangle.
+    /// The index of the shape or triangle of the first hit.
     Primitive,
-    /// The shape.
+    /// The index of the shape of the first hit.
     Instance,
-    /// The barycentric coordinates in the triangle.
+    /// The barycentric coordinates of the first hit in its triangle.
     Barycentric,
-    /// The fraction of light that surfaces reflect.
+    /// The fraction of light that the first surface reflects.
     Albedo,
     /// Light after one reflection.
     Direct,
@@ -43,9 +43,9 @@ pub enum View {
     Indirect,
     /// Light without reflections.
     Emission,
-    /// The variance of a pixel.
+    /// The variance of a pixel's mean.
     Variance,
-    /// The number of samples.
+    /// The number of samples of a pixel.
     Samples,
     /// Radiance, a second image, and their difference.
     Compare(Against),
@@ -55,7 +55,7 @@ pub enum View {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Against {
-    /// The image of the CPU.
+    /// The image that the CPU renders.
     Cpu,
     /// The image from before the last saved change of the scene or the shaders.
     Before,
@@ -81,12 +81,12 @@ impl View {
     ];
 
     /// Returns the first-hit layer that the view shows, if any.
-    pub fn of_hits(self, integrator: Integrator) -> Option<Aov> {
+    pub fn hit_layer(self, integrator: Integrator) -> Option<Aov> {
         self.aov().filter(|aov| aov.source(integrator) == AovSource::FirstHit)
     }
 
     /// Returns the film layer that the view shows, if it is not color.
-    pub fn of_film(self, integrator: Integrator) -> Option<Aov> {
+    pub fn film_layer(self, integrator: Integrator) -> Option<Aov> {
         self.aov().filter(|aov| aov.source(integrator) != AovSource::FirstHit)
     }
 
@@ -109,8 +109,8 @@ impl View {
         }
     }
 
-    /// Returns whether the CPU also renders this view.
-    pub fn is_by_both(self) -> bool {
+    /// Returns whether both the GPU and the CPU render this view.
+    pub fn is_rendered_twice(self) -> bool {
         self == View::Compare(Against::Cpu)
     }
 }
@@ -120,7 +120,7 @@ impl View {
 pub enum Content {
     /// [`View::Color`]
     Color(Pixels),
-    /// [`View::Samples`]: the sample counts, and the final number.
+    /// [`View::Samples`]: the sample counts, and the final number of samples.
     Samples(Vec<u32>, u32),
     /// The views of first hits.
     Hits(Aov, Vec<FirstHit>),
@@ -145,7 +145,7 @@ impl Content {
     }
 }
 
-/// The description of a frame, sent before the images.
+/// The metadata and statistics of a frame, sent before the images.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Header {
     /// The number of the frame.
@@ -160,7 +160,7 @@ pub struct Header {
     pub height: u32,
     /// Width and height of the transmitted images.
     pub sent: [u32; 2],
-    /// Width and height of the finished image; smaller than the full size if that is too large to display.
+    /// Width and height of the finished image; smaller than the full size if the full size is too large to display.
     pub finest: [u32; 2],
     /// Current number of samples per pixel.
     pub samples: u32,
@@ -191,16 +191,16 @@ pub struct Header {
 /// The images of a view, as PNG files and as values.
 #[derive(Clone, Debug)]
 pub struct Frame {
-    /// The description.
+    /// The metadata and statistics of the images.
     pub header: Header,
     /// PNG files, one for each part of the header.
     pub pictures: Vec<Vec<u8>>,
-    /// The values.
+    /// The pixel values of the images.
     pub content: Content,
     /// The names for the indices in the values.
     pub names: Names,
     /// The display settings.
-    pub look: DisplaySettings,
+    pub display: DisplaySettings,
 }
 
 /// The names of shapes and materials in the scene file, for display.
@@ -215,23 +215,23 @@ pub struct Names {
 
 impl Frame {
     /// Encodes the images of `content` and completes the header.
-    pub fn new(mut header: Header, content: Content, names: Names, look: DisplaySettings) -> Frame {
+    pub fn new(mut header: Header, content: Content, names: Names, display: DisplaySettings) -> Frame {
         let [width, height] = header.sent;
-        let mut found = Vec::new();
-        let mut marked = |name, mut rgb: Vec<u8>, faults: Vec<Option<BadPixel>>| {
-            if look.marks {
+        let mut counts = Vec::new();
+        let mut mark_and_count = |name, mut rgb: Vec<u8>, faults: Vec<Option<BadPixel>>| {
+            if display.marks {
                 mark(&mut rgb, &faults);
             }
-            found.push((name, BadPixels::count(&faults, width)));
+            counts.push((name, BadPixels::count(&faults, width)));
             (name, rgb)
         };
-        let light = |pixels: &Pixels| faults(&pixels.colors, look.negative, |color| *color);
+        let color_faults = |pixels: &Pixels| faults(&pixels.colors, display.allow_negative, |color| *color);
         let pictures: Vec<(&'static str, Vec<u8>)> = match &content {
-            Content::Color(colors) => vec![marked("picture", look.bytes(colors), light(colors))],
+            Content::Color(colors) => vec![mark_and_count("picture", display.bytes(colors), color_faults(colors))],
             Content::Film(layer) => {
-                let negative = look.negative || layer.may_be_negative();
-                let found = faults(&layer.values.colors, negative, |color| *color);
-                vec![marked("picture", layer.bytes(&look), found)]
+                let allow_negative = display.allow_negative || layer.may_be_negative();
+                let faults = faults(&layer.values.colors, allow_negative, |color| *color);
+                vec![mark_and_count("picture", layer.bytes(&display), faults)]
             }
             Content::Samples(..) => vec![("picture", content.plain_bytes(header.sent))],
             Content::Hits(aov, hits) => {
@@ -244,24 +244,24 @@ impl Frame {
                     Aov::Barycentric => [hit.barycentric.x, hit.barycentric.y, 0.0],
                     _ => [0.0; 3],
                 };
-                vec![marked(
+                vec![mark_and_count(
                     "picture",
                     content.plain_bytes(header.sent),
                     faults(hits, true, values),
                 )]
             }
             Content::Compare(first, second) => {
-                header.differing = difference(first, second, 0.0).map(|found| (found.unequal, found.largest));
+                header.differing = difference(first, second, 0.0).map(|result| (result.unequal, result.largest));
                 vec![
-                    marked("first", look.bytes(first), light(first)),
-                    marked("second", look.bytes(second), light(second)),
-                    ("difference", amplified(first, second, look.gain)),
+                    mark_and_count("first", display.bytes(first), color_faults(first)),
+                    mark_and_count("second", display.bytes(second), color_faults(second)),
+                    ("difference", amplified(first, second, display.gain)),
                 ]
             }
         };
-        header.faults = found;
+        header.faults = counts;
         header.first_hits = matches!(content, Content::Hits(..));
-        let exposure = look.view.exposure;
+        let exposure = display.view.exposure;
         header.histogram = match &content {
             Content::Color(pixels) | Content::Compare(pixels, _) => Some(Histogram::of(&pixels.colors, exposure)),
             Content::Film(layer) if layer.is_light() => Some(Histogram::of(&layer.values.colors, exposure)),
@@ -269,7 +269,7 @@ impl Frame {
         };
         header.legend = match &content {
             Content::Film(layer) if layer.aov == Aov::Variance => Some(Legend::of_errors(exposure)),
-            _ if look.false_color && header.histogram.is_some() => Some(Legend::of(exposure)),
+            _ if display.false_color && header.histogram.is_some() => Some(Legend::of(exposure)),
             _ => None,
         };
         let (parts, pictures): (Vec<_>, Vec<_>) = pictures
@@ -285,7 +285,7 @@ impl Frame {
             pictures,
             content,
             names,
-            look,
+            display,
         }
     }
 
@@ -302,21 +302,21 @@ impl Frame {
         Some(match &self.content {
             Content::Color(pixels) => {
                 let color = *pixels.colors.get(i)?;
-                let shown = self.look.shown(color).map(|byte| byte.to_string()).join(" ");
+                let shown = self.display.color_bytes(color).map(|byte| byte.to_string()).join(" ");
                 vec![("linear RGB", numbers(color)), ("bits", bits(color)), ("shown", shown)]
             }
-            Content::Film(layer) => layer.pixel(i, &self.look)?,
+            Content::Film(layer) => layer.pixel(i, &self.display)?,
             Content::Samples(counts, total) => vec![("samples", format!("{} of {total}", counts.get(i)?))],
             Content::Hits(aov, hits) => self.hit(*aov, hits.get(i)?),
             Content::Compare(first, second) => {
                 let (first, second) = (*first.colors.get(i)?, *second.colors.get(i)?);
-                let apart = Vec3::from(first) - Vec3::from(second);
+                let difference = Vec3::from(first) - Vec3::from(second);
                 vec![
                     ("first", numbers(first)),
                     ("bits", bits(first)),
                     ("second", numbers(second)),
                     ("bits", bits(second)),
-                    ("difference", numbers(apart.into())),
+                    ("difference", numbers(difference.into())),
                 ]
             }
         })
@@ -332,7 +332,7 @@ impl Frame {
             (Some(instance), None) => format!("instances[{instance}]"),
             (_, Some(light)) => format!("lights[{light}]"),
         };
-        let mut known = match aov {
+        let mut values = match aov {
             Aov::Normal => values("normal", hit.normal.into()),
             Aov::ShadingNormal => values("shading normal", hit.shading_normal.into()),
             Aov::Depth => values("depth", [hit.depth]),
@@ -341,14 +341,14 @@ impl Frame {
             Aov::Uv => values("uv", hit.uv.into()),
             _ => Vec::new(),
         };
-        known.push(("on", shape));
-        known.extend(
+        values.push(("on", shape));
+        values.extend(
             self.names
                 .materials
                 .get(hit.material as usize)
                 .map(|name| ("material", name.clone())),
         );
-        known
+        values
     }
 }
 
@@ -358,26 +358,26 @@ fn values<const N: usize>(name: &'static str, values: [f32; N]) -> Vec<(&'static
 
 /// Returns the differences multiplied by `gain`; any difference yields at least a visible minimum.
 fn amplified(gpu: &Pixels, cpu: &Pixels, gain: f32) -> Vec<u8> {
-    const LEAST: f32 = 0.2;
+    const MIN_DIFFERENCE: f32 = 0.2;
     let pairs: Vec<_> = gpu.colors.iter().copied().zip(cpu.colors.iter().copied()).collect();
     bytes(&pairs, |(gpu, cpu)| {
         if gpu.map(f32::to_bits) == cpu.map(f32::to_bits) {
             return Vec3::ZERO;
         }
-        let apart = (Vec3::from(*gpu) - Vec3::from(*cpu)).abs() * gain;
+        let difference = (Vec3::from(*gpu) - Vec3::from(*cpu)).abs() * gain;
         // NaN counts as the largest difference.
-        let apart = Vec3::select(apart.is_nan_mask(), Vec3::ONE, apart);
-        if apart.max_element() < LEAST {
-            Vec3::splat(LEAST)
+        let difference = Vec3::select(difference.is_nan_mask(), Vec3::ONE, difference);
+        if difference.max_element() < MIN_DIFFERENCE {
+            Vec3::splat(MIN_DIFFERENCE)
         } else {
-            apart
+            difference
         }
     })
 }
 
 /// Encodes radiance as PNG.
-pub(super) fn png_of(pixels: &Pixels, look: DisplaySettings) -> Vec<u8> {
-    png(pixels.width, pixels.height, &look.bytes(pixels))
+pub(super) fn png_of(pixels: &Pixels, display: DisplaySettings) -> Vec<u8> {
+    png(pixels.width, pixels.height, &display.bytes(pixels))
 }
 
 /// Encodes 8-bit RGB as PNG with fast compression.
@@ -403,8 +403,8 @@ mod tests {
 
     #[test]
     fn every_difference_is_visible() {
-        let a = pixels(&[[0.5; 3], [0.0; 3], [1.0; 3], [1.0; 3], [0.0; 3]]);
-        let b = pixels(&[
+        let first = pixels(&[[0.5; 3], [0.0; 3], [1.0; 3], [1.0; 3], [0.0; 3]]);
+        let second = pixels(&[
             [0.5; 3],
             [-0.0; 3],
             [1.0, 1.0 + f32::EPSILON, 1.0],
@@ -412,9 +412,9 @@ mod tests {
             [0.001, 0.0, 1.0],
         ]);
         assert_eq!(
-            amplified(&a, &b, 256.0),
+            amplified(&first, &second, 256.0),
             [0, 0, 0, 51, 51, 51, 51, 51, 51, 255, 255, 255, 65, 0, 255]
         );
-        assert_eq!(amplified(&a, &a, 256.0), [0; 15]);
+        assert_eq!(amplified(&first, &first, 256.0), [0; 15]);
     }
 }

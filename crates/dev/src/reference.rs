@@ -1,4 +1,4 @@
-//! Reference images, kept or uploaded by viewers, and the difference between two images.
+//! Reference images, kept or uploaded by viewers, and error measures of two images.
 
 use std::sync::Arc;
 
@@ -42,7 +42,7 @@ impl Reference {
             for (pixel, value) in pixels.iter_mut().zip(&values) {
                 pixel[i] = match picture.kind {
                     Kind::Linear => *value,
-                    Kind::Display { .. } => light_of(*value, view.transform),
+                    Kind::Display { .. } => to_linear(*value, view.transform),
                 } as f32;
             }
         }
@@ -56,19 +56,22 @@ impl Reference {
         })
     }
 
-    /// Returns the pixels at the size `sent`; `None` if the size of the image is not `whole`.
-    pub fn at(&self, whole: [u32; 2], sent: [u32; 2]) -> Option<Pixels> {
+    /// Returns the pixels at the size `sent`; `None` if the size of the reference is not `full_size`.
+    pub fn at(&self, full_size: [u32; 2], sent: [u32; 2]) -> Option<Pixels> {
         let Pixels { width, height, .. } = *self.pixels;
-        if [width, height] != whole {
+        if [width, height] != full_size {
             return None;
         }
-        if sent == whole {
+        if sent == full_size {
             return Some((*self.pixels).clone());
         }
-        let scaled = ScaledImage { from: sent, to: whole };
+        let scaled = ScaledImage {
+            from: sent,
+            to: full_size,
+        };
         let color = |i: u32| {
-            let place = scaled.index(i % sent[0], i / sent[0])?;
-            self.pixels.colors.get(place).copied()
+            let index = scaled.index(i % sent[0], i / sent[0])?;
+            self.pixels.colors.get(index).copied()
         };
         Some(Pixels {
             width: sent[0],
@@ -79,27 +82,27 @@ impl Reference {
 }
 
 /// Converts a display value to a linear value. For AgX and PBR Neutral, only the sRGB curve can be inverted.
-fn light_of(value: f64, transform: ViewTransform) -> f64 {
+fn to_linear(value: f64, transform: ViewTransform) -> f64 {
     match transform {
         ViewTransform::Gamma22 => value.powf(2.2),
         _ => srgb_to_linear(value),
     }
 }
 
-/// The difference between two images.
+/// Error measures of two images.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct Apart {
+pub struct ErrorMeasures {
     /// The frame that was measured.
     pub frame: u64,
-    /// The root mean square error of the linear values; `None` if it is not finite.
+    /// The root mean square error of the linear values; `None` if the error is not finite.
     pub rmse: Option<f64>,
     /// HDR-FLIP, as measured by `wgray diff`.
     pub flip: Option<f64>,
 }
 
-impl Apart {
+impl ErrorMeasures {
     /// Measures the difference between two images of equal size.
-    pub fn of(frame: u64, first: &Pixels, second: &Pixels) -> Apart {
+    pub fn of(frame: u64, first: &Pixels, second: &Pixels) -> ErrorMeasures {
         let squares = first.colors.iter().flatten().zip(second.colors.iter().flatten());
         let sum: f64 = squares.map(|(a, b)| (f64::from(*a) - f64::from(*b)).powi(2)).sum();
         let rmse = (sum / (3.0 * first.colors.len().max(1) as f64)).sqrt();
@@ -107,7 +110,7 @@ impl Apart {
             true => Some(0.0),
             false => compare::flip(&picture(first), &picture(second), PIXELS_PER_DEGREE, None).map(|flip| flip.mean),
         };
-        Apart {
+        ErrorMeasures {
             frame,
             rmse: Some(rmse).filter(|rmse| rmse.is_finite()),
             flip: flip.filter(|flip| flip.is_finite()),
@@ -152,9 +155,10 @@ mod tests {
             let light = [[0.0, 0.001, 0.18], [0.5, 0.75, 1.0]];
             let bytes: Vec<u8> = light.iter().flat_map(|color| view.rgb8(*color)).collect();
             let file = image::in_memory(2, 1, &bytes).unwrap();
-            let read = Reference::decode("a.png".to_owned(), file, view).unwrap();
-            let again: Vec<u8> = read.pixels.colors.iter().flat_map(|color| view.rgb8(*color)).collect();
-            assert_eq!(again, bytes, "{transform:?}");
+            let reference = Reference::decode("a.png".to_owned(), file, view).unwrap();
+            let colors = reference.pixels.colors.iter();
+            let displayed: Vec<u8> = colors.flat_map(|color| view.rgb8(*color)).collect();
+            assert_eq!(displayed, bytes, "{transform:?}");
         }
         let error = Reference::decode("a.png".to_owned(), b"not an image".to_vec(), ViewSettings::default());
         assert!(error.unwrap_err().starts_with("a.png: "));
@@ -186,12 +190,12 @@ mod tests {
     fn differences_between_images_are_measured() {
         let a = pixels(vec![[0.5; 3]; 64 * 64], 64);
         let b = pixels(vec![[0.75; 3]; 64 * 64], 64);
-        let same = Apart::of(3, &a, &a);
+        let same = ErrorMeasures::of(3, &a, &a);
         assert_eq!((same.frame, same.rmse, same.flip), (3, Some(0.0), Some(0.0)));
-        let apart = Apart::of(4, &a, &b);
-        assert_eq!(apart.rmse, Some(0.25));
-        assert!(apart.flip.is_some_and(|flip| flip > 0.05), "{apart:?}");
-        let odd = pixels(vec![[f32::NAN; 3]; 64 * 64], 64);
-        assert_eq!(Apart::of(5, &a, &odd).rmse, None);
+        let different = ErrorMeasures::of(4, &a, &b);
+        assert_eq!(different.rmse, Some(0.25));
+        assert!(different.flip.is_some_and(|flip| flip > 0.05), "{different:?}");
+        let invalid = pixels(vec![[f32::NAN; 3]; 64 * 64], 64);
+        assert_eq!(ErrorMeasures::of(5, &a, &invalid).rmse, None);
     }
 }

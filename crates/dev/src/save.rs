@@ -13,30 +13,30 @@ use super::edit::edited;
 use wgray_scene::{CameraDescription, Description, KeyPath, Segment};
 
 /// Assumed maximum time that a program takes to write a file.
-const SAVING: Duration = Duration::from_millis(100);
+const MAX_SAVE_DURATION: Duration = Duration::from_millis(100);
 /// Maximum time to wait until another program has saved the file.
-const PATIENCE: Duration = Duration::from_millis(500);
+const MAX_WAIT: Duration = Duration::from_millis(500);
 
 /// Replaces a file atomically: a reader sees either the old or the new content.
 pub fn replace(path: &Path, content: &[u8]) -> std::io::Result<()> {
-    written(path, content)?.persist(path)?;
+    write_temporary(path, content)?.persist(path)?;
     Ok(())
 }
 
-/// Like [`replace`], but fails if the content of the file is not `known`.
-pub fn replace_known(path: &Path, known: &[u8], content: &[u8]) -> std::io::Result<()> {
-    let file = written(path, content)?;
-    if fs::read(path)? != known {
+/// Like [`replace`], but fails if the file no longer contains `expected`.
+pub fn replace_unchanged(path: &Path, expected: &[u8], content: &[u8]) -> std::io::Result<()> {
+    let file = write_temporary(path, content)?;
+    if fs::read(path)? != expected {
         return Err(std::io::Error::other(
-            "another program changed it at the same time; nothing was written",
+            "another program changed the file at the same time; nothing was written",
         ));
     }
     file.persist(path)?;
     Ok(())
 }
 
-/// Waits until a file has not changed for a short time. If the file were replaced while another program is writing it,
-/// the rest of the other program's data would be lost.
+/// Waits until a file has not changed for a short time. If wgray replaced the file while another program is writing it,
+/// the rest of that program's data would be lost.
 ///
 /// # Errors
 ///
@@ -46,8 +46,8 @@ pub fn wait_settled(path: &Path) -> Result<(), String> {
     loop {
         let changed = fs::metadata(path).and_then(|data| data.modified()).ok();
         let age = changed.and_then(|changed| changed.elapsed().ok());
-        match age.and_then(|age| SAVING.checked_sub(age)) {
-            Some(rest) if start.elapsed() < PATIENCE => sleep(rest.max(Duration::from_millis(1))),
+        match age.and_then(|age| MAX_SAVE_DURATION.checked_sub(age)) {
+            Some(remaining) if start.elapsed() < MAX_WAIT => sleep(remaining.max(Duration::from_millis(1))),
             Some(_) => {
                 return Err(format!(
                     "{}: another program is writing this file; nothing was written",
@@ -60,7 +60,7 @@ pub fn wait_settled(path: &Path) -> Result<(), String> {
 }
 
 /// Writes a temporary file next to `path`, with the permissions of `path`.
-fn written(path: &Path, content: &[u8]) -> std::io::Result<tempfile::NamedTempFile> {
+fn write_temporary(path: &Path, content: &[u8]) -> std::io::Result<tempfile::NamedTempFile> {
     let folder = path
         .parent()
         .filter(|folder| !folder.as_os_str().is_empty())
@@ -85,10 +85,10 @@ fn written(path: &Path, content: &[u8]) -> std::io::Result<tempfile::NamedTempFi
 ///
 /// # Errors
 ///
-/// A message for the user, if the file is not a scene or the camera does not fit it.
+/// A message for the user, if the file is not a scene or its camera is of a different type.
 pub fn with_camera(text: &str, origin: &str, camera: &CameraDescription) -> Result<String, String> {
-    let mend = |error| format!("fix the file first: {error}");
-    let before = Description::parse_camera(text, origin).map_err(mend)?;
+    let fix_first = |error| format!("fix the file first: {error}");
+    let before = Description::parse_camera(text, origin).map_err(fix_first)?;
     if std::mem::discriminant(&before) != std::mem::discriminant(camera) {
         return Err(format!("{origin}: the type of the camera in the file has changed"));
     }
@@ -100,7 +100,7 @@ pub fn with_camera(text: &str, origin: &str, camera: &CameraDescription) -> Resu
                 Entry::Number(x) => Value::from(x),
                 Entry::Point(point) => Value::from(point.to_array().to_vec()),
             };
-            text = edited(&text, &path, Some(&value)).map_err(|why| format!("{origin}: {why}"))?;
+            text = edited(&text, &path, Some(&value)).map_err(|reason| format!("{origin}: {reason}"))?;
         }
     }
     Ok(text)
@@ -123,13 +123,13 @@ mod tests {
     }
 
     #[test]
-    fn comments_and_layout_stay() {
+    fn comments_and_layout_are_preserved() {
         let new = camera("position = [0, -2, 1.25]\nlook_at = [0.5, 0, 1]\nfov = 45");
         let saved = with_camera(SCENE, "s.toml", &new).unwrap();
-        let wanted = SCENE
+        let expected = SCENE
             .replace(" 0,  -3.0, # back\n 1.3 ", " 0,  -2, # back\n 1.25 ")
             .replace("look_at = [0, 0, 1]", "look_at = [0.5, 0, 1]");
-        assert_eq!(saved, wanted);
+        assert_eq!(saved, expected);
         assert_eq!(Description::parse(&saved, "s.toml").unwrap().camera, new);
     }
 
@@ -150,7 +150,7 @@ mod tests {
     }
 
     #[test]
-    fn a_broken_file_and_another_camera_are_refused() {
+    fn a_broken_file_and_another_type_of_camera_are_rejected() {
         let new = camera("type = 'orthographic'\nposition = [0, 1, 2]\nlook_at = [0, 0, 0]\nheight = 2");
         assert!(
             with_camera(SCENE, "s.toml", &new)
@@ -187,29 +187,29 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("s.toml");
         fs::write(&file, "theirs").unwrap();
-        let error = replace_known(&file, b"before", b"ours").unwrap_err();
+        let error = replace_unchanged(&file, b"before", b"ours").unwrap_err();
         assert!(error.to_string().contains("another program"), "{error}");
         assert_eq!(fs::read_to_string(&file).unwrap(), "theirs");
-        replace_known(&file, b"theirs", b"ours").unwrap();
+        replace_unchanged(&file, b"theirs", b"ours").unwrap();
         assert_eq!(fs::read_to_string(&file).unwrap(), "ours");
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
         // If the file keeps changing, the wait ends with an error.
-        let changed = |ago: Duration| {
+        let set_age = |age: Duration| {
             let file = fs::File::options().write(true).open(&file).unwrap();
-            file.set_modified(SystemTime::now() - ago).unwrap();
+            file.set_modified(SystemTime::now() - age).unwrap();
         };
-        for (ago, waits) in [(2 * SAVING, false), (SAVING / 4, true)] {
-            changed(ago);
+        for (age, waits) in [(2 * MAX_SAVE_DURATION, false), (MAX_SAVE_DURATION / 4, true)] {
+            set_age(age);
             let start = Instant::now();
             wait_settled(&file).unwrap();
-            assert_eq!(start.elapsed() > SAVING / 2, waits, "{ago:?}");
+            assert_eq!(start.elapsed() > MAX_SAVE_DURATION / 2, waits, "{age:?}");
         }
-        changed(Duration::ZERO);
+        set_age(Duration::ZERO);
         let is_done = AtomicBool::new(false);
         let error = std::thread::scope(|scope| {
             scope.spawn(|| {
                 while !is_done.load(Relaxed) {
-                    changed(Duration::ZERO);
+                    set_age(Duration::ZERO);
                     sleep(Duration::from_millis(1));
                 }
             });
@@ -222,7 +222,7 @@ mod tests {
     }
 
     #[test]
-    fn line_ends_and_a_byte_order_mark_stay() {
+    fn line_endings_and_a_byte_order_mark_are_preserved() {
         let new = camera("position = [0, -2, 1.25]\nlook_at = [0.5, 0, 1]\nup = [0, 1, 0]\nfov = 45");
         let unix = with_camera(SCENE, "s.toml", &new).unwrap();
         let dos = |text: &str| format!("\u{feff}{}", text.replace('\n', "\r\n"));

@@ -32,7 +32,7 @@ use super::shared::Shared;
 use super::viewer;
 
 /// Maximum number of concurrent viewers.
-const VIEWERS: usize = 16;
+const MAX_VIEWERS: usize = 16;
 /// Maximum number of requests that are received or answered concurrently.
 const MAX_REQUESTS: usize = 64;
 const REQUEST_TIMEOUT: Duration = Duration::from_secs(10);
@@ -54,12 +54,12 @@ impl Listener {
     /// # Errors
     ///
     /// Addresses that do not exist, are not on this machine or are in use.
-    pub fn open(place: &str) -> io::Result<Listener> {
-        let named = |error: io::Error| io::Error::new(error.kind(), format!("{place}: {error}"));
-        let addresses: Vec<SocketAddr> = place.to_socket_addrs().map_err(named)?.collect();
-        let listener = TcpListener::bind(addresses.as_slice()).map_err(named)?;
+    pub fn open(address: &str) -> io::Result<Listener> {
+        let with_address = |error: io::Error| io::Error::new(error.kind(), format!("{address}: {error}"));
+        let addresses: Vec<SocketAddr> = address.to_socket_addrs().map_err(with_address)?.collect();
+        let listener = TcpListener::bind(addresses.as_slice()).map_err(with_address)?;
         listener.set_nonblocking(true)?;
-        let name = place.rsplit_once(':').map_or(place, |(name, _)| name).to_string();
+        let name = address.rsplit_once(':').map_or(address, |(name, _)| name).to_string();
         let guard = Guard {
             name: Some(name),
             loopback: listener.local_addr()?.ip().is_loopback(),
@@ -67,7 +67,7 @@ impl Listener {
         Ok(Listener { listener, guard })
     }
 
-    /// Returns the address.
+    /// Returns the address, with the selected port.
     pub fn address(&self) -> io::Result<SocketAddr> {
         self.listener.local_addr()
     }
@@ -83,10 +83,10 @@ impl Listener {
             state: session.state.clone(),
             frames: session.frames.clone(),
             times: session.times.clone(),
-            seen: session.seen.clone(),
-            send: Arc::new(session.commands()),
-            give: Arc::new(session.references()),
-            seats: Arc::new(Semaphore::new(VIEWERS)),
+            scene_views: session.seen.clone(),
+            send_command: Arc::new(session.commands()),
+            submit_reference: Arc::new(session.references()),
+            viewer_slots: Arc::new(Semaphore::new(MAX_VIEWERS)),
             viewers: session.viewers(),
         };
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
@@ -98,35 +98,35 @@ impl Listener {
 }
 
 /// A connection on which no complete request header has arrived yet.
-struct Unread {
+struct Waiting {
     task: AbortHandle,
-    has_head: Arc<AtomicBool>,
+    has_header: Arc<AtomicBool>,
 }
 
-/// Answers requests, each on a separate connection and in limited time. If there are too many connections, a new one
-/// replaces the connection that has waited longest for a request.
+/// Answers each request on a separate connection and in limited time. If there are too many connections, a new
+/// connection replaces the connection that has waited longest for a request.
 async fn answer_all(listener: &tokio::net::TcpListener, routes: Router) -> io::Result<()> {
     let requests = Arc::new(Semaphore::new(MAX_REQUESTS));
-    let mut unread: VecDeque<Unread> = VecDeque::new();
+    let mut waiting: VecDeque<Waiting> = VecDeque::new();
     loop {
         let Ok((stream, _)) = listener.accept().await else {
-            tokio::time::sleep(Duration::from_millis(50)).await; // too many open files, or the client has gone
+            tokio::time::sleep(Duration::from_millis(50)).await; // too many open files, or the client disconnected
             continue;
         };
-        unread.retain(|known| !known.task.is_finished() && !known.has_head.load(Ordering::Relaxed));
+        waiting.retain(|entry| !entry.task.is_finished() && !entry.has_header.load(Ordering::Relaxed));
         if requests.available_permits() == 0
-            && let Some(oldest) = unread.pop_front()
+            && let Some(oldest) = waiting.pop_front()
         {
             oldest.task.abort();
         }
-        let place = requests.clone().acquire_owned().await.map_err(io::Error::other)?;
-        let (routes, has_head) = (
+        let permit = requests.clone().acquire_owned().await.map_err(io::Error::other)?;
+        let (routes, has_header) = (
             TowerToHyperService::new(routes.clone()),
             Arc::new(AtomicBool::new(false)),
         );
-        let is_read = Arc::clone(&has_head);
+        let header_arrived = Arc::clone(&has_header);
         let service = service_fn(move |request: hyper::Request<Incoming>| {
-            is_read.store(true, Ordering::Relaxed);
+            header_arrived.store(true, Ordering::Relaxed);
             routes.call(request)
         });
         let task = tokio::spawn(async move {
@@ -134,10 +134,10 @@ async fn answer_all(listener: &tokio::net::TcpListener, routes: Router) -> io::R
             let connection = http.keep_alive(false).serve_connection(TokioIo::new(stream), service);
             // On failure, the connection ends.
             let _answered = tokio::time::timeout(REQUEST_TIMEOUT, connection.with_upgrades()).await;
-            drop(place);
+            drop(permit);
         });
         let task = task.abort_handle();
-        unread.push_back(Unread { task, has_head });
+        waiting.push_back(Waiting { task, has_header });
     }
 }
 
@@ -185,16 +185,16 @@ fn routes(shared: Shared) -> Router {
             post(reference).layer(DefaultBodyLimit::max(MAX_FILE_BYTES)),
         )
         .route("/socket", get(socket))
-        .layer(middleware::from_fn_with_state(shared.clone(), guarded))
+        .layer(middleware::from_fn_with_state(shared.clone(), check_origin))
         .with_state(shared)
 }
 
-async fn picture(shared: Shared, kind: &'static str, make: fn(&Frame) -> io::Result<Vec<u8>>) -> Response {
+async fn picture(shared: Shared, kind: &'static str, encode: fn(&Frame) -> io::Result<Vec<u8>>) -> Response {
     let frame = shared.frames.borrow().clone();
     let Some(frame) = frame.filter(|frame| frame.header.sent == frame.header.finest) else {
         return (StatusCode::CONFLICT, "the image is not complete yet").into_response();
     };
-    match tokio::task::spawn_blocking(move || make(&frame)).await {
+    match tokio::task::spawn_blocking(move || encode(&frame)).await {
         Ok(Ok(file)) => ([(header::CONTENT_TYPE, kind)], file).into_response(),
         Ok(Err(error)) => (StatusCode::INTERNAL_SERVER_ERROR, error.to_string()).into_response(),
         Err(error) => (StatusCode::INTERNAL_SERVER_ERROR, error.to_string()).into_response(),
@@ -212,11 +212,11 @@ async fn picture_exr(State(shared): State<Shared>) -> Response {
 /// Receives a reference file from the viewer's machine.
 async fn reference(State(shared): State<Shared>, UrlPath(name): UrlPath<String>, body: Bytes) -> Response {
     let frame = shared.frames.borrow().clone();
-    let view = frame.map(|frame| frame.look.view).unwrap_or_default();
+    let view = frame.map(|frame| frame.display.view).unwrap_or_default();
     let name: String = name.chars().filter(|c| !c.is_control()).take(MAX_NAME_LEN).collect();
-    let work = move || Reference::decode(name, body.to_vec(), view);
-    match tokio::task::spawn_blocking(work).await {
-        Ok(Ok(reference)) => match (shared.give)(reference) {
+    let decode = move || Reference::decode(name, body.to_vec(), view);
+    match tokio::task::spawn_blocking(decode).await {
+        Ok(Ok(reference)) => match (shared.submit_reference)(reference) {
             true => StatusCode::NO_CONTENT.into_response(),
             false => (StatusCode::SERVICE_UNAVAILABLE, "busy: the file was dropped").into_response(),
         },
@@ -226,12 +226,12 @@ async fn reference(State(shared): State<Shared>, UrlPath(name): UrlPath<String>,
 }
 
 /// Rejects requests from other origins and prevents the browser from loading external resources.
-async fn guarded(State(shared): State<Shared>, request: Request, next: Next) -> Response {
+async fn check_origin(State(shared): State<Shared>, request: Request, next: Next) -> Response {
     // Requests that change anything must come from the page itself.
-    let acts = request.uri().path() == "/socket" || request.method() != Method::GET;
-    let mut response = match shared.guard.check(request.uri(), request.headers(), acts) {
+    let must_have_origin = request.uri().path() == "/socket" || request.method() != Method::GET;
+    let mut response = match shared.guard.check(request.uri(), request.headers(), must_have_origin) {
         Ok(()) => next.run(request).await,
-        Err(why) => (StatusCode::FORBIDDEN, why).into_response(),
+        Err(reason) => (StatusCode::FORBIDDEN, reason).into_response(),
     };
     let policy = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; connect-src 'self'; \
                   base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
@@ -249,16 +249,16 @@ async fn guarded(State(shared): State<Shared>, request: Request, next: Next) -> 
 }
 
 async fn socket(State(shared): State<Shared>, upgrade: WebSocketUpgrade) -> Response {
-    let Ok(seat) = shared.seats.clone().try_acquire_owned() else {
+    let Ok(slot) = shared.viewer_slots.clone().try_acquire_owned() else {
         return (StatusCode::SERVICE_UNAVAILABLE, "too many viewers").into_response();
     };
     let upgrade = upgrade
         .max_message_size(MAX_MESSAGE_BYTES)
         .max_frame_size(MAX_MESSAGE_BYTES);
     upgrade.on_upgrade(async move |socket| {
-        let looking = shared.viewers.enter();
-        let _gone = viewer::serve(socket, &shared).await; // the reason why a viewer leaves does not matter
-        drop(looking);
-        drop(seat);
+        let viewer = shared.viewers.enter();
+        let _end = viewer::serve(socket, &shared).await; // the reason for the end does not matter
+        drop(viewer);
+        drop(slot);
     })
 }

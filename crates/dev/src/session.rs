@@ -23,13 +23,13 @@ use wgray_render::gpu::{AdapterChoice, choose};
 
 /// The settings of a session.
 pub struct Settings {
-    /// The files.
+    /// The scene file, the overrides of its values, and the shaders.
     pub sources: Sources,
     /// The device to render on.
     pub device: AdapterChoice,
     /// A PNG file that is replaced after each reload.
     pub out: Option<PathBuf>,
-    /// True to pause rendering while there are no viewers ([`Session::viewers`]) and no `out`.
+    /// True to pause rendering while no viewer exists ([`Session::viewers`]), unless `out` is set.
     pub only_for_viewers: bool,
     /// The template of links to an editor; `None` for no links.
     pub editor: Option<String>,
@@ -38,29 +38,29 @@ pub struct Settings {
 }
 
 /// Maximum number of events in the queue while a dispatch runs.
-const WAITING: usize = 256;
+const MAX_EVENTS: usize = 256;
 
 /// A running session; ends when dropped.
 pub struct Session {
     events: SyncSender<Event>,
-    asked: Arc<Mutex<u64>>,
+    command_count: Arc<Mutex<u64>>,
     /// The newest state.
     pub state: watch::Receiver<Arc<State>>,
     /// The newest frame, if any. A slow receiver skips frames.
     pub frames: watch::Receiver<Option<Arc<Frame>>>,
-    /// The timings.
+    /// The timings of kernels and stages.
     pub times: Times,
-    /// The scene and the camera, once a scene is loaded.
+    /// The scene and the camera for queries, once a scene is loaded.
     pub seen: watch::Receiver<Option<Arc<SceneView>>>,
     viewers: Viewers,
     watch: Option<Watch>,
     thread: Option<JoinHandle<()>>,
 }
 
-/// The number of viewers.
+/// The counter of viewers.
 #[derive(Clone)]
 pub struct Viewers {
-    looking: Arc<AtomicUsize>,
+    count: Arc<AtomicUsize>,
     events: SyncSender<Event>,
 }
 
@@ -70,7 +70,7 @@ pub struct Viewer(Viewers);
 impl Viewers {
     /// Adds a viewer.
     pub fn enter(&self) -> Viewer {
-        self.looking.fetch_add(1, Ordering::SeqCst);
+        self.count.fetch_add(1, Ordering::SeqCst);
         let _ = self.events.try_send(Event::Viewers); // a full inbox wakes the painter as well
         Viewer(self.clone())
     }
@@ -78,7 +78,7 @@ impl Viewers {
 
 impl Drop for Viewer {
     fn drop(&mut self) {
-        self.0.looking.fetch_sub(1, Ordering::SeqCst);
+        self.0.count.fetch_sub(1, Ordering::SeqCst);
     }
 }
 
@@ -117,10 +117,10 @@ impl Session {
         std::fs::metadata(&sources.scene).map_err(|error| StartError::NoScene(sources.scene.clone(), error))?;
         let device = choose(&choice)?;
         let snapshot = sources.read();
-        let (events, inbox) = sync_channel(WAITING);
+        let (events, inbox) = sync_channel(MAX_EVENTS);
         let started = Instant::now();
-        let first = Event::Files(Box::new(snapshot.clone()), started, 0);
-        let _ = events.send(first); // the inbox still exists
+        let first_event = Event::Files(Box::new(snapshot.clone()), started, 0);
+        let _ = events.send(first_event); // the inbox exists
         let writes = Arc::default();
         let watch = Watch::start(sources.clone(), snapshot, Arc::clone(&writes), {
             let events = events.clone();
@@ -136,28 +136,28 @@ impl Session {
         let (state_sender, state) = watch::channel(Arc::default());
         let (frame_sender, frames) = watch::channel(None);
         let (scene_sender, seen) = watch::channel(None);
-        let looking = Arc::new(AtomicUsize::new(0));
-        let wanted_by = (only_for_viewers && out.is_none()).then(|| looking.clone());
+        let count = Arc::new(AtomicUsize::new(0));
+        let viewer_count = (only_for_viewers && out.is_none()).then(|| count.clone());
         let channels = SessionChannels {
             report,
             state: state_sender,
             frames: frame_sender,
             times: times.clone(),
             editor,
-            seen: scene_sender,
+            scene_views: scene_sender,
             events: events.clone(),
         };
-        let painter = Painter::new(sources, device, builder, (out, wanted_by), writes, channels);
+        let painter = Painter::new(sources, device, builder, (out, viewer_count), writes, channels);
         let thread = std::thread::Builder::new()
             .name("render".to_string())
             .spawn(move || run(painter, inbox))?;
         Ok(Session {
             viewers: Viewers {
-                looking,
+                count,
                 events: events.clone(),
             },
             events,
-            asked: Arc::default(),
+            command_count: Arc::default(),
             state,
             frames,
             times,
@@ -169,13 +169,13 @@ impl Session {
 
     /// Sends a command.
     pub fn send(&self, command: Command) {
-        let mut asked = self.asked.lock().unwrap_or_else(PoisonError::into_inner);
-        *asked += 1;
+        let mut command_count = self.command_count.lock().unwrap_or_else(PoisonError::into_inner);
+        *command_count += 1;
         let _ = self.events.send(Event::Command(command)); // the thread lives as long as the session
     }
 
-    /// Returns a function that submits reference images from any thread. It does not block, but returns false if the
-    /// session is busy.
+    /// Returns a function that submits reference images from any thread. The function does not block; it returns false
+    /// if the session is busy.
     pub fn references(&self) -> impl Fn(Reference) -> bool + Send + Sync + 'static {
         let events = self.events.clone();
         move |reference| events.try_send(Event::Reference(reference)).is_ok()
@@ -186,17 +186,17 @@ impl Session {
         self.viewers.clone()
     }
 
-    /// Returns a function that sends commands from any thread. It does not block, and returns the value that
+    /// Returns a function that sends commands from any thread. The function does not block; it returns the value that
     /// [`State::executed`] has after the command, or `None` if the session is busy.
     pub fn commands(&self) -> impl Fn(Command) -> Option<u64> + Send + Sync + 'static {
-        let (events, asked) = (self.events.clone(), self.asked.clone());
+        let (events, command_count) = (self.events.clone(), self.command_count.clone());
         move |command| {
-            let mut asked = asked.lock().unwrap_or_else(PoisonError::into_inner);
+            let mut command_count = command_count.lock().unwrap_or_else(PoisonError::into_inner);
             if let Err(TrySendError::Full(_)) = events.try_send(Event::Command(command)) {
                 return None;
             }
-            *asked += 1;
-            Some(*asked)
+            *command_count += 1;
+            Some(*command_count)
         }
     }
 }
@@ -214,18 +214,19 @@ impl Drop for Session {
 /// Handles all pending events before each dispatch, so that an event waits for at most one dispatch.
 fn run(mut painter: Painter, inbox: Receiver<Event>) {
     loop {
-        let event = if painter.has_work() {
+        let event = if painter.has_next_step() {
             inbox.try_recv().ok()
         } else {
             inbox.recv().ok().or(Some(Event::Stop))
         };
         match event {
             Some(Event::Stop) => break,
-            Some(event) => painter.take(event),
-            None => painter.work(),
+            Some(event) => painter.handle(event),
+            None => painter.render_step(),
         }
     }
-    drop(inbox); // first, because other threads may wait for room in it, and the painter for them
+    // Dropped before the painter, which waits for other threads: they may wait for a free slot in the inbox.
+    drop(inbox);
 }
 
 #[cfg(test)]
@@ -248,7 +249,7 @@ mod tests {
         shapes = [{ type = 'sphere', material = 'm', center = [0, 0, 0], radius = 1 }]
     ";
 
-    fn wait<T>(what: &str, mut ready: impl FnMut() -> Option<T>) -> T {
+    fn wait<T>(name: &str, mut ready: impl FnMut() -> Option<T>) -> T {
         let start = Instant::now();
         while start.elapsed() < Duration::from_secs(40) {
             if let Some(value) = ready() {
@@ -256,7 +257,7 @@ mod tests {
             }
             std::thread::sleep(Duration::from_millis(2));
         }
-        panic!("{what} does not come");
+        panic!("timeout while waiting for {name}");
     }
 
     fn finished(session: &Session, after: u64) -> (u64, Pixels) {
@@ -296,23 +297,23 @@ mod tests {
             report: Box::new(move |report| drop(sender.send(report))),
         })
         .unwrap();
-        let (first, wanted) = finished(&session, 0);
+        let (first, expected) = finished(&session, 0);
 
-        // The device is lost while idle: the loss is detected at the next move, and the move is still shown.
+        // The device is lost while idle: the session detects the loss at the next move, and shows the moved image.
         session.events.send(Event::Lose).unwrap();
         session.send(Command::Move(Move::Orbit(0.1, 0.0)));
         let (second, _) = finished(&session, first);
         session.send(Command::ResetCamera);
-        let (third, again) = finished(&session, second);
-        assert_eq!(again, wanted);
+        let (third, after_loss) = finished(&session, second);
+        assert_eq!(after_loss, expected);
         assert!(session.state.borrow().problems.is_empty());
-        let lost = reports.try_iter().find_map(|report| match report {
+        let problem = reports.try_iter().find_map(|report| match report {
             Report::Problem(problem) => Some(problem.kind),
             _ => None,
         });
-        assert_eq!(lost, Some("device"), "the device was not lost");
+        assert_eq!(problem, Some("device"), "the device was not lost");
 
-        // The device is lost while a kernel with invalid shaders is compiled: the last good shaders are used.
+        // The device is lost while a kernel with invalid shaders is compiled: the session uses the last good shaders.
         let good = Shaders::built_in().text("kernels/render.wgsl").to_string();
         session.events.send(Event::Lose).unwrap();
         fs::write(path("shaders/kernels/render.wgsl"), good.replace("= sum;", "= sun;")).unwrap();
@@ -327,10 +328,10 @@ mod tests {
         });
         session.send(Command::Move(Move::Orbit(0.1, 0.0)));
         session.send(Command::ResetCamera);
-        let (_, again) = wait("the image", || {
-            Some(finished(&session, third)).filter(|(_, pixels)| *pixels == wanted)
+        let (_, after_error) = wait("the image", || {
+            Some(finished(&session, third)).filter(|(_, pixels)| *pixels == expected)
         });
-        assert_eq!(again, wanted);
+        assert_eq!(after_error, expected);
         fs::write(path("shaders/kernels/render.wgsl"), good).unwrap();
         wait("no error", || session.state.borrow().problems.is_empty().then_some(()));
     }

@@ -18,9 +18,9 @@ pub struct Shared {
     pub state: watch::Receiver<Arc<messages::State>>,
     pub frames: watch::Receiver<Option<Arc<Frame>>>,
     pub times: Times,
-    pub seen: watch::Receiver<Option<Arc<SceneView>>>,
-    pub send: Arc<dyn Fn(Command) -> Option<u64> + Send + Sync>,
-    pub give: Arc<dyn Fn(Reference) -> bool + Send + Sync>,
-    pub seats: Arc<Semaphore>,
+    pub scene_views: watch::Receiver<Option<Arc<SceneView>>>,
+    pub send_command: Arc<dyn Fn(Command) -> Option<u64> + Send + Sync>,
+    pub submit_reference: Arc<dyn Fn(Reference) -> bool + Send + Sync>,
+    pub viewer_slots: Arc<Semaphore>,
     pub viewers: Viewers,
 }

@@ -7,10 +7,10 @@ use serde::Serialize;
 
 use wgray_render::gpu::sliders::{Slider, Value};
 
-/// A slider for the page.
+/// The state of a slider, for the page.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SliderState {
-    /// The override.
+    /// The override that the slider sets.
     #[serde(flatten)]
     pub slider: Slider,
     /// The absolute path of the file, for an editor; `None` for built-in shaders.
@@ -19,7 +19,7 @@ pub struct SliderState {
     pub value: Value,
 }
 
-/// The values of a session, by file and name.
+/// The slider values of a session, by file and name.
 #[derive(Default)]
 pub struct Sliders {
     /// Changed values, each with the value in the file at the time of the change: a later edit of the file takes
@@ -41,9 +41,9 @@ impl Sliders {
     }
 
     /// Resets all sliders, or one slider, given by file and name.
-    pub fn reset(&mut self, one: Option<(String, String)>) {
-        match one {
-            Some(one) => drop(self.moved.remove(&one)),
+    pub fn reset(&mut self, slider: Option<(String, String)>) {
+        match slider {
+            Some(key) => drop(self.moved.remove(&key)),
             None => self.moved.clear(),
         }
     }
@@ -104,13 +104,13 @@ mod tests {
         assert_eq!(
             value(&sliders, &slider),
             Value::Number(0.125),
-            "the range of the file applies"
+            "the range in the file does not apply"
         );
         slider.default = Value::Number(0.0625);
         assert_eq!(
             value(&sliders, &slider),
             slider.default,
-            "another value of the file applies"
+            "the edited value in the file does not apply"
         );
         slide(&mut sliders, &slider, Value::Number(0.0)).unwrap();
         sliders.reset(None);

@@ -17,7 +17,7 @@ use wgray_scene::{
     is_gltf, is_mesh, is_model, read_bytes, read_text,
 };
 
-/// The locations of the files.
+/// The locations of the files of a session, and the overrides.
 #[derive(Clone, Debug)]
 pub struct Sources {
     /// The scene file.
@@ -39,13 +39,13 @@ pub struct Loaded {
     pub scene: Scene,
     /// The packed scene, as the backends read it.
     pub packed: Packed,
-    /// The locations of the parts of the text, computed on first use.
+    /// The locations of the pieces of the text, computed on first use.
     places: OnceLock<Places>,
 }
 
 impl Loaded {
     pub fn new(text: String, scene: Scene, description: Description) -> Loaded {
-        let packed = pack(&scene).without_layers(); // views of layers have their own kernels
+        let packed = pack(&scene).without_layers(); // layer views have their own kernels
         Loaded {
             text,
             camera: description.camera.clone(),
@@ -73,18 +73,18 @@ pub type Constants = (Specialization, Integrator, bool);
 
 pub fn constants(packed: &Packed, view: View) -> Constants {
     let integrator = packed.integrator;
-    let of_samples = view
+    let is_sample_layer = view
         .aov()
         .is_some_and(|aov| aov.source(integrator) == AovSource::Samples);
     let specialization = Specialization {
-        layers: (of_samples && integrator.has_layers()).into(),
+        layers: (is_sample_layer && integrator.has_layers()).into(),
         ..packed.specialization
     };
     (specialization, integrator, packed.sampling.adaptive)
 }
 
-/// Returns the view that a kernel shows if `view` is selected: color, if `view` needs a different kernel.
-pub fn shown((specialization, integrator, adaptive): &Constants, view: View) -> View {
+/// Returns the view that a kernel shows if `view` is selected: the color view if `view` needs a different kernel.
+pub fn supported_view((specialization, integrator, adaptive): &Constants, view: View) -> View {
     match view.aov().map(|aov| aov.source(*integrator)) {
         Some(AovSource::Samples) if specialization.layers == 0 => View::Color,
         Some(AovSource::Adaptive) if !adaptive => View::Color,
@@ -92,9 +92,9 @@ pub fn shown((specialization, integrator, adaptive): &Constants, view: View) -> 
     }
 }
 
-/// Returns whether two kernels differ only in the views that they support.
-pub fn are_of_one_scene(a: &Constants, b: &Constants) -> bool {
-    let of_scene = |(specialization, integrator, ..): &Constants| {
+/// Returns whether two kernels of a scene differ only in the layers that they support.
+pub fn differ_only_in_layers(a: &Constants, b: &Constants) -> bool {
+    let without_layers = |(specialization, integrator, ..): &Constants| {
         let layers = 0;
         (
             Specialization {
@@ -104,7 +104,7 @@ pub fn are_of_one_scene(a: &Constants, b: &Constants) -> bool {
             *integrator,
         )
     };
-    of_scene(a) == of_scene(b)
+    without_layers(a) == without_layers(b)
 }
 
 /// The state of all files at one point in time.
@@ -113,8 +113,8 @@ pub struct Snapshot {
     pub scene: Result<Arc<Loaded>, Vec<Diagnostic>>,
     pub shaders: Result<Arc<Shaders>, Box<Diagnostic>>,
     /// Time spent on reading the files, and on packing the scene.
-    pub took: [Duration; 2],
-    /// All files of the scene with their states, which determine whether the scene is read again.
+    pub durations: [Duration; 2],
+    /// All files of the scene, and their states: the scene is read again if a state changes.
     pub files: Vec<(PathBuf, FileStamp)>,
 }
 
@@ -139,12 +139,12 @@ impl FileStamp {
 }
 
 impl Sources {
-    /// Returns the states of models, meshes and textures: in the snapshot, and now.
+    /// Returns the states of models, meshes and textures in the snapshot, and their current states.
     pub fn assets(&self, snapshot: &Snapshot) -> [Vec<FileStamp>; 2] {
         let texts = usize::from(!is_model(&self.scene));
         let files = || snapshot.files.iter().skip(texts);
-        let then = files().map(|(_, stamp)| stamp.clone()).collect();
-        [then, files().map(|(path, _)| self.stamp(path)).collect()]
+        let old = files().map(|(_, stamp)| stamp.clone()).collect();
+        [old, files().map(|(path, _)| self.stamp(path)).collect()]
     }
 
     /// Returns the reason if the scene file cannot be edited on the page.
@@ -169,7 +169,7 @@ impl Sources {
     pub fn reread(&self, last: &Snapshot, begin: impl FnOnce()) -> Option<Snapshot> {
         let start = Instant::now();
         let shaders = match (self.read_shaders(), &last.shaders) {
-            (Ok(new), Ok(old)) if new == *old => Ok(old.clone()), // the same pointer, which later stages compare
+            (Ok(new), Ok(old)) if new == *old => Ok(old.clone()), // keeps the pointer, which is compared later
             (shaders, _) => shaders,
         };
         let same_shaders = match (&shaders, &last.shaders) {
@@ -182,7 +182,7 @@ impl Sources {
             (true, true) => None,
             (true, false) => Some(Snapshot {
                 shaders,
-                took: [start.elapsed(), Duration::ZERO],
+                durations: [start.elapsed(), Duration::ZERO],
                 ..last.clone()
             }),
             (false, _) => {
@@ -214,32 +214,32 @@ impl Sources {
 
     fn read_scene(&self, shaders: Result<Arc<Shaders>, Box<Diagnostic>>) -> Snapshot {
         let start = Instant::now();
-        // The states are determined before reading, so that a file that changes in the meantime is read again.
+        // The states are determined before the files are read, so that a file that changes meanwhile is read again.
         let mut files = vec![(self.scene.clone(), self.stamp(&self.scene))];
-        let mut named = BTreeSet::new();
+        let mut used_files = BTreeSet::new();
         let (mut text, origin) = (String::new(), self.scene.display().to_string());
         let scene = match is_model(&self.scene) {
-            true => Scene::load_and_list(&self.scene, &self.overrides, &mut named),
-            false => read_text(&self.scene).and_then(|read| {
-                text = read;
-                let draft = PendingScene::read(&text, &origin, folder_of(&self.scene), &self.overrides)?;
-                let assets = self.named_files(&draft.description);
+            true => Scene::load_and_list(&self.scene, &self.overrides, &mut used_files),
+            false => read_text(&self.scene).and_then(|scene_text| {
+                text = scene_text;
+                let pending = PendingScene::read(&text, &origin, folder_of(&self.scene), &self.overrides)?;
+                let assets = self.asset_files(&pending.description);
                 files.extend(assets.map(|path| (path.clone(), self.stamp(&path))));
-                draft.check(&mut named)
+                pending.check(&mut used_files)
             }),
         };
-        for path in named {
-            if files.iter().all(|(known, _)| *known != path) {
+        for path in used_files {
+            if files.iter().all(|(listed, _)| *listed != path) {
                 let stamp = self.stamp(&path);
                 files.push((path, stamp));
             }
         }
-        let mut took = [start.elapsed(), Duration::ZERO];
+        let mut durations = [start.elapsed(), Duration::ZERO];
         let scene = match scene {
             Ok((scene, description)) => {
                 let start = Instant::now();
                 let loaded = Loaded::new(text, scene, description);
-                took[1] = start.elapsed();
+                durations[1] = start.elapsed();
                 Ok(Arc::new(loaded))
             }
             Err(error) => Err(Diagnostic::scene(&error, &text)),
@@ -247,13 +247,13 @@ impl Sources {
         Snapshot {
             scene,
             shaders,
-            took,
+            durations,
             files,
         }
     }
 
-    fn named_files(&self, described: &Description) -> impl Iterator<Item = PathBuf> {
-        described.files(self.scene.parent().unwrap_or(Path::new("")))
+    fn asset_files(&self, description: &Description) -> impl Iterator<Item = PathBuf> {
+        description.files(self.scene.parent().unwrap_or(Path::new("")))
     }
 
     fn stamp(&self, path: &Path) -> FileStamp {

@@ -47,7 +47,7 @@ enum Question {
     Pixel([u32; 2]),
     Object([u32; 2]),
     Inspect(Inspect),
-    /// Asks for the objects whose names contain a text.
+    /// Requests the objects whose names contain a text.
     Objects(String),
 }
 
@@ -68,8 +68,8 @@ struct Inspect {
 impl Request {
     /// Parses a message: the name of a command, or an object with that name as its only key.
     fn parse(message: &str) -> Result<Request, String> {
-        let plain = |error: serde_json::Error| escape_control(&cut(&error.to_string())).into_owned();
-        let value: Json = serde_json::from_str(message).map_err(|error| format!("not JSON: {}", plain(error)))?;
+        let sanitized = |error: serde_json::Error| escape_control(&cut(&error.to_string())).into_owned();
+        let value: Json = serde_json::from_str(message).map_err(|error| format!("not JSON: {}", sanitized(error)))?;
         let name = match &value {
             Json::String(name) => Some(name),
             Json::Object(object) if object.len() == 1 => object.keys().next(),
@@ -77,17 +77,17 @@ impl Request {
         };
         let name =
             name.ok_or("a message must be the name of a command, or an object with that name as its only key")?;
-        // Parsed from the text, because a JSON value hides duplicate keys.
+        // The text is parsed, because a JSON value hides duplicate keys.
         let parsed = match name.as_str() {
             "shown" => serde_json::from_str(message).map(|Acknowledgement { shown }| Request::Acknowledge(shown)),
             name if QUESTIONS.contains(&name) => serde_json::from_str(message).map(Request::Question),
             _ => serde_json::from_str(message).map(Request::Command),
         };
         parsed.map_err(|error| {
-            let shown = escape_control(&cut(name)).into_owned();
+            let name_for_display = escape_control(&cut(name)).into_owned();
             match error.to_string().starts_with(&format!("unknown variant `{name}`")) {
-                true => format!("unknown command \"{shown}\""),
-                false => format!("invalid arguments of \"{shown}\": {}", plain(error)),
+                true => format!("unknown command \"{name_for_display}\""),
+                false => format!("invalid arguments of \"{name_for_display}\": {}", sanitized(error)),
             }
         })
     }
@@ -105,7 +105,7 @@ enum Reply<'a> {
     },
     Object(Box<Object>),
     Objects(ObjectList),
-    /// The number of an accepted command, which [`messages::State::executed`] reaches.
+    /// The number of an accepted command: [`messages::State::executed`] reaches this number after the command.
     Asked(u64),
     #[serde(rename = "refused")]
     Refusal(String),
@@ -116,18 +116,18 @@ enum Reply<'a> {
 pub(super) async fn serve(socket: WebSocket, shared: &Shared) -> Option<()> {
     let (sink, stream) = socket.split();
     let (answer, answers) = mpsc::channel(MAX_ANSWERS);
-    let (acknowledge, shown) = watch::channel(0);
+    let (acknowledge, acknowledged) = watch::channel(0);
     tokio::select! {
-        end = send(sink, answers, shown, shared) => end,
+        end = send(sink, answers, acknowledged, shared) => end,
         end = receive(stream, &answer, &acknowledge, shared) => end,
     }
 }
 
-/// Receives and handles messages, and passes the answers on for sending.
+/// Receives and handles messages, and queues the answers for sending.
 async fn receive(
     mut stream: SplitStream<WebSocket>,
     answers: &mpsc::Sender<Reply<'static>>,
-    shown: &watch::Sender<u64>,
+    acknowledged: &watch::Sender<u64>,
     shared: &Shared,
 ) -> Option<()> {
     loop {
@@ -138,13 +138,13 @@ async fn receive(
         };
         let reply = match Request::parse(&text) {
             Ok(Request::Acknowledge(number)) => {
-                shown.send_replace(number);
+                acknowledged.send_replace(number);
                 continue;
             }
             Ok(Request::Question(question)) => answer(question, shared).await,
             Ok(Request::Command(command)) => {
                 let busy = || Reply::Refusal("busy: the command was dropped".to_string());
-                (shared.send)(command).map_or_else(busy, Reply::Asked)
+                (shared.send_command)(command).map_or_else(busy, Reply::Asked)
             }
             Err(error) => Reply::Refusal(format!("not understood: {error}")),
         };
@@ -156,38 +156,38 @@ async fn receive(
 async fn send(
     mut sink: SplitSink<WebSocket, Message>,
     mut answers: mpsc::Receiver<Reply<'static>>,
-    mut shown: watch::Receiver<u64>,
+    mut acknowledged: watch::Receiver<u64>,
     shared: &Shared,
 ) -> Option<()> {
     let (mut state, mut frames) = (shared.state.clone(), shared.frames.clone());
     state.mark_changed();
     frames.mark_changed();
     let mut ping = tokio::time::interval(PING_INTERVAL);
-    let mut clock = tokio::time::interval(TIMES_INTERVAL);
-    clock.set_missed_tick_behavior(MissedTickBehavior::Delay);
+    let mut times_tick = tokio::time::interval(TIMES_INTERVAL);
+    times_tick.set_missed_tick_behavior(MissedTickBehavior::Delay);
     let mut times = Vec::new();
     let mut in_flight = VecDeque::new();
     let mut last_state: Option<Instant> = None;
     loop {
         let has_room = in_flight.len() < MAX_FRAMES_IN_FLIGHT;
         let pause = last_state.map_or(Duration::ZERO, |last| STATE_INTERVAL.saturating_sub(last.elapsed()));
-        let pauses = !has_room && !pause.is_zero();
+        let must_pause = !has_room && !pause.is_zero();
         let message = tokio::select! {
             biased;
             reply = answers.recv() => text(&reply?)?,
-            changed = shown.changed() => {
+            changed = acknowledged.changed() => {
                 changed.ok()?;
-                let shown = *shown.borrow_and_update();
-                in_flight.retain(|number| *number > shown);
+                let last = *acknowledged.borrow_and_update();
+                in_flight.retain(|number| *number > last);
                 continue;
             }
-            changed = state.changed(), if !pauses => {
+            changed = state.changed(), if !must_pause => {
                 changed.ok()?;
                 last_state = Some(Instant::now());
                 let state = state.borrow_and_update().clone();
                 text(&Reply::State(&state))?
             }
-            () = sleep(pause), if pauses => continue,
+            () = sleep(pause), if must_pause => continue,
             _ = ping.tick() => Message::Ping(Vec::new().into()),
             changed = frames.changed(), if has_room => {
                 changed.ok()?;
@@ -195,15 +195,15 @@ async fn send(
                 in_flight.push_back(frame.header.number);
                 let start = Instant::now();
                 timeout(SEND_TIMEOUT, sink.send(Message::Binary(bytes(&frame)?.into()))).await.ok()?.ok()?;
-                shared.times.part("send", start.elapsed());
+                shared.times.record_stage("send", start.elapsed());
                 continue;
             }
-            _ = clock.tick() => {
-                let now = shared.times.timings();
-                if now == times {
+            _ = times_tick.tick() => {
+                let new = shared.times.timings();
+                if new == times {
                     continue;
                 }
-                times = now;
+                times = new;
                 text(&Reply::Times(&times))?
             }
         };
@@ -219,32 +219,33 @@ async fn answer(question: Question, shared: &Shared) -> Reply<'static> {
             Reply::Pixel { x, y, values }
         }
         Question::Object(pixel) => {
-            let nothing = move || Object::none("", Some(pixel));
-            let found = of_scene(shared, nothing, move |seen| seen.at(pixel)).await;
-            Reply::Object(Box::new(found))
+            let default = move || Object::without_scene("", Some(pixel));
+            let object = query_scene(shared, default, move |view| view.at(pixel)).await;
+            Reply::Object(Box::new(object))
         }
         Question::Inspect(Inspect { name, material }) => {
-            let nothing = || Object::none(&name, None);
-            let wanted = name.clone();
-            let found = of_scene(shared, nothing, move |seen| seen.object(&wanted, material.as_deref())).await;
-            Reply::Object(Box::new(found))
+            let default = || Object::without_scene(&name, None);
+            let object_name = name.clone();
+            let query = move |view: &SceneView| view.object(&object_name, material.as_deref());
+            let object = query_scene(shared, default, query).await;
+            Reply::Object(Box::new(object))
         }
         Question::Objects(part) => {
-            Reply::Objects(of_scene(shared, ObjectList::default, move |seen| seen.objects(&part)).await)
+            Reply::Objects(query_scene(shared, ObjectList::default, move |view| view.objects(&part)).await)
         }
     }
 }
 
-/// Runs a query on the scene, which may be large, on a separate thread. Returns `nothing` if no scene is loaded.
-async fn of_scene<T: Send + 'static>(
+/// Runs a query on a separate thread, because the scene may be large. Returns `default()` if no scene is loaded.
+async fn query_scene<T: Send + 'static>(
     shared: &Shared,
-    nothing: impl Fn() -> T,
-    find: impl FnOnce(&SceneView) -> T + Send + 'static,
+    default: impl Fn() -> T,
+    query: impl FnOnce(&SceneView) -> T + Send + 'static,
 ) -> T {
-    let seen = shared.seen.borrow().clone();
-    let Some(seen) = seen else { return nothing() };
-    let found = tokio::task::spawn_blocking(move || find(&seen)).await;
-    found.unwrap_or_else(|_| nothing())
+    let view = shared.scene_views.borrow().clone();
+    let Some(view) = view else { return default() };
+    let answer = tokio::task::spawn_blocking(move || query(&view)).await;
+    answer.unwrap_or_else(|_| default())
 }
 
 fn text(reply: &Reply) -> Option<Message> {

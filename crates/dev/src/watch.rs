@@ -1,5 +1,5 @@
-//! Watches the files of a session. Events only mean "look again": the content of the files decides. Folders are
-//! watched, because editors save by rename.
+//! Watches the files of a session. After an event, the files are read, because only their content shows what changed.
+//! Folders are watched instead of files, because editors save by rename.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -15,28 +15,28 @@ use super::messages::Event;
 use super::source::{FileStamp, Loaded, Snapshot, Sources};
 
 /// Files are read after this time without a change, because saving in an editor causes several events.
-const QUIET: Duration = Duration::from_millis(20);
+const SETTLE_TIME: Duration = Duration::from_millis(20);
 /// Files are read after this time at the latest.
-const PATIENCE: Duration = Duration::from_millis(150);
+const MAX_SETTLE_TIME: Duration = Duration::from_millis(150);
 
 /// An error in the scene is reported after this time without a change, because the scene file may be incomplete.
-const DOUBT: Duration = Duration::from_millis(100);
+const ERROR_DELAY: Duration = Duration::from_millis(100);
 /// Maximum delay of an error while files keep changing.
-const DOUBTS: Duration = Duration::from_secs(1);
+const MAX_ERROR_DELAY: Duration = Duration::from_secs(1);
 
-/// Incomplete or large models, meshes and textures are read after this time without a change: a program may be writing
-/// them.
-const GROWTH_QUIET: Duration = Duration::from_millis(300);
+/// Incomplete or large models, meshes and textures are read after this time without a change, because a program may
+/// still be writing the files.
+const WRITE_SETTLE_TIME: Duration = Duration::from_millis(300);
 /// Such files are read after this time at the latest.
-const GROWTH_PATIENCE: Duration = Duration::from_secs(10);
+const MAX_WRITE_SETTLE_TIME: Duration = Duration::from_secs(10);
 /// Minimum total size in bytes at which models, meshes and textures count as large.
-const LARGE: u64 = 1 << 20;
+const LARGE_BYTES: u64 = 1 << 20;
 
 /// Changes of the scene file that this session made and that need not be read again.
 #[derive(Default)]
 pub struct Writes {
     pub count: u64,
-    /// The scene after the last change, and its files, until the watcher has taken them over.
+    /// The scene after the last change, and its files, until the watcher uses them as its last state.
     pub known: Option<KnownScene>,
 }
 
@@ -56,9 +56,9 @@ impl Wake {
             Ok(EventKind::Access(AccessKind::Close(AccessMode::Write)) | EventKind::Modify(ModifyKind::Data(_))) => {
                 Some(Wake::Content)
             }
-            Ok(EventKind::Access(_)) => None, // files are read all the time, also by this program
+            Ok(EventKind::Access(_)) => None, // reading, for example by this program
             Ok(_) => Some(Wake::Names),
-            Err(_) => Some(Wake::Names), // it may hide any change
+            Err(_) => Some(Wake::Names), // any change may have been missed
         }
     }
 }
@@ -102,7 +102,7 @@ impl Watch {
 
 impl Drop for Watch {
     fn drop(&mut self) {
-        let _ = self.stop.send(Wake::Stop); // it may have ended already
+        let _ = self.stop.send(Wake::Stop); // the thread may have ended already
         if let Some(thread) = self.thread.take() {
             let _ = thread.join();
         }
@@ -117,11 +117,11 @@ fn run(
     writes: &Mutex<Writes>,
     mut report: impl FnMut(Event) -> bool,
 ) {
-    let mut reads = false; // true after a report of reading, until its end is reported
-    let mut again = None; // the event during a possibly incomplete save, and the time of its first change
-    let mut failed = last.scene.is_err(); // whether the last scene that was read has errors, reported or not
+    let mut reading_reported = false; // true between reports of the start and the end of reading
+    let mut deferred = None; // the event during a possibly incomplete save, and the time of the save's first change
+    let mut has_errors = last.scene.is_err(); // whether the last scene that was read has errors, reported or not
     loop {
-        let Some((wake, noticed)) = again.take().or_else(|| Some((wakes.recv().ok()?, Instant::now()))) else {
+        let Some((wake, noticed)) = deferred.take().or_else(|| Some((wakes.recv().ok()?, Instant::now()))) else {
             return;
         };
         let woken = Instant::now();
@@ -134,24 +134,24 @@ fn run(
                 Err(RecvTimeoutError::Timeout) => break,
                 Ok(Wake::Stop) | Err(RecvTimeoutError::Disconnected) => return,
             }
-            if woken.elapsed() > PATIENCE {
+            if woken.elapsed() > MAX_SETTLE_TIME {
                 break;
             }
-            next = wakes.recv_timeout(QUIET);
+            next = wakes.recv_timeout(SETTLE_TIME);
         }
         let mut begin = || {
-            reads = reads || report(Event::Reading(true));
+            reading_reported = reading_reported || report(Event::Reading(true));
         };
-        let [then, now] = sources.assets(&last);
-        let is_large = now.iter().map(FileStamp::size).sum::<u64>() >= LARGE;
-        let is_growing = then != now && (failed || is_large);
+        let [old, new] = sources.assets(&last);
+        let is_large = new.iter().map(FileStamp::size).sum::<u64>() >= LARGE_BYTES;
+        let is_growing = old != new && (has_errors || is_large);
         if is_growing {
             begin();
-            match wait_settled(wakes, now, || {
-                let [_, now] = sources.assets(&last);
-                now
+            match wait_settled(wakes, new, || {
+                let [_, current] = sources.assets(&last);
+                current
             }) {
-                Some(more) => names |= more,
+                Some(names_changed) => names |= names_changed,
                 None => return,
             }
         }
@@ -167,50 +167,47 @@ fn run(
             writes.count
         };
         if let Some(new) = sources.reread(&last, &mut begin) {
-            failed = new.scene.is_err();
+            has_errors = new.scene.is_err();
             let is_doubtful = new.scene.is_err() && new.scene.as_ref().err() != last.scene.as_ref().err();
             if is_doubtful
-                && noticed.elapsed() < DOUBTS
-                && let Ok(wake) = wakes.recv_timeout(if is_growing { GROWTH_QUIET } else { DOUBT })
+                && noticed.elapsed() < MAX_ERROR_DELAY
+                && let Ok(wake) = wakes.recv_timeout(if is_growing { WRITE_SETTLE_TIME } else { ERROR_DELAY })
             {
-                again = Some((wake, noticed));
+                deferred = Some((wake, noticed));
                 continue;
             }
-            // The scene may now use different files. Changes since their recorded states are noticed.
+            // The scene may now use different files. Changes since the recorded states are noticed.
             folders.follow(sources, &new);
             last = new.clone();
-            reads = false;
+            reading_reported = false;
             if !report(Event::Files(Box::new(new), noticed, count)) {
                 return;
             }
-        } else if std::mem::take(&mut reads) && !report(Event::Reading(false)) {
+        } else if std::mem::take(&mut reading_reported) && !report(Event::Reading(false)) {
             return;
         }
     }
 }
 
-/// Waits until files are unchanged for some time. Returns whether names may have changed; `None` if the watch ends.
-fn wait_settled(
-    wakes: &Receiver<Wake>,
-    mut known: Vec<FileStamp>,
-    stamps: impl Fn() -> Vec<FileStamp>,
-) -> Option<bool> {
+/// Waits until files are unchanged for [`WRITE_SETTLE_TIME`]. Returns whether file names may have changed; `None` if
+/// the watch ends.
+fn wait_settled(wakes: &Receiver<Wake>, mut old: Vec<FileStamp>, stamps: impl Fn() -> Vec<FileStamp>) -> Option<bool> {
     let start = Instant::now();
-    let (mut since, mut names) = (start, false);
+    let (mut last_change, mut names) = (start, false);
     loop {
-        match wakes.recv_timeout(GROWTH_QUIET.saturating_sub(since.elapsed())) {
+        match wakes.recv_timeout(WRITE_SETTLE_TIME.saturating_sub(last_change.elapsed())) {
             Ok(Wake::Stop) | Err(RecvTimeoutError::Disconnected) => return None,
             Ok(Wake::Names) => names = true,
             Ok(Wake::Content) | Err(RecvTimeoutError::Timeout) => {}
         }
-        // Other files in these folders may change continually.
+        // An event may come from a different file in these folders.
         let new = stamps();
-        if new != known {
-            (known, since) = (new, Instant::now());
-        } else if since.elapsed() >= GROWTH_QUIET {
+        if new != old {
+            (old, last_change) = (new, Instant::now());
+        } else if last_change.elapsed() >= WRITE_SETTLE_TIME {
             return Some(names);
         }
-        if start.elapsed() >= GROWTH_PATIENCE {
+        if start.elapsed() >= MAX_WRITE_SETTLE_TIME {
             return Some(names);
         }
     }
@@ -223,19 +220,19 @@ struct Folders {
 
 impl Folders {
     fn follow(&mut self, sources: &Sources, snapshot: &Snapshot) {
-        let wanted = wanted(sources, snapshot);
+        let folders = folders_to_watch(sources, snapshot);
         self.watched.retain(|path, mode| {
-            let keep = wanted.get(path) == Some(mode);
+            let keep = folders.get(path) == Some(mode);
             if !keep {
-                let _ = self.watcher.unwatch(path); // it may be gone with its folder
+                let _ = self.watcher.unwatch(path); // fails if the folder was deleted
             }
             keep
         });
-        for (path, mode) in wanted {
+        for (path, mode) in folders {
             if self.watched.contains_key(&path) {
                 continue;
             }
-            // If a folder is deleted at this moment, its parent reports an event.
+            // If the folder is deleted at this moment, its parent folder reports an event.
             match self.watcher.watch(&path, mode) {
                 Ok(()) => drop(self.watched.insert(path, mode)),
                 Err(error) => tracing::warn!("{} cannot be watched: {error}", path.display()),
@@ -245,14 +242,14 @@ impl Folders {
 
     fn forget(&mut self) {
         for path in std::mem::take(&mut self.watched).into_keys() {
-            let _ = self.watcher.unwatch(&path); // it may be gone
+            let _ = self.watcher.unwatch(&path); // fails if the folder was deleted
         }
     }
 }
 
 /// Returns the folders to watch, by canonical path: the shader folder including its subfolders, and the folders of all
 /// files and link targets. Subfolders of the scene's folder are not watched, because it may be a home folder.
-fn wanted(sources: &Sources, snapshot: &Snapshot) -> BTreeMap<PathBuf, RecursiveMode> {
+fn folders_to_watch(sources: &Sources, snapshot: &Snapshot) -> BTreeMap<PathBuf, RecursiveMode> {
     let files = snapshot
         .files
         .iter()

@@ -2,8 +2,8 @@
 //! Blender 4.0 and later, without a look.
 //!
 //! All constants and steps are from Z. Zhou, `AgX_LUT_Gen`: `AgXBaseRec2020.py`, whose matrices Blender's tables use,
-//! and `AgXBasesRGB.py`. The curve is by J. Smith (`sigmoid.py` there). Two simplifications: values are not
-//! interpolated in a 57 x 57 x 57 table, and colors outside the display gamut are clipped.
+//! and `AgXBasesRGB.py`. The curve is by J. Smith (`sigmoid.py` in the same repository). Two simplifications: values
+//! are not interpolated in a 57 x 57 x 57 table, and colors outside the display gamut are clipped.
 
 use std::sync::LazyLock;
 
@@ -18,7 +18,7 @@ const TO_REC2020: [[f64; 3]; 3] = [
     [0.016_391_4, 0.088_013_3, 0.895_595_3],
 ];
 
-/// Moves the primaries inwards and rotates them, which reduces hue shifts of bright saturated colors.
+/// Matrix that moves the primaries inwards and rotates them, which reduces hue shifts of bright saturated colors.
 const INSET: [[f64; 3]; 3] = [
     [0.856_627_153_315_983, 0.095_121_240_538_158_8, 0.048_251_606_145_858_3],
     [0.137_318_972_929_847, 0.761_241_990_602_591, 0.101_439_036_467_562],
@@ -32,8 +32,9 @@ const OUTSET_INVERSE: [[f64; 3]; 3] = [
     [0.111_420_988_957_48, 0.087_199_619_202_834_9, 0.801_379_391_839_686],
 ];
 
-/// Middle gray, and the dynamic range of the curve in stops below and above it.
+/// Middle gray.
 const MIDDLE: f64 = 0.18;
+/// Dynamic range of the curve, in stops below and above middle gray.
 const STOPS_BELOW: f64 = 10.0;
 const STOPS_ABOVE: f64 = 6.5;
 /// Exponent that decodes the output of the curve to linear display light.
@@ -47,8 +48,8 @@ const HUE: f64 = 0.4;
 /// Returns linear display light, possibly out of gamut, for linear scene light >= 0.
 pub(super) fn agx(light: Rgb) -> Rgb {
     let light = *INWARDS * DVec3::from(light);
-    let shown = light.map(|value| curve(place(value)).powf(POWER));
-    let shown = with_hue(shown, mixed(hue(light), hue(shown), HUE));
+    let shown = light.map(|value| curve(log_position(value)).powf(POWER));
+    let shown = with_hue(shown, mix_hues(hue(light), hue(shown), HUE));
     (*OUTWARDS * shown).into()
 }
 
@@ -61,7 +62,7 @@ fn matrix(rows: [[f64; 3]; 3]) -> DMat3 {
 }
 
 /// Logarithmic position of a value in the dynamic range, 0 to 1.
-fn place(value: f64) -> f64 {
+fn log_position(value: f64) -> f64 {
     let stops = (value / MIDDLE).log2(); // -inf for 0
     ((stops + STOPS_BELOW) / (STOPS_BELOW + STOPS_ABOVE)).clamp(0.0, 1.0)
 }
@@ -69,20 +70,21 @@ fn place(value: f64) -> f64 {
 /// Sigmoid from (0, 0) to (1, 1), steepest at middle gray; middle gray is a fixed point.
 fn curve(x: f64) -> f64 {
     let Halves { below, above } = &*HALVES;
-    let (middle, grey) = pivot();
+    let (middle, gray) = pivot();
     match x >= middle {
-        true => (grey + bent(x - middle, *above)).min(1.0),
-        false => (grey - bent(middle - x, *below)).max(0.0),
+        true => (gray + branch(x - middle, *above)).min(1.0),
+        false => (gray - branch(middle - x, *below)).max(0.0),
     }
 }
 
-/// Returns the position of middle gray and the value of the curve there.
+/// Returns the position of middle gray and the value of the curve at this position.
 fn pivot() -> (f64, f64) {
-    (STOPS_BELOW / (STOPS_BELOW + STOPS_ABOVE), *GREY)
+    (STOPS_BELOW / (STOPS_BELOW + STOPS_ABOVE), *GRAY)
 }
 
-static GREY: LazyLock<f64> = LazyLock::new(|| MIDDLE.powf(1.0 / POWER));
+static GRAY: LazyLock<f64> = LazyLock::new(|| MIDDLE.powf(1.0 / POWER));
 
+/// Scales of the two branches of the curve, below and above middle gray.
 struct Halves {
     below: f64,
     above: f64,
@@ -90,31 +92,31 @@ struct Halves {
 
 static HALVES: LazyLock<Halves> = LazyLock::new(|| {
     let scale = |width: f64, height: f64| {
-        let steep = SLOPE * width;
-        (steep.powf(-BEND) * ((steep / height).powf(BEND) - 1.0)).powf(-1.0 / BEND)
+        let scaled_width = SLOPE * width;
+        (scaled_width.powf(-BEND) * ((scaled_width / height).powf(BEND) - 1.0)).powf(-1.0 / BEND)
     };
-    let (middle, grey) = pivot();
+    let (middle, gray) = pivot();
     Halves {
-        below: scale(middle, grey),
-        above: scale(1.0 - middle, 1.0 - grey),
+        below: scale(middle, gray),
+        above: scale(1.0 - middle, 1.0 - gray),
     }
 });
 
 /// One branch of the sigmoid, relative to middle gray.
-fn bent(x: f64, scale: f64) -> f64 {
+fn branch(x: f64, scale: f64) -> f64 {
     let x = SLOPE * x / scale;
     scale * x / (1.0 + x.powf(BEND)).powf(1.0 / BEND)
 }
 
 /// Returns the HSV hue in turns, 0 to 1; 0 for grays. A. R. Smith, "Color gamut transform pairs", SIGGRAPH 1978.
 fn hue(color: DVec3) -> f64 {
-    let (most, spread) = (color.max_element(), color.max_element() - color.min_element());
+    let (max, spread) = (color.max_element(), color.max_element() - color.min_element());
     let [r, g, b] = color.into();
     if !(spread > 0.0) {
         0.0
-    } else if most == r {
+    } else if max == r {
         ((g - b) / spread / 6.0).rem_euclid(1.0)
-    } else if most == g {
+    } else if max == g {
         ((b - r) / spread + 2.0) / 6.0
     } else {
         ((r - g) / spread + 4.0) / 6.0
@@ -122,17 +124,17 @@ fn hue(color: DVec3) -> f64 {
 }
 
 /// Interpolates two hues along the shorter arc.
-fn mixed(from: f64, to: f64, share: f64) -> f64 {
+fn mix_hues(from: f64, to: f64, weight: f64) -> f64 {
     let arc = (to - from + 0.5).rem_euclid(1.0) - 0.5;
-    from + share * arc
+    from + weight * arc
 }
 
 /// Replaces the HSV hue of the color; value and saturation are kept.
 fn with_hue(color: DVec3, hue: f64) -> DVec3 {
-    let (most, spread) = (color.max_element(), color.max_element() - color.min_element());
-    let part = |number: f64| {
-        let x = (number + hue * 6.0).rem_euclid(6.0);
-        most - spread * x.min(4.0 - x).clamp(0.0, 1.0)
+    let (max, spread) = (color.max_element(), color.max_element() - color.min_element());
+    let channel = |offset: f64| {
+        let x = (offset + hue * 6.0).rem_euclid(6.0);
+        max - spread * x.min(4.0 - x).clamp(0.0, 1.0)
     };
-    DVec3::new(part(5.0), part(3.0), part(1.0))
+    DVec3::new(channel(5.0), channel(3.0), channel(1.0))
 }

@@ -8,12 +8,12 @@ use std::path::Path;
 /// (standard input, `<(...)` of a shell), which have a writer, and missing files, which fail when opened.
 pub fn reject(path: &Path) -> io::Result<()> {
     let Ok(data) = fs::metadata(path) else { return Ok(()) };
-    let refused = |rule| Err(io::Error::new(io::ErrorKind::InvalidInput, rule));
+    let invalid = |rule| Err(io::Error::new(io::ErrorKind::InvalidInput, rule));
     match kind(data.file_type()) {
-        Kind::Device => refused("it is a device, and must be a file"),
+        Kind::Device => invalid("it is a device; it must be a file"),
         // The link of an anonymous pipe does not resolve.
         Kind::Pipe if path.canonicalize().is_ok() => {
-            refused("it is a named pipe, which may never deliver data; it must be a file")
+            invalid("it is a named pipe, which may never deliver data; it must be a file")
         }
         _ => Ok(()),
     }
@@ -26,11 +26,11 @@ enum Kind {
 }
 
 #[cfg(unix)]
-fn kind(of: FileType) -> Kind {
+fn kind(file_type: FileType) -> Kind {
     use std::os::unix::fs::FileTypeExt as _;
     match () {
-        () if of.is_char_device() || of.is_block_device() => Kind::Device,
-        () if of.is_fifo() => Kind::Pipe,
+        () if file_type.is_char_device() || file_type.is_block_device() => Kind::Device,
+        () if file_type.is_fifo() => Kind::Pipe,
         () => Kind::Other,
     }
 }
@@ -48,8 +48,8 @@ mod tests {
     fn named_pipes_and_devices_are_rejected() {
         let folder = tempfile::tempdir().unwrap();
         let pipe = folder.path().join("pipe");
-        let made = std::process::Command::new("mkfifo").arg(&pipe).status().unwrap();
-        assert!(made.success());
+        let status = std::process::Command::new("mkfifo").arg(&pipe).status().unwrap();
+        assert!(status.success());
         assert!(reject(&pipe).unwrap_err().to_string().contains("a named pipe"));
         assert!(
             reject(Path::new("/dev/zero"))
@@ -59,8 +59,8 @@ mod tests {
         );
         let file = folder.path().join("file");
         fs::write(&file, "").unwrap();
-        for good in [&file, folder.path(), &folder.path().join("none")] {
-            reject(good).unwrap();
+        for path in [&file, folder.path(), &folder.path().join("none")] {
+            reject(path).unwrap();
         }
     }
 

@@ -1,5 +1,5 @@
-//! The transfer function of sRGB (IEC 61966-2-1:1999, sections 5.2 and 5.3). `cpu/texel.rs` implements the 32-bit
-//! version of the kernels.
+//! The transfer function of sRGB (IEC 61966-2-1:1999, sections 5.2 and 5.3). The 32-bit version of the kernels is in
+//! `cpu/texel.rs` of wgray-render.
 
 /// Converts an sRGB-encoded value to a linear value; both are in 0 ... 1.
 pub fn srgb_to_linear(x: f64) -> f64 {

@@ -1,4 +1,4 @@
-//! Detects truncated image files by their last bytes: the writer may have been killed, or the disk may have been full.
+//! Detects image files that are truncated, because the writer was killed or the disk was full.
 
 use std::fs::File;
 use std::io::{BufReader, Read as _, Seek as _, SeekFrom};
@@ -14,7 +14,7 @@ const JPEG_END: &[u8] = &[0xff, 0xd9];
 /// Returns true if a file is a PNG, JPEG, WebP or OpenEXR image that ends as its format requires. Pixels are not
 /// decoded.
 pub fn is_complete(path: &Path) -> bool {
-    let complete = || {
+    let check = || {
         let mut file = File::open(path).ok()?;
         let length = file.metadata().ok()?.len();
         let mut start = [0; 12];
@@ -40,5 +40,5 @@ pub fn is_complete(path: &Path) -> bool {
             _ => None,
         }
     };
-    catch_panic(complete).ok().flatten().unwrap_or(false)
+    catch_panic(check).ok().flatten().unwrap_or(false)
 }

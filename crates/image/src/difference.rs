@@ -25,17 +25,17 @@ pub fn difference(a: &Pixels, b: &Pixels, tolerance: f32) -> Option<Difference> 
     };
     for (a, b) in a.colors.iter().zip(&b.colors) {
         result.unequal += usize::from(a.map(f32::to_bits) != b.map(f32::to_bits));
-        let mut beyond = false;
+        let mut is_beyond = false;
         for (a, b) in a.iter().zip(b) {
-            let apart = if a.to_bits() == b.to_bits() { 0.0 } else { (a - b).abs() };
-            beyond |= !(apart <= tolerance);
-            result.largest = if apart.is_nan() || result.largest.is_nan() {
+            let difference = if a.to_bits() == b.to_bits() { 0.0 } else { (a - b).abs() };
+            is_beyond |= !(difference <= tolerance);
+            result.largest = if difference.is_nan() || result.largest.is_nan() {
                 f32::NAN
             } else {
-                result.largest.max(apart)
+                result.largest.max(difference)
             };
         }
-        result.beyond += usize::from(beyond);
+        result.beyond += usize::from(is_beyond);
     }
     Some(result)
 }
@@ -44,7 +44,7 @@ pub fn difference(a: &Pixels, b: &Pixels, tolerance: f32) -> Option<Difference> 
 mod tests {
     use super::*;
 
-    fn picture(colors: &[[f32; 3]]) -> Pixels {
+    fn pixels(colors: &[[f32; 3]]) -> Pixels {
         Pixels {
             width: colors.len() as u32,
             height: 1,
@@ -54,28 +54,28 @@ mod tests {
 
     #[test]
     fn differences_are_counted_and_measured() {
-        let a = picture(&[[0.0, 1.0, 2.0], [3.0, 4.0, 5.0], [0.0; 3]]);
+        let a = pixels(&[[0.0, 1.0, 2.0], [3.0, 4.0, 5.0], [0.0; 3]]);
         let same = Difference {
             unequal: 0,
             largest: 0.0,
             beyond: 0,
         };
         assert_eq!(difference(&a, &a, 0.0), Some(same));
-        let b = picture(&[[0.0, 1.0, 2.5], [3.0, 4.0, 5.0], [-0.0, 0.0, 0.25]]);
-        let apart = Difference {
+        let b = pixels(&[[0.0, 1.0, 2.5], [3.0, 4.0, 5.0], [-0.0, 0.0, 0.25]]);
+        let expected = Difference {
             unequal: 2,
             largest: 0.5,
             beyond: 1,
         };
-        assert_eq!(difference(&a, &b, 0.25), Some(apart));
+        assert_eq!(difference(&a, &b, 0.25), Some(expected));
     }
 
     #[test]
     fn nan_is_never_within_the_tolerance() {
-        let (a, b) = (picture(&[[0.0; 3]]), picture(&[[f32::NAN, 0.0, 0.0]]));
-        let found = difference(&a, &b, f32::MAX).unwrap();
-        assert_eq!((found.unequal, found.beyond), (1, 1));
-        assert!(found.largest.is_nan());
+        let (a, b) = (pixels(&[[0.0; 3]]), pixels(&[[f32::NAN, 0.0, 0.0]]));
+        let result = difference(&a, &b, f32::MAX).unwrap();
+        assert_eq!((result.unequal, result.beyond), (1, 1));
+        assert!(result.largest.is_nan());
         assert_eq!(
             difference(&b, &b, 0.0).unwrap().beyond,
             0,
@@ -84,7 +84,7 @@ mod tests {
     }
 
     #[test]
-    fn images_of_different_sizes_are_not_compared() {
-        assert_eq!(difference(&picture(&[[0.0; 3]]), &picture(&[]), 1.0), None);
+    fn images_of_different_sizes_have_no_difference() {
+        assert_eq!(difference(&pixels(&[[0.0; 3]]), &pixels(&[]), 1.0), None);
     }
 }

@@ -7,31 +7,31 @@ use std::path::{Path, PathBuf};
 
 use tempfile::{Builder, NamedTempFile};
 
-use super::output::{Destination, Output, named, open};
+use super::output::{Destination, Output, open, with_name};
 use super::temporary;
 
-/// An unfinished output, deleted when dropped. Its error messages contain the name of the output.
+/// An unfinished output, which is deleted when dropped. Error messages contain the name of the output.
 #[derive(Debug)]
 pub struct Pending {
     name: String,
     output: BufWriter<Spool>,
-    /// The first error. It is stored because some encoders ignore errors.
+    /// The first error, because some encoders ignore errors.
     failure: Option<(io::ErrorKind, String)>,
 }
 
 #[derive(Debug)]
 enum Spool {
-    /// A temporary file in the folder of its target, the target, and the replaced file's permissions.
-    Beside(NamedTempFile, PathBuf, Option<Permissions>),
-    /// An anonymous file, deleted with the process, and the pipe or device to copy it to.
-    Nameless(File, File),
+    /// A temporary file in the folder of the target, the target, and the permissions of the replaced file.
+    Named(NamedTempFile, PathBuf, Option<Permissions>),
+    /// An anonymous file, which disappears with the process, and the pipe or device that receives its bytes.
+    Anonymous(File, File),
 }
 
 impl Spool {
     fn file(&mut self) -> &mut File {
         match self {
-            Spool::Beside(file, ..) => file.as_file_mut(),
-            Spool::Nameless(file, _) => file,
+            Spool::Named(file, ..) => file.as_file_mut(),
+            Spool::Anonymous(file, _) => file,
         }
     }
 }
@@ -60,16 +60,16 @@ impl Pending {
     /// The folder cannot be written, or the pipe or device cannot be opened.
     pub fn start(output: Output) -> io::Result<Pending> {
         let name = output.name().to_owned();
-        let spool = match output.place {
+        let spool = match output.destination {
             Destination::File { path, existing } => {
-                beside(&path).map(|file| Spool::Beside(file, path, existing.map(|(_, permissions)| permissions)))
+                beside(&path).map(|file| Spool::Named(file, path, existing.map(|(_, permissions)| permissions)))
             }
-            Destination::Through { file: Some(file), .. } => nameless(file),
-            Destination::Through { path, file: None, .. } => open(&path).and_then(nameless),
-            Destination::Standard(stream) => stream.file().and_then(nameless),
+            Destination::Special { file: Some(file), .. } => spool_anonymously(file),
+            Destination::Special { path, file: None, .. } => open(&path).and_then(spool_anonymously),
+            Destination::Standard(stream) => stream.file().and_then(spool_anonymously),
         };
         Ok(Pending {
-            output: BufWriter::new(spool.map_err(|error| named(&name, &error))?),
+            output: BufWriter::new(spool.map_err(|error| with_name(&name, &error))?),
             name,
             failure: None,
         })
@@ -88,36 +88,36 @@ impl Pending {
         }
         // A full or faulty disk may report an error only now.
         let result = match self.output.get_mut() {
-            Spool::Beside(file, ..) => file.as_file().sync_data(),
-            Spool::Nameless(..) => Ok(()),
+            Spool::Named(file, ..) => file.as_file().sync_data(),
+            Spool::Anonymous(..) => Ok(()),
         };
-        self.noted(result)
+        self.record_error(result)
     }
 
     /// Renames the file to its target, replacing an existing file; copies the bytes to a pipe or device.
     pub fn finish(mut self) -> io::Result<()> {
         self.complete()?;
         let spool = self.output.into_inner().map_err(|error| error.into_error());
-        let finished = spool.and_then(|spool| match spool {
-            Spool::Beside(file, path, permissions) => {
+        let result = spool.and_then(|spool| match spool {
+            Spool::Named(file, path, permissions) => {
                 if let Some(permissions) = permissions {
                     file.as_file().set_permissions(permissions)?;
                 }
                 file.persist(path)?;
                 Ok(())
             }
-            Spool::Nameless(mut file, mut to) => {
+            Spool::Anonymous(mut file, mut to) => {
                 file.seek(SeekFrom::Start(0))?;
                 io::copy(&mut file, &mut to)?;
                 to.flush()
             }
         });
-        finished.map_err(|error| named(&self.name, &error))
+        result.map_err(|error| with_name(&self.name, &error))
     }
 
-    fn noted<T>(&mut self, result: io::Result<T>) -> io::Result<T> {
+    fn record_error<T>(&mut self, result: io::Result<T>) -> io::Result<T> {
         result.map_err(|error| {
-            let error = named(&self.name, &error);
+            let error = with_name(&self.name, &error);
             self.failure.get_or_insert_with(|| (error.kind(), error.to_string()));
             error
         })
@@ -127,23 +127,23 @@ impl Pending {
 impl Write for Pending {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         let result = self.output.write(bytes);
-        self.noted(result)
+        self.record_error(result)
     }
 
     fn flush(&mut self) -> io::Result<()> {
         let result = self.output.flush();
-        self.noted(result)
+        self.record_error(result)
     }
 }
 
 impl Seek for Pending {
     fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
         let result = self.output.seek(to);
-        self.noted(result)
+        self.record_error(result)
     }
 }
 
-fn nameless(to: File) -> io::Result<Spool> {
+fn spool_anonymously(to: File) -> io::Result<Spool> {
     let folder = std::env::temp_dir();
     let spool = tempfile::tempfile_in(&folder).map_err(|error| {
         let folder = folder.display();
@@ -152,59 +152,60 @@ fn nameless(to: File) -> io::Result<Spool> {
             format!("cannot create a temporary file in {folder} (TMPDIR): {error}"),
         )
     });
-    Ok(Spool::Nameless(spool?, to))
+    Ok(Spool::Anonymous(spool?, to))
 }
 
 /// Maximum part of the target's name in a temporary name, in bytes.
 const MAX_NAME_BYTES: usize = 120;
 
-/// Prefix and suffix of a temporary name: `.wgray-PID@HOST-` and `-NAME`, around a random part.
-struct Name {
+/// Pattern of a temporary name: `.wgray-PID@HOST-RANDOM-NAME`.
+struct TemporaryName {
     host: String,
-    end: String,
+    suffix: String,
 }
 
-impl Name {
-    fn of(path: &Path) -> Name {
+impl TemporaryName {
+    fn of(path: &Path) -> TemporaryName {
         let mut name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         name.truncate(name.floor_char_boundary(MAX_NAME_BYTES));
-        Name {
+        TemporaryName {
             host: host(),
-            end: format!("-{name}"),
+            suffix: format!("-{name}"),
         }
     }
 
-    fn start(&self, process: u32) -> String {
+    fn prefix(&self, process: u32) -> String {
         format!(".wgray-{process}@{}-", self.host)
     }
 
-    /// Returns true if the file name was made by this program on this machine for this target.
-    fn fits(&self, file_name: &str) -> bool {
+    /// Returns true if this program created the file name on this machine for this target.
+    fn matches(&self, file_name: &str) -> bool {
         let number = file_name.strip_prefix(".wgray-").and_then(|rest| rest.split_once('@'));
         let Some(Ok(process)) = number.map(|(number, _)| number.parse()) else {
             return false;
         };
-        let random = file_name.strip_prefix(&self.start(process));
-        let random = random.and_then(|rest| rest.strip_suffix(&self.end));
-        random.is_some_and(|random| random.len() == RANDOM && random.bytes().all(|byte| byte.is_ascii_alphanumeric()))
+        let random = file_name.strip_prefix(&self.prefix(process));
+        let random = random.and_then(|rest| rest.strip_suffix(&self.suffix));
+        random
+            .is_some_and(|random| random.len() == RANDOM_LEN && random.bytes().all(|byte| byte.is_ascii_alphanumeric()))
     }
 }
 
 /// Length of the random part of a temporary name.
-const RANDOM: usize = 6;
+const RANDOM_LEN: usize = 6;
 
-/// Creates a temporary file in the folder of its target, locked while in use.
+/// Creates a temporary file in the folder of its target. The file is locked while it is in use.
 ///
 /// # Errors
 ///
 /// The folder cannot be written.
 pub fn beside(path: &Path) -> io::Result<NamedTempFile> {
     let folder = path.parent().unwrap_or(Path::new("."));
-    let name = Name::of(path);
+    let name = TemporaryName::of(path);
     remove_stale(folder, &name);
-    let start = name.start(std::process::id());
+    let prefix = name.prefix(std::process::id());
     let mut builder = Builder::new();
-    builder.prefix(&start).suffix(&name.end).rand_bytes(RANDOM);
+    builder.prefix(&prefix).suffix(&name.suffix).rand_bytes(RANDOM_LEN);
     #[cfg(unix)]
     {
         // The default mode of new files, before the umask.
@@ -225,14 +226,17 @@ pub fn beside(path: &Path) -> io::Result<NamedTempFile> {
 
 /// Deletes temporary files that killed processes left for the same target. Ignores all errors.
 pub fn remove_stale_beside(path: &Path) {
-    remove_stale(path.parent().unwrap_or(Path::new(".")), &Name::of(path));
+    remove_stale(path.parent().unwrap_or(Path::new(".")), &TemporaryName::of(path));
 }
 
-fn remove_stale(folder: &Path, name: &Name) {
+fn remove_stale(folder: &Path, name: &TemporaryName) {
     let Ok(entries) = fs::read_dir(folder) else { return };
     for entry in entries.flatten() {
-        let fits = entry.file_name().to_str().is_some_and(|file_name| name.fits(file_name));
-        if !fits || !entry.file_type().is_ok_and(|kind| kind.is_file()) {
+        let is_match = entry
+            .file_name()
+            .to_str()
+            .is_some_and(|file_name| name.matches(file_name));
+        if !is_match || !entry.file_type().is_ok_and(|kind| kind.is_file()) {
             continue;
         }
         // A process that is still writing the file holds the lock.
@@ -251,8 +255,8 @@ fn host() -> String {
     let name = rustix::system::uname().nodename().to_string_lossy().into_owned();
     #[cfg(not(unix))]
     let name = std::env::var("COMPUTERNAME").unwrap_or_default();
-    let allowed = |c: &char| c.is_ascii_alphanumeric() || matches!(c, '.' | '-' | '_');
-    name.chars().filter(allowed).take(64).collect()
+    let is_allowed = |c: &char| c.is_ascii_alphanumeric() || matches!(c, '.' | '-' | '_');
+    name.chars().filter(is_allowed).take(64).collect()
 }
 
 #[cfg(test)]
@@ -261,10 +265,10 @@ mod tests {
 
     #[test]
     fn temporary_names_match_program_machine_and_target() {
-        let name = Name::of(Path::new("folder/out.png"));
+        let name = TemporaryName::of(Path::new("folder/out.png"));
         let host = host();
-        assert!(name.fits(&format!("{}aB3dE6-out.png", name.start(123))));
-        for other in [
+        assert!(name.matches(&format!("{}aB3dE6-out.png", name.prefix(123))));
+        for file_name in [
             format!(".wgray-123@{host}-aB3dE6-out.exr"),
             format!(".wgray-123@{host}-aB3dE6-other-out.png"),
             format!(".wgray-123@{host}-aB3d-out.png"),
@@ -275,7 +279,7 @@ mod tests {
             ".wgray-aB3dE6".to_owned(),
             "out.png".to_owned(),
         ] {
-            assert!(!name.fits(&other), "{other}");
+            assert!(!name.matches(&file_name), "{file_name}");
         }
     }
 

@@ -1,5 +1,5 @@
-//! Allocations that may fail. The global allocator asks [`is_fallible`] whether the caller handles a failure. If not,
-//! it can end the program in an orderly way.
+//! Allocations that may fail. The global allocator queries [`is_fallible`]: if the caller does not handle the failure of
+//! an allocation, the allocator can end the program in an orderly way.
 
 use std::cell::Cell;
 
@@ -19,7 +19,7 @@ pub fn fallible<T>(allocate: impl FnOnce() -> T) -> T {
     allocate()
 }
 
-/// Returns true if failure of this thread's current allocation is handled.
+/// Returns true if the caller handles the failure of this thread's current allocation.
 pub fn is_fallible() -> bool {
     FALLIBLE.try_with(Cell::get).unwrap_or(false)
 }
@@ -29,7 +29,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_the_marked_allocations_are_fallible() {
+    fn only_marked_allocations_are_fallible() {
         assert!(!is_fallible());
         assert!(fallible(|| fallible(is_fallible) && is_fallible()));
         let _ = std::panic::catch_unwind(|| fallible(|| std::panic::resume_unwind(Box::new(()))));
@@ -37,28 +37,28 @@ mod tests {
         assert!(!fallible(|| std::thread::spawn(is_fallible).join().unwrap()));
     }
 
-    /// If an allocation with `try_reserve` is not marked, its failure ends the program.
+    /// The failure of an unmarked allocation ends the program, even with `try_reserve`.
     #[test]
     fn every_fallible_allocation_is_marked() {
         let workspace = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."));
         let mut folders = vec![workspace.join("src"), workspace.join("crates")];
-        let mut found = 0;
+        let mut count = 0;
         while let Some(folder) = folders.pop() {
             for entry in std::fs::read_dir(folder).unwrap() {
                 let path = entry.unwrap().path();
                 if path.is_dir() {
                     folders.push(path);
-                } else if path.extension().is_some_and(|end| end == "rs")
+                } else if path.extension().is_some_and(|extension| extension == "rs")
                     && !path.ends_with("crates/image/src/memory.rs")
                 {
                     let text = std::fs::read_to_string(&path).unwrap();
                     for line in text.lines().filter(|line| line.contains(".try_reserve")) {
-                        found += 1;
+                        count += 1;
                         assert!(line.contains("fallible("), "{}: {line}", path.display());
                     }
                 }
             }
         }
-        assert!(found >= 4, "{found}");
+        assert!(count >= 4, "{count}");
     }
 }

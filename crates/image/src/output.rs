@@ -5,27 +5,27 @@ use std::fs::{self, File, Metadata, OpenOptions, Permissions};
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// A target to write to. Its error messages contain its name.
+/// A target to write to. Error messages contain the name of the target.
 #[derive(Debug)]
 pub struct Output {
     name: String,
-    pub(super) place: Destination,
+    pub(super) destination: Destination,
 }
 
 #[derive(Debug)]
 pub(super) enum Destination {
     /// A regular file, which may not exist yet.
     File {
-        /// Path without symbolic links.
+        /// The path, with symbolic links resolved.
         path: PathBuf,
-        /// Identity and permissions of the existing file.
+        /// Identity and permissions of the existing file, if any.
         existing: Option<(Identity, Permissions)>,
     },
     /// A pipe or a device.
-    Through {
+    Special {
         path: PathBuf,
         identity: Identity,
-        /// Handle, once it is open.
+        /// The handle, once the pipe or device is open.
         file: Option<File>,
     },
     Standard(Stream),
@@ -66,20 +66,20 @@ impl Identity {
         }
     }
 
-    fn is(&self, other: &Identity) -> bool {
+    fn is_same_file(&self, other: &Identity) -> bool {
         self.numbers.is_some() && self.numbers == other.numbers && !self.is_character_device
     }
 }
 
 /// Maximum number of symbolic links to follow, as in Linux.
-const LINKS: usize = 40;
+const MAX_LINKS: usize = 40;
 
 impl Output {
     /// Returns standard output.
     pub fn standard() -> Output {
         Output {
             name: "standard output".to_owned(),
-            place: Destination::Standard(Stream::Output),
+            destination: Destination::Standard(Stream::Output),
         }
     }
 
@@ -87,12 +87,12 @@ impl Output {
     ///
     /// # Errors
     ///
-    /// The path is a folder, its folder does not exist, or the file is not writable or is marked read-only.
+    /// The path is a folder, the folder of the file does not exist, or the file is read-only or not writable.
     pub fn find(path: &Path) -> io::Result<Output> {
         let name = path.display().to_string();
-        match place(path) {
-            Ok(place) => Ok(Output { name, place }),
-            Err(error) => Err(named(&name, &error)),
+        match resolve(path) {
+            Ok(destination) => Ok(Output { name, destination }),
+            Err(error) => Err(with_name(&name, &error)),
         }
     }
 
@@ -103,8 +103,8 @@ impl Output {
     ///
     /// The pipe or device cannot be opened.
     pub fn connect(&mut self) -> io::Result<()> {
-        if let Destination::Through { path, file, .. } = &mut self.place {
-            *file = Some(open(path).map_err(|error| named(&self.name, &error))?);
+        if let Destination::Special { path, file, .. } = &mut self.destination {
+            *file = Some(open(path).map_err(|error| with_name(&self.name, &error))?);
         }
         Ok(())
     }
@@ -115,17 +115,17 @@ impl Output {
     ///
     /// The errors of [`Output::find`]; also fails if the output is not a regular file.
     pub fn again(&self) -> io::Result<Output> {
-        let again = match &self.place {
-            Destination::File { path, .. } => place(path),
+        let resolved = match &self.destination {
+            Destination::File { path, .. } => resolve(path),
             _ => Err(io::ErrorKind::Unsupported.into()),
         };
-        match again {
-            Ok(place @ Destination::File { .. }) => Ok(Output {
+        match resolved {
+            Ok(destination @ Destination::File { .. }) => Ok(Output {
                 name: self.name.clone(),
-                place,
+                destination,
             }),
-            Ok(_) => Err(named(&self.name, &io::Error::other("it is not a regular file"))),
-            Err(error) => Err(named(&self.name, &error)),
+            Ok(_) => Err(with_name(&self.name, &io::Error::other("it is not a regular file"))),
+            Err(error) => Err(with_name(&self.name, &error)),
         }
     }
 
@@ -136,12 +136,12 @@ impl Output {
 
     /// Returns true for a regular file, which may not exist yet.
     pub fn is_file(&self) -> bool {
-        matches!(self.place, Destination::File { .. })
+        matches!(self.destination, Destination::File { .. })
     }
 
     /// Returns the path of a regular file, without symbolic links.
     pub fn path(&self) -> Option<&Path> {
-        match &self.place {
+        match &self.destination {
             Destination::File { path, .. } => Some(path),
             _ => None,
         }
@@ -151,25 +151,25 @@ impl Output {
     /// character devices, which can be shared.
     pub fn is_same(&self, other: &Output) -> bool {
         let same_path = self.path().is_some() && self.path() == other.path();
-        let same_stream = match (&self.place, &other.place) {
+        let same_stream = match (&self.destination, &other.destination) {
             (Destination::Standard(a), Destination::Standard(b)) => a == b,
             _ => false,
         };
         let identities = self.identity().zip(other.identity());
-        same_path || same_stream || identities.is_some_and(|(a, b)| a.is(&b))
+        same_path || same_stream || identities.is_some_and(|(a, b)| a.is_same_file(&b))
     }
 
     /// Returns true if writing would change an input file, even if the paths differ.
     pub fn is_input(&self, path: &Path) -> bool {
         let same_path = self.path().is_some() && fs::canonicalize(path).ok().as_deref() == self.path();
         let input = fs::metadata(path).ok().map(|data| Identity::of(&data));
-        same_path || self.identity().zip(input).is_some_and(|(a, b)| a.is(&b))
+        same_path || self.identity().zip(input).is_some_and(|(a, b)| a.is_same_file(&b))
     }
 
     fn identity(&self) -> Option<Identity> {
-        match &self.place {
+        match &self.destination {
             Destination::File { existing, .. } => existing.as_ref().map(|(identity, _)| identity.clone()),
-            Destination::Through { identity, .. } => Some(identity.clone()),
+            Destination::Special { identity, .. } => Some(identity.clone()),
             Destination::Standard(stream) => {
                 let data = stream.file().and_then(|file| file.metadata());
                 data.ok().map(|data| Identity::of(&data))
@@ -211,14 +211,14 @@ pub(super) fn open(path: &Path) -> io::Result<File> {
     OpenOptions::new().write(true).open(path)
 }
 
-fn place(path: &Path) -> io::Result<Destination> {
+fn resolve(path: &Path) -> io::Result<Destination> {
     if path.as_os_str().as_encoded_bytes().ends_with(b"/") {
-        return Err(folder());
+        return Err(folder_error());
     }
     let mut path = path.to_owned();
-    for _ in 0..=LINKS {
+    for _ in 0..=MAX_LINKS {
         let Some(file_name) = path.file_name() else {
-            return Err(folder());
+            return Err(folder_error());
         };
         let parent = path.parent().filter(|parent| !parent.as_os_str().is_empty());
         let parent = fs::canonicalize(parent.unwrap_or(Path::new("."))).map_err(|error| match error.kind() {
@@ -244,7 +244,7 @@ fn place(path: &Path) -> io::Result<Destination> {
         }
     }
     match fs::metadata(&path) {
-        Ok(data) if data.is_dir() => Err(folder()),
+        Ok(data) if data.is_dir() => Err(folder_error()),
         Ok(data) if data.is_file() => {
             if data.permissions().readonly() {
                 let message = "it is read-only; make it writable or choose another name";
@@ -254,7 +254,7 @@ fn place(path: &Path) -> io::Result<Destination> {
             let existing = Some((Identity::of(&data), data.permissions()));
             Ok(Destination::File { path, existing })
         }
-        Ok(data) => Ok(Destination::Through {
+        Ok(data) => Ok(Destination::Special {
             identity: Identity::of(&data),
             path,
             file: None,
@@ -264,11 +264,11 @@ fn place(path: &Path) -> io::Result<Destination> {
     }
 }
 
-/// Returns the standard stream of a path such as `/dev/stdout` or `/dev/fd/1`. Opening it again would overwrite a file
-/// to which the shell appends.
+/// Returns the standard stream of a path such as `/dev/stdout` or `/dev/fd/1`. If the path were opened instead, a file
+/// to which the shell appends would be overwritten.
 fn stream(path: &Path) -> Option<Stream> {
-    let own = PathBuf::from(format!("/proc/{}/fd", std::process::id()));
-    if path.parent() != Some(&own) {
+    let descriptors = PathBuf::from(format!("/proc/{}/fd", std::process::id()));
+    if path.parent() != Some(&descriptors) {
         return None;
     }
     match path.file_name()?.to_str()? {
@@ -278,14 +278,14 @@ fn stream(path: &Path) -> Option<Stream> {
     }
 }
 
-fn folder() -> io::Error {
+fn folder_error() -> io::Error {
     io::Error::new(io::ErrorKind::IsADirectory, "it is a folder")
 }
 
 /// Adds the name of the output to an error.
-pub(super) fn named(name: &str, error: &io::Error) -> io::Error {
+pub(super) fn with_name(name: &str, error: &io::Error) -> io::Error {
     let text = error.to_string();
-    // tempfile adds the temporary name, which means nothing to the user.
+    // The crate `tempfile` adds the temporary name, which means nothing to the user.
     let reason = text.split(" at path ").next().unwrap_or_default();
     io::Error::new(error.kind(), format!("{name}: cannot be written: {reason}"))
 }

@@ -11,18 +11,18 @@ thread_local! {
     static DEPTH: Cell<u32> = const { Cell::new(0) };
 }
 
-/// Returns true if [`catch_panic`] would catch a panic of this thread. Panic hooks, such as the hook of
-/// [`install_quiet_hook`], need not print such panics.
+/// Returns true if [`catch_panic`] would catch a panic of this thread. The hook of [`install_quiet_hook`] does not print
+/// such panics.
 pub fn is_contained() -> bool {
     DEPTH.try_with(Cell::get).is_ok_and(|depth| depth > 0)
 }
 
 /// Installs a panic hook that passes uncaught panics to the previous hook.
 pub fn install_quiet_hook() {
-    let before = std::panic::take_hook();
+    let previous_hook = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |info| {
         if !is_contained() {
-            before(info);
+            previous_hook(info);
         }
     }));
 }
@@ -31,10 +31,10 @@ pub fn install_quiet_hook() {
 ///
 /// # Errors
 ///
-/// The panic message, if the closure panics. In this case, values that the closure modified may only be dropped.
-pub fn catch_panic<T>(calls: impl FnOnce() -> T) -> Result<T, String> {
-    let _inside = Inside::enter();
-    catch_unwind(AssertUnwindSafe(calls)).map_err(|panic| message(panic.as_ref()))
+/// The panic message, if the closure panics. After a panic, values that the closure modified may only be dropped.
+pub fn catch_panic<T>(closure: impl FnOnce() -> T) -> Result<T, String> {
+    let _guard = DepthGuard::enter();
+    catch_unwind(AssertUnwindSafe(closure)).map_err(|panic| message(panic.as_ref()))
 }
 
 fn message(panic: &(dyn Any + Send)) -> String {
@@ -46,22 +46,23 @@ fn message(panic: &(dyn Any + Send)) -> String {
 }
 
 /// Marks the thread as inside [`catch_panic`].
-struct Inside;
+struct DepthGuard;
 
-impl Inside {
-    fn enter() -> Inside {
-        let _ = DEPTH.try_with(|depth| depth.set(depth.get() + 1)); // thread-locals fail while the thread ends; its panics are printed then
-        Inside
+impl DepthGuard {
+    fn enter() -> DepthGuard {
+        // Thread-local variables fail while the thread ends, and the panics of the thread are then printed.
+        let _ = DEPTH.try_with(|depth| depth.set(depth.get() + 1));
+        DepthGuard
     }
 }
 
-impl Drop for Inside {
+impl Drop for DepthGuard {
     fn drop(&mut self) {
         let _ = DEPTH.try_with(|depth| depth.set(depth.get().saturating_sub(1)));
     }
 }
 
-/// A value of a library whose drop may panic; such panics are ignored.
+/// A value of a library. Panics while the value is dropped are ignored.
 #[derive(Clone)]
 pub struct CatchPanicOnDrop<T>(ManuallyDrop<T>);
 
@@ -92,9 +93,9 @@ impl<T> Drop for CatchPanicOnDrop<T> {
 mod tests {
     use super::*;
 
-    struct Bad;
+    struct PanicsOnDrop;
 
-    impl Drop for Bad {
+    impl Drop for PanicsOnDrop {
         fn drop(&mut self) {
             panic!("in a drop");
         }
@@ -132,9 +133,9 @@ mod tests {
 
     #[test]
     fn catch_panic_on_drop_ignores_panics_of_destructors() {
-        drop(CatchPanicOnDrop::new(Bad));
+        drop(CatchPanicOnDrop::new(PanicsOnDrop));
         assert!(
-            catch_unwind(|| drop(Bad)).is_err(),
+            catch_unwind(|| drop(PanicsOnDrop)).is_err(),
             "dropping without the wrapper did not panic"
         );
     }

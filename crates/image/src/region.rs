@@ -16,7 +16,7 @@ pub struct Region {
 }
 
 impl Region {
-    /// Returns the region of a whole image.
+    /// Returns the region that covers an image of this size.
     pub fn whole(width: u32, height: u32) -> Region {
         Region {
             x0: 0,
@@ -26,12 +26,12 @@ impl Region {
         }
     }
 
-    /// Returns the number of columns, 0 if reversed.
+    /// Returns the number of columns; 0 if `x1` is less than `x0`.
     pub fn width(&self) -> u32 {
         self.x1.saturating_sub(self.x0)
     }
 
-    /// Returns the number of rows, 0 if reversed.
+    /// Returns the number of rows; 0 if `y1` is less than `y0`.
     pub fn height(&self) -> u32 {
         self.y1.saturating_sub(self.y0)
     }

@@ -5,37 +5,37 @@ use std::borrow::Cow;
 use std::fmt::Write as _;
 
 /// Returns true for control characters and direction marks (Unicode UAX 9).
-fn acts(c: char) -> bool {
-    let turns = ['\u{61c}', '\u{200e}', '\u{200f}', '\u{2028}', '\u{2029}'];
+fn is_control_or_mark(c: char) -> bool {
+    let marks = ['\u{61c}', '\u{200e}', '\u{200f}', '\u{2028}', '\u{2029}'];
     c.is_control()
-        || turns.contains(&c)
+        || marks.contains(&c)
         || ('\u{202a}'..='\u{202e}').contains(&c)
         || ('\u{2066}'..='\u{2069}').contains(&c)
 }
 
 /// Escapes text, including line breaks.
 pub fn escape_control(text: &str) -> Cow<'_, str> {
-    shown(text, &[])
+    escape(text, &[])
 }
 
 /// Escapes text with several lines; line breaks and tabs are kept.
 pub fn escape_control_in_lines(text: &str) -> Cow<'_, str> {
-    shown(text, &['\n', '\t'])
+    escape(text, &['\n', '\t'])
 }
 
-fn shown<'a>(text: &'a str, kept: &[char]) -> Cow<'a, str> {
-    let is_shown = |c: char| !acts(c) || kept.contains(&c);
-    if text.chars().all(is_shown) {
+fn escape<'a>(text: &'a str, allowed: &[char]) -> Cow<'a, str> {
+    let is_safe = |c: char| !is_control_or_mark(c) || allowed.contains(&c);
+    if text.chars().all(is_safe) {
         return text.into();
     }
-    let mut shown = String::with_capacity(text.len() + 16);
+    let mut escaped = String::with_capacity(text.len() + 16);
     for c in text.chars() {
-        match is_shown(c) {
-            true => shown.push(c),
-            false => drop(write!(shown, "{}", c.escape_default())),
+        match is_safe(c) {
+            true => escaped.push(c),
+            false => drop(write!(escaped, "{}", c.escape_default())),
         }
     }
-    shown.into()
+    escaped.into()
 }
 
 #[cfg(test)]
@@ -43,15 +43,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_acts_on_a_terminal_is_shown() {
-        for (text, wanted) in [
+    fn control_characters_and_direction_marks_are_escaped() {
+        for (text, expected) in [
             ("a\u{1b}[31mb", "a\\u{1b}[31mb"),
             ("a\nerror: b\t\r", "a\\nerror: b\\t\\r"),
             ("\u{9b}31m\u{7f}\0", "\\u{9b}31m\\u{7f}\\u{0}"),
             ("\u{202e}gnp.exe\u{2066}\u{200f}", "\\u{202e}gnp.exe\\u{2066}\\u{200f}"),
             ("Größe 日本 é \"\\\" 🦀", "Größe 日本 é \"\\\" 🦀"),
         ] {
-            assert_eq!(escape_control(text), wanted);
+            assert_eq!(escape_control(text), expected);
         }
         assert!(matches!(escape_control("plain"), Cow::Borrowed("plain")));
         assert_eq!(escape_control_in_lines("a\n\tb\u{1b}\n"), "a\n\tb\\u{1b}\n");

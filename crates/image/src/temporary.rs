@@ -19,14 +19,14 @@ pub(super) fn register(path: &Path) {
     if names.len() >= PRUNE_FROM {
         names.retain(exists);
     }
-    // Marked `fallible`: otherwise a failed allocation would end the program here, while this thread holds the lock
-    // that `remove_temporary_files` needs.
+    // The allocation is marked `fallible`. Otherwise, its failure would end the program here, while this thread holds
+    // the lock that `remove_temporary_files` needs.
     if crate::memory::fallible(|| names.try_reserve(1)).is_ok() {
         names.push(name);
     }
 }
 
-/// Removes the unfinished files, without allocating.
+/// Removes the registered files, without allocating.
 pub fn remove_temporary_files() {
     const ATTEMPTS: usize = 1000;
     for _ in 0..ATTEMPTS {
@@ -80,22 +80,22 @@ mod tests {
     use super::*;
 
     #[test]
-    fn registered_files_are_removed_and_others_stay() {
+    fn only_registered_files_are_removed() {
         let folder = tempfile::tempdir().unwrap();
         let paths: Vec<_> = (0..PRUNE_FROM + 3).map(|i| folder.path().join(i.to_string())).collect();
         for path in &paths {
             std::fs::write(path, "").unwrap();
             register(path);
         }
-        let other = folder.path().join("other");
-        std::fs::write(&other, "").unwrap();
+        let unregistered = folder.path().join("other");
+        std::fs::write(&unregistered, "").unwrap();
         // The files of other tests stay.
         let names = NAMES.lock().unwrap();
         names
             .iter()
-            .filter(|one| paths.iter().any(|path| name(path).as_ref() == Some(*one)))
+            .filter(|registered| paths.iter().any(|path| name(path).as_ref() == Some(*registered)))
             .for_each(remove);
         drop(names);
-        assert!(paths.iter().all(|path| !path.exists()) && other.exists());
+        assert!(paths.iter().all(|path| !path.exists()) && unregistered.exists());
     }
 }

@@ -1,7 +1,7 @@
 //! View transforms: from linear light to display values, 0 to 1, before quantization.
 //!
-//! Light is linear RGB with the primaries of sRGB (Rec. 709, D65). NaN and negative values are treated as 0, infinity
-//! as the largest finite value.
+//! Light is linear RGB with the primaries of sRGB (Rec. 709, D65). NaN and negative values are treated as 0, and
+//! infinity is treated as the largest finite value.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -22,7 +22,7 @@ pub enum ViewTransform {
     /// AgX without a look: desaturates bright colors gradually, like film.
     #[serde(rename = "agx")]
     Agx,
-    /// Khronos PBR Neutral: keeps colors up to a brightness, and compresses brighter ones.
+    /// Khronos PBR Neutral: keeps colors up to a brightness, and compresses brighter colors.
     #[serde(rename = "khronos-pbr-neutral")]
     KhronosPbrNeutral,
 }
@@ -52,12 +52,12 @@ impl ViewTransform {
 pub struct ViewSettings {
     /// View transform.
     pub transform: ViewTransform,
-    /// Exposure in stops, -100 to 100: light is multiplied by 2 to this power before the transform.
+    /// Exposure in stops, -100 to 100: light is multiplied by 2^exposure before the transform.
     pub exposure: f64,
 }
 
 impl ViewSettings {
-    /// Maximum magnitude of the exposure in stops. It keeps light values far from the limits of 64-bit floats.
+    /// Maximum magnitude of the exposure in stops, which keeps light far from the limits of 64-bit floats.
     pub const MAX_STOPS: f64 = 100.0;
 
     /// Returns the exposure, or the rule that it violates.
@@ -83,16 +83,16 @@ impl ViewSettings {
     }
 
     /// Returns the display values of a reflectance such as an albedo: only the curve is applied.
-    pub fn display_share(&self, share: [f32; 3]) -> [f64; 3] {
+    pub fn display_share(&self, reflectance: [f32; 3]) -> [f64; 3] {
         match self.transform {
-            ViewTransform::Gamma22 => share.map(sane).map(gamma22),
-            _ => share.map(sane).map(srgb),
+            ViewTransform::Gamma22 => reflectance.map(sanitized).map(gamma22),
+            _ => reflectance.map(sanitized).map(srgb),
         }
     }
 
     fn exposed(&self, linear: [f32; 3]) -> Rgb {
         let factor = self.exposure.exp2();
-        linear.map(|value| sane(value) * factor)
+        linear.map(|value| sanitized(value) * factor)
     }
 
     /// Returns the display values in 8 bits.
@@ -103,9 +103,9 @@ impl ViewSettings {
     /// Returns the straight (not premultiplied) display values of a color that is premultiplied by alpha, black where
     /// alpha is 0, and the linear alpha.
     pub fn display_straight(&self, linear: [f32; 3], alpha: f32) -> [f64; 4] {
-        let standalone_prim = linear.map(|value| if alpha > 0.0 { value / alpha } else { 0.0 });
-        let [r, g, b] = self.display(standalone_prim);
-        [r, g, b, sane(alpha).min(1.0)]
+        let straight = linear.map(|value| if alpha > 0.0 { value / alpha } else { 0.0 });
+        let [r, g, b] = self.display(straight);
+        [r, g, b, sanitized(alpha).min(1.0)]
     }
 
     /// Returns the straight display values in 8 bits.
@@ -131,24 +131,25 @@ fn transformed(transform: ViewTransform, light: Rgb) -> Rgb {
 /// Returns the light that is displayed as a color. If no such light exists, returns the candidate that is displayed
 /// closest to the color: the result of [`solution`], or a multiple of the linear color.
 fn inverse(transform: ViewTransform, display: Rgb) -> Rgb {
-    const EXACT: f64 = 0.5 / 255.0;
+    const MAX_DISTANCE: f64 = 0.5 / 255.0;
     let distance = |light: &Rgb| {
-        let found = transformed(transform, *light);
-        let squares = (0..3).map(|i| (found[i] - display[i]).powi(2));
+        let shown = transformed(transform, *light);
+        let squares = (0..3).map(|i| (shown[i] - display[i]).powi(2));
         squares.sum::<f64>().sqrt()
     };
-    let found = solution(transform, display);
-    if distance(&found) < EXACT {
-        return found;
+    let solved = solution(transform, display);
+    if distance(&solved) < MAX_DISTANCE {
+        return solved;
     }
     let linear = display.map(srgb_to_linear);
     let multiples = (0..=400).map(|i| linear.map(|x| x * (0.025 * f64::from(i - 200)).exp2()));
-    let all = multiples.chain([found]);
-    all.min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap_or(found)
+    let candidates = multiples.chain([solved]);
+    let closest = candidates.min_by(|a, b| distance(a).total_cmp(&distance(b)));
+    closest.unwrap_or(solved)
 }
 
-/// Solves `transformed(transform, light) == display` by coordinate-wise bisection: each display channel increases with
-/// the light of this channel.
+/// Solves `transformed(transform, light) == display` by coordinate-wise bisection, because each display channel
+/// increases with the light of the channel.
 fn solution(transform: ViewTransform, display: Rgb) -> Rgb {
     /// Maximum light of a channel. PBR Neutral only approaches white.
     const MAX_LIGHT: f64 = 1e3;
@@ -157,7 +158,7 @@ fn solution(transform: ViewTransform, display: Rgb) -> Rgb {
     const SWEEPS: usize = 100;
     const BISECTIONS: usize = 60;
     let [white, ..] = transformed(transform, [MAX_LIGHT; 3]);
-    let goal = display.map(|value| {
+    let target = display.map(|value| {
         if value <= white + 1e-9 {
             value.min(white)
         } else {
@@ -170,12 +171,12 @@ fn solution(transform: ViewTransform, display: Rgb) -> Rgb {
             let (mut low, mut high) = (0.0, MAX_LIGHT);
             for _ in 0..BISECTIONS {
                 light[channel] = 0.5 * (low + high);
-                match transformed(transform, light)[channel] < goal[channel] {
+                match transformed(transform, light)[channel] < target[channel] {
                     true => low = light[channel],
                     false => high = light[channel],
                 }
             }
-            light[channel] = if goal[channel] > 0.0 { high } else { 0.0 };
+            light[channel] = if target[channel] > 0.0 { high } else { 0.0 };
         }
     }
     light
@@ -184,7 +185,7 @@ fn solution(transform: ViewTransform, display: Rgb) -> Rgb {
 /// Encodes a linear value in 8 bits with [`ViewTransform::Gamma22`]: clamped to [0, 1], raised to the power 1/2.2,
 /// times 255, rounded to the nearest integer. NaN yields 0.
 pub fn encode(linear: f32) -> u8 {
-    to_8_bits(gamma22(sane(linear)))
+    to_8_bits(gamma22(sanitized(linear)))
 }
 
 /// Rounds to the nearest of 256 steps from 0 to 1; halves round up.
@@ -198,7 +199,7 @@ pub fn to_16_bits(value: f64) -> u16 {
 }
 
 /// Replaces NaN and negative values by 0, and infinity by the largest finite value.
-fn sane(value: f32) -> f64 {
+fn sanitized(value: f32) -> f64 {
     match value > 0.0 {
         true => f64::from(value.min(f32::MAX)),
         false => 0.0, // NaN too
@@ -222,9 +223,9 @@ fn khronos_pbr_neutral(light: Rgb) -> Rgb {
     const F90: f64 = 0.04;
     const START: f64 = 0.8 - F90;
     const DESATURATION: f64 = 0.15;
-    let least = smallest(light);
-    let offset = match least <= 2.0 * F90 {
-        true => least - least * least / (4.0 * F90),
+    let min = smallest(light);
+    let offset = match min <= 2.0 * F90 {
+        true => min - min * min / (4.0 * F90),
         false => F90,
     };
     let light = light.map(|value| value - offset);
@@ -232,10 +233,10 @@ fn khronos_pbr_neutral(light: Rgb) -> Rgb {
     if peak <= START {
         return light;
     }
-    let room = 1.0 - START;
-    let shown = 1.0 - room * room / (peak + room - START);
-    let white = 1.0 - 1.0 / (DESATURATION * (peak - shown) + 1.0);
-    light.map(|value| mix(value * (shown / peak), shown, white))
+    let range = 1.0 - START;
+    let new_peak = 1.0 - range * range / (peak + range - START);
+    let white = 1.0 - 1.0 / (DESATURATION * (peak - new_peak) + 1.0);
+    light.map(|value| mix(value * (new_peak / peak), new_peak, white))
 }
 
 fn smallest([r, g, b]: Rgb) -> f64 {
@@ -246,8 +247,8 @@ fn largest([r, g, b]: Rgb) -> f64 {
     r.max(g).max(b)
 }
 
-fn mix(a: f64, b: f64, share: f64) -> f64 {
-    a * (1.0 - share) + b * share
+fn mix(a: f64, b: f64, weight: f64) -> f64 {
+    a * (1.0 - weight) + b * weight
 }
 
 #[cfg(test)]
@@ -261,7 +262,7 @@ mod tests {
         }
     }
 
-    fn apart(a: [f64; 3], b: [f64; 3]) -> f64 {
+    fn max_difference(a: [f64; 3], b: [f64; 3]) -> f64 {
         a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
     }
 
@@ -288,7 +289,7 @@ mod tests {
         }
         // The sRGB curve is inverted exactly.
         let srgb = view(ViewTransform::Srgb).light_of([1.0, 0.5, 0.0]);
-        assert!(apart(srgb, [1.0, 0.214_041_14, 0.0]) < 1e-8, "{srgb:?}");
+        assert!(max_difference(srgb, [1.0, 0.214_041_14, 0.0]) < 1e-8, "{srgb:?}");
     }
 
     /// Checks both branches of the curve and the point where the branches meet.
@@ -304,14 +305,17 @@ mod tests {
             (7.0, 1.0),
         ] {
             let found = view(ViewTransform::Srgb).display([linear; 3]);
-            assert!(apart(found, [shown; 3]) < 1e-6, "{linear}: {found:?}");
+            assert!(max_difference(found, [shown; 3]) < 1e-6, "{linear}: {found:?}");
         }
         let gamma = view(ViewTransform::Gamma22).display([0.5; 3]);
-        assert!(apart(gamma, [0.735_356_98; 3]) > 1e-3, "another curve passes");
+        assert!(
+            max_difference(gamma, [0.735_356_98; 3]) > 1e-3,
+            "a different curve passes"
+        );
     }
 
-    /// Checks the formulas of the specification: grays up to 0.08 become x² / 0.16, and grays from 0.08 to 0.8 are
-    /// reduced by 0.04. Primaries up to 0.76 are unchanged. For brighter colors, the peak becomes 1 - 0.0576 / (x -
+    /// Checks the formulas of the specification: grays x up to 0.08 become x² / 0.16, and grays from 0.08 to 0.8 are
+    /// reduced by 0.04. Primaries up to 0.76 are unchanged. For brighter colors, a peak x becomes 1 - 0.0576 / (x -
     /// 0.52), and the other channels move towards the peak.
     #[test]
     fn pbr_neutral_matches_the_specification() {
@@ -325,14 +329,17 @@ mod tests {
             ([2.04, 2.04, 2.04], [0.961_081_1; 3]),
         ] {
             let (found, expected) = (neutral.display(light), srgb.display(linear));
-            assert!(apart(found, expected) < 1e-6, "{light:?}: {found:?}, {expected:?}");
+            assert!(
+                max_difference(found, expected) < 1e-6,
+                "{light:?}: {found:?}, {expected:?}"
+            );
         }
         // x = 2 has a peak of 2, which is displayed as p = 1 - 0.0576 / 1.48. The weight of white is 1 - 1 / (0.15 (2 -
         // p) + 1).
         let peak = 1.0 - 0.0576 / 1.48;
         let white = 1.0 - 1.0 / (0.15 * (2.0 - peak) + 1.0);
         let expected = srgb.display([peak as f32, (peak * white) as f32, (peak * white) as f32]);
-        assert!(apart(neutral.display([2.0, 0.0, 0.0]), expected) < 1e-6);
+        assert!(max_difference(neutral.display([2.0, 0.0, 0.0]), expected) < 1e-6);
     }
 
     #[test]
@@ -343,8 +350,8 @@ mod tests {
             let shown = |light: [f64; 3]| view.display(light.map(|x| x as f32));
             for color in [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 1.0, 0.0]] {
                 let found = distance(shown(view.light_of(color)), color);
-                for other in [color.map(srgb_to_linear), solution(transform, color)] {
-                    assert!(found < distance(shown(other), color), "{transform:?} {color:?}");
+                for candidate in [color.map(srgb_to_linear), solution(transform, color)] {
+                    assert!(found < distance(shown(candidate), color), "{transform:?} {color:?}");
                 }
             }
         }
@@ -385,15 +392,21 @@ mod tests {
             ([0.3, 2.5, 40.0], [0.899_475, 0.936_018, 1.0], [0.8941, 0.9365, 1.0]),
         ] {
             let found = agx.display(light);
-            assert!(apart(found, formula) < 2e-5, "{light:?}: {found:?}, {formula:?}");
-            assert!(apart(found, blender) < 0.015, "{light:?}: {found:?}, {blender:?}");
+            assert!(
+                max_difference(found, formula) < 2e-5,
+                "{light:?}: {found:?}, {formula:?}"
+            );
+            assert!(
+                max_difference(found, blender) < 0.015,
+                "{light:?}: {found:?}, {blender:?}"
+            );
         }
-        let grey = agx.display([0.18; 3]);
+        let gray = agx.display([0.18; 3]);
         assert!(
-            apart(grey, view(ViewTransform::Srgb).display([0.18; 3])) < 2e-4,
+            max_difference(gray, view(ViewTransform::Srgb).display([0.18; 3])) < 2e-4,
             "middle gray changes"
         );
-        assert!(apart(agx.display([1.0; 3]), view(ViewTransform::Srgb).display([1.0; 3])) > 0.2);
+        assert!(max_difference(agx.display([1.0; 3]), view(ViewTransform::Srgb).display([1.0; 3])) > 0.2);
     }
 
     #[test]
@@ -406,21 +419,21 @@ mod tests {
             };
             assert_eq!(brighter.display(light), view(transform).display(light.map(|x| 2.0 * x)));
             assert_ne!(brighter.display(light), view(transform).display(light));
-            let share = brighter.display_share(light);
+            let albedo = brighter.display_share(light);
             assert_eq!(
-                share,
+                albedo,
                 view(transform).display_share(light),
                 "the exposure changes an albedo"
             );
         }
-        for (stops, fits) in [
+        for (stops, is_valid) in [
             (100.0, true),
             (-100.0, true),
             (100.5, false),
             (f64::NAN, false),
             (f64::INFINITY, false),
         ] {
-            assert_eq!(ViewSettings::check_exposure(stops).is_ok(), fits, "{stops}");
+            assert_eq!(ViewSettings::check_exposure(stops).is_ok(), is_valid, "{stops}");
         }
     }
 
@@ -445,7 +458,7 @@ mod tests {
                 for (r, g, b) in values
                     .iter()
                     .flat_map(|r| values.map(move |g| (*r, g, values)))
-                    .flat_map(|(r, g, all)| all.map(|b| (r, g, b)))
+                    .flat_map(|(r, g, values)| values.map(|b| (r, g, b)))
                 {
                     let shown = settings.display([r, g, b]);
                     assert!(

@@ -16,21 +16,21 @@ use wgray_image::Region;
 /// - [`begin`](Backend::begin) creates an empty film. [`resume`](Backend::resume) continues one, possibly from another
 ///   backend. Both replace the current film.
 /// - A film covers a region of the image, which may be empty.
-/// - A film has the scene's [layout](FilmLayout): with adaptive sampling also moments and pilot statistics, and layers
-///   if requested ([`Packed::with_layers`]). Layers do not change the bits of other lists.
-/// - [`film`](Backend::film) copies the film, unless a dispatch is pending.
+/// - A film has the scene's [layout](FilmLayout): sums; with adaptive sampling, also moments and pilot statistics; if
+///   requested, layers ([`Packed::with_layers`]). Layers do not change the bits of other lists.
+/// - [`film`](Backend::film) returns a copy of the film. It fails while a dispatch is pending.
 ///
 /// # Dispatches
 ///
 /// - [`submit`](Backend::submit) starts a dispatch, which adds samples to the pixels of a tile. At most one dispatch is
 ///   pending, until [`poll`](Backend::poll) returns true or [`wait`](Backend::wait) returns.
 ///   [`render`](Backend::render) submits and waits.
-/// - `submit` and `poll` never wait for a device. A backend without a device does the work inside `poll` or `wait`.
-/// - With nothing pending, `poll` returns true and `wait` returns immediately.
-/// - The film's bits are the same for every partition of the work into tiles and ranges, provided that every pixel gets
-///   each sample once, in ascending order.
+/// - `submit` and `poll` never wait for a device. A backend without a device computes the samples in `poll` or `wait`.
+/// - If no dispatch is pending, `poll` returns true and `wait` returns immediately.
+/// - Every partition of a render into tiles and sample ranges gives a film with the same bits, provided that every
+///   pixel gets each sample once, in ascending order.
 /// - With adaptive sampling, all pixels get their first [`samples_of_all`](Backend::samples_of_all) samples before any
-///   pixel gets further samples. For the last tile that lacks pilot samples, one range may contain both.
+///   pixel gets further samples. The dispatch that completes the pilot samples may add further samples to its tile.
 /// - An empty tile or an empty range of samples changes nothing, regardless of its position.
 ///
 /// # First hits
@@ -47,7 +47,7 @@ use wgray_image::Region;
 /// - [`RenderError::FilmMismatch`]: `resume` with a film whose layout differs from the scene's;
 /// - [`RenderError::PilotIncomplete`]: further samples before all pixels of the film have their pilot samples.
 ///
-/// All other errors come from the device. After such an error, nothing is pending and no film exists; `begin` and
+/// All other errors come from the device. After such an error, no dispatch is pending and no film exists; `begin` and
 /// `resume` may still succeed.
 pub trait Backend {
     /// Creates an empty film of a region of the image.
@@ -59,10 +59,10 @@ pub trait Backend {
     /// Starts to add a range of samples to the pixels of a tile.
     fn submit(&mut self, tile: Region, samples: Range<u32>) -> Result<(), RenderError>;
 
-    /// Returns true if nothing is pending. Completes a finished dispatch, or submits its next step.
+    /// Returns true if no dispatch is pending. Completes a finished dispatch, or submits its next part.
     fn poll(&mut self) -> Result<bool, RenderError>;
 
-    /// Waits until nothing is pending.
+    /// Waits until no dispatch is pending.
     fn wait(&mut self) -> Result<(), RenderError>;
 
     /// Adds samples to the pixels of a tile, and waits.
@@ -78,11 +78,11 @@ pub trait Backend {
     /// available; [`job::first_hits`](crate::job::first_hits) splits a large region.
     fn first_hits(&mut self, region: Region) -> Result<Vec<FirstHit>, RenderError>;
 
-    /// Returns the maximum size of a film in pixels, such that [`around`](Backend::around) fits too.
+    /// Returns the maximum number of pixels of a region whose film fits, including the pixels that
+    /// [`around`](Backend::around) adds.
     fn largest_film(&self) -> u64;
 
-    /// Returns the number of pilot samples, which determine the number of further samples; `u32::MAX` without adaptive
-    /// sampling.
+    /// Returns the number of samples that every pixel gets: the pilot samples with adaptive sampling, else `u32::MAX`.
     fn samples_of_all(&self) -> u32;
 
     /// Returns the pixels that determine the sample counts of a region: the region, and with adaptive sampling also its
@@ -103,7 +103,7 @@ pub(crate) struct Rules {
 pub(crate) struct FilmState {
     pub region: Region,
     /// Pilot samples so far, over all pixels.
-    first_samples: u64,
+    pilot_total: u64,
 }
 
 impl Rules {
@@ -149,43 +149,40 @@ impl Rules {
     }
 
     pub fn in_picture(&self, region: Region) -> Result<(), RenderError> {
-        inside("region", region, "picture", self.picture)
+        inside("region", region, "image", self.picture)
     }
 
     pub fn begin(&self, region: Region) -> Result<FilmState, RenderError> {
         self.in_picture(region)?;
-        Ok(FilmState {
-            region,
-            first_samples: 0,
-        })
+        Ok(FilmState { region, pilot_total: 0 })
     }
 
     pub fn resume(&self, film: &Film) -> Result<FilmState, RenderError> {
         self.in_picture(film.region)?;
         let pixels = film.region.pixels();
-        let of = |there: bool| if there { pixels } else { 0 };
+        let length_if = |exists: bool| if exists { pixels } else { 0 };
         let FilmLayout { adaptive, layers } = self.film_layout;
-        let with = |there: bool| if there { "with" } else { "without" };
-        let sampling = format!("a scene {} adaptive sampling", with(adaptive));
-        let asked = format!("a scene {} layers", with(layers));
-        let known = [
+        let with_or_without = |exists: bool| if exists { "with" } else { "without" };
+        let sampling = format!("a scene {} adaptive sampling", with_or_without(adaptive));
+        let layering = format!("a scene {} layers", with_or_without(layers));
+        let first_lists = [
             ("sums", pixels, &sampling),
-            ("moments", of(adaptive), &sampling),
-            ("pilot samples", of(adaptive), &sampling),
+            ("moments", length_if(adaptive), &sampling),
+            ("pilot statistics", length_if(adaptive), &sampling),
         ];
-        let of_layers = std::iter::repeat(("pixels of a layer", of(layers), &asked));
-        for (list, (what, wanted, scene)) in film.lists().zip(known.into_iter().chain(of_layers)) {
+        let layer_lists = std::iter::repeat(("pixels of a layer", length_if(layers), &layering));
+        for (list, (name, expected, scene)) in film.lists().zip(first_lists.into_iter().chain(layer_lists)) {
             let found = list.len() as u64;
-            if found != wanted {
+            if found != expected {
                 return Err(RenderError::FilmMismatch(format!(
-                    "{found} {what} for {pixels} pixels; {scene} has {wanted}"
+                    "{name}: found {found}, expected {expected} for {scene}"
                 )));
             }
         }
-        let first = |count: u32| u64::from(count.min(self.pilot_samples));
+        let pilot_count = |count: u32| u64::from(count.min(self.pilot_samples));
         Ok(FilmState {
             region: film.region,
-            first_samples: film.sample_counts().map(first).sum(),
+            pilot_total: film.sample_counts().map(pilot_count).sum(),
         })
     }
 
@@ -196,20 +193,20 @@ impl Rules {
         }
         inside("tile", tile, "film", film.region)?;
         if self.film_layout.adaptive {
-            let first = samples.end.min(self.pilot_samples).saturating_sub(samples.start);
-            let done = film.first_samples + tile.pixels() * u64::from(first);
-            if samples.end > self.pilot_samples && done < film.region.pixels() * u64::from(self.pilot_samples) {
+            let added = samples.end.min(self.pilot_samples).saturating_sub(samples.start);
+            let pilot_total = film.pilot_total + tile.pixels() * u64::from(added);
+            if samples.end > self.pilot_samples && pilot_total < film.region.pixels() * u64::from(self.pilot_samples) {
                 return Err(RenderError::PilotIncomplete {
                     samples: samples.clone(),
                     first: self.pilot_samples,
                 });
             }
-            film.first_samples = done;
+            film.pilot_total = pilot_total;
         }
         Ok(true)
     }
 
-    /// Returns the end of the samples that one kernel can process: either pilot samples or further ones.
+    /// Returns the end of the samples that one execution of a kernel can add: either pilot samples or further samples.
     pub fn end_of_part(&self, samples: &Range<u32>) -> u32 {
         match self.film_layout.adaptive && samples.start < self.pilot_samples {
             true => samples.end.min(self.pilot_samples),
@@ -218,14 +215,14 @@ impl Rules {
     }
 }
 
-fn inside(what: &'static str, region: Region, of: &'static str, limits: Region) -> Result<(), RenderError> {
+fn inside(name: &'static str, region: Region, container: &'static str, limits: Region) -> Result<(), RenderError> {
     if region.is_empty() || (!limits.is_empty() && region.within(limits) == region) {
         return Ok(());
     }
     Err(RenderError::Outside {
-        what,
+        what: name,
         region,
-        of,
+        of: container,
         limits,
     })
 }

@@ -12,27 +12,27 @@ use wgray_image::Region;
 pub struct ShaderError {
     /// Source file, line and column, such as `camera.wgsl:12:9`, or the failed stage.
     pub place: String,
-    /// The message.
+    /// The rule that the shader violates, without the location.
     pub message: String,
-    /// The marked source line and its neighbors, if known.
+    /// The source line with marks below the error, if known.
     pub excerpt: Option<String>,
 }
 
-/// All errors of the shaders; at least one.
+/// All errors found in the shaders, at least one.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 pub struct ShaderErrors(pub Vec<ShaderError>);
 
 impl fmt::Display for ShaderErrors {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for (i, error) in self.0.iter().enumerate() {
-            let line = if i == 0 { "" } else { "\n" };
-            write!(f, "{line}{error}")?;
+            let separator = if i == 0 { "" } else { "\n" };
+            write!(f, "{separator}{error}")?;
         }
         Ok(())
     }
 }
 
-/// Why an image could not be rendered.
+/// An error that stops a render.
 #[derive(Debug, Error)]
 pub enum RenderError {
     /// No device matches the request.
@@ -49,8 +49,8 @@ pub enum RenderError {
         /// The driver's message.
         message: String,
     },
-    /// The device was lost with all of its memory, for example because its driver was reset. Another device may be
-    /// opened.
+    /// The device and its memory were lost, for example because the driver was reset. The caller can open a device
+    /// again.
     #[error("{device}: the device was lost: {message}")]
     Lost {
         /// The adapter's name.
@@ -63,7 +63,7 @@ pub enum RenderError {
     OutOfMemory {
         /// The adapter's name.
         device: String,
-        /// The failed allocation and the memory in use, once known.
+        /// The failed allocation and the memory in use, if known.
         message: Option<String>,
     },
     /// The driver ends long loops early, even for a single sample of a pixel.
@@ -84,30 +84,30 @@ pub enum RenderError {
         message: String,
     },
     /// A method that needs a film was called before a film existed.
-    #[error("no film; begin or resume one first")]
+    #[error("no film exists; begin or resume a film first")]
     NoFilm,
     /// A method was called while a dispatch was pending.
-    #[error("a call is pending; wait for it, or poll until it is done")]
+    #[error("a dispatch is pending; call wait, or poll until poll returns true")]
     Pending,
     /// A region extends outside of the film or the image.
     #[error("the {what} x0,y0,x1,y1 = {region} must lie within the {of} {limits}")]
     Outside {
         /// Name of the region.
         what: &'static str,
-        /// Its pixels.
+        /// Pixels of the region.
         region: Region,
-        /// Name of the region that must contain it.
+        /// Name of the containing region.
         of: &'static str,
-        /// Its pixels.
+        /// Pixels of the containing region.
         limits: Region,
     },
     /// The film cannot be resumed for this scene.
     #[error("the film does not fit the scene: {0}")]
     FilmMismatch(String),
     /// With adaptive sampling, further samples were requested before every pixel had its pilot samples, which determine
-    /// the number of samples needed.
+    /// the sample counts.
     #[error(
-        "samples {} to {} come too early: some pixels of the film do not have their first {first} yet",
+        "samples {} to {} were requested too early: some pixels of the film lack some of their first {first} samples",
         samples.start, samples.end
     )]
     PilotIncomplete {
@@ -117,15 +117,15 @@ pub enum RenderError {
         first: u32,
     },
     /// An image of this size in bytes does not fit into memory.
-    #[error("an image in memory needs {} MiB, which are not available; render a crop", .0 >> 20)]
+    #[error("not enough memory: the image needs {} MiB; render a crop", .0 >> 20)]
     Memory(u64),
     /// A checkpoint or part cannot be read.
     #[error("{0}")]
     Input(std::io::Error),
-    /// The work was cancelled.
+    /// The caller cancelled the render.
     #[error("cancelled")]
     Cancelled,
-    /// The output failed.
+    /// The output could not be written.
     #[error(transparent)]
     Output(#[from] std::io::Error),
 }

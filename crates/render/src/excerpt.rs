@@ -2,9 +2,10 @@
 
 /// Prefix of the lines of an excerpt that have no line number.
 pub const NO_NUMBER: &str = "      |";
+/// Maximum width of a printed line, in characters.
 const WIDTH: usize = 160;
-/// Number of characters before the marked location in a truncated line.
-const BEFORE: usize = 60;
+/// Number of characters before the marks in a truncated line.
+const CONTEXT: usize = 60;
 
 /// Returns a line with its line number, which counts from 1. Truncates a long line.
 pub fn numbered(number: usize, line: &str) -> String {
@@ -14,26 +15,26 @@ pub fn numbered(number: usize, line: &str) -> String {
 
 /// Returns a numbered line with marks below `length` characters from `start`. Truncates a long line around the marks.
 pub fn marked(number: usize, line: &str, start: usize, length: usize) -> String {
-    let (part, at) = window(line, start);
-    let room = part.chars().count().saturating_sub(at).max(1);
-    let (indent, marks) = (" ".repeat(at), "^".repeat(length.clamp(1, room)));
+    let (part, mark) = window(line, start);
+    let available = part.chars().count().saturating_sub(mark).max(1);
+    let (indent, marks) = (" ".repeat(mark), "^".repeat(length.clamp(1, available)));
     format!("{number:>5} | {part}\n{NO_NUMBER} {indent}{marks}")
 }
 
-/// Returns the printed part of a line, and the position of `place` in it.
-fn window(line: &str, place: usize) -> (String, usize) {
+/// Returns the printed part of a line, and `position` relative to the start of this part.
+fn window(line: &str, position: usize) -> (String, usize) {
     let count = line.chars().count();
-    let place = place.min(count);
-    let first = place.saturating_sub(BEFORE).min(count.saturating_sub(WIDTH));
-    let one_wide = |c: char| if c.is_control() { ' ' } else { c };
-    let mut part: Vec<char> = line.chars().skip(first).take(WIDTH).map(one_wide).collect();
+    let position = position.min(count);
+    let first = position.saturating_sub(CONTEXT).min(count.saturating_sub(WIDTH));
+    let blank_control = |c: char| if c.is_control() { ' ' } else { c };
+    let mut part: Vec<char> = line.chars().skip(first).take(WIDTH).map(blank_control).collect();
     if first > 0 {
         part[0] = '…';
     }
     if first + WIDTH < count {
         part[WIDTH - 1] = '…';
     }
-    (part.into_iter().collect(), place - first)
+    (part.into_iter().collect(), position - first)
 }
 
 #[cfg(test)]
@@ -67,19 +68,19 @@ mod tests {
     #[test]
     fn long_lines_are_truncated_around_the_marks() {
         let line: String = (0..5000).map(|i| char::from(b'a' + (i % 26) as u8)).collect();
-        for place in [
+        for position in [
             0, 1, 59, 60, 61, 100, 158, 159, 160, 2500, 4838, 4839, 4840, 4998, 4999, 5000,
         ] {
-            let excerpt = marked(1, &line, place, 3);
-            let (shown, marks) = excerpt.split_once('\n').unwrap();
-            let (shown, marks) = (&shown["    1 | ".len()..], &marks[NO_NUMBER.len() + 1..]);
-            assert_eq!(shown.chars().count(), WIDTH);
+            let excerpt = marked(1, &line, position, 3);
+            let (printed, marks) = excerpt.split_once('\n').unwrap();
+            let (printed, marks) = (&printed["    1 | ".len()..], &marks[NO_NUMBER.len() + 1..]);
+            assert_eq!(printed.chars().count(), WIDTH);
             assert!(marks.chars().count() <= WIDTH + 1);
-            let at = marks.find('^').unwrap();
-            let marked = shown.chars().nth(at);
-            assert_eq!(marked, line.chars().nth(place), "{place}: {excerpt}");
-            assert_eq!(shown.starts_with('…'), place > BEFORE, "{place}");
-            assert_eq!(shown.ends_with('…'), place < 5000 - WIDTH + BEFORE, "{place}");
+            let mark = marks.find('^').unwrap();
+            let marked = printed.chars().nth(mark);
+            assert_eq!(marked, line.chars().nth(position), "{position}: {excerpt}");
+            assert_eq!(printed.starts_with('…'), position > CONTEXT, "{position}");
+            assert_eq!(printed.ends_with('…'), position < 5000 - WIDTH + CONTEXT, "{position}");
         }
     }
 }

@@ -26,10 +26,10 @@ impl FilmLayout {
     }
 }
 
-/// The path integrator's sums besides the radiance.
+/// A sum that the path integrator accumulates in addition to the radiance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Layer {
-    /// Emitted radiance; a: fraction of samples that hit anything.
+    /// Emitted radiance; a: sum of the weights of samples that hit anything.
     Emission,
     /// Radiance scattered once.
     Direct,
@@ -84,7 +84,7 @@ impl Film {
 
     /// Returns an empty film.
     pub fn of(region: Region, film_layout: FilmLayout) -> Film {
-        let list = |there: bool| match there {
+        let list = |exists: bool| match exists {
             true => vec![Vec4::zeroed(); region.pixels() as usize],
             false => Vec::new(),
         };
@@ -130,23 +130,23 @@ impl Film {
     }
 
     /// Returns the part of the film in a region, which must lie inside the film.
-    pub fn part(self, part: Region) -> Film {
-        if part == self.region {
+    pub fn part(self, region: Region) -> Film {
+        if region == self.region {
             return self;
         }
         let width = self.region.width() as usize;
-        let columns = (part.x0 - self.region.x0) as usize..(part.x1 - self.region.x0) as usize;
-        let rows = (part.y0 - self.region.y0) as usize..(part.y1 - self.region.y0) as usize;
-        let of_part = |records: &[Vec4]| {
-            let of_rows = records.chunks(width.max(1)).take(rows.end).skip(rows.start);
-            of_rows.flat_map(|row| row[columns.clone()].to_vec()).collect()
+        let columns = (region.x0 - self.region.x0) as usize..(region.x1 - self.region.x0) as usize;
+        let rows = (region.y0 - self.region.y0) as usize..(region.y1 - self.region.y0) as usize;
+        let crop = |records: &[Vec4]| {
+            let rows = records.chunks(width.max(1)).take(rows.end).skip(rows.start);
+            rows.flat_map(|row| row[columns.clone()].to_vec()).collect()
         };
         Film {
-            region: part,
-            sums: of_part(&self.sums),
-            moments: of_part(&self.moments),
-            pilot_sums: of_part(&self.pilot_sums),
-            layers: self.layers.each_ref().map(|list| of_part(list)),
+            region,
+            sums: crop(&self.sums),
+            moments: crop(&self.moments),
+            pilot_sums: crop(&self.pilot_sums),
+            layers: self.layers.each_ref().map(|list| crop(list)),
         }
     }
 
@@ -161,8 +161,8 @@ impl Film {
     }
 
     /// Returns the estimated variance of a pixel's mean per channel. Requires adaptive sampling. The estimate assumes
-    /// independent samples; for stratified patterns it is, on average, an upper bound. It does not determine the
-    /// pixel's own number of samples, which depends on its neighbors.
+    /// independent samples; for stratified patterns it is, on average, an upper bound. A pixel's number of samples
+    /// depends on the variance of its neighbors, not on its own.
     pub fn variance(&self, pixel: usize) -> [f32; 3] {
         variance_of_mean(self.sums[pixel], self.moments[pixel]).to_array()
     }
@@ -172,20 +172,20 @@ impl Film {
         self.layers.iter().all(|list| !list.is_empty())
     }
 
-    /// Returns a layer's mean over a pixel's samples; 0 if the pixel has no samples or the film no layers.
+    /// Returns a layer's mean over a pixel's samples; 0 if the pixel has no samples or the film has no layers.
     pub fn layer(&self, layer: Layer, pixel: usize) -> [f32; 3] {
         let sum = self.layers[layer as usize].get(pixel).copied().unwrap_or_default();
         mean(sum.xyz().extend(self.sums[pixel].w))
     }
 
     /// Returns the fraction of a pixel's samples that hit anything; 0 if the pixel has no samples, 1 if the film has no
-    /// layers. Filters with negative weights can move the fraction out of 0 to 1.
+    /// layers. With filters that have negative weights, the fraction can be negative or greater than 1.
     pub fn alpha(&self, pixel: usize) -> f32 {
-        let all = self.sums[pixel].w;
+        let weight = self.sums[pixel].w;
         match self.layers[Layer::Emission as usize].get(pixel) {
             None => 1.0,
-            Some(_) if all == 0.0 => 0.0,
-            Some(sum) => sum.w / all,
+            Some(_) if weight == 0.0 => 0.0,
+            Some(sum) => sum.w / weight,
         }
     }
 

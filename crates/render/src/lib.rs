@@ -1,5 +1,5 @@
-//! The renderer of wgray: scenes are packed into plain records, which a CPU path and WGSL kernels on a GPU turn into
-//! the same bits.
+//! The renderer of wgray. Scenes are packed into plain records, from which the CPU renderer and the WGSL kernels
+//! compute the same bits.
 
 pub mod backend;
 pub mod bvh;

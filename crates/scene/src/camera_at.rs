@@ -14,13 +14,13 @@ impl CameraPath {
 }
 
 impl Scene {
-    /// Returns the camera at a frame; [`Scene::camera`] if it is not animated. Frames may be fractional, and may lie
-    /// outside of the path.
+    /// Returns the camera at a frame; [`Scene::camera`] if the camera is not animated. Frames may be fractional, and
+    /// may lie outside of the path.
     ///
     /// # Errors
     ///
-    /// The camera has no valid view, for example because its path passes through the target point, or the frame is not
-    /// finite.
+    /// The camera has no valid view, for example because the camera path passes through the target point; or the
+    /// frame is not finite.
     pub fn camera_at(&self, frame: f64) -> Result<Camera, SceneError> {
         let Some(path) = &self.camera_path else {
             return Ok(self.camera);
@@ -31,7 +31,7 @@ impl Scene {
                 format!("{frame} must be finite"),
             )));
         }
-        path.at(frame).map_err(|problem| match &path.place {
+        path.at(frame).map_err(|problem| match &path.location {
             Some((origin, line)) => SceneError::Invalid {
                 origin: origin.clone(),
                 line: *line,

@@ -8,8 +8,8 @@ use super::{CameraDescription, CameraKeyDescription, Interpolation};
 /// The path of a scene's camera.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CameraPath {
-    /// The camera; provides the values that have no keys.
-    still: CameraDescription,
+    /// The camera without its path, for values that have no keys.
+    base: CameraDescription,
     interpolation: Interpolation,
     position: Vec<Key<DVec3>>,
     look_at: Vec<Key<DVec3>>,
@@ -19,7 +19,8 @@ pub struct CameraPath {
     aperture: Vec<Key<f64>>,
     focus_distance: Vec<Key<f64>>,
     frames: (f64, f64),
-    pub(crate) place: Option<(String, usize)>,
+    /// The name of the scene file, and the line of the path.
+    pub(crate) location: Option<(String, usize)>,
 }
 
 impl CameraPath {
@@ -33,7 +34,7 @@ impl CameraPath {
             CameraDescription::Panorama(_) => None,
         };
         Some(CameraPath {
-            still: camera.clone().with_path(None),
+            base: camera.clone().with_path(None),
             interpolation: path.interpolation,
             position: keys(&path.keys, |key| key.position),
             look_at: keys(&path.keys, |key| key.look_at),
@@ -42,7 +43,7 @@ impl CameraPath {
             aperture: keys(&path.keys, |key| key.aperture),
             focus_distance: keys(&path.keys, |key| key.focus_distance),
             frames: (first.frame, last.frame),
-            place: None,
+            location: None,
         })
     }
 
@@ -51,25 +52,25 @@ impl CameraPath {
         self.frames
     }
 
-    pub(super) fn set_place(&mut self, origin: &str, line: usize) {
-        self.place = Some((origin.to_owned(), line));
+    pub(super) fn set_location(&mut self, origin: &str, line: usize) {
+        self.location = Some((origin.to_owned(), line));
     }
 
     /// Returns the camera at a frame without validating it.
     pub(crate) fn description(&self, frame: f64) -> CameraDescription {
-        let mut camera = self.still.clone();
-        let at = |keys: &[Key<f64>]| value(keys, frame, self.interpolation);
+        let mut camera = self.base.clone();
+        let interpolate = |keys: &[Key<f64>]| value(keys, frame, self.interpolation);
         let (position, look_at, up) = match &mut camera {
             CameraDescription::Perspective(c) => {
-                c.fov = at(&self.extent).unwrap_or(c.fov);
-                if let Some(aperture) = at(&self.aperture) {
+                c.fov = interpolate(&self.extent).unwrap_or(c.fov);
+                if let Some(aperture) = interpolate(&self.aperture) {
                     (c.aperture, c.f_number) = (Some(aperture), None); // either key sets the lens diameter
                 }
-                c.focus_distance = at(&self.focus_distance).or(c.focus_distance);
+                c.focus_distance = interpolate(&self.focus_distance).or(c.focus_distance);
                 (&mut c.position, &mut c.look_at, &mut c.up)
             }
             CameraDescription::Orthographic(c) => {
-                c.height = at(&self.extent).unwrap_or(c.height);
+                c.height = interpolate(&self.extent).unwrap_or(c.height);
                 (&mut c.position, &mut c.look_at, &mut c.up)
             }
             CameraDescription::Panorama(c) => (&mut c.position, &mut c.look_at, &mut c.up),
@@ -82,6 +83,6 @@ impl CameraPath {
 }
 
 fn keys<T>(keys: &[CameraKeyDescription], value: impl Fn(&CameraKeyDescription) -> Option<T>) -> Vec<Key<T>> {
-    let of = |key: &CameraKeyDescription| Some((key.frame, value(key)?));
-    keys.iter().filter_map(of).collect()
+    let frame_and_value = |key: &CameraKeyDescription| Some((key.frame, value(key)?));
+    keys.iter().filter_map(frame_and_value).collect()
 }

@@ -20,8 +20,8 @@ use super::{
     SamplesDescription, Scale, Up, parse,
 };
 
-/// Maximum size of a file in bytes. The parsed values need many times as much memory.
-const LARGEST: usize = 4 << 20;
+/// Maximum size of a file in bytes, small because the parsed values need many times as much memory.
+const MAX_FILE_BYTES: usize = 4 << 20;
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -95,23 +95,24 @@ pub fn asset_root(folder: &Path) -> PathBuf {
         true => Path::new("."),
         false => folder,
     };
-    let whole = folder.canonicalize().ok();
-    let parent = whole.as_deref().and_then(Path::parent);
+    let canonical = folder.canonicalize().ok();
+    let parent = canonical.as_deref().and_then(Path::parent);
     parent.map_or_else(|| folder.join(".."), Path::to_owned)
 }
 
 pub fn read(text: &str, origin: &str, defines: &mut Defines) -> Result<Description, SceneError> {
-    let course = read_json(text, defines).map_err(|broken| match broken {
+    let course = read_json(text, defines).map_err(|fault| match fault {
         ReadFault::Values(problems) => {
-            let error = |at, problem: Problem| syntax_error(origin, place(text, at), problem.to_string());
-            match problems.of_define(defines) {
+            let error =
+                |offset, problem: Problem| syntax_error(origin, line_and_column(text, offset), problem.to_string());
+            match problems.define_error(defines) {
                 Some(error) => error,
-                None => problems.into_error(|problem| begin(text, &problem.key), error),
+                None => problems.into_error(|problem| value_offset(text, &problem.key), error),
             }
         }
         ReadFault::Text(error, key) => text_error(text, origin, error, key),
         ReadFault::Large => {
-            let rule = format!("a JSON scene must not be larger than {} MiB", LARGEST >> 20);
+            let rule = format!("a JSON scene must not be larger than {} MiB", MAX_FILE_BYTES >> 20);
             syntax_error(origin, (1, 1), rule)
         }
     })?;
@@ -127,15 +128,15 @@ pub fn invalid(text: &str, origin: &str, problems: Problems, defines: &Defines) 
         message: problem.message.replace("\"conductor\"", "\"specular\""),
         ..problem
     });
-    if let Some(error) = problems.of_define(defines) {
+    if let Some(error) = problems.define_error(defines) {
         return error;
     }
-    let invalid = |at: usize, problem: Problem| SceneError::Invalid {
+    let error = |offset: usize, problem: Problem| SceneError::Invalid {
         origin: origin.to_owned(),
-        line: place(text, at).0,
+        line: line_and_column(text, offset).0,
         problem,
     };
-    problems.into_error(|problem| begin(text, &problem.key), invalid)
+    problems.into_error(|problem| value_offset(text, &problem.key), error)
 }
 
 enum ReadFault {
@@ -146,13 +147,15 @@ enum ReadFault {
 }
 
 fn text_error(text: &str, origin: &str, error: serde_json::Error, key: KeyPath) -> SceneError {
-    let (line, bytes) = (error.line().max(1), error.column());
     // serde_json counts columns in bytes.
-    let before = text.lines().nth(line - 1).unwrap_or_default().as_bytes();
-    let before = &before[..bytes.saturating_sub(1).min(before.len())];
-    let column = String::from_utf8_lossy(before).chars().count() + 1;
-    let whole = error.to_string();
-    let message = whole.rsplit_once(" at line ").map_or(&*whole, |(message, _)| message);
+    let (line, byte_column) = (error.line().max(1), error.column());
+    let line_bytes = text.lines().nth(line - 1).unwrap_or_default().as_bytes();
+    let bytes_before = &line_bytes[..byte_column.saturating_sub(1).min(line_bytes.len())];
+    let column = String::from_utf8_lossy(bytes_before).chars().count() + 1;
+    let full_message = error.to_string();
+    let message = full_message
+        .rsplit_once(" at line ")
+        .map_or(&*full_message, |(message, _)| message);
     let message = message
         .replace(", expected any valid TOML value", "")
         .replace('`', "\"")
@@ -177,7 +180,7 @@ fn syntax_error(origin: &str, (line, column): (usize, usize), message: String) -
 }
 
 fn read_json(text: &str, defines: &mut Defines) -> Result<Course, ReadFault> {
-    if text.len() > LARGEST {
+    if text.len() > MAX_FILE_BYTES {
         return Err(ReadFault::Large);
     }
     let mut deserializer = serde_json::Deserializer::from_str(text);
@@ -192,13 +195,13 @@ fn read_json(text: &str, defines: &mut Defines) -> Result<Course, ReadFault> {
         return Err(ReadFault::Values(Problem::new(message).into()));
     };
     defines
-        .put(&[], &mut table, |_| false)
+        .apply(&[], &mut table, |_| false)
         .map_err(|problem| ReadFault::Values(problem.into()))?;
-    let in_json = |problem: Problem| {
-        // The message is written for TOML.
-        let shown = find(text, &problem.key).filter(|value| value.starts_with('{'));
-        let message = match (problem.message.rsplit_once(" must be "), shown) {
-            (Some((_, rule)), Some(shown)) => format!("{} must be {rule}", cut(&one_line(shown))),
+    let in_json_terms = |problem: Problem| {
+        // The message uses the terms of TOML.
+        let object = find(text, &problem.key).filter(|value| value.starts_with('{'));
+        let message = match (problem.message.rsplit_once(" must be "), object) {
+            (Some((_, rule)), Some(object)) => format!("{} must be {rule}", cut(&one_line(object))),
             _ => problem.message,
         };
         let message = message.replace(
@@ -208,7 +211,7 @@ fn read_json(text: &str, defines: &mut Defines) -> Result<Course, ReadFault> {
         let message = message.replace("must be a table", "must be an object");
         Problem { message, ..problem }
     };
-    parse::read_for(table, Integrator::Path).map_err(|problems| ReadFault::Values(problems.map(in_json)))
+    parse::read_for(table, Integrator::Path).map_err(|problems| ReadFault::Values(problems.map(in_json_terms)))
 }
 
 /// Validates the values that the conversion to +Z up changes, so that errors show the numbers of the file.
@@ -220,12 +223,12 @@ fn check(course: &Course) -> Result<(), Problems> {
         objects,
         ..
     } = course;
-    // `validate_frame`, because a vertical view is only allowed for the default `up`, +Z.
-    let mut found = Collector::default();
-    found.values(camera(cam_config).validate_frame().map_err(Problems::from).at("camera"));
-    found.value(light(&self::rectangle(light_config).into()).at(0).at("lights"));
+    // Uses `validate_frame`, because a vertical view is only allowed for the default `up`, +Z.
+    let mut problems = Collector::default();
+    problems.values(camera(cam_config).validate_frame().map_err(Problems::from).at("camera"));
+    problems.value(light(&self::rectangle(light_config).into()).at(0).at("lights"));
     for (i, object) in objects.iter().enumerate() {
-        found.value(point(object.translate).at("translate").at(i).at("shapes"));
+        problems.value(point(object.translate).at("translate").at(i).at("shapes"));
     }
     let mut names = BTreeMap::new();
     for (i, material) in materials.iter().enumerate() {
@@ -234,18 +237,18 @@ fn check(course: &Course) -> Result<(), Problems> {
                 "{:?} is defined twice, first in materials[{first}]",
                 cut(&material.name)
             );
-            found.value(Err::<(), _>(Problem::new(message).at("name").at(i).at("materials")));
+            problems.value(Err::<(), _>(Problem::new(message).at("name").at(i).at("materials")));
         }
     }
-    found.end(())
+    problems.end(())
 }
 
 /// Returns the camera in the coordinates of the file.
 fn camera(camera: &Camera) -> super::CameraDescription {
-    let mut described = PerspectiveDescription::new(camera.position, camera.look_at, camera.vertical_fov);
-    described.up = camera.ref_up;
-    described.focal_length = camera.focal_length;
-    described.into()
+    let mut perspective = PerspectiveDescription::new(camera.position, camera.look_at, camera.vertical_fov);
+    perspective.up = camera.ref_up;
+    perspective.focal_length = camera.focal_length;
+    perspective.into()
 }
 
 /// Returns the light in the coordinates of the file.
@@ -254,7 +257,7 @@ fn rectangle(light: &Light) -> RectangleLightDescription {
 }
 
 /// Converts a vector from +Y up to +Z up, like [`Up::Y`] for meshes.
-fn turned(v: DVec3) -> DVec3 {
+fn to_z_up(v: DVec3) -> DVec3 {
     DVec3::new(v.x, -v.z, v.y)
 }
 
@@ -272,9 +275,9 @@ fn description(course: &Course) -> Description {
         *width,
         *height,
         camera(&Camera {
-            position: turned(cam_config.position),
-            look_at: turned(cam_config.look_at),
-            ref_up: turned(cam_config.ref_up),
+            position: to_z_up(cam_config.position),
+            look_at: to_z_up(cam_config.look_at),
+            ref_up: to_z_up(cam_config.ref_up),
             ..*cam_config
         }),
     )
@@ -285,8 +288,8 @@ fn description(course: &Course) -> Description {
         ..RenderDescription::default()
     })
     .with_light(LightDescription::from(RectangleLightDescription {
-        center: turned(light_config.position),
-        normal: turned(DVec3::NEG_Y),
+        center: to_z_up(light_config.position),
+        normal: to_z_up(DVec3::NEG_Y),
         ..rectangle(light_config)
     }));
     for Material { name, kind, color } in materials {
@@ -300,7 +303,7 @@ fn description(course: &Course) -> Description {
     for object in objects {
         scene = scene.with_shape(MeshDescription {
             up: Up::Y,
-            translate: Some(turned(object.translate)),
+            translate: Some(to_z_up(object.translate)),
             scale: Some(Scale::All(object.scale)),
             ..MeshDescription::new(&object.material_name, &object.obj_file_path)
         });
@@ -308,9 +311,9 @@ fn description(course: &Course) -> Description {
     scene
 }
 
-/// Returns the path in the file for a path in its description.
+/// Converts a key path of the description to the key path in the file.
 fn key_in_file(text: &str, key: &KeyPath, defines: &Defines) -> KeyPath {
-    let renamed = |segment: &Segment| match segment {
+    let in_file = |segment: &Segment| match segment {
         Segment::Key(key) => Segment::from(match key.as_str() {
             "up" => "ref_up",
             "fov" => "vertical_fov",
@@ -334,16 +337,16 @@ fn key_in_file(text: &str, key: &KeyPath, defines: &Defines) -> KeyPath {
         ("render", [Segment::Key(key), ..]) => vec![key.as_str().into()],
         ("camera", rest) => [Segment::from("cam_config")]
             .into_iter()
-            .chain(rest.iter().map(renamed))
+            .chain(rest.iter().map(in_file))
             .collect(),
         ("lights", [_, rest @ ..]) => {
-            let renamed = |segment| match renamed(segment) {
+            let in_light = |segment| match in_file(segment) {
                 Segment::Key(key) if key == "color" => "radiance".into(),
                 other => other,
             };
             [Segment::from("light_config")]
                 .into_iter()
-                .chain(rest.iter().map(renamed))
+                .chain(rest.iter().map(in_light))
                 .collect()
         }
         ("materials", [Segment::Key(name), rest @ ..]) => {
@@ -357,7 +360,7 @@ fn key_in_file(text: &str, key: &KeyPath, defines: &Defines) -> KeyPath {
         }
         ("shapes", rest) => [Segment::from("objects")]
             .into_iter()
-            .chain(rest.iter().map(renamed))
+            .chain(rest.iter().map(in_file))
             .collect(),
         _ => return key.clone(),
     })
@@ -365,8 +368,8 @@ fn key_in_file(text: &str, key: &KeyPath, defines: &Defines) -> KeyPath {
 
 /// Returns the text of the value at a path, or of the innermost existing ancestor.
 fn find<'a>(text: &'a str, path: &KeyPath) -> Option<&'a str> {
-    let whole: &RawValue = serde_json::from_str(text).ok()?;
-    let mut value = whole.get();
+    let root: &RawValue = serde_json::from_str(text).ok()?;
+    let mut value = root.get();
     for segment in &path.0 {
         let inner: Option<&RawValue> = match segment {
             Segment::Key(key) => {
@@ -386,13 +389,14 @@ fn find<'a>(text: &'a str, path: &KeyPath) -> Option<&'a str> {
     Some(value)
 }
 
-fn begin(text: &str, path: &KeyPath) -> usize {
+/// Returns the byte offset of the value that [`find`] returns.
+fn value_offset(text: &str, path: &KeyPath) -> usize {
     find(text, path).map_or(0, |value| value.as_ptr() as usize - text.as_ptr() as usize)
 }
 
 /// Returns the line and column, both counted from 1, of a byte offset.
-fn place(text: &str, at: usize) -> (usize, usize) {
-    let before = text.get(..at).unwrap_or_default();
+fn line_and_column(text: &str, offset: usize) -> (usize, usize) {
+    let before = text.get(..offset).unwrap_or_default();
     let line = before.rsplit('\n').next().unwrap_or_default();
     (before.matches('\n').count() + 1, line.chars().count() + 1)
 }

@@ -1,4 +1,4 @@
-//! Decoder of image files, with limits that are checked against the header before any texel is decoded.
+//! Decoder of image files, whose limits are checked against the header before any texel is decoded.
 
 mod gray_exr;
 
@@ -15,15 +15,15 @@ use super::texture::{Image, Texels};
 
 /// Maximum number of texels along a side.
 pub(super) const MAX_IMAGE_SIDE: u32 = 16_384;
-/// Memory limit of a decoder besides the image, in bytes.
-const BESIDE: usize = 64 << 20;
+/// Memory limit of the PNG decoder in bytes, not counting the image.
+const MAX_DECODER_BYTES: usize = 64 << 20;
 
-/// Limit on the decoded size in bytes: a constant, plus an allowance per byte of the file. A small file may decode to
-/// 16,384 x 16,384 zeros. Decoders need the same amount of memory again.
-const LARGEST: (u64, u64) = (256 << 20, 32);
+/// Limit on the decoded size in bytes: a constant, plus an allowance per byte of the file, because a small file may
+/// declare 16,384 x 16,384 texels. A decoder may need as much memory again.
+const DECODED_LIMIT: (u64, u64) = (256 << 20, 32);
 
-/// Limit in bytes on the texels that an EXR file does not store; increases with the file size like [`LARGEST`].
-const BLANK: u64 = 64 << 20;
+/// Limit in bytes on the texels that an EXR file does not store; increases with the file size like [`DECODED_LIMIT`].
+const BLANK_LIMIT: u64 = 64 << 20;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Format {
@@ -50,21 +50,21 @@ impl Format {
             true => Format::Ktx2,
             false => Format::Image(image::guess_format(bytes).ok()?),
         };
-        let is_supported = FORMATS.iter().any(|(known, _)| *known == format);
+        let is_supported = FORMATS.iter().any(|(supported, _)| *supported == format);
         is_supported.then_some(format)
     }
 
     /// Returns the format that belongs to the extension of a file name, whether or not the format is supported.
     pub fn of_name(file: &str) -> Option<Format> {
-        let ending = Path::new(file).extension()?;
-        match ending.eq_ignore_ascii_case("ktx2") {
+        let extension = Path::new(file).extension()?;
+        match extension.eq_ignore_ascii_case("ktx2") {
             true => Some(Format::Ktx2),
             false => ImageFormat::from_path(file).ok().map(Format::Image),
         }
     }
 
     pub fn name(self) -> &'static str {
-        let found = FORMATS.iter().find(|(known, _)| *known == self);
+        let found = FORMATS.iter().find(|(supported, _)| *supported == self);
         found.map_or("unknown", |(_, name)| name)
     }
 }
@@ -74,7 +74,7 @@ pub(super) struct Header {
     pub width: u32,
     pub height: u32,
     /// True if the values have more than 8 bits.
-    pub is_deep: bool,
+    pub exceeds_8_bits: bool,
 }
 
 impl Header {
@@ -82,7 +82,7 @@ impl Header {
         Header {
             width: image.width,
             height: image.height,
-            is_deep: matches!(image.texels, Texels::Floats(_)),
+            exceeds_8_bits: matches!(image.texels, Texels::Floats(_)),
         }
     }
 }
@@ -149,13 +149,13 @@ pub(super) fn decode(
     if format == ImageFormat::OpenExr
         && let Some(image) = gray_exr(
             bytes,
-            |size, bytes_of_pixel| {
+            |size, bytes_per_pixel| {
                 stored.set(stored.get() + u64::from(size.0) * u64::from(size.1));
-                sides(size).and_then(|()| weigh(bytes, size, bytes_of_pixel))
+                check_sides(size).and_then(|()| check_decoded_size(bytes, size, bytes_per_pixel))
             },
             |header| {
-                check(header, &fits)?;
-                weigh(bytes, (header.width, header.height), 3 * size_of::<f32>() as u64)
+                check_header(header, &fits)?;
+                check_decoded_size(bytes, (header.width, header.height), 3 * size_of::<f32>() as u64)
             },
         )?
     {
@@ -169,96 +169,114 @@ pub(super) fn decode(
     let decoder = reader.into_decoder()?;
     let (width, height) = decoder.dimensions();
     let color = decoder.color_type();
-    let is_deep = color.bytes_per_pixel() > color.channel_count();
-    check(Header { width, height, is_deep }, &fits)?;
-    weigh(bytes, (width, height), color.bytes_per_pixel().into())?;
+    let exceeds_8_bits = color.bytes_per_pixel() > color.channel_count();
+    let header = Header {
+        width,
+        height,
+        exceeds_8_bits,
+    };
+    check_header(header, &fits)?;
+    check_decoded_size(bytes, (width, height), color.bytes_per_pixel().into())?;
     if format == ImageFormat::OpenExr {
-        weigh_blank(bytes, (width, height), stored.get())?;
+        check_blank_size(bytes, (width, height), stored.get())?;
     }
     Ok(DynamicImage::from_decoder(decoder)?)
 }
 
 /// Rejects an image that is too large for the size of its file.
-fn weigh(file: &[u8], (width, height): (u32, u32), bytes_of_texel: u64) -> Result<(), DecodeError> {
-    let bytes = u64::from(width) * u64::from(height) * bytes_of_texel;
+fn check_decoded_size(file: &[u8], (width, height): (u32, u32), bytes_per_texel: u64) -> Result<(), DecodeError> {
+    let bytes = u64::from(width) * u64::from(height) * bytes_per_texel;
     let length = file.len() as u64;
-    let most = LARGEST.0 + length * LARGEST.1;
-    match bytes <= most {
+    let limit = DECODED_LIMIT.0 + length * DECODED_LIMIT.1;
+    match bytes <= limit {
         true => Ok(()),
         false => Err(DecodeError::Large(format!(
-            "has {width} x {height} texels and needs {bytes} bytes; the limit for a file of {length} bytes is {most} bytes"
+            "has {width} x {height} texels and needs {bytes} bytes; the limit for a file of {length} bytes is {limit} bytes"
         ))),
     }
 }
 
 /// Rejects an EXR file with too many texels that are not stored.
-fn weigh_blank(file: &[u8], (width, height): (u32, u32), stored: u64) -> Result<(), DecodeError> {
+fn check_blank_size(file: &[u8], (width, height): (u32, u32), stored: u64) -> Result<(), DecodeError> {
     let blank = (u64::from(width) * u64::from(height)).saturating_sub(stored);
     let (bytes, length) = (blank * 3 * size_of::<f32>() as u64, file.len() as u64);
-    let most = BLANK + length * LARGEST.1;
-    match bytes <= most {
+    let limit = BLANK_LIMIT + length * DECODED_LIMIT.1;
+    match bytes <= limit {
         true => Ok(()),
         false => Err(DecodeError::Large(format!(
-            "declares {width} x {height} texels and stores {stored}; the rest needs {bytes} bytes; the limit for a file of {length} bytes is {most} bytes"
+            "declares {width} x {height} texels and stores {stored}; the missing texels need {bytes} bytes; the limit for a file of {length} bytes is {limit} bytes"
         ))),
     }
 }
 
-fn sides((width, height): (u32, u32)) -> Result<(), DecodeError> {
+fn check_sides((width, height): (u32, u32)) -> Result<(), DecodeError> {
     match width.max(height) <= MAX_IMAGE_SIDE {
         true => Ok(()),
         false => Err(LimitErrorKind::DimensionError.into_error().into()),
     }
 }
 
-fn check(header: Header, fits: impl Fn(Header) -> Result<(), String>) -> Result<(), DecodeError> {
-    sides((header.width, header.height))?;
+fn check_header(header: Header, fits: impl Fn(Header) -> Result<(), String>) -> Result<(), DecodeError> {
+    check_sides((header.width, header.height))?;
     fits(header).map_err(DecodeError::Rule)
 }
 
 fn decode_ktx2(bytes: &[u8], fits: impl Fn(Header) -> Result<(), String>) -> Result<DynamicImage, DecodeError> {
     let file = Ktx2::parse(bytes).map_err(DecodeError::Damaged)?;
     let (width, height) = (file.width, file.height);
-    let is_deep = false;
-    check(Header { width, height, is_deep }, fits)?;
-    weigh(bytes, (width, height), 4)?;
+    let header = Header {
+        width,
+        height,
+        exceeds_8_bits: false,
+    };
+    check_header(header, fits)?;
+    check_decoded_size(bytes, (width, height), 4)?;
     file.decode().map_err(DecodeError::Damaged)
 }
 
-/// Uses the PNG crate directly, because it can skip color profiles and texts, whose decompressed size is unknown.
+/// Uses the crate `png` directly, because it can skip color profiles and texts, whose decompressed size is unknown.
 fn decode_png(bytes: &[u8], fits: impl Fn(Header) -> Result<(), String>) -> Result<DynamicImage, DecodeError> {
     let mut options = png::DecodeOptions::default();
     options.set_ignore_text_chunk(true);
     options.set_ignore_iccp_chunk(true);
     let mut decoder = png::Decoder::new_with_options(Cursor::new(bytes), options);
-    decoder.set_limits(png::Limits { bytes: BESIDE });
-    decoder.set_transformations(png::Transformations::EXPAND); // palettes to colors, fewer than 8 bits to 8
+    decoder.set_limits(png::Limits {
+        bytes: MAX_DECODER_BYTES,
+    });
+    decoder.set_transformations(png::Transformations::EXPAND); // to colors instead of palettes, and to at least 8 bits
     let info = decoder.read_header_info()?;
     let (width, height) = (info.width, info.height);
-    let is_deep = info.bit_depth == png::BitDepth::Sixteen;
-    check(Header { width, height, is_deep }, fits)?;
+    let is_16_bit = info.bit_depth == png::BitDepth::Sixteen;
+    let header = Header {
+        width,
+        height,
+        exceeds_8_bits: is_16_bit,
+    };
+    check_header(header, fits)?;
     let mut reader = decoder.read_info()?;
     let size = reader.output_buffer_size();
     let (color, depth) = reader.output_color_type();
-    let bytes_of_texel = color.samples() as u64 * if depth == png::BitDepth::Sixteen { 2 } else { 1 };
-    weigh(bytes, (width, height), bytes_of_texel)?;
+    let bytes_per_texel = color.samples() as u64 * if depth == png::BitDepth::Sixteen { 2 } else { 1 };
+    check_decoded_size(bytes, (width, height), bytes_per_texel)?;
     let mut values = vec![0; size.ok_or_else(|| LimitErrorKind::InsufficientMemory.into_error())?];
     reader.next_frame(&mut values)?;
     let color = reader.output_color_type().0;
-    let image = match is_deep {
+    let image = match is_16_bit {
         true => {
-            let deep = values
+            let values_u16 = values
                 .chunks_exact(2)
                 .map(|pair| u16::from_be_bytes([pair[0], pair[1]]));
-            let deep: Vec<u16> = deep.collect();
+            let values_u16: Vec<u16> = values_u16.collect();
             drop(values);
             match color {
-                png::ColorType::Grayscale => ImageBuffer::from_raw(width, height, deep).map(DynamicImage::ImageLuma16),
-                png::ColorType::GrayscaleAlpha => {
-                    ImageBuffer::from_raw(width, height, deep).map(DynamicImage::ImageLumaA16)
+                png::ColorType::Grayscale => {
+                    ImageBuffer::from_raw(width, height, values_u16).map(DynamicImage::ImageLuma16)
                 }
-                png::ColorType::Rgba => ImageBuffer::from_raw(width, height, deep).map(DynamicImage::ImageRgba16),
-                _ => ImageBuffer::from_raw(width, height, deep).map(DynamicImage::ImageRgb16),
+                png::ColorType::GrayscaleAlpha => {
+                    ImageBuffer::from_raw(width, height, values_u16).map(DynamicImage::ImageLumaA16)
+                }
+                png::ColorType::Rgba => ImageBuffer::from_raw(width, height, values_u16).map(DynamicImage::ImageRgba16),
+                _ => ImageBuffer::from_raw(width, height, values_u16).map(DynamicImage::ImageRgb16),
             }
         }
         false => match color {

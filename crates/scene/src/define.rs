@@ -27,13 +27,13 @@ impl Define {
     ///
     /// The path is invalid, or the value is empty or starts like TOML but is invalid.
     pub fn new(key: &str, value: &str) -> Result<Define, Problem> {
-        let (path, rest) = read_key(key, unreadable)?;
+        let (path, rest) = read_key(key, syntax_problem)?;
         match rest {
             "" => Ok(Define {
-                value: read_value(value).map_err(|message| about(&path, message))?,
+                value: read_value(value).map_err(|message| problem_at(&path, message))?,
                 key: path,
             }),
-            _ => Err(unreadable(key)),
+            _ => Err(syntax_problem(key)),
         }
     }
 }
@@ -42,21 +42,25 @@ impl FromStr for Define {
     type Err = Problem;
 
     fn from_str(text: &str) -> Result<Define, Problem> {
-        let (path, rest) = read_key(text, unreadable)?;
+        let (path, rest) = read_key(text, syntax_problem)?;
         let Some(value) = rest.strip_prefix('=') else {
-            return Err(unreadable(text));
+            return Err(syntax_problem(text));
         };
         Ok(Define {
-            value: read_value(value).map_err(|message| about(&path, message))?,
+            value: read_value(value).map_err(|message| problem_at(&path, message))?,
             key: path,
         })
     }
 }
 
 impl Define {
-    /// Returns true if the override sets this key, a part of its value, or a table that contains it.
+    /// Returns true if the override sets this key, a part of its value, or a table that contains the key.
     pub(super) fn overrides_key(&self, key: &KeyPath) -> bool {
-        self.key.0.iter().zip(&key.0).all(|(own, step)| is_step(own, step))
+        self.key
+            .0
+            .iter()
+            .zip(&key.0)
+            .all(|(written, segment)| matches_segment(written, segment))
     }
 }
 
@@ -66,7 +70,7 @@ impl fmt::Display for Define {
     }
 }
 
-pub(super) fn about(key: &KeyPath, message: String) -> Problem {
+pub(super) fn problem_at(key: &KeyPath, message: String) -> Problem {
     let key = key.clone();
     Problem {
         key,
@@ -74,7 +78,7 @@ pub(super) fn about(key: &KeyPath, message: String) -> Problem {
     }
 }
 
-fn unreadable(text: &str) -> Problem {
+fn syntax_problem(text: &str) -> Problem {
     let rule = "must be KEY=VALUE, such as render.seed=3 or shapes[2].radius=0.5";
     Problem::new(format!("{} {rule}", cut(text)))
 }
@@ -84,14 +88,14 @@ impl FromStr for KeyPath {
 
     /// Parses a path with the syntax of a scene file: `materials."dark red".color`, `shapes[2].radius`.
     fn from_str(text: &str) -> Result<KeyPath, Problem> {
-        match read_key(text, no_path)? {
+        match read_key(text, path_problem)? {
             (path, "") => Ok(path),
-            _ => Err(no_path(text)),
+            _ => Err(path_problem(text)),
         }
     }
 }
 
-fn no_path(text: &str) -> Problem {
+fn path_problem(text: &str) -> Problem {
     Problem::new(format!("{} must be a path, such as shapes[2].radius", cut(text)))
 }
 
@@ -99,70 +103,72 @@ fn no_path(text: &str) -> Problem {
 const MAX_SEGMENTS: usize = 80;
 
 fn too_deep(text: &str) -> Problem {
-    Problem::new(format!("{} must have at most {MAX_SEGMENTS} steps", cut(text)))
+    Problem::new(format!("{} must have at most {MAX_SEGMENTS} segments", cut(text)))
 }
 
-/// Parses the path at the start of a text. Also returns the rest, which is empty or starts with `=`. `unreadable`
-/// creates the error.
-fn read_key(text: &str, unreadable: fn(&str) -> Problem) -> Result<(KeyPath, &str), Problem> {
+/// Parses the path at the start of a text. Also returns the rest of the text, which is empty or starts with `=`.
+/// `syntax_problem` creates the error.
+fn read_key(text: &str, syntax_problem: fn(&str) -> Problem) -> Result<(KeyPath, &str), Problem> {
     let mut path = Vec::new();
-    // The tokens that are valid next: a name, or a separator between names.
-    let (mut name, mut between) = (true, false);
+    let (mut expects_name, mut expects_separator) = (true, false);
     let mut rest = "";
     let mut tokens = Source::new(text).lex();
     while let Some(token) = tokens.next() {
         let (start, end) = (token.span().start(), token.span().end());
-        let written = text.get(start..end).unwrap_or_default();
+        let token_text = text.get(start..end).unwrap_or_default();
         match token.kind() {
             TokenKind::Whitespace | TokenKind::Eof => {}
             TokenKind::Equals => {
                 rest = text.get(start..).unwrap_or_default();
                 break;
             }
-            TokenKind::Atom if name => {
-                path.push(Segment::from(written));
-                (name, between) = (false, true);
+            TokenKind::Atom if expects_name => {
+                path.push(Segment::from(token_text));
+                (expects_name, expects_separator) = (false, true);
             }
-            TokenKind::BasicString | TokenKind::LiteralString if name => {
-                let quoted = format!("key = {written}").parse::<Table>().ok();
+            TokenKind::BasicString | TokenKind::LiteralString if expects_name => {
+                let quoted = format!("key = {token_text}").parse::<Table>().ok();
                 let quoted = quoted.as_ref().and_then(|table| table.get("key")?.as_str());
-                path.push(Segment::from(quoted.ok_or_else(|| unreadable(text))?));
-                (name, between) = (false, true);
+                path.push(Segment::from(quoted.ok_or_else(|| syntax_problem(text))?));
+                (expects_name, expects_separator) = (false, true);
             }
-            TokenKind::Dot if between => (name, between) = (true, false),
-            TokenKind::LeftSquareBracket if between => {
+            TokenKind::Dot if expects_separator => (expects_name, expects_separator) = (true, false),
+            TokenKind::LeftSquareBracket if expects_separator => {
                 let inner = tokens.next().zip(tokens.next());
                 let (number, _) = inner
                     .filter(|(number, end)| {
                         (number.kind(), end.kind()) == (TokenKind::Atom, TokenKind::RightSquareBracket)
                     })
-                    .ok_or_else(|| unreadable(text))?;
-                let number = text.get(number.span().start()..number.span().end()).and_then(index);
-                path.push(Segment::Index(number.ok_or_else(|| unreadable(text))?));
+                    .ok_or_else(|| syntax_problem(text))?;
+                let number = text
+                    .get(number.span().start()..number.span().end())
+                    .and_then(parse_index);
+                path.push(Segment::Index(number.ok_or_else(|| syntax_problem(text))?));
             }
-            _ => return Err(unreadable(text)),
+            _ => return Err(syntax_problem(text)),
         }
     }
-    match between && !path.is_empty() {
+    match expects_separator && !path.is_empty() {
         true if path.len() > MAX_SEGMENTS => Err(too_deep(text)),
         true => Ok((KeyPath(path), rest)),
-        false => Err(unreadable(text)),
+        false => Err(syntax_problem(text)),
     }
 }
 
-pub(super) fn index(text: &str) -> Option<usize> {
+pub(super) fn parse_index(text: &str) -> Option<usize> {
     let digits = text.bytes().all(|byte| byte.is_ascii_digit());
     text.parse().ok().filter(|_| digits)
 }
 
-/// Parses a TOML value or an unquoted string. Text that starts like a list, table or quoted string must be one.
+/// Parses a TOML value or an unquoted string. Text that starts like a list, table or quoted string must be
+/// valid TOML.
 fn read_value(text: &str) -> Result<Value, String> {
     let text = text.trim();
     if text.is_empty() {
         return Err("has no value after the =; \"\" is an empty string".to_owned());
     }
-    let read = format!("value = {text}").parse::<Table>();
-    let error = match read {
+    let parsed = format!("value = {text}").parse::<Table>();
+    let error = match parsed {
         Ok(mut table) => match table.remove("value") {
             Some(value) if table.is_empty() => return Ok(value),
             _ => "there is text after the value".to_owned(),
@@ -175,11 +181,11 @@ fn read_value(text: &str) -> Result<Value, String> {
     }
 }
 
-/// Compares segments; an index may also be written as a name.
-pub(super) fn is_step(written: &Segment, step: &Segment) -> bool {
-    match (written, step) {
-        (Segment::Key(name), Segment::Index(number)) => index(name) == Some(*number),
-        _ => written == step,
+/// Compares a segment as written in a key with a segment of a path; an index may also be written as a name.
+pub(super) fn matches_segment(written: &Segment, segment: &Segment) -> bool {
+    match (written, segment) {
+        (Segment::Key(name), Segment::Index(number)) => parse_index(name) == Some(*number),
+        _ => written == segment,
     }
 }
 
@@ -265,9 +271,9 @@ radius = 0.5
                 "radius = 2\n",
             ),
         ] {
-            let wanted = edited(from, to);
-            assert_ne!(wanted, parse(SCENE, &[]).unwrap(), "{define}");
-            assert_eq!(parse(SCENE, &[define]).unwrap(), wanted, "{define}");
+            let expected = edited(from, to);
+            assert_ne!(expected, parse(SCENE, &[]).unwrap(), "{define}");
+            assert_eq!(parse(SCENE, &[define]).unwrap(), expected, "{define}");
         }
         assert_eq!(parse(SCENE, &["shapes=[]"]).unwrap().shapes, []);
     }
@@ -282,8 +288,8 @@ radius = 0.5
             ..Overrides::default()
         };
         assert_eq!(Scene::parse_with(SCENE, "s.toml", &overrides).unwrap().render.seed, 8);
-        let made = parse(SCENE, &["materials.new={type=\"mirror\"}", "shapes[0].material=new"]).unwrap();
-        assert_eq!(made.material_names[made.shapes[0].material], "new");
+        let scene = parse(SCENE, &["materials.new={type=\"mirror\"}", "shapes[0].material=new"]).unwrap();
+        assert_eq!(scene.material_names[scene.shapes[0].material], "new");
     }
 
     #[test]
@@ -291,10 +297,13 @@ radius = 0.5
         for (define, message) in [
             ("camera.fov=x", "camera.fov: \"x\" must be a number"),
             ("camera.fov=180", "camera.fov: 180 must be from 0.001 to 179.999"),
-            ("camera.position[0]=1e10", "camera.position: 1e10 must be finite"),
+            (
+                "camera.position[0]=1e10",
+                "camera.position: 1e10 must be from -1e9 to 1e9",
+            ),
             (
                 "camera.position[3]=1",
-                "camera.position[3]: does not exist; the list has 3 elements, counted from 0",
+                "camera.position[3]: does not exist; the length of the list is 3, and indices start at 0",
             ),
             (
                 "camera.position.x=1",
@@ -304,7 +313,7 @@ radius = 0.5
             ("camera[0]=1", "camera: is a table and has no [0]"),
             (
                 "shapes[2].radius=1",
-                "shapes[2]: does not exist; the list has 2 elements, counted from 0",
+                "shapes[2]: does not exist; the length of the list is 2, and indices start at 0",
             ),
             (
                 "shapes[1].size=1",
@@ -346,15 +355,15 @@ radius = 0.5
             );
         }
         // Errors in values from the file are reported at their location in the file.
-        let bad = SCENE.replace("radius = 0.5", "radius = -1");
-        let message = parse(&bad, &["shapes[0].radius=2", "camera.fov=50"])
+        let invalid = SCENE.replace("radius = 0.5", "radius = -1");
+        let message = parse(&invalid, &["shapes[0].radius=2", "camera.fov=50"])
             .unwrap_err()
             .to_string();
         assert!(
             message.starts_with("s.toml:18: shapes[1].radius: -1 must be"),
             "{message}"
         );
-        assert!(parse(&bad, &["shapes[1].radius=1"]).is_ok());
+        assert!(parse(&invalid, &["shapes[1].radius=1"]).is_ok());
     }
 
     #[test]
@@ -404,7 +413,7 @@ radius = 0.5
 
     #[test]
     fn text_that_is_not_toml_is_a_string() {
-        for (text, wanted) in [
+        for (text, expected) in [
             ("3", Value::Integer(3)),
             ("-0.5", Value::Float(-0.5)),
             ("1e3", Value::Float(1000.0)),
@@ -420,7 +429,7 @@ radius = 0.5
             ("[1, 2]", Value::from(vec![1, 2])),
         ] {
             let parsed: Define = format!("key={text}").parse().unwrap();
-            assert_eq!(parsed.value, wanted, "{text}");
+            assert_eq!(parsed.value, expected, "{text}");
             assert_eq!(Define::new("key", text).unwrap(), parsed);
         }
         assert!(Define::new("a=b", "1").is_err());
@@ -428,15 +437,15 @@ radius = 0.5
 
     #[test]
     fn path_depth_is_limited() {
-        let path = |steps: usize| format!("{}=1", vec!["a"; steps].join("."));
+        let path = |segments: usize| format!("{}=1", vec!["a"; segments].join("."));
         assert!(path(MAX_SEGMENTS).parse::<Define>().is_ok());
-        for steps in [MAX_SEGMENTS + 1, 100_000] {
-            let error = path(steps).parse::<Define>().unwrap_err().to_string();
-            assert!(error.ends_with(".a=1 must have at most 80 steps"), "{error}");
+        for segments in [MAX_SEGMENTS + 1, 100_000] {
+            let error = path(segments).parse::<Define>().unwrap_err().to_string();
+            assert!(error.ends_with(".a=1 must have at most 80 segments"), "{error}");
             assert!(error.len() < 100, "{error}");
         }
-        let numbers = format!("a{}=1", "[0]".repeat(MAX_SEGMENTS));
-        assert!(numbers.parse::<Define>().is_err());
+        let indices = format!("a{}=1", "[0]".repeat(MAX_SEGMENTS));
+        assert!(indices.parse::<Define>().is_err());
     }
 
     #[test]

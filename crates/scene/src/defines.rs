@@ -2,7 +2,7 @@
 
 use toml::{Table, Value};
 
-use crate::define::{Define, about, index, is_step};
+use crate::define::{Define, matches_segment, parse_index, problem_at};
 use crate::error::SceneError;
 use crate::key_path::{KeyPath, Segment, cut, list};
 use crate::problem::{At as _, Problem, Problems};
@@ -10,100 +10,118 @@ use crate::suggest;
 
 impl Problems {
     /// Returns the error of the first problem that an override caused.
-    pub(super) fn of_define(&self, defines: &Defines) -> Option<SceneError> {
+    pub(super) fn define_error(&self, defines: &Defines) -> Option<SceneError> {
         let problem = self.iter().find(|problem| defines.has_set(&problem.key))?;
         Some(SceneError::Override(problem.clone().at("define")))
     }
 }
 
-/// Overrides that are applied while a file is parsed. Their paths are recorded, so that errors can be attributed to
-/// them.
+/// Overrides that are applied while a file is parsed. The paths of the overrides are recorded, so that errors can be
+/// attributed to overrides.
 pub(super) struct Defines<'a> {
-    given: &'a [Define],
+    overrides: &'a [Define],
     /// Overrides that were applied or have failed.
-    put: Vec<Put>,
+    applied: Vec<AppliedDefine>,
 }
 
-struct Put {
-    number: usize,
+struct AppliedDefine {
+    /// Index of the override.
+    index: usize,
     /// The key, with indices for list elements.
     path: Vec<Segment>,
     /// Path length of the outermost table or value that was created or replaced.
-    own: usize,
+    replaced_len: usize,
 }
 
 impl<'a> Defines<'a> {
-    pub fn new(given: &'a [Define]) -> Defines<'a> {
-        Defines { given, put: Vec::new() }
+    pub fn new(overrides: &'a [Define]) -> Defines<'a> {
+        Defines {
+            overrides,
+            applied: Vec::new(),
+        }
     }
 
     pub fn restarted(&self) -> Defines<'a> {
-        Defines::new(self.given)
+        Defines::new(self.overrides)
     }
 
     pub fn restart(&mut self) {
-        self.put.clear();
+        self.applied.clear();
     }
 
-    /// Returns true if an override set the value of this key, or of a table that contains it.
+    /// Returns true if an override set the value of this key, or of a table that contains the key.
     pub fn has_set(&self, key: &KeyPath) -> bool {
         let key = key.0.as_slice();
-        self.put.iter().any(|put| {
-            let is_below = put.path.get(..put.own).is_some_and(|own| key.starts_with(own));
-            let rest = put.path.strip_prefix(key);
-            is_below || rest.is_some_and(|rest| rest.iter().all(|step| matches!(step, Segment::Index(_))))
+        self.applied.iter().any(|define| {
+            let replaced = define.path.get(..define.replaced_len);
+            let is_replaced = replaced.is_some_and(|replaced| key.starts_with(replaced));
+            let rest = define.path.strip_prefix(key);
+            is_replaced || rest.is_some_and(|rest| rest.iter().all(|segment| matches!(segment, Segment::Index(_))))
         })
     }
 
-    /// Applies the overrides of the table at this path; with an empty path, the overrides for which `is_elsewhere` is
-    /// false.
-    pub fn put(
+    /// Applies the overrides of the table at this path; with an empty path, all overrides whose first key is not
+    /// excluded.
+    pub fn apply(
         &mut self,
-        at: &[Segment],
-        whole: &mut Table,
-        is_elsewhere: impl Fn(&str) -> bool,
+        table_path: &[Segment],
+        table: &mut Table,
+        is_excluded: impl Fn(&str) -> bool,
     ) -> Result<(), Problem> {
-        let belongs = |define: &Define| match (define.key.0.first(), at) {
-            (Some(Segment::Key(first)), []) => !is_elsewhere(first),
+        let depth = table_path.len();
+        let belongs = |define: &Define| match (define.key.0.first(), table_path) {
+            (Some(Segment::Key(first)), []) => !is_excluded(first),
             (_, []) => true,
-            _ => define.key.0.len() >= at.len() && define.key.0.iter().zip(at).all(|(a, b)| is_step(a, b)),
+            _ => {
+                let mut pairs = define.key.0.iter().zip(table_path);
+                define.key.0.len() >= depth && pairs.all(|(written, segment)| matches_segment(written, segment))
+            }
         };
-        let (given, mut value) = (self.given, Value::Table(std::mem::take(whole)));
-        for (number, define) in given.iter().enumerate().filter(|(_, define)| belongs(define)) {
-            let mut path = at.to_vec();
-            let put = put(&mut value, &mut path, &define.key.0[at.len()..], &define.value);
-            let own = match &put {
-                Ok(own) => *own,
+        let (overrides, mut value) = (self.overrides, Value::Table(std::mem::take(table)));
+        for (index, define) in overrides.iter().enumerate().filter(|(_, define)| belongs(define)) {
+            let mut path = table_path.to_vec();
+            let result = set_value(&mut value, &mut path, &define.key.0[depth..], &define.value);
+            let replaced_len = match &result {
+                Ok(replaced_len) => *replaced_len,
                 Err(_) => path.len(),
             };
             let key = KeyPath(path.clone());
-            self.put.push(Put { number, path, own });
-            put.map_err(|message| about(&key, message))?;
+            self.applied.push(AppliedDefine {
+                index,
+                path,
+                replaced_len,
+            });
+            result.map_err(|message| problem_at(&key, message))?;
         }
         match value {
-            Value::Table(table) => *whole = table,
+            Value::Table(new_table) => *table = new_table,
             other => {
                 let message = format!("{} must be a table", cut(&other.to_string()));
-                return Err(about(&KeyPath(at.to_vec()), message));
+                return Err(problem_at(&KeyPath(table_path.to_vec()), message));
             }
         }
         Ok(())
     }
 
-    pub fn not_there(&mut self, key: &KeyPath) -> Problem {
-        self.put.push(Put {
-            number: self.given.len(),
+    /// Returns the problem of an override whose key does not exist.
+    pub fn missing_key(&mut self, key: &KeyPath) -> Problem {
+        self.applied.push(AppliedDefine {
+            index: self.overrides.len(),
             path: key.0.clone(),
-            own: key.0.len(),
+            replaced_len: key.0.len(),
         });
-        about(key, "does not exist".to_owned())
+        problem_at(key, "does not exist".to_owned())
     }
 
-    /// Returns a key that was not applied to any table.
-    pub fn left(&self) -> Option<&'a KeyPath> {
-        let is_put = |number: usize| self.put.iter().any(|put| put.number == number);
-        let mut left = self.given.iter().enumerate().filter(|(number, _)| !is_put(*number));
-        left.next().map(|(_, define)| &define.key)
+    /// Returns the key of an override that was not applied to any table.
+    pub fn unapplied(&self) -> Option<&'a KeyPath> {
+        let is_applied = |index: usize| self.applied.iter().any(|define| define.index == index);
+        let mut unapplied = self
+            .overrides
+            .iter()
+            .enumerate()
+            .filter(|(index, _)| !is_applied(*index));
+        unapplied.next().map(|(_, define)| &define.key)
     }
 }
 
@@ -115,20 +133,20 @@ fn is_samples(path: &[Segment]) -> bool {
 
 /// Sets a value in a tree of tables and lists. Creates missing tables, except named textures, materials and meshes.
 /// Appends the path of the value or failure to `path`. Returns the path length of the outermost table that was created,
-/// or of the value if none was.
-fn put(root: &mut Value, path: &mut Vec<Segment>, key: &[Segment], new: &Value) -> Result<usize, String> {
-    let mut own = None;
+/// or of the value if no table was created.
+fn set_value(root: &mut Value, path: &mut Vec<Segment>, key: &[Segment], new: &Value) -> Result<usize, String> {
+    let mut replaced_len = None;
     let mut value = root;
-    for (i, step) in key.iter().enumerate() {
+    for (i, segment) in key.iter().enumerate() {
         let is_last = i + 1 == key.len();
         let is_named = matches!(path.as_slice(), [Segment::Key(kind)] if ["textures", "materials", "meshes"].contains(&kind.as_str()));
         if let (Value::Integer(count), true) = (&*value, is_samples(path)) {
             *value = Value::Table(Table::from_iter([("count".to_owned(), Value::from(*count))]));
         }
         let kind = kind_of(value);
-        let next = match (value, step) {
+        let next = match (value, segment) {
             (Value::Table(table), Segment::Key(name)) => {
-                path.push(step.clone());
+                path.push(segment.clone());
                 if !table.contains_key(name) {
                     if is_named && !is_last {
                         return Err(match table.is_empty() {
@@ -144,30 +162,34 @@ fn put(root: &mut Value, path: &mut Vec<Segment>, key: &[Segment], new: &Value) 
                     if let Some(Segment::Index(_)) = key.get(i + 1) {
                         return Err("does not exist, so it has no elements".to_owned());
                     }
-                    own.get_or_insert(path.len());
+                    replaced_len.get_or_insert(path.len());
                     table.insert(name.clone(), Value::Table(Table::new()));
                 }
                 table.get_mut(name)
             }
-            (Value::Array(list), step) => {
-                let number = match step {
-                    Segment::Index(number) => Some(*number),
-                    Segment::Key(name) => index(name),
+            (Value::Array(list), segment) => {
+                let index = match segment {
+                    Segment::Index(index) => Some(*index),
+                    Segment::Key(name) => parse_index(name),
                 };
-                let Some(number) = number else {
+                let Some(index) = index else {
                     return Err("is a list; add the index of an element, such as [0]".to_owned());
                 };
-                path.push(Segment::Index(number));
+                path.push(Segment::Index(index));
                 let count = list.len();
-                match list.get_mut(number) {
-                    None => return Err(format!("does not exist; the list has {count} elements, counted from 0")),
+                match list.get_mut(index) {
+                    None => {
+                        return Err(format!(
+                            "does not exist; the length of the list is {count}, and indices start at 0"
+                        ));
+                    }
                     found => found,
                 }
             }
             _ => {
                 return Err(format!(
-                    "is {kind} and has no {step}",
-                    step = KeyPath(vec![step.clone()])
+                    "is {kind} and has no {segment}",
+                    segment = KeyPath(vec![segment.clone()])
                 ));
             }
         };
@@ -177,7 +199,7 @@ fn put(root: &mut Value, path: &mut Vec<Segment>, key: &[Segment], new: &Value) 
         }
     }
     *value = new.clone();
-    Ok(own.unwrap_or(path.len()))
+    Ok(replaced_len.unwrap_or(path.len()))
 }
 
 fn kind_of(value: &Value) -> &'static str {

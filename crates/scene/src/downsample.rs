@@ -8,7 +8,7 @@ use wgray_image::color::{linear_to_srgb, srgb_to_linear};
 
 /// A mip level in linear light.
 pub struct Level {
-    /// Columns.
+    /// Number of columns.
     pub width: usize,
     /// Rows, top row first.
     pub rows: Vec<Vec<DVec3>>,
@@ -62,14 +62,16 @@ pub fn half_of(image: &Image, row: impl Fn(usize) -> usize + Sync) -> Level {
 /// Returns the next coarser level: area-weighted means of the covered texels.
 fn half(width: usize, height: usize, texel: impl Fn(usize, usize) -> DVec3 + Sync) -> Level {
     let (new_width, new_height) = ((width / 2).max(1), (height / 2).max(1));
-    let lines = (0..new_height).into_par_iter().with_min_len(16);
+    let row_indices = (0..new_height).into_par_iter().with_min_len(16);
     let rows = if width.is_multiple_of(2) && height.is_multiple_of(2) {
-        // For even sizes: the same sum as below, in the same order, but with constant weights.
+        // For even sizes: the same sum in the same order as for other sizes, but with constant weights.
         let color = |i: usize, j: usize| {
             let texel = |x: usize, y: usize| texel(2 * i + x, 2 * j + y) * 0.25;
             DVec3::ZERO + texel(0, 0) + texel(1, 0) + texel(0, 1) + texel(1, 1)
         };
-        lines.map(|j| (0..new_width).map(|i| color(i, j)).collect()).collect()
+        row_indices
+            .map(|j| (0..new_width).map(|i| color(i, j)).collect())
+            .collect()
     } else {
         let (columns, rows) = (covers(width, new_width), covers(height, new_height));
         let color = |column: &[(usize, f64)], row: &[(usize, f64)]| {
@@ -81,27 +83,27 @@ fn half(width: usize, height: usize, texel: impl Fn(usize, usize) -> DVec3 + Syn
             }
             sum
         };
-        lines
+        row_indices
             .map(|j| columns.iter().map(|column| color(column, &rows[j])).collect())
             .collect()
     };
     Level { width: new_width, rows }
 }
 
-/// For each of `to` texels, returns the texels among `from` that it covers, with their weights. `to` is half of `from`,
-/// rounded down, and at least 1.
-fn covers(from: usize, to: usize) -> Vec<Vec<(usize, f64)>> {
-    let size = from as f64 / to as f64;
+/// For each of `new_count` texels, returns the indices and the weights of the old texels that the new texel covers.
+/// `new_count` is half of `old_count`, rounded down, and at least 1.
+fn covers(old_count: usize, new_count: usize) -> Vec<Vec<(usize, f64)>> {
+    let size = old_count as f64 / new_count as f64;
     let cover = |i: usize| {
         let (start, end) = (i as f64 * size, (i + 1) as f64 * size);
-        let inside = move |j: usize| (end.min((j + 1) as f64) - start.max(j as f64)) / size;
-        let touched = start as usize..from.min(end.ceil() as usize);
-        touched
-            .map(move |j| (j, inside(j)))
+        let weight = move |j: usize| (end.min((j + 1) as f64) - start.max(j as f64)) / size;
+        let covered = start as usize..old_count.min(end.ceil() as usize);
+        covered
+            .map(move |j| (j, weight(j)))
             .filter(|(_, weight)| *weight > 0.0)
             .collect()
     };
-    (0..to).map(cover).collect()
+    (0..new_count).map(cover).collect()
 }
 
 /// Returns the image with half the width and height, rounded down, but at least 1.

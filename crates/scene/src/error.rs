@@ -12,7 +12,7 @@ use crate::problem::{ErrorPlace, MAX_PROBLEMS, Problem, Problems};
 #[non_exhaustive]
 pub enum SceneError {
     /// The file cannot be read.
-    // Not named `source`: error chains would print its text twice.
+    // Not named `source`, because error chains would print the text of `error` twice.
     #[error("{}: cannot be read: {error}", path.display())]
     Read {
         /// The file.
@@ -25,9 +25,9 @@ pub enum SceneError {
     Syntax {
         /// Name of the file.
         origin: String,
-        /// Counted from 1.
+        /// Line, counted from 1.
         line: usize,
-        /// In characters, counted from 1.
+        /// Column in characters, counted from 1.
         column: usize,
         /// The message.
         message: String,
@@ -37,7 +37,7 @@ pub enum SceneError {
     Invalid {
         /// Name of the file.
         origin: String,
-        /// Counted from 1.
+        /// Line, counted from 1.
         line: usize,
         /// The problem.
         problem: Problem,
@@ -61,7 +61,7 @@ pub enum SceneError {
     Unsupported {
         /// The file.
         path: PathBuf,
-        /// The format, and what to do.
+        /// The format, and advice for the user.
         message: String,
     },
     /// An override is invalid; the key is the field of [`Overrides`](super::Overrides).
@@ -70,29 +70,29 @@ pub enum SceneError {
 }
 
 impl SceneError {
-    /// Returns the location.
+    /// Returns the location of the error, or of the first error.
     pub fn place(&self) -> ErrorPlace {
-        let of_file = |file: String| ErrorPlace {
+        let in_file = |file: String| ErrorPlace {
             file: Some(file),
             ..ErrorPlace::default()
         };
         match self {
-            SceneError::Read { path, .. } | SceneError::Unsupported { path, .. } => of_file(path.display().to_string()),
+            SceneError::Read { path, .. } | SceneError::Unsupported { path, .. } => in_file(path.display().to_string()),
             SceneError::Mesh(error) => ErrorPlace {
                 line: error.line(),
-                ..of_file(error.path().display().to_string())
+                ..in_file(error.path().display().to_string())
             },
             SceneError::Syntax {
                 origin, line, column, ..
             } => ErrorPlace {
                 line: Some(*line),
                 column: Some(*column),
-                ..of_file(origin.clone())
+                ..in_file(origin.clone())
             },
             SceneError::Invalid { origin, line, problem } => ErrorPlace {
                 line: Some(*line),
                 key: Some(problem.key.to_string()).filter(|key| !key.is_empty()),
-                ..of_file(origin.clone())
+                ..in_file(origin.clone())
             },
             SceneError::Several { errors, .. } => errors.first().map(SceneError::place).unwrap_or_default(),
             SceneError::Gltf(error) => error.place(),
@@ -100,7 +100,7 @@ impl SceneError {
         }
     }
 
-    /// Returns the individual errors (only this error if there is just one), and a message if there are further errors.
+    /// Returns the individual errors (only this error if there is no other), and a message if further errors exist.
     pub fn each(&self) -> (&[SceneError], Option<String>) {
         match self {
             SceneError::Several { errors, more: 0 } => (errors, None),
@@ -118,19 +118,22 @@ impl SceneError {
 }
 
 impl Problems {
-    /// Converts problems to an error, in the order of the text.
+    /// Converts problems to an error, in the order of their offsets in the text.
     pub fn into_error(
         self,
-        place: impl Fn(&Problem) -> usize,
+        offset_of: impl Fn(&Problem) -> usize,
         error: impl Fn(usize, Problem) -> SceneError,
     ) -> SceneError {
         let mut all: Vec<(usize, Problem)> = (std::iter::once(self.first).chain(self.others))
-            .map(|problem| (place(&problem), problem))
+            .map(|problem| (offset_of(&problem), problem))
             .collect();
-        all.sort_by_key(|(at, _)| *at);
+        all.sort_by_key(|(offset, _)| *offset);
         let more = self.more + all.len().saturating_sub(MAX_PROBLEMS);
         all.truncate(MAX_PROBLEMS);
-        let mut errors: Vec<SceneError> = all.into_iter().map(|(at, problem)| error(at, problem)).collect();
+        let mut errors: Vec<SceneError> = all
+            .into_iter()
+            .map(|(offset, problem)| error(offset, problem))
+            .collect();
         match (errors.len(), more) {
             (1, 0) => errors.remove(0),
             _ => SceneError::Several { errors, more },

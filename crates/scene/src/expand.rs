@@ -13,7 +13,7 @@ impl Description {
     ///
     /// # Errors
     ///
-    /// The first invalid value. [`Scene::parse`](super::Scene::parse) reports all of them.
+    /// The first invalid value. [`Scene::parse`](super::Scene::parse) reports all invalid values.
     pub fn validate(&self) -> Result<Scene, Problem> {
         self.validate_with(&Assets::beside(Path::new(".")))
     }
@@ -30,7 +30,7 @@ impl Description {
 
     /// Like [`Description::validate_with`], but returns all problems. Lists the files even if there are problems.
     pub(crate) fn validate_and_list(&self, assets: &Assets, files: &mut BTreeSet<PathBuf>) -> Result<Scene, Problems> {
-        files.extend(self.files_beside(assets));
+        files.extend(self.files_on_disk(assets));
         let integrator = self.integrator();
         let settings = self.settings(integrator);
         let has_gltf = self
@@ -44,23 +44,24 @@ impl Description {
         let mut scene = match expanded {
             None => self.validate_plain(settings, integrator, assets, files)?,
             Some(Err(problem)) => {
-                let others = self.validate_plain(Err(problem.into()), integrator, assets, files);
-                others.map_err(Problems::once_per_key)? // the file may have the same problem again
+                let validated = self.validate_plain(Err(problem.into()), integrator, assets, files);
+                validated.map_err(Problems::once_per_key)? // validation may find the problem of the file again
             }
             Some(Ok(expanded)) => {
                 // The files may have added lights.
                 let settings = expanded.description.settings(integrator);
-                let described = &expanded.description;
-                let scene = described.validate_plain(settings, integrator, &expanded.assets, files);
-                let place = |problem| expanded.place(self, problem);
-                let mut scene = scene.map_err(|problems| problems.map(place).once_per_key())?;
+                let scene = expanded
+                    .description
+                    .validate_plain(settings, integrator, &expanded.assets, files);
+                let original = |problem| expanded.original_problem(self, problem);
+                let mut scene = scene.map_err(|problems| problems.map(original).once_per_key())?;
                 scene.notes.splice(0..0, expanded.notes);
                 scene.imported = expanded.imported;
                 scene
             }
         };
-        let chosen = integrator_note(self).map(Note::from);
-        scene.notes.splice(0..0, chosen);
+        let note = integrator_note(self).map(Note::from);
+        scene.notes.splice(0..0, note);
         Ok(scene)
     }
 }

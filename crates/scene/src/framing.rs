@@ -1,4 +1,4 @@
-//! The automatic camera: it frames the whole scene, seen from a given direction.
+//! The automatic camera, which frames the entire scene from a direction.
 
 use std::str::FromStr;
 
@@ -8,20 +8,19 @@ use super::PerspectiveDescription;
 
 /// Vertical field of view in degrees, except in wide images.
 const FOV: f64 = 35.0;
-/// Maximum aspect ratio up to which the horizontal field of view increases with the width. In wider views, perspective
+/// Aspect ratio up to which the horizontal field of view increases with the width. In wider views, perspective
 /// would stretch the sides.
-const WIDEST: f64 = 2.0;
+const MAX_ASPECT: f64 = 2.0;
 /// Fraction of the image that the scene fills, with margins of 5 %.
-const INSIDE: f64 = 0.9;
+const FILL: f64 = 0.9;
 /// Minimum distance from the camera to the nearest point, relative to the scene's extent; only relevant for scenes that
 /// are elongated along the view direction.
-const NEAREST: f64 = 0.1;
+const MIN_DISTANCE: f64 = 0.1;
 /// Range of the diagonal of a framed scene's bounding box. The range keeps distances and coordinates within their
 /// limits.
 const EXTENTS: (f64, f64) = (1e-8, 4e8);
-/// Minimum elevation in degrees at which the view counts as vertical, so that the vertical axis cannot be up in the
-/// image.
-const STEEPEST: f64 = 89.9;
+/// Minimum elevation in degrees of a view that counts as vertical, where the vertical axis cannot be up in the image.
+const MIN_VERTICAL_ELEVATION: f64 = 89.9;
 
 /// The side from which a scene is seen. The front is towards -y and the top towards +z, as in upright glTF files.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -75,25 +74,25 @@ impl View {
 
     /// Returns the direction to the camera (not normalized), and the up direction of the image.
     fn direction(self) -> (DVec3, DVec3) {
-        let from = |x: f64, y: f64, z: f64| (DVec3::new(x, y, z), DVec3::Z);
+        let upright = |x: f64, y: f64, z: f64| (DVec3::new(x, y, z), DVec3::Z);
         match self {
-            // 30 degrees to the right, 20 upwards: at 15 degrees the top of a cube is seen edge-on.
-            View::Corner => from(0.5, -0.866_025_403_784, 0.363_970_234_266),
-            View::Front => from(0.0, -1.0, 0.0),
-            View::Back => from(0.0, 1.0, 0.0),
-            View::Left => from(-1.0, 0.0, 0.0),
-            View::Right => from(1.0, 0.0, 0.0),
+            // 30 degrees to the right and 20 degrees upwards. At 15 degrees, the top of a cube would be seen edge-on.
+            View::Corner => upright(0.5, -0.866_025_403_784, 0.363_970_234_266),
+            View::Front => upright(0.0, -1.0, 0.0),
+            View::Back => upright(0.0, 1.0, 0.0),
+            View::Left => upright(-1.0, 0.0, 0.0),
+            View::Right => upright(1.0, 0.0, 0.0),
             View::Top => (DVec3::Z, DVec3::Y),
             View::Bottom => (DVec3::NEG_Z, DVec3::NEG_Y),
-            View::Iso => from(1.0, -1.0, 1.0),
+            View::Iso => upright(1.0, -1.0, 1.0),
         }
     }
 }
 
-/// A direction from which the camera looks, in degrees.
+/// The direction from the scene to the camera, in degrees.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Orbit {
-    /// Rotation about the vertical axis, -360 to 360: 0 is the front, 90 the right.
+    /// Rotation about the vertical axis, -360 to 360: 0 is the front, and 90 is the right.
     pub azimuth: f64,
     /// The angle above the horizon, from -90 to 90.
     pub elevation: f64,
@@ -103,12 +102,12 @@ impl Orbit {
     /// Returns the direction to the camera, and the up direction of the image.
     fn direction(self) -> (DVec3, DVec3) {
         let (sin, cos) = self.azimuth.to_radians().sin_cos();
-        let (high, level) = self.elevation.to_radians().sin_cos();
-        let towards = DVec3::new(sin * level, -cos * level, high);
+        let (elevation_sin, elevation_cos) = self.elevation.to_radians().sin_cos();
+        let towards = DVec3::new(sin * elevation_cos, -cos * elevation_cos, elevation_sin);
         // Seen from straight above or below, up is towards the back or the front of the scene.
-        match self.elevation.abs() < STEEPEST {
+        match self.elevation.abs() < MIN_VERTICAL_ELEVATION {
             true => (towards, DVec3::Z),
-            false => (towards, DVec3::new(-sin, cos, 0.0) * high.signum()),
+            false => (towards, DVec3::new(-sin, cos, 0.0) * elevation_sin.signum()),
         }
     }
 }
@@ -116,7 +115,7 @@ impl Orbit {
 impl FromStr for Orbit {
     type Err = String;
 
-    /// Reads `AZIMUTH,ELEVATION`.
+    /// Parses `AZIMUTH,ELEVATION`.
     fn from_str(text: &str) -> Result<Orbit, String> {
         let rule = "must be AZIMUTH,ELEVATION in degrees, such as 30,15";
         let (azimuth, elevation) = text.split_once(',').ok_or(rule)?;
@@ -125,8 +124,8 @@ impl FromStr for Orbit {
             azimuth: number(azimuth)?,
             elevation: number(elevation)?,
         };
-        let inside = |x: f64, most: f64| (-most..=most).contains(&x);
-        match (inside(orbit.azimuth, 360.0), inside(orbit.elevation, 90.0)) {
+        let is_within = |x: f64, limit: f64| (-limit..=limit).contains(&x);
+        match (is_within(orbit.azimuth, 360.0), is_within(orbit.elevation, 90.0)) {
             (false, _) => Err(format!("the azimuth, {}, must be from -360 to 360", orbit.azimuth)),
             (_, false) => Err(format!("the elevation, {}, must be from -90 to 90", orbit.elevation)),
             _ => Ok(orbit),
@@ -143,9 +142,9 @@ pub struct Framing {
     pub orbit: Option<Orbit>,
     /// The vertical field of view in degrees. If absent, 35, or less if the image is more than twice as wide as high.
     pub fov: Option<f64>,
-    /// Width of the image over its height.
+    /// Width of the image, divided by its height.
     pub aspect: f64,
-    /// True to keep the whole scene in the image while the camera orbits its center.
+    /// True to keep the entire scene in the image while the camera orbits the scene's center.
     pub turns: bool,
 }
 
@@ -168,14 +167,14 @@ impl Framing {
 
 /// Checks that a model's extent is within the limits of the automatic camera. Returns the violated rule as the error.
 pub fn check_extent(points: impl Iterator<Item = DVec3>) -> Result<(), String> {
-    let (low, top) = points.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, top), p| {
-        (low.min(p), top.max(p))
+    let (low, high) = points.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| {
+        (low.min(p), high.max(p))
     });
-    let size = (top - low).length();
-    let (least, most) = EXTENTS;
-    match size > 0.0 && low.x <= top.x && !(least..=most).contains(&size) {
+    let size = (high - low).length();
+    let (min, max) = EXTENTS;
+    match size > 0.0 && low.x <= high.x && !(min..=max).contains(&size) {
         true => Err(format!(
-            "the diagonal of the model's bounds is {size:.3e} units; the automatic camera needs {least:e} to {most:e}: scale the model"
+            "the diagonal of the model's bounds is {size:.3e} units; the automatic camera needs {min:e} to {max:e}: scale the model"
         )),
         false => Ok(()),
     }
@@ -188,44 +187,53 @@ pub fn framed(points: impl Iterator<Item = DVec3> + Clone, framing: Framing) -> 
     let forward = -towards.normalize();
     let right = forward.cross(up).normalize();
     let upwards = right.cross(forward);
-    let high = match framing.fov {
+    let tan_y = match framing.fov {
         Some(fov) => (fov.to_radians() / 2.0).tan(),
-        None => (FOV.to_radians() / 2.0).tan() * (WIDEST / framing.aspect).min(1.0),
+        None => (FOV.to_radians() / 2.0).tan() * (MAX_ASPECT / framing.aspect).min(1.0),
     };
-    let wide = high * framing.aspect;
-    let (low, top) = points
+    let tan_x = tan_y * framing.aspect;
+    let (low, high) = points
         .clone()
-        .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, top), p| {
-            (low.min(p), top.max(p))
+        .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| {
+            (low.min(p), high.max(p))
         });
-    if !(low.x <= top.x) {
+    if !(low.x <= high.x) {
         return framed(std::iter::once(DVec3::ZERO), framing);
     }
-    let middle = 0.5 * low + 0.5 * top;
+    let center = 0.5 * low + 0.5 * high;
     let extent = Extent {
         points: &points,
-        middle,
+        center,
         axis: framing.turns.then_some(up),
     };
-    let reach = |n: DVec3| extent.reach(n, DVec3::ZERO).0;
+    let support = |n: DVec3| extent.support(n, DVec3::ZERO).0;
     // A point p is in the image if right . (p - camera) <= w forward . (p - camera), and likewise for the other sides.
-    let (w, h) = (INSIDE * wide, INSIDE * high);
-    let across = reach(right - w * forward) + reach(-right - w * forward);
-    let along = reach(upwards - h * forward) + reach(-upwards - h * forward);
-    let (behind, before) = (reach(forward), reach(-forward));
-    let size = (top - low).length();
-    let nearest = if size > 0.0 { NEAREST * size } else { 1.0 };
-    let back = (across / (2.0 * w)).max(along / (2.0 * h)).max(before + nearest);
-    let higher = extent.offset(upwards, forward, back);
-    let (sideways, ahead) = match framing.turns {
-        true => (0.0, higher * up.dot(forward) / up.dot(upwards)), // to the axis
-        false => (extent.offset(right, forward, back), (behind - before) / 2.0),
+    let (w, h) = (FILL * tan_x, FILL * tan_y);
+    let width = support(right - w * forward) + support(-right - w * forward);
+    let height = support(upwards - h * forward) + support(-upwards - h * forward);
+    let (depth_behind, depth_before) = (support(forward), support(-forward));
+    let size = (high - low).length();
+    let min_distance = if size > 0.0 { MIN_DISTANCE * size } else { 1.0 };
+    let distance = (width / (2.0 * w))
+        .max(height / (2.0 * h))
+        .max(depth_before + min_distance);
+    let offset_up = extent.offset(upwards, forward, distance);
+    let (offset_right, target_ahead) = match framing.turns {
+        true => (0.0, offset_up * up.dot(forward) / up.dot(upwards)), // the target point lies on the axis
+        false => (
+            extent.offset(right, forward, distance),
+            (depth_behind - depth_before) / 2.0,
+        ),
     };
-    let aside = right * sideways + upwards * higher;
-    let fov = 2.0 * high.atan().to_degrees();
+    let offset = right * offset_right + upwards * offset_up;
+    let fov = 2.0 * tan_y.atan().to_degrees();
     PerspectiveDescription {
         up,
-        ..PerspectiveDescription::new(middle + aside - forward * back, middle + aside + forward * ahead, fov)
+        ..PerspectiveDescription::new(
+            center + offset - forward * distance,
+            center + offset + forward * target_ahead,
+            fov,
+        )
     }
 }
 
@@ -235,7 +243,7 @@ const MAX_STEPS: usize = 64;
 /// The extent of points relative to the center of their bounding box.
 struct Extent<'a, I> {
     points: &'a I,
-    middle: DVec3,
+    center: DVec3,
     /// Axis of rotation, if any. Each point then represents its circle around the axis.
     axis: Option<DVec3>,
 }
@@ -243,16 +251,16 @@ struct Extent<'a, I> {
 impl<I: Iterator<Item = DVec3> + Clone> Extent<'_, I> {
     /// Returns the value of the support function of the points (the maximum of `p . n`), and its derivative along
     /// `step`.
-    fn reach(&self, n: DVec3, step: DVec3) -> (f64, f64) {
-        let of = |point: DVec3| {
-            let p = point - self.middle;
+    fn support(&self, n: DVec3, step: DVec3) -> (f64, f64) {
+        let point_support = |point: DVec3| {
+            let p = point - self.center;
             let Some(axis) = self.axis else {
                 return (p.dot(n), p.dot(step));
             };
-            let across = |v: DVec3| v - axis * v.dot(axis);
-            let (radius, length) = (across(p).length(), across(n).length());
+            let perpendicular = |v: DVec3| v - axis * v.dot(axis);
+            let (radius, length) = (perpendicular(p).length(), perpendicular(n).length());
             let slope = if length > 0.0 {
-                across(n).dot(step) / length
+                perpendicular(n).dot(step) / length
             } else {
                 0.0
             };
@@ -262,23 +270,26 @@ impl<I: Iterator<Item = DVec3> + Clone> Extent<'_, I> {
                 radius * slope + height * step.dot(axis),
             )
         };
-        let further = |a: (f64, f64), b: (f64, f64)| if b.0 > a.0 { b } else { a };
-        self.points.clone().map(of).fold((f64::NEG_INFINITY, 0.0), further)
+        let farther = |a: (f64, f64), b: (f64, f64)| if b.0 > a.0 { b } else { a };
+        self.points
+            .clone()
+            .map(point_support)
+            .fold((f64::NEG_INFINITY, 0.0), farther)
     }
 
-    /// Returns the offset along `side` of a camera at distance `back` that makes both margins along `side` equal.
+    /// Returns the offset along `side` of a camera at distance `distance` that makes both margins along `side` equal.
     ///
-    /// Let w be the tangent of half of the angle that the points then subtend. The points touch both planes that bound
-    /// the angle: `reach(side - w forward) + reach(-side - w forward) = 2 w back`. The left-hand side minus the
-    /// right-hand side is convex and decreasing in w, so Newton's method, started at w = 0, converges to the root from
-    /// below.
-    fn offset(&self, side: DVec3, forward: DVec3, back: f64) -> f64 {
+    /// Let w be the tangent of half of the angle that the points subtend at the camera. The points touch both planes
+    /// that bound the angle: `support(side - w forward) + support(-side - w forward) = 2 w distance`. The left-hand
+    /// side minus the right-hand side is convex and decreasing in w, so Newton's method, started at w = 0, converges to
+    /// the root from below.
+    fn offset(&self, side: DVec3, forward: DVec3, distance: f64) -> f64 {
         let (mut w, mut offset) = (0.0, 0.0);
         for _ in 0..MAX_STEPS {
-            let (right, right_slope) = self.reach(side - w * forward, -forward);
-            let (left, left_slope) = self.reach(-side - w * forward, -forward);
+            let (right, right_slope) = self.support(side - w * forward, -forward);
+            let (left, left_slope) = self.support(-side - w * forward, -forward);
             offset = (right - left) / 2.0;
-            let step = (right + left - 2.0 * w * back) / (2.0 * back - right_slope - left_slope);
+            let step = (right + left - 2.0 * w * distance) / (2.0 * distance - right_slope - left_slope);
             if !(step > 1e-12 * w) {
                 break;
             }

@@ -114,43 +114,43 @@ impl Geometry {
     /// Returns the bounding box, or `None` for a plane, which is infinite.
     pub fn bounds(&self) -> Option<Bounds> {
         match self {
-            Geometry::Rectangle(shape) => around(shape.center, shape.u.abs() + shape.v.abs()),
-            Geometry::Disk(shape) => around(shape.center, root_of_squares(&[shape.u, shape.v])),
-            Geometry::Ellipsoid { center, axes } => around(*center, root_of_squares(axes)),
+            Geometry::Rectangle(shape) => centered(shape.center, shape.u.abs() + shape.v.abs()),
+            Geometry::Disk(shape) => centered(shape.center, root_of_squares(&[shape.u, shape.v])),
+            Geometry::Ellipsoid { center, axes } => centered(*center, root_of_squares(axes)),
             Geometry::Cylinder {
                 center,
                 axes: [a, b, c],
-            } => around(*center, root_of_squares(&[*a, *b]) + c.abs()),
+            } => centered(*center, root_of_squares(&[*a, *b]) + c.abs()),
             Geometry::Triangles(triangles) => {
                 let points = triangles.iter().flatten().map(|point| (*point, *point));
                 points.reduce(join)
             }
             Geometry::Mesh { mesh, to_world, .. } => {
-                let place = |point: &Vec3| to_world.transform_point3(point.as_dvec3() + mesh.center);
-                let points = mesh.positions.par_iter().map(place);
+                let transform = |point: &Vec3| to_world.transform_point3(point.as_dvec3() + mesh.center);
+                let points = mesh.positions.par_iter().map(transform);
                 points.map(|point| (point, point)).reduce_with(join)
             }
             Geometry::Plane { .. } => None,
         }
     }
 
-    /// Calls `point` with points whose projections onto a unit vector bound the projection of the geometry. For a
-    /// plane, this is one point; for a mesh, the corners of its bounding box.
+    /// Calls `point` with points whose projections onto a unit vector bound the projection of the geometry. A plane has
+    /// a single such point. For a mesh, the points are the corners of the bounding box.
     pub fn each_extreme(&self, direction: DVec3, mut point: impl FnMut(DVec3)) {
-        let mut between = |center: DVec3, half: f64| {
-            point(center + direction * half);
-            point(center - direction * half);
+        let mut both_ends = |center: DVec3, half_length: f64| {
+            point(center + direction * half_length);
+            point(center - direction * half_length);
         };
-        let round = |axes: &[DVec3]| axes.iter().map(|axis| axis.dot(direction).powi(2)).sum::<f64>().sqrt();
+        let half_extent = |axes: &[DVec3]| axes.iter().map(|axis| axis.dot(direction).powi(2)).sum::<f64>().sqrt();
         match self {
             Geometry::Rectangle(rectangle) => rectangle.corners().into_iter().for_each(point),
-            Geometry::Disk(disk) => between(disk.center, round(&[disk.u, disk.v])),
-            Geometry::Ellipsoid { center, axes } => between(*center, round(axes)),
+            Geometry::Disk(disk) => both_ends(disk.center, half_extent(&[disk.u, disk.v])),
+            Geometry::Ellipsoid { center, axes } => both_ends(*center, half_extent(axes)),
             Geometry::Cylinder {
                 center,
                 axes: [a, b, c],
             } => {
-                between(*center, round(&[*a, *b]) + c.dot(direction).abs());
+                both_ends(*center, half_extent(&[*a, *b]) + c.dot(direction).abs());
             }
             Geometry::Triangles(triangles) => triangles.iter().flatten().for_each(|v| point(*v)),
             Geometry::Mesh { mesh, to_world, .. } => {
@@ -167,12 +167,14 @@ fn is_sphere(axes: &[DVec3; 3]) -> bool {
     *axes == [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| axis * axes[0].x)
 }
 
+/// Returns the bounding box of two boxes.
 pub(crate) fn join((low, high): Bounds, (other_low, other_high): Bounds) -> Bounds {
     (low.min(other_low), high.max(other_high))
 }
 
-fn around(center: DVec3, reach: DVec3) -> Option<Bounds> {
-    Some((center - reach, center + reach))
+/// Returns a box by its center and half its size.
+fn centered(center: DVec3, half_extent: DVec3) -> Option<Bounds> {
+    Some((center - half_extent, center + half_extent))
 }
 
 /// Returns the half extents of the bounding box of a disk or ellipsoid: for each coordinate axis, the norm of the

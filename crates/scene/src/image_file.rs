@@ -20,8 +20,8 @@ use wgray_image::color::srgb_to_linear;
 
 /// Maximum size of a file in bytes.
 const MAX_FILE_BYTES: u64 = 512 << 20;
-/// Maximum component of a texel, equal to the maximum for all colors.
-const BRIGHTEST: f32 = 1e6;
+/// Maximum component of a texel, equal to the maximum component of all colors.
+const MAX_TEXEL: f32 = 1e6;
 
 /// Locations of the images and meshes of a scene.
 #[derive(Clone, Debug, PartialEq)]
@@ -32,15 +32,15 @@ pub struct Assets {
     pub root: PathBuf,
     /// Files outside of `root` that are allowed, by their absolute paths in the scene.
     pub elsewhere: BTreeSet<PathBuf>,
-    /// Images in memory by name. A texture uses an image in memory instead of a file of the same name.
+    /// Images in memory, by name. A texture uses an image in memory instead of a file with the same name.
     pub images: BTreeMap<String, Arc<Image>>,
-    /// Encoded image files in memory by name.
+    /// Encoded image files in memory, by name.
     pub encoded: BTreeMap<String, Arc<[u8]>>,
-    /// Maximum side in texels of images in `encoded`; larger ones are halved until they fit.
+    /// Maximum side in texels of images in `encoded`. Larger images are halved until they fit.
     pub longest_side: Option<u32>,
     /// Reasons for missing image files, by the names that textures use.
     pub(super) absent: BTreeMap<String, String>,
-    /// Meshes in memory by name.
+    /// Meshes in memory, by name.
     pub meshes: BTreeMap<String, Arc<Mesh>>,
     /// True to report damage to a file as an error, instead of using a placeholder with a warning.
     pub strict: bool,
@@ -115,7 +115,7 @@ impl Assets {
                 "{name:?} must have at most {MAX_IMAGE_SIDE} texels along a side"
             ));
         }
-        has_texels(name, *width, *height)?;
+        check_size(name, *width, *height)?;
         if count as u64 != u64::from(*width) * u64::from(*height) {
             return Err(format!("{name:?} has {count} texels; its size is {width} x {height}"));
         }
@@ -123,7 +123,7 @@ impl Assets {
             return Err(format!("{name:?} must have the encoding of the image in memory"));
         }
         fits(Header::of(image))?;
-        in_range(name, image)?;
+        check_texels(name, image)?;
         Ok(File {
             image: Arc::clone(image),
             format: None,
@@ -138,12 +138,12 @@ impl Assets {
     pub(super) fn image(
         &self,
         file: &str,
-        place: &AssetKey,
+        key: &AssetKey,
         part: Part,
         fits: impl Fn(Header) -> Result<(), String>,
     ) -> Result<File, Problem> {
         let encoding = part.encoding();
-        let bytes = match place {
+        let bytes = match key {
             AssetKey::Memory(_) if part == Part::Alpha => {
                 return Err(Problem::new(format!(
                     "{file:?} is an image in memory, which has no alpha channel"
@@ -153,7 +153,7 @@ impl Assets {
             AssetKey::File(path) => Cow::Owned(read(file, path)?),
             AssetKey::Encoded(name) => Cow::Borrowed(self.encoded.get(name).map_or(&[][..], |bytes| bytes)),
         };
-        let is_named = matches!(place, AssetKey::File(_));
+        let is_named = matches!(key, AssetKey::File(_));
         let format = Format::of(&bytes).ok_or_else(|| {
             Problem::damage(match is_named {
                 true => format!("{file:?} must be a PNG, JPEG, WebP, KTX2, EXR or HDR file"),
@@ -170,32 +170,32 @@ impl Assets {
                 format.name()
             )));
         }
-        let longest = self.longest_side.filter(|_| matches!(place, AssetKey::Encoded(_)));
+        let max_side = self.longest_side.filter(|_| matches!(key, AssetKey::Encoded(_)));
         let halvings = |width: u32, height: u32| {
             let sizes = (0..).map(|i| width.max(height) >> i);
-            longest.map_or(0, |longest| sizes.take_while(|size| *size > longest.max(1)).count())
+            max_side.map_or(0, |max_side| sizes.take_while(|size| *size > max_side.max(1)).count())
         };
         let fits = |header: Header| {
-            let times = halvings(header.width, header.height);
+            let count = halvings(header.width, header.height);
             fits(Header {
-                width: (header.width >> times).max(1),
-                height: (header.height >> times).max(1),
+                width: (header.width >> count).max(1),
+                height: (header.height >> count).max(1),
                 ..header
             })
         };
-        let decoded = decode(&bytes, format, fits).map_err(|refused| match refused {
+        let decoded = decode(&bytes, format, fits).map_err(|error| match error {
             DecodeError::Rule(rule) => Problem::new(rule),
             DecodeError::Large(rule) => Problem::new(format!("{file:?} {rule}")),
             DecodeError::Damaged(rule) => Problem::damage(format!("{file:?} {rule}")),
-            DecodeError::Channels(channels) => Problem::new(format!("{file:?} {}", refused_channels(&channels))),
+            DecodeError::Channels(channels) => Problem::new(format!("{file:?} {}", channels_message(&channels))),
             DecodeError::Image(error) => Problem {
                 is_damage: !matches!(error, ImageError::Limits(_)),
-                ..Problem::new(format!("{file:?} {}", refused_image(&error)))
+                ..Problem::new(format!("{file:?} {}", image_message(&error)))
             },
         })?;
         drop(bytes);
         let (width, height) = (decoded.width(), decoded.height());
-        has_texels(file, width, height)?;
+        check_size(file, width, height)?;
         let default = if is_float { Encoding::Linear } else { Encoding::Srgb };
         let texels = match part {
             Part::Colors(_) => texels(decoded, is_float, encoding.unwrap_or(default)),
@@ -217,16 +217,17 @@ impl Assets {
     }
 
     /// Returns a file's name for messages: relative to the current folder if the file was named on the command line.
-    fn shown<'f>(&self, file: &'f str) -> &'f str {
-        let is_given = self.elsewhere.contains(Path::new(file));
-        let here = std::env::current_dir().ok().filter(|_| is_given);
-        let inside = here.and_then(|here| Path::new(file).strip_prefix(here).ok()?.to_str());
-        inside.unwrap_or(file)
+    fn display_name<'f>(&self, file: &'f str) -> &'f str {
+        let is_from_command_line = self.elsewhere.contains(Path::new(file));
+        let current_folder = std::env::current_dir().ok().filter(|_| is_from_command_line);
+        let relative =
+            current_folder.and_then(|current_folder| Path::new(file).strip_prefix(current_folder).ok()?.to_str());
+        relative.unwrap_or(file)
     }
 
     pub(super) fn find(&self, file: &str) -> Result<AssetKey, Problem> {
-        if let Some(why) = self.absent.get(file) {
-            return Err(Problem::damage(why));
+        if let Some(reason) = self.absent.get(file) {
+            return Err(Problem::damage(reason));
         }
         if self.images.contains_key(file) {
             return Ok(AssetKey::Memory(file.to_owned()));
@@ -236,12 +237,12 @@ impl Assets {
         }
         let path = self.folder.join(file).canonicalize();
         let path = path.map_err(|error| {
-            let other = in_other_case(&self.folder, file);
-            let other = other
+            let similar = in_other_case(&self.folder, file);
+            let similar = similar
                 .as_deref()
-                .map(|other| other.strip_prefix(&self.folder).unwrap_or(other));
-            let hint = other.map_or_else(String::new, |name| format!("; did you mean {name:?}?"));
-            Problem::damage(unreadable(self.shown(file), &error) + &hint)
+                .map(|similar| similar.strip_prefix(&self.folder).unwrap_or(similar));
+            let hint = similar.map_or_else(String::new, |name| format!("; did you mean {name:?}?"));
+            Problem::damage(unreadable(self.display_name(file), &error) + &hint)
         })?;
         let root = self.root.canonicalize().map_err(|error| {
             let root = self.root.display();
@@ -266,51 +267,51 @@ impl Assets {
     }
 }
 
-fn has_texels(name: &str, width: u32, height: u32) -> Result<(), String> {
+fn check_size(name: &str, width: u32, height: u32) -> Result<(), String> {
     if width == 0 || height == 0 {
         return Err(format!(
-            "{name:?} must have a texel at least; its size is {width} x {height}"
+            "{name:?} must have at least one texel; its size is {width} x {height}"
         ));
     }
     Ok(())
 }
 
-fn in_range(name: &str, image: &Image) -> Result<(), String> {
+fn check_texels(name: &str, image: &Image) -> Result<(), String> {
     if let Texels::Floats(values) = &image.texels {
-        let bad = |value: &f32| !(0.0..=BRIGHTEST).contains(value);
-        if let Some(i) = values.iter().position(|texel| texel.iter().any(bad)) {
+        let is_invalid = |value: &f32| !(0.0..=MAX_TEXEL).contains(value);
+        if let Some(i) = values.iter().position(|texel| texel.iter().any(is_invalid)) {
             let (x, y) = (i as u32 % image.width, i as u32 / image.width);
             let [r, g, b] = values[i];
-            let rule = "the values of each must be finite, from 0 to 1e6";
+            let rule = "texel values must be from 0 to 1e6";
             return Err(format!("{name:?} has the texel [{r}, {g}, {b}] at ({x}, {y}); {rule}"));
         }
     }
     Ok(())
 }
 
-/// Clamps invalid texels. Returns a description of them; `None` if all are valid.
+/// Clamps invalid texels. Returns a description of the damage; `None` if all texels are valid.
 fn clamp(image: &mut Image) -> Option<String> {
     let Texels::Floats(values) = &mut image.texels else {
         return None;
     };
-    let is_bad = |value: &f32| !(0.0..=BRIGHTEST).contains(value);
+    let is_invalid = |value: &f32| !(0.0..=MAX_TEXEL).contains(value);
     let (mut first, mut count) = (0, 0_usize);
     for (i, texel) in values
         .iter_mut()
         .enumerate()
-        .filter(|(_, texel)| texel.iter().any(is_bad))
+        .filter(|(_, texel)| texel.iter().any(is_invalid))
     {
         first = if count == 0 { i } else { first };
         count += 1;
         // The comparison is false for NaN, which becomes 0.
-        *texel = texel.map(|x| if x > 0.0 { x.min(BRIGHTEST) } else { 0.0 });
+        *texel = texel.map(|x| if x > 0.0 { x.min(MAX_TEXEL) } else { 0.0 });
     }
     let (x, y) = (first as u32 % image.width, first as u32 / image.width);
-    let rule = "the values of each must be finite, from 0 to 1e6";
+    let rule = "texel values must be from 0 to 1e6";
     match count {
         0 => None,
-        1 => Some(format!("has 1 bad texel, at ({x}, {y}); {rule}")),
-        _ => Some(format!("has {count} bad texels, the first at ({x}, {y}); {rule}")),
+        1 => Some(format!("has 1 invalid texel, at ({x}, {y}); {rule}")),
+        _ => Some(format!("has {count} invalid texels, the first at ({x}, {y}); {rule}")),
     }
 }
 
@@ -344,6 +345,7 @@ impl Part {
 }
 
 impl File {
+    /// Returns true if the image contains this part of the file, in this encoding.
     pub fn is(&self, part: Part) -> bool {
         self.is_alpha == (part == Part::Alpha) && part.encoding().unwrap_or(self.default) == self.encoding
     }
@@ -356,8 +358,8 @@ impl File {
 
 fn check_name(file: &str, format: Format) -> Result<(), String> {
     match Format::of_name(file) {
-        Some(named) if named != format => Err(format!(
-            "{file:?} must be what its name says; it is a file of type {}",
+        Some(expected) if expected != format => Err(format!(
+            "{file:?} must match its extension; it is a file of type {}",
             format.name()
         )),
         _ => Ok(()),
@@ -368,7 +370,7 @@ fn read(file: &str, path: &Path) -> Result<Vec<u8>, Problem> {
     let mut bytes = Vec::new();
     let too_large = || Problem::new(format!("{file:?} must not be larger than {} MiB", MAX_FILE_BYTES >> 20));
     // Rejects most files that are too large without reading them.
-    if fs::metadata(path).is_ok_and(|data| data.len() > MAX_FILE_BYTES) {
+    if fs::metadata(path).is_ok_and(|metadata| metadata.len() > MAX_FILE_BYTES) {
         return Err(too_large());
     }
     fs::File::open(path)
@@ -385,23 +387,23 @@ fn unreadable(file: &str, error: &io::Error) -> String {
 }
 
 /// Returns the message about an invalid image, without the name of the image.
-fn refused_image(error: &ImageError) -> String {
+fn image_message(error: &ImageError) -> String {
     match error {
         ImageError::Limits(limit) if matches!(limit.kind(), LimitErrorKind::DimensionError) => {
             format!("must have at most {MAX_IMAGE_SIDE} texels along a side")
         }
         ImageError::Limits(_) => "requires more memory than its header declares".to_string(),
-        ImageError::Unsupported(_) => format!("must be of a kind that can be read: {error}"),
+        ImageError::Unsupported(_) => format!("must have a supported format: {error}"),
         _ => format!("is damaged or truncated: {error}"),
     }
 }
 
 /// Returns the message about an EXR file without supported channels, without the name of the file.
-fn refused_channels(channels: &Channels) -> String {
+fn channels_message(channels: &Channels) -> String {
     match channels.are_deep {
-        true => "must have one value for each pixel and channel; it is deep".to_owned(),
+        true => "must have one value for each pixel and channel; deep images are not supported".to_owned(),
         false => format!(
-            "must have the channels \"R\", \"G\" and \"B\", or one alone; it has {}",
+            "must have the channels \"R\", \"G\" and \"B\", or a single channel; it has {}",
             list(&channels.names)
         ),
     }
@@ -443,6 +445,6 @@ fn alpha(image: DynamicImage) -> Option<Texels> {
     Some(match image {
         DynamicImage::ImageLumaA8(gray) => bytes(gray.pixels().map(|texel| texel.0[1]).collect()),
         DynamicImage::ImageRgba8(colors) => bytes(colors.pixels().map(|texel| texel.0[3]).collect()),
-        deep => Texels::Floats(deep.into_rgba32f().pixels().map(|texel| [texel.0[3]; 3]).collect()),
+        image => Texels::Floats(image.into_rgba32f().pixels().map(|texel| [texel.0[3]; 3]).collect()),
     })
 }

@@ -5,20 +5,21 @@ use std::fmt::{self, Write as _};
 
 /// Maximum length of a value or key in a message, in characters.
 const MAX_VALUE_LEN: usize = 60;
+
 /// Returns a value or key for a message, with the middle elided if it is long.
 pub fn cut(text: &str) -> Cow<'_, str> {
     cut_to(MAX_VALUE_LEN, text)
 }
 
-/// Removes the middle of a text longer than this many characters.
-pub fn cut_to(longest: usize, text: &str) -> Cow<'_, str> {
+/// Elides the middle of a text that is longer than `max_len` characters.
+pub fn cut_to(max_len: usize, text: &str) -> Cow<'_, str> {
     let count = text.chars().count();
-    if count <= longest {
+    if count <= max_len {
         return text.into();
     }
-    let kept = longest - 3;
-    let start: String = text.chars().take(kept - kept / 3).collect();
-    let end: String = text.chars().skip(count - kept / 3).collect();
+    let kept_len = max_len - 3;
+    let start: String = text.chars().take(kept_len - kept_len / 3).collect();
+    let end: String = text.chars().skip(count - kept_len / 3).collect();
     format!("{start}...{end}").into()
 }
 
@@ -27,18 +28,18 @@ pub fn list<S: AsRef<str>>(names: impl IntoIterator<Item = S>) -> String {
     listed(names, 24)
 }
 
-/// Formats up to `most` names.
-pub fn listed<S: AsRef<str>>(names: impl IntoIterator<Item = S>, most: usize) -> String {
+/// Formats up to `max` names, and the number of the remaining names.
+pub fn listed<S: AsRef<str>>(names: impl IntoIterator<Item = S>, max: usize) -> String {
     let mut text = String::new();
     let mut names = names.into_iter();
-    for name in names.by_ref().take(most) {
+    for name in names.by_ref().take(max) {
         let comma = if text.is_empty() { "" } else { ", " };
         // Writing to a String cannot fail.
         let _ = write!(text, "{comma}{:?}", cut(name.as_ref()));
     }
     match names.count() {
         0 => text,
-        more => format!("{text} and {more} more"),
+        remaining => format!("{text} and {remaining} more"),
     }
 }
 
@@ -72,7 +73,7 @@ impl From<usize> for Segment {
 
 impl fmt::Display for KeyPath {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let bare = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
+        let is_bare = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
         let end = self.0.len().saturating_sub(MAX_SEGMENTS / 2);
         for (i, segment) in self.0.iter().enumerate() {
             if self.0.len() > MAX_SEGMENTS && (MAX_SEGMENTS / 2..end).contains(&i) {
@@ -87,11 +88,11 @@ impl fmt::Display for KeyPath {
                     if i > 0 {
                         f.write_str(".")?;
                     }
-                    let shown = cut(key);
-                    if !key.is_empty() && key.chars().all(bare) {
-                        f.write_str(&shown)?;
+                    let elided = cut(key);
+                    if !key.is_empty() && key.chars().all(is_bare) {
+                        f.write_str(&elided)?;
                     } else {
-                        write!(f, "{shown:?}")?;
+                        write!(f, "{elided:?}")?;
                     }
                 }
             }
@@ -111,7 +112,7 @@ impl KeyPath {
                     if !text.is_empty() {
                         text.push('.');
                     }
-                    text.push_str(&written_key(key));
+                    text.push_str(&toml_key(key));
                 }
             }
         }
@@ -120,7 +121,7 @@ impl KeyPath {
 }
 
 /// Formats a key as in TOML: bare or quoted.
-fn written_key(key: &str) -> std::borrow::Cow<'_, str> {
+fn toml_key(key: &str) -> Cow<'_, str> {
     let is_bare = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
     if !key.is_empty() && key.chars().all(is_bare) {
         return key.into();

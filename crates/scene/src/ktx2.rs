@@ -1,6 +1,6 @@
 //! KTX 2 files with Basis Universal texels, which glTF files reference by `KHR_texture_basisu` (Khronos Group, "KTX
-//! File Format Specification", version 2.0.4). Every length is checked here, because the decoders allocate what a
-//! header declares.
+//! File Format Specification", version 2.0.4). Every length is checked here, because the decoders allocate memory
+//! according to the header.
 
 use std::io::Read as _;
 use std::ops::Range;
@@ -13,12 +13,12 @@ use wgray_image::panic_guard::catch_panic;
 
 /// First bytes of a file (section 3.1).
 pub(super) const IDENTIFIER: &[u8] = b"\xabKTX 20\xbb\r\n\x1a\n";
-/// Position of the index of levels (section 2); the entry of a level has 24 bytes.
+/// Position of the index of levels (section 2), and the size of an entry of the index, in bytes.
 const INDEX: usize = 80;
 const ENTRY: usize = 24;
-/// Window sizes of a Zstandard frame that are always accepted, in bytes (RFC 8878, section 3.1.1.1.2); larger windows
-/// only for larger images.
-const WINDOW: u64 = 8 << 20;
+/// Window size of a Zstandard frame that is always accepted, in bytes (RFC 8878, section 3.1.1.1.2). Larger windows are
+/// only accepted for larger images.
+const MIN_WINDOW_LIMIT: u64 = 8 << 20;
 
 /// The supercompression schemes (section 3.2).
 const NONE: u32 = 0;
@@ -45,33 +45,37 @@ pub(crate) struct Ktx2<'a> {
     descriptor: Range<usize>,
     level: Range<usize>,
     /// Length in bytes of the largest level after Zstandard decompression.
-    inflated: usize,
+    decompressed_size: usize,
 }
 
-fn damaged(what: impl std::fmt::Display) -> String {
-    format!("is damaged or truncated: {what}")
+fn damaged(reason: impl std::fmt::Display) -> String {
+    format!("is damaged or truncated: {reason}")
 }
 
-fn number<const N: usize>(bytes: &[u8], at: usize) -> Result<[u8; N], String> {
-    let found = bytes.get(at..at + N).and_then(|bytes| bytes.try_into().ok());
+fn read_bytes<const N: usize>(bytes: &[u8], offset: usize) -> Result<[u8; N], String> {
+    let found = bytes.get(offset..offset + N).and_then(|bytes| bytes.try_into().ok());
     found.ok_or_else(|| damaged("the KTX2 header ends early"))
 }
 
-fn short(bytes: &[u8], at: usize) -> Result<u32, String> {
-    Ok(u32::from_le_bytes(number(bytes, at)?))
+fn short(bytes: &[u8], offset: usize) -> Result<u32, String> {
+    Ok(u32::from_le_bytes(read_bytes(bytes, offset)?))
 }
 
-fn long(bytes: &[u8], at: usize) -> Result<u64, String> {
-    Ok(u64::from_le_bytes(number(bytes, at)?))
+fn long(bytes: &[u8], offset: usize) -> Result<u64, String> {
+    Ok(u64::from_le_bytes(read_bytes(bytes, offset)?))
 }
 
-fn part(bytes: &[u8], what: &str, at: u64, length: u64) -> Result<Range<usize>, String> {
-    let end = at.checked_add(length).filter(|end| *end <= bytes.len() as u64);
-    let end = end.ok_or_else(|| damaged(format!("{what} must lie in the file; it has {length} bytes at {at}")))?;
-    Ok(at as usize..end as usize)
+fn checked_range(bytes: &[u8], name: &str, offset: u64, length: u64) -> Result<Range<usize>, String> {
+    let end = offset.checked_add(length).filter(|end| *end <= bytes.len() as u64);
+    let end = end.ok_or_else(|| {
+        damaged(format!(
+            "{name} must be inside the file; its offset is {offset}, its length {length}"
+        ))
+    })?;
+    Ok(offset as usize..end as usize)
 }
 
-/// Returns whether a file has alpha, or `None` if it is not a KTX 2 file.
+/// Returns true if a file is valid and has alpha; `None` if the file is not a KTX 2 file.
 pub(crate) fn has_alpha(bytes: &[u8]) -> Option<bool> {
     let is_ktx2 = bytes.starts_with(IDENTIFIER);
     is_ktx2.then(|| Ktx2::parse(bytes).is_ok_and(|file| file.has_alpha))
@@ -90,24 +94,26 @@ impl<'a> Ktx2<'a> {
         if width == 0 || height == 0 || depth != 0 || layers > 1 || faces != 1 {
             return Err("must contain one 2D image, not an array, a cube map or a volume".to_owned());
         }
-        let descriptor = part(
+        let descriptor = checked_range(
             bytes,
             "the data format descriptor",
             short(bytes, 48)?.into(),
             short(bytes, 52)?.into(),
         )?;
-        let described = &bytes[descriptor.clone()];
-        let model = described.get(12).copied().unwrap_or(0);
-        let is_known = matches!((model, supercompression), (ETC1S, BASIS_LZ) | (UASTC, NONE | ZSTANDARD));
-        if format != 0 || !is_known {
+        let descriptor_bytes = &bytes[descriptor.clone()];
+        let model = descriptor_bytes.get(12).copied().unwrap_or(0);
+        let is_supported = matches!((model, supercompression), (ETC1S, BASIS_LZ) | (UASTC, NONE | ZSTANDARD));
+        if format != 0 || !is_supported {
             return Err(format!(
                 "must contain ETC1S texels with BasisLZ, or UASTC texels with or without Zstandard; it has \
                  format {format}, color model {model} and supercompression {supercompression}"
             ));
         }
         // A header of 28 bytes, and 16 for each channel.
-        let channels: Vec<u8> = match described.len() {
-            44 | 60 => (described[28..].chunks(16)).map(|channel| channel[3] & 15).collect(),
+        let channels: Vec<u8> = match descriptor_bytes.len() {
+            44 | 60 => (descriptor_bytes[28..].chunks(16))
+                .map(|channel| channel[3] & 15)
+                .collect(),
             length => return Err(damaged(format!("the data format descriptor has {length} bytes"))),
         };
         let has_alpha = match (model, &channels[..]) {
@@ -118,20 +124,20 @@ impl<'a> Ktx2<'a> {
         if !(1..=16).contains(&levels) {
             return Err(damaged(format!("it has {levels} levels")));
         }
-        let level = part(bytes, "level 0", long(bytes, INDEX)?, long(bytes, INDEX + 8)?)?;
-        let inflated = long(bytes, INDEX + 16)?;
+        let level = checked_range(bytes, "level 0", long(bytes, INDEX)?, long(bytes, INDEX + 8)?)?;
+        let decompressed_size = long(bytes, INDEX + 16)?;
         let blocks = u64::from(width.div_ceil(4)) * u64::from(height.div_ceil(4));
         let needed = blocks.saturating_mul(16);
         let length = match supercompression {
             NONE => level.len() as u64,
-            ZSTANDARD => inflated,
+            ZSTANDARD => decompressed_size,
             _ => needed,
         };
         if length != needed {
             let rule = format!("{width} x {height} UASTC texels have {needed} bytes, not {length}");
             return Err(damaged(rule));
         }
-        part(bytes, "the global data", long(bytes, 64)?, long(bytes, 72)?)?;
+        checked_range(bytes, "the global data", long(bytes, 64)?, long(bytes, 72)?)?;
         Ok(Ktx2 {
             bytes,
             width,
@@ -140,18 +146,18 @@ impl<'a> Ktx2<'a> {
             supercompression,
             descriptor,
             level,
-            inflated: inflated as usize,
+            decompressed_size: decompressed_size as usize,
         })
     }
 
     /// Decodes the largest level, to 8 bits per channel. In messages, the error follows the file's name.
     pub fn decode(&self) -> Result<DynamicImage, String> {
-        let inflated;
+        let decompressed;
         let bytes = match self.supercompression {
             ZSTANDARD => {
-                let file = catch_panic(|| self.inflated());
-                inflated = file.and_then(|file| file).map_err(damaged)?;
-                &inflated
+                let file = catch_panic(|| self.decompressed());
+                decompressed = file.and_then(|file| file).map_err(damaged)?;
+                &decompressed
             }
             _ => self.bytes,
         };
@@ -169,35 +175,37 @@ impl<'a> Ktx2<'a> {
         })
     }
 
-    /// Returns the file with only the largest level, decompressed. Does not use the decompression of the crate
-    /// `basisu`, because version 0.1.0 depends on ruzstd 0.7, which does not limit the length of a block.
-    fn inflated(&self) -> Result<Vec<u8>, String> {
+    /// Returns the file with only the largest level, decompressed. The decompression of the crate `basisu` 0.1.0 is not
+    /// used, because it depends on ruzstd 0.7, which does not limit the length of a block.
+    fn decompressed(&self) -> Result<Vec<u8>, String> {
         let error = |error: &dyn std::fmt::Display| format!("its Zstandard data cannot be decompressed: {error}");
-        let window = (self.inflated as u64).next_power_of_two().max(WINDOW);
+        let window = (self.decompressed_size as u64)
+            .next_power_of_two()
+            .max(MIN_WINDOW_LIMIT);
         let data = &self.bytes[self.level.clone()];
-        let mut data = StreamingDecoder::new_with_max_window_size(data, window).map_err(|why| error(&why))?;
+        let mut data = StreamingDecoder::new_with_max_window_size(data, window).map_err(|cause| error(&cause))?;
         let descriptor = &self.bytes[self.descriptor.clone()];
-        let end_of_index = INDEX + ENTRY;
-        let start = (end_of_index + descriptor.len()).next_multiple_of(16);
-        let mut file = vec![0; start + self.inflated];
+        let index_end = INDEX + ENTRY;
+        let start = (index_end + descriptor.len()).next_multiple_of(16);
+        let mut file = vec![0; start + self.decompressed_size];
         file[..40].copy_from_slice(&self.bytes[..40]);
-        for (at, value) in [
+        for (offset, value) in [
             (40, 1),
             (44, NONE),
-            (48, end_of_index as u32),
+            (48, index_end as u32),
             (52, descriptor.len() as u32),
         ] {
-            file[at..at + 4].copy_from_slice(&value.to_le_bytes());
+            file[offset..offset + 4].copy_from_slice(&value.to_le_bytes());
         }
-        for (at, value) in [(0, start), (8, self.inflated), (16, self.inflated)] {
-            file[INDEX + at..INDEX + at + 8].copy_from_slice(&(value as u64).to_le_bytes());
+        for (offset, value) in [(0, start), (8, self.decompressed_size), (16, self.decompressed_size)] {
+            file[INDEX + offset..INDEX + offset + 8].copy_from_slice(&(value as u64).to_le_bytes());
         }
-        file[end_of_index..end_of_index + descriptor.len()].copy_from_slice(descriptor);
-        data.read_exact(&mut file[start..]).map_err(|why| error(&why))?;
+        file[index_end..index_end + descriptor.len()].copy_from_slice(descriptor);
+        data.read_exact(&mut file[start..]).map_err(|cause| error(&cause))?;
         match data.read(&mut [0]) {
             Ok(0) => Ok(file),
             Ok(_) => Err(error(&"it is longer than its header declares")),
-            Err(why) => Err(error(&why)),
+            Err(cause) => Err(error(&cause)),
         }
     }
 }

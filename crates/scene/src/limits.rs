@@ -12,15 +12,15 @@ pub(super) const SHARES: (f64, f64) = (0.0, 1.0);
 /// Rotation angles in degrees.
 pub(super) const TURNS: (f64, f64) = (-360.0, 360.0);
 
-/// Maximum pixels along a side of the image, and maximum samples.
+/// Maximum number of pixels along a side of the image, and of samples.
 pub(super) const MOST: u32 = 65_536;
-/// Minimum samples for an error estimate.
+/// Minimum number of samples for an error estimate.
 pub(super) const MIN_ADAPTIVE_SAMPLES: u32 = 2;
 /// Maximum number of bounces of a path.
 pub(super) const DEEPEST: u32 = 1024;
-/// Range of the maximum contribution of a sample.
+/// Maximum contributions of a sample.
 pub(super) const CLAMPS: (f64, f64) = (1e-6, 1e6);
-/// Range of ray origin offsets above a surface, relative to the largest coordinate there.
+/// Offsets of ray origins above a surface, relative to the largest coordinate of the surface point.
 pub(super) const SHADOW_EPSILONS: (f64, f64) = (0.0, 0.1);
 /// Filter radii in pixels.
 pub(super) const FILTER_RADII: (f64, f64) = (0.01, 16.0);
@@ -32,22 +32,22 @@ pub(super) const FOVS: (f64, f64) = (0.001, 179.999);
 pub(super) const APERTURES: (f64, f64) = (0.0, 1e9);
 /// F-numbers: focal length divided by lens diameter.
 pub(super) const F_NUMBERS: (f64, f64) = (0.1, 1e9);
-/// Corners of lenses that are not round.
+/// Numbers of corners of polygonal lenses.
 pub(super) const BLADES: (u32, u32) = (3, 16);
 
 pub(super) const SHININESS: (f64, f64) = (1e-6, 1e6);
 /// Indices of refraction, relative to the medium in front of a surface.
-pub(super) const IORS: (f64, f64) = (0.01, DENSEST);
-/// Indices of refraction of principled materials, from the index of a vacuum up.
-pub(super) const PRINCIPLED_IORS: (f64, f64) = (1.0, DENSEST);
-/// Ranges of the real and imaginary parts of the refractive indices of metals.
-pub(super) const ETAS: (f64, f64) = (0.001, DENSEST);
-pub(super) const KS: (f64, f64) = (0.0, DENSEST);
+pub(super) const IORS: (f64, f64) = (0.01, MAX_IOR);
+/// Indices of refraction of principled materials; 1 is the index of a vacuum.
+pub(super) const PRINCIPLED_IORS: (f64, f64) = (1.0, MAX_IOR);
+/// Real parts and imaginary parts of the indices of refraction of metals.
+pub(super) const ETAS: (f64, f64) = (0.001, MAX_IOR);
+pub(super) const KS: (f64, f64) = (0.0, MAX_IOR);
 /// Maximum index of refraction.
-const DENSEST: f64 = 100.0;
+const MAX_IOR: f64 = 100.0;
 /// Absorption coefficients per unit of length.
 pub(super) const ABSORPTIONS: (f64, f64) = (0.0, 1e6);
-/// Thicknesses of volumes; 0 is a thin sheet.
+/// Thicknesses of volumes; 0 means a thin sheet.
 pub(super) const THICKNESSES: (f64, f64) = (0.0, 1e9);
 pub(super) const ATTENUATION_DISTANCES: (f64, f64) = (1e-6, 1e9);
 
@@ -64,7 +64,7 @@ pub(super) const UV_SETS: u32 = 8;
 /// Factors of the slopes of normal maps.
 pub(super) const STRENGTHS: (f64, f64) = (-100.0, 100.0);
 
-/// Angles between axis and edge of a cone, in degrees.
+/// Angles between the axis and the edge of a cone, in degrees.
 pub(super) const CONES: (f64, f64) = (0.01, 180.0);
 pub(super) const ENVIRONMENT_SCALES: (f64, f64) = (0.0, 1e6);
 /// Elevations of the sun in degrees.

@@ -216,7 +216,7 @@ pub struct Facets {
     pub anisotropy: f64,
     /// Rotation of the first axis from the direction of u towards the direction of v, in degrees.
     pub rotation: f64,
-    /// True to compensate the energy that single-scattering microfacets lose.
+    /// True to compensate the energy that a single-scattering microfacet model loses.
     pub compensated: bool,
 }
 

@@ -1,4 +1,4 @@
-//! Cache of the mesh files that are in use.
+//! Cache of the meshes that are in use.
 
 use std::collections::HashMap;
 use std::fs;
@@ -8,12 +8,12 @@ use std::time::SystemTime;
 
 use crate::mesh::{Mesh, MeshError, Normals};
 
-/// File version and options.
+/// A version of a file, and the options of the reader.
 #[derive(PartialEq, Eq, Hash)]
 struct Key {
     path: PathBuf,
     length: u64,
-    changed: SystemTime,
+    modified: SystemTime,
     normals: Option<Normals>,
 }
 
@@ -26,7 +26,7 @@ struct CachedMesh {
     libraries: Vec<FileStamp>,
 }
 
-/// The meshes in use. A scene that is reloaded in development mode thus reuses BVHs.
+/// The meshes in use. A scene that is reloaded in development mode reuses the meshes and their BVHs.
 static IN_USE: Mutex<Option<HashMap<Key, CachedMesh>>> = Mutex::new(None);
 
 /// Reads a mesh; returns the existing mesh if it is in use and its files have not changed.
@@ -34,13 +34,13 @@ pub fn load(path: &Path, normals: Option<Normals>) -> Result<Arc<Mesh>, MeshErro
     let Some(key) = key(path, normals) else {
         return Mesh::load(path, normals).map(Arc::new); // reports the error
     };
-    if let Some(mesh) = known(&key) {
+    if let Some(mesh) = cached_mesh(&key) {
         return Ok(mesh);
     }
-    // The lock is not held, because a thread of the reader may call this function for another scene.
+    // The lock is not held while reading, because a thread of the reader may call this function for another scene.
     let read = Arc::new(Mesh::load(path, normals)?);
     let libraries = libraries(&read);
-    if let Some(mesh) = known(&key) {
+    if let Some(mesh) = cached_mesh(&key) {
         return Ok(mesh); // another thread was faster
     }
     let mut in_use = IN_USE.lock().unwrap_or_else(PoisonError::into_inner);
@@ -52,28 +52,28 @@ pub fn load(path: &Path, normals: Option<Normals>) -> Result<Arc<Mesh>, MeshErro
 }
 
 /// Returns the mesh if it is in use and its MTL files have not changed.
-fn known(key: &Key) -> Option<Arc<Mesh>> {
+fn cached_mesh(key: &Key) -> Option<Arc<Mesh>> {
     let mut in_use = IN_USE.lock().unwrap_or_else(PoisonError::into_inner);
     let in_use = in_use.get_or_insert_default();
-    in_use.retain(|_, known| known.mesh.strong_count() > 0);
-    let known = in_use.get(key)?;
-    let mesh = known.mesh.upgrade()?;
-    (libraries(&mesh) == known.libraries).then_some(mesh)
+    in_use.retain(|_, cached| cached.mesh.strong_count() > 0);
+    let cached = in_use.get(key)?;
+    let mesh = cached.mesh.upgrade()?;
+    (libraries(&mesh) == cached.libraries).then_some(mesh)
 }
 
 fn key(path: &Path, normals: Option<Normals>) -> Option<Key> {
-    let (length, changed) = stamp(path)?;
+    let (length, modified) = stamp(path)?;
     Some(Key {
         path: path.to_owned(),
         length,
-        changed,
+        modified,
         normals,
     })
 }
 
 fn stamp(path: &Path) -> FileStamp {
-    let data = fs::metadata(path).ok()?;
-    Some((data.len(), data.modified().ok()?))
+    let metadata = fs::metadata(path).ok()?;
+    Some((metadata.len(), metadata.modified().ok()?))
 }
 
 fn libraries(mesh: &Mesh) -> Vec<FileStamp> {
@@ -93,7 +93,7 @@ mod tests {
         fs::write(&path, SMALL).unwrap();
         let first = load(&path, None).unwrap();
         assert!(Arc::ptr_eq(&first, &load(&path, None).unwrap()));
-        // Other normals require a different mesh.
+        // A different normals option requires a different mesh.
         let flat = load(&path, Some(Normals::Flat)).unwrap();
         assert!(!Arc::ptr_eq(&first, &flat));
         let smooth = load(&path, Some(Normals::Smooth)).unwrap();
@@ -109,13 +109,13 @@ mod tests {
         use rayon::prelude::*;
         let folder = tempfile::tempdir().unwrap();
         let files: Vec<PathBuf> = (0..32).map(|i| folder.path().join(format!("{i}.obj"))).collect();
-        let many = SMALL.replace("1 2 3", "-3 -2 -1").repeat(2000);
-        files.iter().for_each(|file| fs::write(file, &many).unwrap());
-        let read = files.par_iter().chain(&files).map(|file| load(file, None).unwrap());
-        let read: Vec<Arc<Mesh>> = read.collect();
-        assert!(read.iter().all(|mesh| mesh.positions == read[0].positions));
-        let is_one = |file| read.iter().any(|mesh| Arc::ptr_eq(mesh, &load(file, None).unwrap()));
-        assert!(files.iter().all(|file| is_one(file)));
+        let large_text = SMALL.replace("1 2 3", "-3 -2 -1").repeat(2000);
+        files.iter().for_each(|file| fs::write(file, &large_text).unwrap());
+        let meshes = files.par_iter().chain(&files).map(|file| load(file, None).unwrap());
+        let meshes: Vec<Arc<Mesh>> = meshes.collect();
+        assert!(meshes.iter().all(|mesh| mesh.positions == meshes[0].positions));
+        let is_cached = |file| meshes.iter().any(|mesh| Arc::ptr_eq(mesh, &load(file, None).unwrap()));
+        assert!(files.iter().all(|file| is_cached(file)));
     }
 
     #[test]
@@ -125,12 +125,12 @@ mod tests {
         fs::write(&path, SMALL).unwrap();
         let weak = Arc::downgrade(&load(&path, None).unwrap());
         assert_eq!(weak.strong_count(), 0);
-        let other = folder.path().join("b.obj");
-        fs::write(&other, SMALL).unwrap();
-        let _other = load(&other, None).unwrap();
+        let other_path = folder.path().join("b.obj");
+        fs::write(&other_path, SMALL).unwrap();
+        let _other_mesh = load(&other_path, None).unwrap();
         let in_use = IN_USE.lock().unwrap();
-        let known = in_use.iter().flatten().filter(|(key, _)| key.path == path);
-        assert_eq!(known.count(), 0);
+        let cached = in_use.iter().flatten().filter(|(key, _)| key.path == path);
+        assert_eq!(cached.count(), 0);
     }
 
     #[test]

@@ -38,7 +38,7 @@ const METALS: &[Entry] = &[
 impl MetalIndex {
     /// Returns the metal of this name.
     pub fn named(name: &str) -> Option<MetalIndex> {
-        let (_, eta, k) = METALS.iter().find(|(known, ..)| *known == name)?;
+        let (_, eta, k) = METALS.iter().find(|(entry_name, ..)| *entry_name == name)?;
         Some(MetalIndex {
             eta: DVec3::from_array(*eta),
             k: DVec3::from_array(*k),

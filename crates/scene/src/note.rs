@@ -1,8 +1,8 @@
-//! Warnings about scenes and the files that they name.
+//! Warnings about scenes and their files.
 
 use std::fmt;
 
-/// A warning about a scene or one of its files, as in `rock.ply:8: face 3: must have 3 vertices or more; it has 2; the
+/// A warning about a scene or one of its files, as in `rock.ply:8: face 3: must have at least 3 vertices, not 2; the
 /// face was removed`.
 #[derive(Clone, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 #[non_exhaustive]
@@ -16,7 +16,7 @@ pub struct Note {
 }
 
 impl Note {
-    /// Turns the note into one about `file`, which the loaded file refers to.
+    /// Returns the note as a note about `file`, which the loaded file refers to.
     pub(crate) fn in_file(self, file: &str) -> Note {
         Note {
             file: Some(file.to_owned()),
@@ -24,8 +24,8 @@ impl Note {
         }
     }
 
-    /// Removes the name of the file if it is `name`, the file that was loaded.
-    pub(crate) fn of_loaded(mut self, name: &str) -> Note {
+    /// Removes the name of the file if it is `name`, the name of the loaded file.
+    pub(crate) fn without_loaded_file(mut self, name: &str) -> Note {
         self.file = self.file.filter(|file| file != name);
         self
     }
@@ -81,16 +81,19 @@ mod tests {
     use super::*;
 
     #[test]
-    fn notes_begin_with_their_place() {
+    fn notes_begin_with_their_location() {
         let note = Note {
             line: Some(8),
             ..Note::from("the face was removed")
         };
         assert_eq!(note.to_string(), "line 8: the face was removed");
-        let inside = note.in_file("a.obj");
-        assert_eq!(inside.to_string(), "a.obj:8: the face was removed");
-        assert_eq!(inside.clone().of_loaded("b.obj"), inside);
-        assert_eq!(inside.of_loaded("a.obj").to_string(), "line 8: the face was removed");
+        let in_file = note.in_file("a.obj");
+        assert_eq!(in_file.to_string(), "a.obj:8: the face was removed");
+        assert_eq!(in_file.clone().without_loaded_file("b.obj"), in_file);
+        assert_eq!(
+            in_file.without_loaded_file("a.obj").to_string(),
+            "line 8: the face was removed"
+        );
         assert_eq!(Note::from("x").in_file("a.obj").to_string(), "a.obj: x");
     }
 }

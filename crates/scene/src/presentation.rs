@@ -19,7 +19,8 @@ const GRAY: [f64; 3] = [0.5; 3];
 /// The radius of the ground, relative to the diagonal of the model's bounds. Large enough for the shadows of low
 /// lights.
 const RADIUS: f64 = 5.0;
-/// The gap between ground and model, relative to the same diagonal, so that no face coincides with the ground.
+/// The gap between ground and model, relative to the diagonal of the model's bounds, so that no face coincides with the
+/// ground.
 const GAP: f64 = 1e-4;
 
 /// Options for a model file without a scene.
@@ -36,16 +37,15 @@ pub struct Presentation {
 }
 
 impl Presentation {
-    /// Returns the name of the first option that is given.
-    pub(super) fn first(&self) -> Option<&'static str> {
-        let camera = self.of_camera();
-        camera
+    /// Returns the name of the first option that is set.
+    pub(super) fn first_option(&self) -> Option<&'static str> {
+        self.camera_option()
             .or(self.orbit.map(|_| "orbit"))
             .or(self.ground.then_some("ground"))
     }
 
-    /// Returns the name of the first option that is given and only adjusts the automatic camera.
-    pub(super) fn of_camera(&self) -> Option<&'static str> {
+    /// Returns the name of the first option that is set and only adjusts the automatic camera.
+    pub(super) fn camera_option(&self) -> Option<&'static str> {
         self.fov.map(|_| "fov").or(self.up.map(|_| "up"))
     }
 
@@ -90,7 +90,7 @@ impl Presentation {
 
 impl Presentation {
     /// Returns a warning if the ground is between the model and the camera.
-    pub(super) fn hiding_ground(&self, scene: &Scene) -> Option<String> {
+    pub(super) fn ground_warning(&self, scene: &Scene) -> Option<String> {
         let ground = self.ground.then(|| scene.ground()).flatten()?;
         let (low, _) = scene.shapes[ground].geometry.bounds()?;
         let warning =
@@ -100,15 +100,16 @@ impl Presentation {
 }
 
 impl Scene {
+    /// Returns the index of the ground among the shapes.
     fn ground(&self) -> Option<usize> {
         let is_ground = |material: usize| self.material_names.get(material).is_some_and(|name| name == GROUND);
         self.shapes.iter().position(|shape| is_ground(shape.material))
     }
 
-    /// Copies the ground from another frame, so that it does not move while the model is animated.
+    /// Copies the ground from another frame, so that the ground does not move while the model is animated.
     pub fn keep_ground(&mut self, before: &Scene) {
-        if let (Some(now), Some(then)) = (self.ground(), before.ground()) {
-            self.shapes[now].geometry = before.shapes[then].geometry.clone();
+        if let (Some(ground), Some(ground_before)) = (self.ground(), before.ground()) {
+            self.shapes[ground].geometry = before.shapes[ground_before].geometry.clone();
         }
     }
 }
@@ -123,7 +124,7 @@ pub struct UpAxis {
 
 impl UpAxis {
     /// Returns the rotation that maps this axis to +z; `None` if the axis is +z. `to_scene` maps directions of the file
-    /// to the scene. -z is rotated about the axis from front to back.
+    /// to the scene. If the axis is -z, the rotation is about the axis from front to back.
     pub(super) fn rotation(self, to_scene: impl Fn(DVec3) -> DVec3) -> Option<(Rotation, DMat3)> {
         let sign = if self.is_negative { -1.0 } else { 1.0 };
         let up = to_scene(DVec3::AXES[self.axis] * sign);
@@ -135,10 +136,10 @@ impl UpAxis {
             (.., -1.0) => (DVec3::Y, 180.0),
             _ => return None,
         };
-        let turn = DMat3::from_axis_angle(axis, f64::to_radians(degrees));
-        // The elements are 0, 1 and -1.
-        let turn = DMat3::from_cols(turn.x_axis.round(), turn.y_axis.round(), turn.z_axis.round());
-        Some((Rotation::About(RotationAbout { axis, degrees }), turn))
+        let matrix = DMat3::from_axis_angle(axis, f64::to_radians(degrees));
+        // The exact elements are 0, 1 and -1.
+        let matrix = DMat3::from_cols(matrix.x_axis.round(), matrix.y_axis.round(), matrix.z_axis.round());
+        Some((Rotation::About(RotationAbout { axis, degrees }), matrix))
     }
 }
 
@@ -152,7 +153,7 @@ impl FromStr for UpAxis {
         };
         let axis = ["x", "y", "z"]
             .iter()
-            .position(|known| name.eq_ignore_ascii_case(known));
+            .position(|axis_name| name.eq_ignore_ascii_case(axis_name));
         let axis = axis.ok_or("must be x, y, z, -x, -y or -z")?;
         Ok(UpAxis { axis, is_negative })
     }

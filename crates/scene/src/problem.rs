@@ -4,15 +4,15 @@ use std::fmt;
 
 use crate::key_path::{KeyPath, Segment, cut_to};
 
-/// The location of an error, as far as it is known.
+/// The location of an error, as far as known.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct ErrorPlace {
     /// Name of the file.
     pub file: Option<String>,
-    /// Counted from 1.
+    /// Line, counted from 1.
     pub line: Option<usize>,
-    /// Counted from 1.
+    /// Column, counted from 1.
     pub column: Option<usize>,
     /// The key path of the value: `shapes[2].size`.
     pub key: Option<String>,
@@ -21,7 +21,7 @@ pub struct ErrorPlace {
 /// Maximum length of a message, in characters.
 const MAX_MESSAGE_LEN: usize = 1000;
 
-/// A value that violates a rule: `shapes[2].size: -1 must be finite and greater than 0`.
+/// A value that violates a rule: `shapes[2].size: -1 must be from 1e-9 to 1e9`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Problem {
@@ -44,7 +44,7 @@ impl From<String> for Problem {
 }
 
 impl Problem {
-    /// Creates a problem of one key.
+    /// Creates a problem with a key.
     pub fn of(key: &str, message: impl Into<String>) -> Self {
         Self::new(message).at(key)
     }
@@ -54,7 +54,7 @@ impl Problem {
         self.at(key)
     }
 
-    /// Returns a problem without a key.
+    /// Creates a problem without a key.
     pub fn new(message: impl Into<String>) -> Self {
         Self {
             key: KeyPath::default(),
@@ -73,7 +73,7 @@ impl Problem {
         }
     }
 
-    /// Returns the problem of a damaged file.
+    /// Creates the problem of a damaged file.
     pub fn damage(message: impl Into<String>) -> Self {
         Self {
             is_damage: true,
@@ -82,8 +82,8 @@ impl Problem {
     }
 }
 
-/// Maximum number of reported problems. Also applies to each section, because the order of the sections in the file is
-/// unknown.
+/// Maximum number of reported problems. The limit also applies to each section, because the order of the sections in
+/// the file is unknown.
 pub(crate) const MAX_PROBLEMS: usize = 20;
 
 /// The problems of a description: at least one.
@@ -122,7 +122,7 @@ impl Problems {
         self.others.len() + 1 >= MAX_PROBLEMS
     }
 
-    /// Adds a problem; if the maximum is reached, only counts it.
+    /// Adds a problem; if the maximum is reached, only counts the problem.
     pub fn add(&mut self, problem: Problem) {
         match self.others.len() + 1 < MAX_PROBLEMS {
             true => self.others.push(problem),
@@ -138,10 +138,10 @@ impl Problems {
 
     /// Keeps the first problem of each key.
     pub fn once_per_key(mut self) -> Problems {
-        let mut known = vec![self.first.key.clone()];
+        let mut keys = vec![self.first.key.clone()];
         self.others.retain(|problem| {
-            let is_new = !known.contains(&problem.key);
-            known.push(problem.key.clone());
+            let is_new = !keys.contains(&problem.key);
+            keys.push(problem.key.clone());
             is_new
         });
         self
@@ -154,16 +154,16 @@ pub struct Collector(Option<Problems>);
 
 impl Collector {
     /// Returns the value; on failure, collects the problem and returns `None`.
-    pub fn value<T>(&mut self, checked: Result<T, Problem>) -> Option<T> {
+    pub fn value<T>(&mut self, result: Result<T, Problem>) -> Option<T> {
         let add = |problem| match &mut self.0 {
             Some(problems) => problems.add(problem),
-            none => *none = Some(problem.into()),
+            empty => *empty = Some(problem.into()),
         };
-        checked.map_err(add).ok()
+        result.map_err(add).ok()
     }
 
     /// Returns the value; on failure, collects the problems and returns `None`.
-    pub fn values<T>(&mut self, checked: Result<T, Problems>) -> Option<T> {
+    pub fn values<T>(&mut self, result: Result<T, Problems>) -> Option<T> {
         let add = |found: Problems| match &mut self.0 {
             Some(problems) => {
                 problems.more += found.more;
@@ -171,15 +171,15 @@ impl Collector {
                     .chain(found.others)
                     .for_each(|problem| problems.add(problem));
             }
-            none => *none = Some(found),
+            empty => *empty = Some(found),
         };
-        checked.map_err(add).ok()
+        result.map_err(add).ok()
     }
 
-    /// Returns the value; on failure, collects the problem, which [`Collector::end`] returns, and returns a default
-    /// that is never used.
-    pub fn or_default<T: Default>(&mut self, checked: Result<T, Problem>) -> T {
-        self.value(checked).unwrap_or_default()
+    /// Returns the value; on failure, collects the problem and returns a default, which is unused because
+    /// [`Collector::end`] returns the problem.
+    pub fn or_default<T: Default>(&mut self, result: Result<T, Problem>) -> T {
+        self.value(result).unwrap_or_default()
     }
 
     /// Returns the value if no problems were collected.
@@ -216,7 +216,8 @@ impl fmt::Display for Problem {
 
 impl std::error::Error for Problem {}
 
-/// Adds the location of a problem while it is returned: `check(x).at("center").at(2).at("shapes")?`.
+/// Adds segments to the key path of a problem while the problem is returned:
+/// `check(x).at("center").at(2).at("shapes")?`.
 pub(crate) trait At {
     /// Prepends a segment to the path of the problem.
     fn at(self, segment: impl Into<Segment>) -> Self;

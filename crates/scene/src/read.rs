@@ -8,7 +8,8 @@ use crate::parse::is_course;
 use crate::{Description, course};
 
 impl Description {
-    /// Parses a scene file without validating its values. `origin` is the file's name in messages; `.json` means JSON.
+    /// Parses a scene file without validating its values. `origin` is the file's name in messages. If the name ends in
+    /// `.json`, the text is JSON, otherwise TOML.
     ///
     /// # Errors
     ///

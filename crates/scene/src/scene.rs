@@ -40,15 +40,15 @@ pub struct Scene {
     pub materials: Vec<Material>,
     /// Names of the materials.
     pub material_names: Vec<String>,
-    /// The environment, if it emits light; `None` with [`Integrator::Phong`].
+    /// The environment; `None` if it neither emits light nor has a background, and with [`Integrator::Phong`].
     pub environment: Option<Environment>,
     /// Lights, in file order.
     pub lights: Vec<Light>,
     /// Shapes in file order, then instances of meshes in file order.
     pub shapes: Vec<Shape>,
-    /// Number of instances, at the end of the shapes.
+    /// Number of instances, which are the last shapes.
     pub instances: usize,
-    /// All files of the scene, sorted: images, meshes, and the files that these refer to.
+    /// All files of the scene, sorted, including the files that meshes and glTF files refer to.
     pub files: Vec<PathBuf>,
     /// Warnings: `rock.ply: 1 of 12 triangles is a duplicate and was removed`.
     pub notes: Vec<Note>,
@@ -80,11 +80,11 @@ pub struct Camera {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Lens {
-    /// Radius of the aperture, or of its corners, in scene units.
+    /// Radius of a round aperture, or distance of the corners from the center, in scene units.
     pub radius: f64,
     /// Distance of the plane in focus, along the view direction, in scene units.
     pub focus: f64,
-    /// Number of corners of the aperture, 3 to 16; 0 if it is round.
+    /// Number of corners of the aperture, 3 to 16; 0 for a round aperture.
     pub blades: u32,
     /// Rotation of the corners in radians, counter-clockwise in the image. At 0, a corner is at the top.
     pub rotation: f64,
@@ -117,7 +117,7 @@ pub struct Render {
     pub ambient: DVec3,
     /// Radiance of rays that leave the scene; with [`Integrator::Path`], the radiance of the environment.
     pub background: DVec3,
-    /// Minimum offset of ray origins above a surface, relative to the largest coordinate there.
+    /// Minimum offset of ray origins above a surface, relative to the largest coordinate of the origin.
     pub shadow_epsilon: f64,
     /// Shadows of glass; always [`Shadows::Opaque`] with [`Integrator::Path`].
     pub shadows: Shadows,
@@ -183,22 +183,22 @@ pub struct Environment {
     pub color: DVec3,
     /// Environment map.
     pub image: Option<EnvironmentImage>,
-    /// Visible to the camera. Reflections and refractions show it in either case.
+    /// True if the camera sees the environment. Reflections and refractions always show the environment.
     pub visible: bool,
     /// Radiance that the camera sees instead of the environment.
     pub background: Option<DVec3>,
 }
 
-/// An equirectangular environment map. Unrotated, its center is towards +x, its left and right edges towards -x, its
-/// upper edge towards +z.
+/// An equirectangular environment map. Without rotation, the center of the map is towards +x, the left and right edges
+/// are towards -x, and the upper edge is towards +z.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct EnvironmentImage {
-    /// Texels; radiance is interpolated bilinearly between their centers.
+    /// Texels; radiance is interpolated bilinearly between the centers of texels.
     pub image: Arc<Image>,
     /// Factor of the radiance.
     pub scale: f64,
-    /// Rotation.
+    /// Rotation from the map to world space.
     pub to_world: DMat3,
 }
 
@@ -206,14 +206,14 @@ pub struct EnvironmentImage {
 #[derive(Clone, Debug, PartialEq)]
 pub enum Light {
     /// An area light. With [`Integrator::Phong`], the light emits from both sides, does not cast shadows, and is
-    /// displayed in its plain color. With [`Integrator::Path`], it emits along its normal, u x v, and occludes other
-    /// lights.
+    /// displayed in its plain color. With [`Integrator::Path`], the light emits along its normal, u x v, and occludes
+    /// other lights.
     Rectangle {
         /// Position and size.
         rectangle: Parallelogram,
         /// Color; with [`Integrator::Path`], the radiance.
         color: DVec3,
-        /// Visible to the camera; always visible to mirrors.
+        /// True if the camera sees the light. Mirrors always reflect the light.
         visible: bool,
     },
     /// A point light, invisible to the camera.
@@ -221,7 +221,7 @@ pub enum Light {
         /// Position.
         position: DVec3,
         /// Color. With [`Integrator::Path`], the intensity (power per unit solid angle) with inverse-square falloff;
-        /// otherwise without falloff.
+        /// with [`Integrator::Phong`], without falloff.
         color: DVec3,
     },
     /// A directional light, invisible to the camera.

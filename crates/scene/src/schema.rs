@@ -1,4 +1,4 @@
-//! The JSON Schema of scene files, derived from the types that parse them (`description/`) and the limits that
+//! The JSON Schema of scene files, derived from the types of descriptions (`description/`) and the limits that
 //! validation uses (`limits.rs`).
 
 pub(crate) mod fields;
@@ -7,7 +7,7 @@ pub(crate) mod range;
 use schemars::generate::SchemaSettings;
 use serde_json::{Value, json};
 
-use super::description::kinds::SPLIT;
+use super::description::kinds::TITLE_SEPARATOR;
 use super::description::tagged::Tagged as _;
 use super::description::tagged_schema::definition;
 use super::{CameraDescription, Description};
@@ -17,39 +17,41 @@ use super::{CameraDescription, Description};
 /// All files that the schema rejects are invalid. The schema does not include rules that involve several values, such
 /// as a camera whose `look_at` is its position, nor rules about references to names.
 pub fn schema() -> String {
-    let mut schema = of_files();
-    without_kinds(&mut schema);
+    let mut schema = file_schema();
+    remove_titles(&mut schema);
     schema["title"] = json!("wgray scene");
     schema["description"] = json!("A scene of wgray, version ".to_owned() + env!("CARGO_PKG_VERSION") + ".");
     format!("{schema:#}\n")
 }
 
-fn of_files() -> Value {
+/// Returns the schema with titles.
+fn file_schema() -> Value {
     // Subschemas are inlined, because editors ignore descriptions next to a reference.
     let settings = SchemaSettings::draft2020_12().with(|settings| settings.inline_subschemas = true);
     let mut schema = settings
         .into_generator()
         .into_root_schema_for::<Description>()
         .to_value();
-    of_camera(&mut schema);
+    make_camera_keys_optional(&mut schema);
     finish(&mut schema);
     schema
 }
 
-/// Removes the kinds, because the descriptions contain them.
-fn without_kinds(schema: &mut Value) {
+/// Removes the titles, which contain the kinds; the descriptions contain the kinds too.
+fn remove_titles(schema: &mut Value) {
     match schema {
-        Value::Array(all) => all.iter_mut().for_each(without_kinds),
+        Value::Array(all) => all.iter_mut().for_each(remove_titles),
         Value::Object(all) => {
             all.retain(|key, value| key != "title" || !value.is_string());
-            all.values_mut().for_each(without_kinds);
+            all.values_mut().for_each(remove_titles);
         }
         _ => {}
     }
 }
 
-/// If a camera has no `type`, it is perspective. Required keys may be in the keys of the camera's path.
-fn of_camera(schema: &mut Value) {
+/// Makes the key `type` of the camera optional, and the required keys of a camera with a path, whose keys may set the
+/// values.
+fn make_camera_keys_optional(schema: &mut Value) {
     let camera = &mut schema["properties"]["camera"];
     camera["properties"]["type"]["default"] = json!(CameraDescription::DEFAULT);
     let tags = CameraDescription::TYPES;
@@ -57,29 +59,30 @@ fn of_camera(schema: &mut Value) {
         camera.remove("required");
     }
     for condition in camera["allOf"].as_array_mut().into_iter().flatten() {
-        let of = &mut condition["if"];
-        if of["properties"]["type"]["const"] == CameraDescription::DEFAULT {
-            *of = json!({ "properties": of["properties"] });
+        let premise = &mut condition["if"];
+        if premise["properties"]["type"]["const"] == CameraDescription::DEFAULT {
+            *premise = json!({ "properties": premise["properties"] });
         }
     }
     for tag in tags {
-        let Some(of_type) = schema["$defs"][definition("camera", tag)].as_object_mut() else {
+        let Some(type_schema) = schema["$defs"][definition("camera", tag)].as_object_mut() else {
             continue;
         };
-        if let Some(required) = of_type.remove("required") {
-            let either = json!([{ "required": required }, { "required": ["path"] }]);
-            of_type.insert("anyOf".to_owned(), either);
+        if let Some(required) = type_schema.remove("required") {
+            let alternatives = json!([{ "required": required }, { "required": ["path"] }]);
+            type_schema.insert("anyOf".to_owned(), alternatives);
         }
     }
 }
 
-/// Adds kinds, ranges and defaults to all descriptions. Removes what TOML does not support, and formats of Rust.
+/// Adds kinds, ranges and defaults to all descriptions. Removes null, which TOML does not support, and the formats of
+/// Rust's number types.
 fn finish(schema: &mut Value) {
     match schema {
         Value::Array(all) => all.iter_mut().for_each(finish),
         Value::Object(_) => {
-            without_null(schema);
-            names(schema);
+            remove_null(schema);
+            collect_names(schema);
             append_kind(schema);
             if let Some(Value::Object(properties)) = schema.get_mut("properties") {
                 for property in properties.values_mut() {
@@ -100,28 +103,28 @@ fn finish(schema: &mut Value) {
 }
 
 /// Removes null, which TOML does not support.
-fn without_null(schema: &mut Value) {
+fn remove_null(schema: &mut Value) {
     let null = json!("null");
     let types = schema.get_mut("type");
     if let Some(Value::Array(list)) = types {
         list.retain(|name| *name != null);
-        if let [one] = list.as_slice() {
-            schema["type"] = one.clone();
+        if let [name] = list.as_slice() {
+            schema["type"] = name.clone();
         }
     }
     if let Some(Value::Array(list)) = schema.get_mut("enum") {
         list.retain(|name| !name.is_null());
     }
     let Some(all) = schema.as_object_mut() else { return };
-    for word in ["anyOf", "oneOf"] {
-        let Some(Value::Array(list)) = all.get_mut(word) else {
+    for keyword in ["anyOf", "oneOf"] {
+        let Some(Value::Array(list)) = all.get_mut(keyword) else {
             continue;
         };
-        list.retain(|one| one.get("type") != Some(&null));
-        if let [Value::Object(one)] = list.as_slice() {
-            let one = one.clone();
-            all.remove(word);
-            for (key, value) in one {
+        list.retain(|alternative| alternative.get("type") != Some(&null));
+        if let [Value::Object(alternative)] = list.as_slice() {
+            let alternative = alternative.clone();
+            all.remove(keyword);
+            for (key, value) in alternative {
                 all.entry(key).or_insert(value);
             }
         }
@@ -132,18 +135,21 @@ fn without_null(schema: &mut Value) {
 }
 
 /// Converts alternatives with descriptions to a list of names, which all editors support.
-fn names(schema: &mut Value) {
+fn collect_names(schema: &mut Value) {
     let Some(all) = schema.as_object_mut() else { return };
     let Some(Value::Array(list)) = all.get("oneOf") else {
         return;
     };
-    let parts = list
-        .iter()
-        .map(|one| Some((one.get("const")?.clone(), one.get("description")?.clone())));
-    let Some(parts) = parts.collect::<Option<Vec<_>>>() else {
+    let pairs = list.iter().map(|alternative| {
+        Some((
+            alternative.get("const")?.clone(),
+            alternative.get("description")?.clone(),
+        ))
+    });
+    let Some(pairs) = pairs.collect::<Option<Vec<_>>>() else {
         return;
     };
-    let (names, descriptions): (Vec<Value>, Vec<Value>) = parts.into_iter().unzip();
+    let (names, descriptions): (Vec<Value>, Vec<Value>) = pairs.into_iter().unzip();
     all.remove("oneOf");
     all.insert("type".to_owned(), json!("string"));
     all.insert("enum".to_owned(), Value::Array(names));
@@ -158,19 +164,19 @@ fn append_kind(schema: &mut Value) {
         _ => String::new(),
     };
     if let Some(Value::String(kind)) = all.get("title") {
-        let (words, range) = kind.split_once(SPLIT).unwrap_or((kind, ""));
-        let has_words = words.is_empty() || text.to_lowercase().contains(words);
-        let more = [words, range]
+        let (label, range) = kind.split_once(TITLE_SEPARATOR).unwrap_or((kind, ""));
+        let has_label = label.is_empty() || text.to_lowercase().contains(label);
+        let addition = [label, range]
             .into_iter()
-            .filter(|part| !part.is_empty() && (*part != words || !has_words));
-        let more = more.collect::<Vec<_>>().join(", ");
-        let end = if text.is_empty() || text.ends_with('.') {
+            .filter(|part| !part.is_empty() && (*part != label || !has_label));
+        let addition = addition.collect::<Vec<_>>().join(", ");
+        let period = if text.is_empty() || text.ends_with('.') {
             ""
         } else {
             "."
         };
-        if let Some(first) = more.get(..1) {
-            text = format!("{text}{end} {}{}.", first.to_uppercase(), &more[1..]);
+        if let Some(first) = addition.get(..1) {
+            text = format!("{text}{period} {}{}.", first.to_uppercase(), &addition[1..]);
         }
     }
     if !text.is_empty() {
@@ -192,24 +198,24 @@ fn append_default(property: &mut Value) {
             all.remove("default");
         }
         (Some(default), Some(Value::String(text))) => {
-            let text = format!("{text} Default: {}.", toml_of(default));
+            let text = format!("{text} Default: {}.", to_toml(default));
             all.insert("description".to_owned(), Value::String(text));
         }
         _ => {}
     }
 }
 
-fn toml_of(value: &Value) -> String {
+fn to_toml(value: &Value) -> String {
     match value {
         Value::Object(table) => {
             let pairs: Vec<String> = table
                 .iter()
-                .map(|(key, value)| format!("{key} = {}", toml_of(value)))
+                .map(|(key, value)| format!("{key} = {}", to_toml(value)))
                 .collect();
             format!("{{ {} }}", pairs.join(", "))
         }
         Value::Array(list) => {
-            let all: Vec<String> = list.iter().map(toml_of).collect();
+            let all: Vec<String> = list.iter().map(to_toml).collect();
             format!("[{}]", all.join(", "))
         }
         Value::Number(number) => number.as_f64().map_or_else(|| number.to_string(), |x| x.to_string()),

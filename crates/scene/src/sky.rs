@@ -18,8 +18,8 @@ const WIDTH: usize = 2048;
 const HEIGHT: usize = 1024;
 /// Wavelengths of red, green and blue in micrometers.
 const WAVELENGTHS: DVec3 = DVec3::new(0.68, 0.55, 0.44);
-/// Extraterrestrial irradiance at normal incidence: a white floor at noon has a radiance of about 1.
-const ABOVE_AIR: f64 = 4.0;
+/// Extraterrestrial irradiance at normal incidence, chosen so that a white floor at noon has a radiance of about 1.
+const SOLAR_IRRADIANCE: f64 = 4.0;
 /// Angular radius of the sun.
 const SUN_RADIUS: f64 = 0.2666 * PI / 180.0;
 /// Single-scattering albedo of haze, and its asymmetry g (Henyey-Greenstein).
@@ -28,9 +28,10 @@ const HAZE_FORWARD: f64 = 0.75;
 /// Fractions of the scattered light that reach the ground: for molecules, and for haze, which scatters forwards.
 const MOLECULES_DOWN: f64 = 0.5;
 const HAZE_DOWN: f64 = 0.8;
-const GROUND: f64 = 0.25;
-/// Number of sample points along each side of a texel, used to estimate the fraction that the sun covers.
-const POINTS: usize = 8;
+/// Albedo of the ground.
+const GROUND_ALBEDO: f64 = 0.25;
+/// Number of sample points along each side of a texel, used to estimate the fraction of the texel that the sun covers.
+const SAMPLES_PER_SIDE: usize = 8;
 
 /// Parameters of a sky; angles in radians.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -46,32 +47,34 @@ pub struct Sky {
 pub fn sky(sky: &Sky) -> Image {
     let air = Air::of(sky);
     let mut texels = Vec::with_capacity(WIDTH * HEIGHT);
-    let rows: Vec<Row> = (0..HEIGHT / 2).map(|row| air.row((row as f64 + 0.5) * ROW)).collect();
+    let rows: Vec<Row> = (0..HEIGHT / 2)
+        .map(|row| air.row((row as f64 + 0.5) * ROW_ANGLE))
+        .collect();
     let azimuths: Vec<(f64, f64)> = (0..WIDTH)
         .map(|column| azimuth(column as f64 + 0.5).sin_cos())
         .collect();
-    // Irradiance on the ground from single scattering, and from the added light at unit scale.
-    let (mut once, mut added) = (DVec3::ZERO, DVec3::ZERO);
+    // Irradiance on the ground by single scattering, and by added light whose radiance is the opacity of the air.
+    let (mut single, mut added) = (DVec3::ZERO, DVec3::ZERO);
     for row in &rows {
-        let angle = TAU / WIDTH as f64 * ROW * row.sine * row.cosine;
+        let projected_angle = TAU / WIDTH as f64 * ROW_ANGLE * row.sine * row.cosine;
         for (sine, cosine) in &azimuths {
             let direction = DVec3::new(row.sine * cosine, row.sine * sine, row.cosine);
             let color = air.scattered_once(row, direction);
-            once += color * angle;
-            added += row.thickness * angle;
+            single += color * projected_angle;
+            added += row.opacity * projected_angle;
             texels.push(color);
         }
     }
-    let beam = ABOVE_AIR * air.through;
-    let height = air.sun.z;
-    let down = (air.molecules * MOLECULES_DOWN + air.haze * HAZE_DOWN) / air.depth;
-    let missing = ((ABOVE_AIR - beam) * height * down - once).max(DVec3::ZERO) / added;
+    let direct = SOLAR_IRRADIANCE * air.transmittance;
+    let sun_height = air.sun.z;
+    let ground_fraction = (air.molecules * MOLECULES_DOWN + air.haze * HAZE_DOWN) / air.depth;
+    let added_scale = ((SOLAR_IRRADIANCE - direct) * sun_height * ground_fraction - single).max(DVec3::ZERO) / added;
     for (texel, i) in texels.iter_mut().zip(0..) {
-        *texel += missing * rows[i / WIDTH].thickness;
+        *texel += added_scale * rows[i / WIDTH].opacity;
     }
-    let ground = GROUND / PI * (beam * height + once + missing * added);
+    let ground = GROUND_ALBEDO / PI * (direct * sun_height + single + added_scale * added);
     texels.resize(WIDTH * HEIGHT, ground);
-    add_sun(&mut texels, air.sun, beam);
+    add_sun(&mut texels, air.sun, direct);
     Image {
         width: WIDTH as u32,
         height: HEIGHT as u32,
@@ -85,9 +88,10 @@ pub fn sky(sky: &Sky) -> Image {
     }
 }
 
-const ROW: f64 = PI / HEIGHT as f64;
+/// Angle between rows.
+const ROW_ANGLE: f64 = PI / HEIGHT as f64;
 
-/// Returns the azimuth of a column, from the left edge.
+/// Returns the azimuth at a column coordinate, which is 0 at the left edge.
 fn azimuth(column: f64) -> f64 {
     PI - column * TAU / WIDTH as f64
 }
@@ -97,10 +101,12 @@ struct Air {
     /// Air mass towards the sun, relative to the zenith.
     sun_mass: f64,
     /// Transmittance towards the sun.
-    through: DVec3,
-    /// Vertical optical depth, and the parts of it that are scattering by molecules and by haze.
+    transmittance: DVec3,
+    /// Vertical optical depth.
     depth: DVec3,
+    /// Vertical optical depth of scattering by molecules.
     molecules: DVec3,
+    /// Vertical optical depth of scattering by haze.
     haze: DVec3,
 }
 
@@ -108,10 +114,11 @@ struct Row {
     /// Sine of the zenith angle.
     sine: f64,
     cosine: f64,
+    /// Air mass towards the row, relative to the zenith.
     mass: f64,
-    through: DVec3,
+    transmittance: DVec3,
     /// Opacity of the air: 1 - transmittance.
-    thickness: DVec3,
+    opacity: DVec3,
 }
 
 impl Air {
@@ -126,7 +133,7 @@ impl Air {
         Air {
             sun: DVec3::new(cosine * sky.azimuth.cos(), cosine * sky.azimuth.sin(), sine),
             sun_mass,
-            through: (-depth * sun_mass).exp(),
+            transmittance: (-depth * sun_mass).exp(),
             depth,
             molecules,
             haze: haze * HAZE_ALBEDO,
@@ -137,31 +144,31 @@ impl Air {
     fn row(&self, angle: f64) -> Row {
         let (sine, cosine) = angle.sin_cos();
         let mass = mass(angle);
-        let through = (-self.depth * mass).exp();
+        let transmittance = (-self.depth * mass).exp();
         Row {
             sine,
             cosine,
             mass,
-            through,
-            thickness: DVec3::ONE - through,
+            transmittance,
+            opacity: DVec3::ONE - transmittance,
         }
     }
 
-    /// Returns the radiance by single scattering. Sunlight that reaches the vertical optical depth t has passed t times
-    /// the sun's air mass; scattered light then passes the remaining depth times the ray's air mass.
+    /// Returns the radiance by single scattering. Sunlight at the vertical optical depth t has passed an optical depth
+    /// of t times the sun's air mass; the scattered light then passes the remaining depth times the ray's air mass.
     fn scattered_once(&self, row: &Row, direction: DVec3) -> DVec3 {
         let cosine = direction.dot(self.sun);
         let g = HAZE_FORWARD;
         let by_molecules = 3.0 / (16.0 * PI) * (1.0 + cosine * cosine);
         let spread = 1.0 + g * g - 2.0 * g * cosine;
         let by_haze = (1.0 - g * g) / (4.0 * PI * spread * spread.sqrt());
-        let sent = (self.molecules * by_molecules + self.haze * by_haze) / self.depth;
+        let scattering = (self.molecules * by_molecules + self.haze * by_haze) / self.depth;
         let difference = row.mass - self.sun_mass;
-        let along = match difference.abs() > 1e-6 {
-            true => (self.through - row.through) / difference,
-            false => self.depth * row.through,
+        let path_integral = match difference.abs() > 1e-6 {
+            true => (self.transmittance - row.transmittance) / difference,
+            false => self.depth * row.transmittance,
         };
-        ABOVE_AIR * sent * row.mass * along
+        SOLAR_IRRADIANCE * scattering * row.mass * path_integral
     }
 }
 
@@ -172,36 +179,47 @@ fn mass(angle: f64) -> f64 {
 
 /// Adds the sun as a disk with this irradiance at normal incidence.
 fn add_sun(texels: &mut [DVec3], sun: DVec3, irradiance: DVec3) {
-    let nearest = (sun.z.clamp(-1.0, 1.0).acos() / ROW) as usize;
-    let reach = (SUN_RADIUS / ROW) as usize + 2;
-    let least = SUN_RADIUS.cos();
+    let nearest = (sun.z.clamp(-1.0, 1.0).acos() / ROW_ANGLE) as usize;
+    let row_radius = (SUN_RADIUS / ROW_ANGLE) as usize + 2;
+    let min_cosine = SUN_RADIUS.cos();
     let mut covered = Vec::new();
-    let mut all = 0.0;
-    for row in nearest.saturating_sub(reach)..(nearest + reach).min(HEIGHT) {
+    let mut total_solid_angle = 0.0;
+    for row in nearest.saturating_sub(row_radius)..(nearest + row_radius).min(HEIGHT) {
         // Radiance is linear in the angle between rows, and constant up to the pole.
-        let beside_pole = if row == 0 || row + 1 == HEIGHT {
+        let pole_factor = if row == 0 || row + 1 == HEIGHT {
             13.0 / 12.0
         } else {
             1.0
         };
-        let solid_angle = beside_pole * TAU / WIDTH as f64 * ROW * ((row as f64 + 0.5) * ROW).sin();
+        let solid_angle = pole_factor * TAU / WIDTH as f64 * ROW_ANGLE * ((row as f64 + 0.5) * ROW_ANGLE).sin();
         for column in 0..WIDTH {
-            let at = |i: usize| (i as f64 + 0.5) / POINTS as f64;
+            let sample_position = |i: usize| (i as f64 + 0.5) / SAMPLES_PER_SIDE as f64;
             let direction = |x: f64, y: f64| {
-                let (angle, turn) = ((row as f64 + y) * ROW, azimuth(column as f64 + x));
-                DVec3::new(angle.sin() * turn.cos(), angle.sin() * turn.sin(), angle.cos())
+                let (angle, azimuth_angle) = ((row as f64 + y) * ROW_ANGLE, azimuth(column as f64 + x));
+                DVec3::new(
+                    angle.sin() * azimuth_angle.cos(),
+                    angle.sin() * azimuth_angle.sin(),
+                    angle.cos(),
+                )
             };
-            if direction(0.5, 0.5).dot(sun) < (SUN_RADIUS + 2.0 * ROW).cos() {
+            if direction(0.5, 0.5).dot(sun) < (SUN_RADIUS + 2.0 * ROW_ANGLE).cos() {
                 continue;
             }
-            let points = (0..POINTS * POINTS).filter(|i| direction(at(i % POINTS), at(i / POINTS)).dot(sun) >= least);
-            let share = points.count() as f64 / (POINTS * POINTS) as f64;
-            covered.push((row * WIDTH + column, share));
-            all += share * solid_angle;
+            let points = (0..SAMPLES_PER_SIDE * SAMPLES_PER_SIDE).filter(|i| {
+                direction(
+                    sample_position(i % SAMPLES_PER_SIDE),
+                    sample_position(i / SAMPLES_PER_SIDE),
+                )
+                .dot(sun)
+                    >= min_cosine
+            });
+            let coverage = points.count() as f64 / (SAMPLES_PER_SIDE * SAMPLES_PER_SIDE) as f64;
+            covered.push((row * WIDTH + column, coverage));
+            total_solid_angle += coverage * solid_angle;
         }
     }
-    for (texel, share) in covered {
-        texels[texel] += irradiance * share / all;
+    for (texel, coverage) in covered {
+        texels[texel] += irradiance * coverage / total_solid_angle;
     }
 }
 
@@ -212,18 +230,18 @@ mod tests {
     fn texels(sky: &Image) -> &[[f32; 3]] {
         match &sky.texels {
             Texels::Floats(texels) => texels,
-            Texels::Bytes(..) => panic!("a sky of bytes"),
+            Texels::Bytes(..) => panic!("the texels of a sky must be floats"),
         }
     }
 
-    /// Returns the solid angle of a texel. At a pole, it is larger by a twelfth, because the radiance is constant up to
-    /// the pole.
-    fn stands_for(row: usize) -> f64 {
-        let square = ((row as f64 + 0.5) * ROW).sin() * ROW * TAU / WIDTH as f64;
+    /// Returns the solid angle of a texel, which is larger by a twelfth at a pole, because the radiance is constant up
+    /// to the pole.
+    fn solid_angle(row: usize) -> f64 {
+        let area = ((row as f64 + 0.5) * ROW_ANGLE).sin() * ROW_ANGLE * TAU / WIDTH as f64;
         if row == 0 || row == HEIGHT - 1 {
-            square * 13.0 / 12.0
+            area * 13.0 / 12.0
         } else {
-            square
+            area
         }
     }
 
@@ -231,10 +249,14 @@ mod tests {
         let mut sum = DVec3::ZERO;
         for (i, texel) in texels(image).iter().enumerate() {
             let (row, column) = (i / WIDTH, i % WIDTH);
-            let (angle, turn) = ((row as f64 + 0.5) * ROW, azimuth(column as f64 + 0.5));
-            let direction = DVec3::new(angle.sin() * turn.cos(), angle.sin() * turn.sin(), angle.cos());
+            let (angle, azimuth_angle) = ((row as f64 + 0.5) * ROW_ANGLE, azimuth(column as f64 + 0.5));
+            let direction = DVec3::new(
+                angle.sin() * azimuth_angle.cos(),
+                angle.sin() * azimuth_angle.sin(),
+                angle.cos(),
+            );
             let color = DVec3::from_array(texel.map(f64::from));
-            sum += color * direction.dot(normal).max(0.0) * stands_for(row);
+            sum += color * direction.dot(normal).max(0.0) * solid_angle(row);
         }
         sum
     }
@@ -254,7 +276,7 @@ mod tests {
                     "elevation {elevation}, turbidity {turbidity}"
                 );
                 // The ground receives at most the light of the sun.
-                let sun = f64::to_radians(elevation).sin() * ABOVE_AIR;
+                let sun = f64::to_radians(elevation).sin() * SOLAR_IRRADIANCE;
                 let down = irradiance(&image, DVec3::Z);
                 assert!(down.max_element() <= sun + 0.1, "{down} of {sun}");
                 assert!(down.min_element() > 0.3 * sun, "{down} of {sun}");
@@ -265,27 +287,31 @@ mod tests {
     #[test]
     fn the_sun_has_the_requested_direction_and_irradiance() {
         for (elevation, azimuth) in [(0.3, 0.0), (0.7, 2.0), (1.5, -1.0), (PI / 2.0, 1.0)] {
-            let asked = Sky {
+            let requested = Sky {
                 elevation,
                 azimuth,
                 turbidity: 2.0,
             };
-            let air = Air::of(&asked);
-            let image = sky(&asked);
+            let air = Air::of(&requested);
+            let image = sky(&requested);
             // Irradiance at normal incidence from within twice the sun's radius.
             let near: DVec3 = {
                 let mut sum = DVec3::ZERO;
                 for (i, texel) in texels(&image).iter().enumerate() {
                     let (row, column) = (i / WIDTH, i % WIDTH);
-                    let (angle, turn) = ((row as f64 + 0.5) * ROW, super::azimuth(column as f64 + 0.5));
-                    let direction = DVec3::new(angle.sin() * turn.cos(), angle.sin() * turn.sin(), angle.cos());
+                    let (angle, azimuth_angle) = ((row as f64 + 0.5) * ROW_ANGLE, super::azimuth(column as f64 + 0.5));
+                    let direction = DVec3::new(
+                        angle.sin() * azimuth_angle.cos(),
+                        angle.sin() * azimuth_angle.sin(),
+                        angle.cos(),
+                    );
                     if direction.dot(air.sun) > (2.0 * SUN_RADIUS).cos() {
-                        sum += DVec3::from_array(texel.map(f64::from)) * stands_for(row);
+                        sum += DVec3::from_array(texel.map(f64::from)) * solid_angle(row);
                     }
                 }
                 sum
             };
-            let expected = ABOVE_AIR * air.through;
+            let expected = SOLAR_IRRADIANCE * air.transmittance;
             let ratio = near / expected;
             assert!((ratio - DVec3::ONE).abs().max_element() < 0.01, "{ratio}");
         }

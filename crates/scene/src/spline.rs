@@ -5,7 +5,7 @@ use std::ops::{Add, Mul, Sub};
 
 use super::Interpolation;
 
-/// A value that keys can have: a number or a point.
+/// The value of a key: a number or a point.
 pub trait Point:
     Copy + PartialEq + Default + Add<Output = Self> + Sub<Output = Self> + Mul<f64, Output = Self>
 {
@@ -13,13 +13,13 @@ pub trait Point:
 
 impl<T: Copy + PartialEq + Default + Add<Output = T> + Sub<Output = T> + Mul<f64, Output = T>> Point for T {}
 
-/// Time and value.
+/// A time and a value.
 pub type Key<T> = (f64, T);
 
-/// Interpolates keys with ascending times; `None` if there are no keys. The value is exact at keys; before the first
-/// and after the last key, it is constant.
-pub fn value<T: Point>(keys: &[Key<T>], at: f64, interpolation: Interpolation) -> Option<T> {
-    let next = keys.partition_point(|(time, _)| *time <= at);
+/// Interpolates keys with ascending times; `None` if there are no keys. The value is exact at keys, and constant
+/// before the first key and after the last key.
+pub fn value<T: Point>(keys: &[Key<T>], time: f64, interpolation: Interpolation) -> Option<T> {
+    let next = keys.partition_point(|(key_time, _)| *key_time <= time);
     let (Some(&a), Some(&b)) = (
         keys.get(next.saturating_sub(1)),
         keys.get(next.min(keys.len().saturating_sub(1))),
@@ -27,17 +27,17 @@ pub fn value<T: Point>(keys: &[Key<T>], at: f64, interpolation: Interpolation) -
         return None;
     };
     let (span, step) = (b.0 - a.0, b.1 - a.1);
-    if !(span > 0.0) || at <= a.0 {
-        return Some(a.1); // outside of the keys, or at one
+    if !(span > 0.0) || time <= a.0 {
+        return Some(a.1); // outside of the keys, or exactly at a key
     }
-    let s = (at - a.0) / span;
+    let s = (time - a.0) / span;
     let (start, end) = match interpolation {
         Interpolation::Linear => return Some(a.1 + step * s),
         Interpolation::Smooth => (slope(keys, next - 1), slope(keys, next)),
     };
     // Cubic Hermite segment: smoothstep between the values, plus the contribution of the slopes.
-    let rest = 1.0 - s;
-    Some(a.1 + step * (s * s * (3.0 - 2.0 * s)) + (start * rest - end * s) * (span * s * rest))
+    let remaining = 1.0 - s;
+    Some(a.1 + step * (s * s * (3.0 - 2.0 * s)) + (start * remaining - end * s) * (span * s * remaining))
 }
 
 /// Returns the derivative of the smooth curve at a key: the secant of its neighbors (E. Catmull and R. Rom, "A Class of
@@ -49,7 +49,11 @@ fn slope<T: Point>(keys: &[Key<T>], i: usize) -> T {
     let Some(key) = keys.get(i) else {
         return T::default();
     };
-    if [before, after].into_iter().flatten().any(|other| other.1 == key.1) {
+    if [before, after]
+        .into_iter()
+        .flatten()
+        .any(|neighbor| neighbor.1 == key.1)
+    {
         return T::default();
     }
     match (before, after) {
@@ -73,7 +77,7 @@ mod tests {
 
     use super::*;
 
-    const WAYS: [Interpolation; 2] = [Interpolation::Linear, Interpolation::Smooth];
+    const INTERPOLATIONS: [Interpolation; 2] = [Interpolation::Linear, Interpolation::Smooth];
     /// Arbitrary values at ascending, uneven times.
     const KEYS: [Key<f64>; 6] = [
         (-2.0, 3.0),
@@ -90,59 +94,59 @@ mod tests {
 
     #[test]
     fn values_are_exact_at_keys_and_constant_outside() {
-        for kind in WAYS {
-            for (time, wanted) in KEYS {
-                assert_eq!(value(&KEYS, time, kind), Some(wanted));
+        for interpolation in INTERPOLATIONS {
+            for (time, expected) in KEYS {
+                assert_eq!(value(&KEYS, time, interpolation), Some(expected));
             }
-            for (time, wanted) in [(-2.5, 3.0), (-1e300, 3.0), (10.26, -6.5), (1e300, -6.5)] {
-                assert_eq!(value(&KEYS, time, kind), Some(wanted));
+            for (time, expected) in [(-2.5, 3.0), (-1e300, 3.0), (10.26, -6.5), (1e300, -6.5)] {
+                assert_eq!(value(&KEYS, time, interpolation), Some(expected));
             }
-            assert_eq!(value(&KEYS[2..3], 7.0, kind), Some(2.5));
-            assert_eq!(value::<f64>(&[], 7.0, kind), None);
+            assert_eq!(value(&KEYS[2..3], 7.0, interpolation), Some(2.5));
+            assert_eq!(value::<f64>(&[], 7.0, interpolation), None);
         }
     }
 
     #[test]
     fn linear_interpolation_is_straight() {
-        for (time, wanted) in [(-0.75, 1.0), (0.75, 0.75), (2.5, 2.25), (5.5, -0.25)] {
-            assert_eq!(value(&KEYS, time, Interpolation::Linear), Some(wanted));
-            assert_ne!(value(&KEYS, time, Interpolation::Smooth), Some(wanted));
+        for (time, expected) in [(-0.75, 1.0), (0.75, 0.75), (2.5, 2.25), (5.5, -0.25)] {
+            assert_eq!(value(&KEYS, time, Interpolation::Linear), Some(expected));
+            assert_ne!(value(&KEYS, time, Interpolation::Smooth), Some(expected));
         }
         let points = [(0.0, DVec3::new(0.0, 2.0, -4.0)), (8.0, DVec3::new(4.0, 2.0, 4.0))];
-        for kind in WAYS {
-            assert_eq!(value(&points, 2.0, kind), Some(DVec3::new(1.0, 2.0, -2.0)));
+        for interpolation in INTERPOLATIONS {
+            assert_eq!(value(&points, 2.0, interpolation), Some(DVec3::new(1.0, 2.0, -2.0)));
         }
     }
 
-    /// Uniform motion with uneven keys; free fall with even keys.
+    /// Tests uniform motion with uneven keys, and free fall with even keys.
     #[test]
     fn constant_speeds_and_accelerations_are_reproduced() {
         let line = |t: f64| DVec3::new(3.0 - 2.0 * t, t, 0.5);
         let uneven = [0.0, 1.0, 1.5, 4.0, 9.0].map(|t| (t, line(t)));
         let fall = |t: f64| DVec3::new(t, 0.0, 7.0 - 4.9 * t * t);
         let even = [0.0, 2.0, 4.0, 6.0].map(|t| (t, fall(t)));
-        let mut straightened = 0.0_f64;
+        let mut linear_error = 0.0_f64;
         for i in 0..=90 {
             let t = f64::from(i) / 10.0;
-            for kind in WAYS {
-                let found = value(&uneven, t, kind).unwrap();
+            for interpolation in INTERPOLATIONS {
+                let found = value(&uneven, t, interpolation).unwrap();
                 assert!(found.abs_diff_eq(line(t), 1e-12), "{t}: {found}");
             }
             if t <= 6.0 {
                 let found = value(&even, t, Interpolation::Smooth).unwrap();
                 assert!(found.abs_diff_eq(fall(t), 1e-12), "{t}: {found}");
                 let found = value(&even, t, Interpolation::Linear).unwrap();
-                straightened = straightened.max(found.distance(fall(t)));
+                linear_error = linear_error.max(found.distance(fall(t)));
             }
         }
-        assert!(straightened > 1.0, "no linear way falls so");
+        assert!(linear_error > 1.0, "linear interpolation must not reproduce free fall");
     }
 
     /// Computed with SciPy 1.17: `CubicHermiteSpline(t, v, m)` with `m[1:-1] = (v[2:] - v[:-2]) / (t[2:] - t[:-2])`,
     /// and, at the ends, `m` is twice the difference quotient minus the neighbor's `m`.
     #[test]
     fn smooth_interpolation_matches_scipy() {
-        for (time, wanted) in [
+        for (time, expected) in [
             (-1.75, 2.2775),
             (-0.5, -0.26000000000000045),
             (0.625, -0.4849330357142856),
@@ -153,23 +157,24 @@ mod tests {
             (10.125, -6.96),
         ] {
             let found = value(&KEYS, time, Interpolation::Smooth).unwrap();
-            assert!(near(found, wanted), "{time}: {found} {wanted}");
+            assert!(near(found, expected), "{time}: {found} {expected}");
         }
     }
 
-    fn speeds(kind: Interpolation) -> Vec<(f64, f64)> {
-        let at = |time| value(&KEYS, time, kind).unwrap();
+    /// Returns the speeds before and after each inner key.
+    fn speeds(interpolation: Interpolation) -> Vec<(f64, f64)> {
+        let value_at = |time| value(&KEYS, time, interpolation).unwrap();
         let step = 1e-6;
-        let inner = &KEYS[1..5];
-        let pairs = inner
+        let inner_keys = &KEYS[1..5];
+        let speeds = inner_keys
             .iter()
-            .map(|(t, v)| ((v - at(t - step)) / step, (at(t + step) - v) / step));
-        pairs.collect()
+            .map(|(t, v)| ((v - value_at(t - step)) / step, (value_at(t + step) - v) / step));
+        speeds.collect()
     }
 
     #[test]
     fn smooth_interpolation_has_continuous_speed() {
-        let jumps = |kind| speeds(kind).into_iter().map(|(a, b)| (a - b).abs());
+        let jumps = |interpolation| speeds(interpolation).into_iter().map(|(a, b)| (a - b).abs());
         assert!(jumps(Interpolation::Smooth).all(|jump| jump < 1e-3));
         assert!(jumps(Interpolation::Linear).all(|jump| jump > 1.0));
     }
@@ -192,9 +197,9 @@ mod tests {
     #[test]
     fn extreme_keys_give_finite_values() {
         let keys = [(-1e9, -1e9), (-1e9 + 1e-6, 1e9), (0.0, -1e9), (1e-6, 1e9), (1e9, -1e9)];
-        for kind in WAYS {
+        for interpolation in INTERPOLATIONS {
             for time in [-1e9 + 5e-7, -0.5e9, 5e-7, 1.0, 1e8, 0.999e9] {
-                assert!(value(&keys, time, kind).unwrap().is_finite(), "{time}");
+                assert!(value(&keys, time, interpolation).unwrap().is_finite(), "{time}");
             }
         }
     }

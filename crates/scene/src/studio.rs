@@ -18,31 +18,33 @@ const CEILING: f64 = 0.25;
 const EDGE: f64 = 0.15;
 
 /// A rectangular emitter at a distance of 1.
-struct Lamp {
+struct Emitter {
+    /// Direction to the center; any length.
     towards: DVec3,
     /// Half of the width, and half of the height.
     half: [f64; 2],
     radiance: f64,
 }
 
-/// For a view along +y: a key light on the left, a weaker fill light on the right, a light above, and a light behind.
-const LAMPS: [Lamp; 4] = [
-    Lamp {
+/// The emitters, for a view along +y: a key light on the left, a weaker fill light on the right, a light above, and a
+/// light behind.
+const EMITTERS: [Emitter; 4] = [
+    Emitter {
         towards: DVec3::new(-0.75, -0.6, 0.65),
         half: [0.5, 0.45],
         radiance: 3.0,
     },
-    Lamp {
+    Emitter {
         towards: DVec3::new(0.95, -0.35, 0.35),
         half: [0.3, 0.55],
         radiance: 1.1,
     },
-    Lamp {
+    Emitter {
         towards: DVec3::new(0.0, 0.0, 1.0),
         half: [0.35, 0.6],
         radiance: 1.8,
     },
-    Lamp {
+    Emitter {
         towards: DVec3::new(0.35, 0.95, 0.5),
         half: [0.12, 0.5],
         radiance: 2.2,
@@ -50,14 +52,14 @@ const LAMPS: [Lamp; 4] = [
 ];
 
 pub fn studio() -> Image {
-    let lamps = LAMPS.map(|lamp| lamp.facing());
+    let emitters = EMITTERS.map(|emitter| emitter.oriented());
     let azimuths: Vec<(f64, f64)> = (0..WIDTH)
         .map(|column| (PI - (0.5 + column as f64) * TAU / WIDTH as f64).sin_cos())
         .collect();
     let row = |row: usize| {
         let (sine, cosine) = ((0.5 + row as f64) * PI / HEIGHT as f64).sin_cos();
         let direction = move |(y, x): &(f64, f64)| DVec3::new(sine * x, sine * y, cosine);
-        let texel = |azimuth| Vec3::splat(radiance(&lamps, direction(azimuth)) as f32).into();
+        let texel = |azimuth| Vec3::splat(radiance(&emitters, direction(azimuth)) as f32).into();
         azimuths.iter().map(texel).collect::<Vec<_>>()
     };
     let rows: Vec<Vec<[f32; 3]>> = (0..HEIGHT).into_par_iter().map(row).collect();
@@ -68,32 +70,35 @@ pub fn studio() -> Image {
     }
 }
 
-fn radiance(lamps: &[AreaLight], direction: DVec3) -> f64 {
+fn radiance(emitters: &[OrientedEmitter], direction: DVec3) -> f64 {
     let z = direction.z;
     // The floor blends smoothly into the walls.
     let room = match z < 0.0 {
         true => WALL + (FLOOR - WALL) * smooth(-3.0 * z),
         false => WALL + (CEILING - WALL) * smooth(z),
     };
-    let lamps = lamps.iter().map(|lamp| lamp.radiance * lamp.share(direction));
-    lamps.fold(room, f64::max)
+    let emitters = emitters
+        .iter()
+        .map(|emitter| emitter.radiance * emitter.coverage(direction));
+    emitters.fold(room, f64::max)
 }
 
-struct AreaLight {
+/// An emitter with unit vectors to its center and along its sides.
+struct OrientedEmitter {
     axis: DVec3,
     sides: [DVec3; 2],
     half: [f64; 2],
     radiance: f64,
 }
 
-impl Lamp {
-    fn facing(&self) -> AreaLight {
+impl Emitter {
+    fn oriented(&self) -> OrientedEmitter {
         let axis = self.towards.normalize();
         let right = match axis.z.abs() < 0.99 {
             true => axis.cross(DVec3::Z).normalize(),
             false => DVec3::X,
         };
-        AreaLight {
+        OrientedEmitter {
             axis,
             sides: [right, right.cross(axis)],
             half: self.half,
@@ -102,16 +107,16 @@ impl Lamp {
     }
 }
 
-impl AreaLight {
+impl OrientedEmitter {
     /// Returns the coverage of the emitter: 1 inside, 0 outside.
-    fn share(&self, direction: DVec3) -> f64 {
+    fn coverage(&self, direction: DVec3) -> f64 {
         let ahead = direction.dot(self.axis);
         if ahead <= 0.0 {
             return 0.0;
         }
-        let at = self.sides.map(|side| direction.dot(side).abs() / ahead);
-        let inside = |i: usize| smooth((1.0 + EDGE - at[i] / self.half[i]) / EDGE);
-        inside(0) * inside(1)
+        let offsets = self.sides.map(|side| direction.dot(side).abs() / ahead);
+        let edge_weight = |i: usize| smooth((1.0 + EDGE - offsets[i] / self.half[i]) / EDGE);
+        edge_weight(0) * edge_weight(1)
     }
 }
 

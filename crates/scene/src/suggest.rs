@@ -24,8 +24,8 @@ fn closest<'a>(wrong: &str, names: impl IntoIterator<Item = &'a str>) -> Option<
     let limit = |name: &str| wrong.chars().count().max(name.chars().count()).div_ceil(3);
     let similar = similar.filter(|(edits, name)| {
         // "pos" is short for "position".
-        let is_short = wrong.len() >= MIN_START_LEN && name.to_lowercase().starts_with(&wrong.to_lowercase());
-        is_short || (*edits <= limit(name) && *edits < name.chars().count())
+        let is_abbreviation = wrong.len() >= MIN_START_LEN && name.to_lowercase().starts_with(&wrong.to_lowercase());
+        is_abbreviation || (*edits <= limit(name) && *edits < name.chars().count())
     });
     similar.min_by_key(|(edits, _)| *edits).map(|(_, name)| name)
 }
@@ -56,12 +56,12 @@ impl Suggestions {
 
 /// Returns the message about an unknown name, with a list of the available names.
 pub(super) fn unknown<'a>(kind: &str, wrong: &str, names: impl Iterator<Item = &'a str> + Clone) -> String {
-    let instead = match hint(wrong, names.clone()) {
+    let suggestion = match hint(wrong, names.clone()) {
         hint if !hint.is_empty() => hint,
         _ if names.clone().next().is_none() => "; the scene has none".to_owned(),
         _ => format!("; the scene has {}", list(names)),
     };
-    format!("there is no {kind} {:?}{instead}", cut(wrong))
+    format!("there is no {kind} {:?}{suggestion}", cut(wrong))
 }
 
 #[cfg(test)]
@@ -71,7 +71,7 @@ mod tests {
     #[test]
     fn similar_names_are_suggested_and_others_are_not() {
         let names = ["yellow", "red", "fov", "look_at"];
-        for (wrong, right) in [
+        for (wrong, expected) in [
             ("yellwo", Some("yellow")),
             ("Yellow", Some("yellow")),
             ("fovv", Some("fov")),
@@ -84,21 +84,21 @@ mod tests {
             ("x", None),
             ("", None),
         ] {
-            assert_eq!(closest(wrong, names), right, "{wrong}");
+            assert_eq!(closest(wrong, names), expected, "{wrong}");
         }
         assert_eq!(closest(&"y".repeat(1000), names), None);
     }
 
     #[test]
     fn messages_about_unknown_names_list_the_available_names() {
-        let of = |wrong, names: &[&'static str]| unknown("material", wrong, names.iter().copied());
-        assert_eq!(of("a", &[]), "there is no material \"a\"; the scene has none");
+        let message = |wrong, names: &[&'static str]| unknown("material", wrong, names.iter().copied());
+        assert_eq!(message("a", &[]), "there is no material \"a\"; the scene has none");
         assert_eq!(
-            of("yellwo", &["red", "yellow"]),
+            message("yellwo", &["red", "yellow"]),
             "there is no material \"yellwo\"; did you mean \"yellow\"?"
         );
         assert_eq!(
-            of("blue", &["red", "yellow"]),
+            message("blue", &["red", "yellow"]),
             "there is no material \"blue\"; the scene has \"red\", \"yellow\""
         );
     }

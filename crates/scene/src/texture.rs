@@ -30,7 +30,7 @@ pub enum Value {
     Texture(usize, Channel),
 }
 
-/// A channel of a texture. In a file the names are in lower case: `"g"`.
+/// A channel of a texture. In a file, the names are in lower case: `"g"`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Channel {
@@ -68,13 +68,13 @@ pub struct Texture {
 /// Content of a texture. Colors are linear RGB.
 #[derive(Clone, Debug, PartialEq)]
 pub enum TextureKind {
-    /// One colour.
+    /// One color.
     Constant(DVec3),
     /// A checkerboard of squares with side 1. The square from (0, 0) to (1, 1) has the color `even`.
     Checker {
         /// Color where floor(u) + floor(v) is even.
         even: DVec3,
-        /// Color elsewhere.
+        /// Color where floor(u) + floor(v) is odd.
         odd: DVec3,
     },
     /// Lines around integer coordinates.
@@ -101,7 +101,7 @@ pub enum TextureKind {
     },
 }
 
-/// Texture addressing outside of the image. In a file the names are in snake case: `"repeat"`.
+/// Texture addressing outside of the image. In a file, the names are in snake case: `"repeat"`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Wrap {
@@ -110,11 +110,11 @@ pub enum Wrap {
     Repeat,
     /// Extends the edge texels.
     Clamp,
-    /// Repeats the image, every other time mirrored.
+    /// Repeats the image, and mirrors every other copy.
     Mirror,
 }
 
-/// Texture filter. In a file the names are in snake case: `"ewa"`.
+/// Texture filter. In a file, the names are in snake case: `"ewa"`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum TextureFilter {
@@ -136,7 +136,7 @@ impl TextureFilter {
     }
 }
 
-/// Encoding of 8-bit and 16-bit values. In a file the names are in snake case: `"srgb"`.
+/// Encoding of 8-bit and 16-bit values. In a file, the names are in snake case: `"srgb"`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Encoding {
@@ -157,7 +157,7 @@ pub struct Image {
     pub texels: Texels,
 }
 
-/// Texels in a storage type.
+/// Texels, stored as bytes or as floats.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Texels {
     /// 8-bit values.
@@ -186,9 +186,9 @@ pub fn words(width: u32, height: u32, levels: u32, is_float: bool) -> u64 {
     u64::from(levels) + texel * sizes.sum::<u64>()
 }
 
-/// Returns the maximum size of an environment map in 32-bit words: three per texel (including two additional rows), two
-/// per cell between texels, and the tables of blocks.
-pub(crate) fn words_around(width: u32, height: u32) -> u64 {
+/// Returns the maximum size of an environment map in 32-bit words: three words per texel (including two additional
+/// rows), two words per cell between texels, and the tables of blocks.
+pub(crate) fn environment_words(width: u32, height: u32) -> u64 {
     const BLOCKS: u64 = 32 * 32 + 290 * 33 * 33;
     let (width, height) = (u64::from(width), u64::from(height));
     3 * width * (height + 2) + 2 * width * (height + 1) + BLOCKS

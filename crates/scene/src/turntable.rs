@@ -10,8 +10,9 @@ use super::{CameraDescription, CameraKeyDescription, CameraPathDescription, Inte
 pub(super) const MAX_FRAMES: u32 = 100_000;
 
 /// Replaces a camera's path by an orbit around its target point, counter-clockwise as seen from `up`. Frame 1, and the
-/// frame after the last, have the original position. Each frame has its own key so that it lies exactly on the circle.
-pub(super) fn turning(camera: &CameraDescription, frames: u32) -> Result<CameraDescription, Problem> {
+/// frame after the last, have the original position. Each frame has its own key, so that the camera is exactly on the
+/// circle.
+pub(super) fn with_orbit(camera: &CameraDescription, frames: u32) -> Result<CameraDescription, Problem> {
     if !(1..=MAX_FRAMES).contains(&frames) {
         return Err(Problem::new(format!("{frames} must be from 1 to {MAX_FRAMES}")));
     }
@@ -23,12 +24,12 @@ pub(super) fn turning(camera: &CameraDescription, frames: u32) -> Result<CameraD
             return Err(Problem::new(rule));
         }
     };
-    let from = position - look_at;
+    let offset = position - look_at;
     let key = |i: u32| {
-        let turn = turned(up, f64::from(i) / f64::from(frames));
-        let turned = if i == 0 { position } else { look_at + turn * from };
+        let rotation = rotation(up, f64::from(i) / f64::from(frames));
+        let key_position = if i == 0 { position } else { look_at + rotation * offset };
         CameraKeyDescription {
-            position: Some(turned),
+            position: Some(key_position),
             ..CameraKeyDescription::new(f64::from(i) + 1.0)
         }
     };
@@ -36,8 +37,9 @@ pub(super) fn turning(camera: &CameraDescription, frames: u32) -> Result<CameraD
     Ok(camera.clone().with_path(path))
 }
 
-fn turned(axis: DVec3, part: f64) -> DQuat {
-    DQuat::from_axis_angle(axis.normalize_or(DVec3::Z), part * TAU)
+/// Returns the rotation by a fraction of a full turn.
+fn rotation(axis: DVec3, fraction: f64) -> DQuat {
+    DQuat::from_axis_angle(axis.normalize_or(DVec3::Z), fraction * TAU)
 }
 
 #[cfg(test)]
@@ -57,35 +59,41 @@ mod tests {
                 up,
                 ..PerspectiveDescription::new(position, look_at, 40.0)
             };
-            let parallel = OrthographicDescription {
+            let orthographic = OrthographicDescription {
                 up,
                 ..OrthographicDescription::new(position, look_at, 4.0)
             };
-            for camera in [CameraDescription::from(camera), parallel.into()] {
+            for camera in [CameraDescription::from(camera), orthographic.into()] {
                 for frames in [1, 2, 3, 36, 100] {
-                    let turning = turning(&camera, frames).unwrap();
-                    let path = CameraPath::of(&turning).unwrap();
+                    let orbiting = with_orbit(&camera, frames).unwrap();
+                    let path = CameraPath::of(&orbiting).unwrap();
                     assert_eq!(path.frames(), (1.0, f64::from(frames)));
-                    let at = |frame: u32| path.at(frame.into()).unwrap();
+                    let camera_at = |frame: u32| path.at(frame.into()).unwrap();
                     assert_eq!(
-                        at(1),
+                        camera_at(1),
                         camera.validate().unwrap(),
                         "the first frame differs from the original view"
                     );
                     let axis = up.normalize();
-                    let around = |p: DVec3| (p - look_at) - axis * (p - look_at).dot(axis);
+                    let radial = |p: DVec3| (p - look_at) - axis * (p - look_at).dot(axis);
                     for frame in 1..=frames {
-                        let now = at(frame);
-                        assert_eq!((now.look_at, now.projection), (look_at, at(1).projection));
-                        let height = (now.position - position).dot(axis);
-                        let radii = [now.position, position].map(|p| around(p).length());
-                        assert!(height.abs() < 1e-12 && (radii[0] - radii[1]).abs() < 1e-12, "{now:?}");
-                        let next = at(if frame == frames { 1 } else { frame + 1 });
-                        let (a, b) = (around(now.position), around(next.position));
+                        let current = camera_at(frame);
+                        assert_eq!(
+                            (current.look_at, current.projection),
+                            (look_at, camera_at(1).projection)
+                        );
+                        let height = (current.position - position).dot(axis);
+                        let radii = [current.position, position].map(|p| radial(p).length());
+                        assert!(
+                            height.abs() < 1e-12 && (radii[0] - radii[1]).abs() < 1e-12,
+                            "{current:?}"
+                        );
+                        let next = camera_at(if frame == frames { 1 } else { frame + 1 });
+                        let (a, b) = (radial(current.position), radial(next.position));
                         let angle = a.cross(b).dot(axis).atan2(a.dot(b));
-                        let wanted = TAU / f64::from(frames);
-                        let apart = (angle - wanted).rem_euclid(TAU);
-                        assert!(apart.min(TAU - apart) < 1e-9, "{frame} of {frames}: {angle}");
+                        let expected = TAU / f64::from(frames);
+                        let difference = (angle - expected).rem_euclid(TAU);
+                        assert!(difference.min(TAU - difference) < 1e-9, "{frame} of {frames}: {angle}");
                     }
                 }
             }
@@ -94,11 +102,11 @@ mod tests {
 
     #[test]
     fn invalid_turntables_are_rejected() {
-        let error = |camera: CameraDescription, frames| turning(&camera, frames).unwrap_err().to_string();
+        let error = |camera: CameraDescription, frames| with_orbit(&camera, frames).unwrap_err().to_string();
         let camera = || PerspectiveDescription::new([0.0, -1.0, 0.0], [0.0; 3], 40.0).into();
         assert_eq!(error(camera(), 0), "0 must be from 1 to 100000");
         assert_eq!(error(camera(), 100_001), "100001 must be from 1 to 100000");
-        turning(&camera(), 100_000).unwrap();
+        with_orbit(&camera(), 100_000).unwrap();
         let panorama = PanoramaDescription::new([0.0, -1.0, 0.0], [0.0; 3]).into();
         assert!(error(panorama, 4).starts_with("does not apply to a panorama camera"));
     }

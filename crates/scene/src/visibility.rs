@@ -35,7 +35,7 @@ impl Scene {
         materials.any(|material| !is_black(&material.emission))
     }
 
-    /// Returns whether any light can arrive at a surface or leave one.
+    /// Returns true if any light can arrive at a surface or leave a surface.
     fn has_light(&self) -> bool {
         let color = |light: &Light| match light {
             Light::Rectangle { color, .. }

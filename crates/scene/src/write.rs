@@ -31,7 +31,7 @@ impl Description {
         let transform = Value::try_from(ViewTransform::default())?;
         defaults.insert("view_transform".to_owned(), transform);
         let render = Table::try_from(RenderDescription::default())?;
-        let none = Table::new();
+        let no_defaults = Table::new();
         let mut sections = vec![
             section("image", &self.image, &defaults)?,
             section("camera", &self.camera, &defaults)?,
@@ -53,41 +53,41 @@ impl Description {
             }
         }
         for light in &self.lights {
-            sections.push(element("lights", light, &none)?);
+            sections.push(element("lights", light, &no_defaults)?);
         }
         for shape in &self.shapes {
             let is_gltf = matches!(shape, ShapeDescription::Gltf(_));
-            let text = element("shapes", shape, if is_gltf { &defaults } else { &none })?;
-            let comment = "# Meshes with their materials, and lights. A table `materials` replaces materials of the file by those of\n\
-                        # this scene, by name.\n";
+            let text = element("shapes", shape, if is_gltf { &defaults } else { &no_defaults })?;
+            let comment = "# Meshes with their materials, and lights. A table `materials` replaces materials of the file by materials\n\
+                        # of this scene, by name.\n";
             sections.push(format!("{}{text}", if is_gltf { comment } else { "" }));
         }
         for instance in &self.instances {
-            sections.push(element("instances", instance, &none)?);
+            sections.push(element("instances", instance, &no_defaults)?);
         }
         Ok(sections.join("\n"))
     }
 
-    /// Moves the scene to another folder by making file names relative to this folder. Names that do not refer to a
+    /// Moves the scene to another folder by making file names relative to `new_folder`. Names that do not refer to a
     /// file are unchanged.
     ///
     /// # Errors
     ///
     /// A folder does not exist, or a name is not UTF-8.
-    pub fn in_folder(mut self, before: &Path, folder: &Path) -> io::Result<Description> {
-        let here = Path::new(".");
-        let whole = |folder: &Path| if folder.as_os_str().is_empty() { here } else { folder }.canonicalize();
-        let (before, folder) = (whole(before)?, whole(folder)?);
-        for name in self.names() {
-            if before == folder && !Path::new(name).is_absolute() {
+    pub fn in_folder(mut self, old_folder: &Path, new_folder: &Path) -> io::Result<Description> {
+        let current = Path::new(".");
+        let canonical = |folder: &Path| if folder.as_os_str().is_empty() { current } else { folder }.canonicalize();
+        let (old_folder, new_folder) = (canonical(old_folder)?, canonical(new_folder)?);
+        for name in self.file_names() {
+            if old_folder == new_folder && !Path::new(name).is_absolute() {
                 continue;
             }
-            let path = before.join(&*name);
+            let path = old_folder.join(&*name);
             let (Some(parent), Some(file)) = (path.parent(), path.file_name()) else {
                 continue;
             };
             let path = parent.canonicalize()?.join(file);
-            *name = from(&folder, &path).ok_or_else(|| {
+            *name = relative_path(&new_folder, &path).ok_or_else(|| {
                 let message = format!("{} must be UTF-8 to be named in a scene", path.display());
                 io::Error::new(io::ErrorKind::InvalidData, message)
             })?;
@@ -95,7 +95,7 @@ impl Description {
         Ok(self)
     }
 
-    fn names(&mut self) -> Vec<&mut String> {
+    fn file_names(&mut self) -> Vec<&mut String> {
         let mut names = Vec::new();
         names.extend(self.textures.values_mut().filter_map(|texture| match texture {
             TextureDescription::Image(image) => Some(&mut image.file),
@@ -121,15 +121,15 @@ const FIRST: [&str; 5] = ["type", "file", "width", "position", "integrator"];
 
 /// Writes a section without values that equal the defaults.
 fn section(name: &str, value: &impl Serialize, defaults: &Table) -> Result<String, toml::ser::Error> {
-    written(&format!("[{name}]\n"), name, value, defaults, Value::Table)
+    format_table(&format!("[{name}]\n"), name, value, defaults, Value::Table)
 }
 
 fn element(name: &str, value: &impl Serialize, defaults: &Table) -> Result<String, toml::ser::Error> {
     let list = |table| Value::Array(vec![Value::Table(table)]);
-    written(&format!("[[{name}]]\n"), name, value, defaults, list)
+    format_table(&format!("[[{name}]]\n"), name, value, defaults, list)
 }
 
-fn written(
+fn format_table(
     head: &str,
     name: &str,
     value: &impl Serialize,
@@ -149,11 +149,11 @@ fn written(
 }
 
 /// Returns the path of a file relative to a folder; both paths are canonical.
-fn from(folder: &Path, path: &Path) -> Option<String> {
+fn relative_path(folder: &Path, path: &Path) -> Option<String> {
     let (folder, path): (Vec<_>, Vec<_>) = (folder.components().collect(), path.components().collect());
-    let same = folder.iter().zip(&path).take_while(|(a, b)| a == b).count();
-    let up = folder[same..].iter().map(|_| Some(".."));
-    let down = path[same..].iter().map(|part| match part {
+    let common = folder.iter().zip(&path).take_while(|(a, b)| a == b).count();
+    let up = folder[common..].iter().map(|_| Some(".."));
+    let down = path[common..].iter().map(|part| match part {
         Component::Normal(name) => name.to_str(),
         _ => None, // another drive
     });
@@ -165,14 +165,14 @@ fn from(folder: &Path, path: &Path) -> Option<String> {
 mod tests {
     use super::*;
 
-    /// All scenes of the project.
+    /// Tests all scenes of the project.
     #[test]
     fn texts_read_back_as_the_same_scene() {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes");
         let mut count = 0;
         for entry in std::fs::read_dir(&folder).unwrap() {
             let path = entry.unwrap().path();
-            if path.extension().is_none_or(|ending| ending != "toml") {
+            if path.extension().is_none_or(|extension| extension != "toml") {
                 continue;
             }
             let description = Description::parse(&std::fs::read_to_string(&path).unwrap(), "s.toml").unwrap();
@@ -198,8 +198,8 @@ mod tests {
             "[image]\nwidth = 1024\nheight = 512\n\n\
              [camera]\ntype = \"perspective\"\nposition = [0.1, -5.0, 0.0000001]\nfov = 35.0\nlook_at = [0.0, 0.0, 0.0]\n\n\
              [render]\n\n[environment]\nname = \"studio\"\n\n\
-             # Meshes with their materials, and lights. A table `materials` replaces materials of the file by those of\n\
-             # this scene, by name.\n\
+             # Meshes with their materials, and lights. A table `materials` replaces materials of the file by materials\n\
+             # of this scene, by name.\n\
              [[shapes]]\ntype = \"gltf\"\nfile = \"a b.glb\"\n"
         );
         assert_eq!(Description::parse(&text, "s.toml").unwrap(), description);
@@ -211,25 +211,25 @@ mod tests {
         for folder in ["a/b", "c"] {
             std::fs::create_dir_all(root.path().join(folder)).unwrap();
         }
-        let named = |file: &str, before: &str, folder: &str| {
+        let moved_name = |file: &str, old_folder: &str, new_folder: &str| {
             let camera = crate::PerspectiveDescription::new([0.0, -5.0, 0.0], [0.0; 3], 35.0);
             let shape = ShapeDescription::Gltf(super::super::GltfDescription::new(file));
             let description = Description::new(1, 1, camera).with_shape(shape);
-            let moved = description.in_folder(&root.path().join(before), &root.path().join(folder));
+            let moved = description.in_folder(&root.path().join(old_folder), &root.path().join(new_folder));
             match moved.unwrap().shapes.remove(0) {
                 ShapeDescription::Gltf(gltf) => gltf.file,
                 other => panic!("{other:?}"),
             }
         };
-        assert_eq!(named("x.glb", "a", "a"), "x.glb");
-        assert_eq!(named("b/../x.glb", "a", "a"), "b/../x.glb");
-        assert_eq!(named("x.glb", "a/b", "a"), "b/x.glb");
-        assert_eq!(named("x.glb", "a/b", ""), "a/b/x.glb");
-        assert_eq!(named("x.glb", "a", "a/b"), "../x.glb");
-        assert_eq!(named("x.glb", "a/b", "c"), "../a/b/x.glb");
-        assert_eq!(named("../x.glb", "a/b", "c"), "../a/x.glb");
-        let whole = root.path().join("a/b/x.glb").display().to_string();
-        assert_eq!(named(&whole, "c", "a"), "b/x.glb");
-        assert_eq!(named(&whole, "a", "a"), "b/x.glb");
+        assert_eq!(moved_name("x.glb", "a", "a"), "x.glb");
+        assert_eq!(moved_name("b/../x.glb", "a", "a"), "b/../x.glb");
+        assert_eq!(moved_name("x.glb", "a/b", "a"), "b/x.glb");
+        assert_eq!(moved_name("x.glb", "a/b", ""), "a/b/x.glb");
+        assert_eq!(moved_name("x.glb", "a", "a/b"), "../x.glb");
+        assert_eq!(moved_name("x.glb", "a/b", "c"), "../a/b/x.glb");
+        assert_eq!(moved_name("../x.glb", "a/b", "c"), "../a/x.glb");
+        let absolute = root.path().join("a/b/x.glb").display().to_string();
+        assert_eq!(moved_name(&absolute, "c", "a"), "b/x.glb");
+        assert_eq!(moved_name(&absolute, "a", "a"), "b/x.glb");
     }
 }

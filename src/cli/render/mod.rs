@@ -14,6 +14,7 @@ use std::time::Instant;
 use crate::device::DeviceInfo;
 use crate::error::RenderError;
 use crate::scene::{Scene, is_model};
+use crate::session::Session;
 use anyhow::Context as _;
 use tracing::info;
 use wgray_render::job::{CheckpointStore, NoCheckpoint};
@@ -44,7 +45,7 @@ pub fn run(args: Args, start: Instant) -> anyhow::Result<ExitCode> {
             continue;
         }
         job.go_to(frame)?;
-        let plan = Plan::resolve(&args, &job.scene, &job.log, frame, start)?;
+        let plan = Plan::resolve(&args, &mut job.session, &job.log, frame, start)?;
         outputs.check_size(plan.region())?;
         if let Some(part) = outputs.part().filter(|_| exists) {
             if plan.is_done(part) {
@@ -57,7 +58,7 @@ pub fn run(args: Args, start: Instant) -> anyhow::Result<ExitCode> {
                 format!("{name}: is damaged, or belongs to another scene or other options; rendering it again");
             job.log.log(Level::Note, &message);
         }
-        picture(&plan, outputs, &mut signals, start)?;
+        picture(&plan, &mut job.session, outputs, &mut signals, start)?;
         start = Instant::now();
     }
     if skipped > 0 {
@@ -70,7 +71,7 @@ pub fn run(args: Args, start: Instant) -> anyhow::Result<ExitCode> {
 struct Job<'a> {
     args: &'a Args,
     log: OnceLog,
-    scene: Scene,
+    session: Session,
     fps: Option<f64>,
     /// The frames to render, with their destinations.
     frames: Vec<(Frame, Outputs)>,
@@ -101,7 +102,7 @@ impl<'a> Job<'a> {
         Ok(Job {
             args,
             log,
-            scene,
+            session: Session::new(&crate::Context::new(), scene),
             fps,
             frames,
         })
@@ -111,17 +112,19 @@ impl<'a> Job<'a> {
         if let Some((number, fps)) = frame.number.zip(self.fps) {
             let mut overrides = self.args.overrides();
             overrides.gltf.time = Some(f64::from(number) / fps);
-            let moment = super::load(&self.args.scene, &overrides)?;
-            let before = std::mem::replace(&mut self.scene, moment);
-            self.scene.keep_ground(&before);
-            if self.args.options.is_framed(&self.scene) {
+            let mut scene = super::load(&self.args.scene, &overrides)?;
+            let before = self.session.scene();
+            scene.keep_ground(before);
+            if self.args.options.is_framed(&scene) {
                 // The automatic camera frames the unanimated model, so that the camera is the same in all frames.
-                (self.scene.camera, self.scene.camera_path) = (before.camera, before.camera_path);
+                (scene.camera, scene.camera_path) = (before.camera, before.camera_path.clone());
             }
+            self.session.set_scene(scene);
         }
         if let Some(number) = frame.number {
-            let camera = self.scene.camera_at(number.into());
-            self.scene.camera = camera.map_err(|error| plain(error.into()))?;
+            let camera = self.session.scene().camera_at(number.into());
+            let camera = camera.map_err(|error| plain(error.into()))?;
+            self.session.set_camera(camera).map_err(plain)?;
         }
         Ok(())
     }
@@ -176,7 +179,13 @@ fn check<'a>(args: &Args, scene: &Scene, frames: impl Iterator<Item = (&'a Frame
 }
 
 /// Renders an image or a part. From the first image on, signals are deferred: they end the command after cleanup.
-fn picture(plan: &Plan, outputs: Outputs, signals: &mut Signals, start: Instant) -> anyhow::Result<()> {
+fn picture(
+    plan: &Plan,
+    session: &mut Session,
+    outputs: Outputs,
+    signals: &mut Signals,
+    start: Instant,
+) -> anyhow::Result<()> {
     let before = signals.deferred().cloned();
     let mut checkpoint = plan.open_checkpoint(before.as_ref())?;
     let mut no_checkpoint = NoCheckpoint;
@@ -195,7 +204,7 @@ fn picture(plan: &Plan, outputs: Outputs, signals: &mut Signals, start: Instant)
     if let Some(signal) = stop.signal() {
         return Err(Interrupted(signal).into());
     }
-    let mut renderer = plan.renderer(stop).map_err(|error| interrupted(error, stop))?;
+    let mut renderer = plan.renderer(session, stop).map_err(|error| interrupted(error, stop))?;
     let setup = start.elapsed().as_secs_f64();
     info!(seconds = setup, "ready");
     let totals = work::write(plan, &mut renderer, outputs.files, store, stop, previews);

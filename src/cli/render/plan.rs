@@ -2,6 +2,7 @@
 
 use std::io;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use crate::error::RenderError;
@@ -9,6 +10,7 @@ use crate::image::Layout;
 use crate::options::Options;
 use crate::renderer::{FaultHandler, Recovery, Renderer};
 use crate::scene::{Scene, ViewSettings};
+use crate::session::Session;
 use tracing::info;
 use wgray_image::Region;
 use wgray_render::job::checkpoint::{Checkpoint, CheckpointError, CheckpointOptions};
@@ -27,7 +29,7 @@ use crate::cli::{Interrupted, Usage, option, plain};
 
 /// The settings of a render, except its destinations.
 pub struct Plan<'a> {
-    pub scene: Packed,
+    pub scene: Arc<Packed>,
     pub picture: Region,
     /// The part to render, and its rows.
     pub tile: Option<(Tile, Region)>,
@@ -48,7 +50,14 @@ pub struct Plan<'a> {
 
 impl<'a> Plan<'a> {
     /// Resolves the settings of one image, which was started at `start`.
-    pub fn resolve(args: &Args, scene: &Scene, log: &'a OnceLog, frame: Frame, start: Instant) -> anyhow::Result<Self> {
+    pub fn resolve(
+        args: &Args,
+        session: &mut Session,
+        log: &'a OnceLog,
+        frame: Frame,
+        start: Instant,
+    ) -> anyhow::Result<Self> {
+        let scene = &Arc::clone(session.scene());
         let early = [("--time-limit", args.time_limit.is_some()), ("--preview", args.preview)];
         for (option, _) in early.into_iter().filter(|(_, given)| *given) {
             can_end_early(option, scene)?;
@@ -61,7 +70,7 @@ impl<'a> Plan<'a> {
         };
         let progress = args.shown_progress();
         let packed = progress::named(progress, "preparing geometry, textures and lights", || {
-            options.pack(scene)
+            session.packed(&options)
         });
         Ok(Plan {
             picture,
@@ -143,7 +152,8 @@ impl<'a> Plan<'a> {
         }
     }
 
-    pub fn renderer<'b>(&'b self, stop: &'b Stop) -> anyhow::Result<Renderer<'b>> {
+    /// Opens the device for the scene, unless the session has done so for an earlier frame.
+    pub fn renderer<'b>(&'b self, session: &'b mut Session, stop: &'b Stop) -> anyhow::Result<Renderer<'b>> {
         let on_fault = FaultHandler {
             tell: Box::new(|why, remedy| match remedy {
                 Recovery::Reopen => self.log.log(Level::Warning, &format!("{why}; re-opening it")),
@@ -154,7 +164,7 @@ impl<'a> Plan<'a> {
             stopped: Box::new(|| stop.signal().is_some()),
         };
         let renderer = progress::named(self.progress, "opening the device and compiling kernels", || {
-            Renderer::new(&self.scene, &self.options, on_fault)
+            session.renderer(&self.options, on_fault)
         });
         let renderer = renderer.map_err(plain)?;
         if let Some(why) = renderer.why() {

@@ -11,9 +11,9 @@ use crate::random::Random;
 use crate::textures::write_exr;
 
 /// Environment maps next to the meshes: name, width and height.
-pub const AROUND: &[(&str, u32, u32)] = &[("dot.exr", 1, 1), ("odd.exr", 5, 3), ("wide.exr", 64, 32)];
+pub const ENVIRONMENT_MAPS: &[(&str, u32, u32)] = &[("dot.exr", 1, 1), ("odd.exr", 5, 3), ("wide.exr", 64, 32)];
 
-/// Mesh files: name, has texture coordinates, has normals. Next to the scenes that failing tests write.
+/// Mesh files: name, has texture coordinates, has normals. Failing tests write their scenes to the same folder.
 pub const MESHES: &[(&str, bool, bool)] = &[
     ("soup.obj", true, false),
     ("slivers.obj", false, false),
@@ -43,16 +43,16 @@ pub fn folder() -> &'static Path {
                 "painted.ply" => painted(&form, &normals, &uvs, &random),
                 _ => form.obj(has_normals.then_some(&normals), has_uvs.then_some(&uvs)),
             };
-            // Atomic: concurrent readers see a complete file.
-            let draft = folder.join(format!("{name}.{}", std::process::id()));
-            fs::write(&draft, text).expect("a place for a mesh");
-            fs::rename(&draft, folder.join(name)).expect("a place for a mesh");
+            // Renaming is atomic: concurrent readers see a complete file.
+            let temporary = folder.join(format!("{name}.{}", std::process::id()));
+            fs::write(&temporary, text).expect("a writable folder");
+            fs::rename(&temporary, folder.join(name)).expect("a writable folder");
         }
-        for (name, width, height) in AROUND {
-            let draft = folder.join(format!("{}.{name}", std::process::id()));
+        for (name, width, height) in ENVIRONMENT_MAPS {
+            let temporary = folder.join(format!("{}.{name}", std::process::id()));
             let value = || random.pick(&[0.0, 0.1, 0.5, 1.0, 30.0]);
-            write_exr(&draft, *width, *height, |_, _| [value(), value(), value()]);
-            fs::rename(&draft, folder.join(name)).expect("a place for an image");
+            write_exr(&temporary, *width, *height, |_, _| [value(), value(), value()]);
+            fs::rename(&temporary, folder.join(name)).expect("a writable folder");
         }
         folder
     })

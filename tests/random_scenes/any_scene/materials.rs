@@ -9,7 +9,7 @@ use wgray::scene::*;
 
 use super::values::*;
 
-pub fn paint() -> impl Strategy<Value = ColorDescription> {
+pub fn color_or_texture() -> impl Strategy<Value = ColorDescription> {
     let texture = select(&["checker", "lines", "constant"][..]).prop_map(str::to_string);
     prop_oneof![
         4 => color(1.0).prop_map(ColorDescription::Plain),
@@ -18,12 +18,12 @@ pub fn paint() -> impl Strategy<Value = ColorDescription> {
 }
 
 pub fn textures() -> impl Strategy<Value = BTreeMap<String, TextureDescription>> {
-    let place = (
+    let placement = (
         select(&[1.0, 4.0, 0.3, -2.0][..]),
         select(&[0.0, 30.0, 90.0][..]),
         0.0..1.0,
     );
-    (color(1.0), color(1.0), place, 0.05..0.5).prop_map(|(even, odd, (scale, rotate, offset), line_width)| {
+    (color(1.0), color(1.0), placement, 0.05..0.5).prop_map(|(even, odd, (scale, rotate, offset), line_width)| {
         let (scale, offset) = ([scale, scale * 2.0], [offset, 0.0]);
         let checker = CheckerDescription {
             even,
@@ -55,8 +55,14 @@ pub fn material() -> BoxedStrategy<MaterialDescription> {
     let shininess =
         prop_oneof![3 => select(&[16.0, 1.0, 2.0, 50.0, 4096.0][..]), 1 => select(&[2.5, 0.5, 1e5, 1e-3][..])];
     let visible = prop_oneof![9 => Just(None), 1 => Just(Some(false))];
-    let phong =
-        (paint(), paint(), paint(), shininess, visible).prop_map(|(ambient, diffuse, specular, shininess, visible)| {
+    let phong = (
+        color_or_texture(),
+        color_or_texture(),
+        color_or_texture(),
+        shininess,
+        visible,
+    )
+        .prop_map(|(ambient, diffuse, specular, shininess, visible)| {
             MaterialDescription::Phong(PhongDescription {
                 color: None,
                 ambient: Some(ambient),
@@ -90,7 +96,7 @@ pub fn material() -> BoxedStrategy<MaterialDescription> {
     prop_oneof![6 => phong, 1 => mirror, 1 => glass].boxed()
 }
 
-/// Generates emission, two of three times `None`.
+/// Generates emission, or `None` in two of three cases.
 pub fn emission() -> impl Strategy<Value = Option<ColorDescription>> {
     let texture = select(&["checker", "lines", "constant"][..]).prop_map(str::to_string);
     prop_oneof![
@@ -100,8 +106,8 @@ pub fn emission() -> impl Strategy<Value = Option<ColorDescription>> {
     ]
 }
 
-/// Generates 0 to 1, often an end, or a texture channel.
-pub fn share() -> impl Strategy<Value = ValueDescription> {
+/// Generates a number from 0 to 1, often 0 or 1, or a texture channel.
+pub fn fraction_or_texture() -> impl Strategy<Value = ValueDescription> {
     let texture = (
         select(&["checker", "lines"][..]).prop_map(str::to_string),
         select(&[Channel::R, Channel::G, Channel::B][..]),
@@ -114,59 +120,72 @@ pub fn share() -> impl Strategy<Value = ValueDescription> {
     ]
 }
 
-/// Generates principled materials with some lobes.
+/// Generates principled materials with any combination of lobes.
 pub fn principled() -> impl Strategy<Value = MaterialDescription> {
-    let shares = proptest::collection::vec(share(), 8);
+    let fractions = proptest::collection::vec(fraction_or_texture(), 8);
     let volume = (select(&[0.0, 1.0][..]), color(1.0), select(&[1.0, 1.3, 1.5, 2.4][..]));
     let alpha = (
         select(&[AlphaMode::Opaque, AlphaMode::Opaque, AlphaMode::Blend, AlphaMode::Mask][..]),
-        share(),
+        fraction_or_texture(),
     );
-    let vertices = (
+    let vertex_settings = (
         select(&[VertexColors::None, VertexColors::BaseColor, VertexColors::Emission][..]),
         prop::bool::weighted(0.8),
     );
-    (paint(), shares, volume, alpha, (vertices, -360.0..360.0)).prop_map(
-        |(base, shares, (thickness, color, ior), (alpha_mode, alpha), (vertices, anisotropy_rotation))| {
-            let mut shares = shares.into_iter();
-            let mut next = || shares.next().unwrap();
-            let mut m = PrincipledDescription::default();
-            (m.base_color, m.metallic, m.roughness) = (base, next(), next());
-            (m.anisotropy, m.anisotropy_rotation) = (next(), anisotropy_rotation);
-            (m.specular, m.transmission, m.ior) = (next(), next(), ior);
-            if thickness > 0.0 {
-                (m.thickness, m.attenuation_color, m.attenuation_distance) = (thickness, color, Some(0.7));
-            }
-            (m.clearcoat, m.clearcoat_roughness, m.sheen_roughness) = (next(), next(), next());
-            m.sheen_color = [0.0, 0.5, color.x].into();
-            (m.alpha_mode, m.alpha) = (alpha_mode, alpha);
-            (m.vertex_colors, m.double_sided) = vertices;
-            MaterialDescription::Principled(m)
-        },
+    (
+        color_or_texture(),
+        fractions,
+        volume,
+        alpha,
+        (vertex_settings, -360.0..360.0),
     )
+        .prop_map(
+            |(
+                base,
+                fractions,
+                (thickness, color, ior),
+                (alpha_mode, alpha),
+                (vertex_settings, anisotropy_rotation),
+            )| {
+                let mut fractions = fractions.into_iter();
+                let mut next = || fractions.next().unwrap();
+                let mut m = PrincipledDescription::default();
+                (m.base_color, m.metallic, m.roughness) = (base, next(), next());
+                (m.anisotropy, m.anisotropy_rotation) = (next(), anisotropy_rotation);
+                (m.specular, m.transmission, m.ior) = (next(), next(), ior);
+                if thickness > 0.0 {
+                    (m.thickness, m.attenuation_color, m.attenuation_distance) = (thickness, color, Some(0.7));
+                }
+                (m.clearcoat, m.clearcoat_roughness, m.sheen_roughness) = (next(), next(), next());
+                m.sheen_color = [0.0, 0.5, color.x].into();
+                (m.alpha_mode, m.alpha) = (alpha_mode, alpha);
+                (m.vertex_colors, m.double_sided) = vertex_settings;
+                MaterialDescription::Principled(m)
+            },
+        )
 }
 
-/// Generates any material of `path`.
-pub fn material_of_paths() -> BoxedStrategy<MaterialDescription> {
+/// Generates any material that `path` supports.
+pub fn path_material() -> BoxedStrategy<MaterialDescription> {
     let texture = select(&["checker", "lines"][..]).prop_map(str::to_string);
     let roughness = prop_oneof![
         2 => Just(ValueDescription::Plain(0.0)),
         1 => (0.0..=1.0).prop_map(ValueDescription::Plain),
         1 => texture.prop_map(ValueDescription::texture),
     ];
-    let diffuse = (paint(), roughness.clone()).prop_map(|(color, roughness)| {
+    let diffuse = (color_or_texture(), roughness.clone()).prop_map(|(color, roughness)| {
         let mut diffuse = DiffuseDescription::new(color);
         diffuse.roughness = roughness;
         MaterialDescription::Diffuse(diffuse)
     });
-    let facets = (
+    let microfacets = (
         prop_oneof![1 => Just(ValueDescription::default()), 3 => roughness],
         prop_oneof![3 => Just(0.0), 1 => 0.0..=1.0],
         -360.0..=360.0,
         any::<bool>(),
     );
     let metal = prop_oneof![
-        2 => paint().prop_map(ConductorDescription::new),
+        2 => color_or_texture().prop_map(ConductorDescription::new),
         1 => Just(ConductorDescription { metal: Some("gold".to_owned()), ..ConductorDescription::default() }),
         1 => (color(3.0), color(3.0)).prop_map(|(eta, k)| ConductorDescription {
             eta: Some(eta + 0.01),
@@ -174,18 +193,23 @@ pub fn material_of_paths() -> BoxedStrategy<MaterialDescription> {
             ..ConductorDescription::default()
         }),
     ];
-    let conductor = (metal, facets.clone()).prop_map(|(mut conductor, facets)| {
+    let conductor = (metal, microfacets.clone()).prop_map(|(mut conductor, microfacets)| {
         (
             conductor.roughness,
             conductor.anisotropy,
             conductor.anisotropy_rotation,
             conductor.energy_compensation,
-        ) = facets;
+        ) = microfacets;
         MaterialDescription::Conductor(conductor)
     });
     let absorption = prop_oneof![Just(DVec3::ZERO), color(3.0)];
-    let clear = (select(&[1.5, 1.0, 0.7, 2.4][..]), paint(), absorption, any::<bool>());
-    let dielectric = (clear, facets).prop_map(|((ior, color, absorption, thin), facets)| {
+    let properties = (
+        select(&[1.5, 1.0, 0.7, 2.4][..]),
+        color_or_texture(),
+        absorption,
+        any::<bool>(),
+    );
+    let dielectric = (properties, microfacets).prop_map(|((ior, color, absorption, thin), microfacets)| {
         let mut dielectric = DielectricDescription::new(ior);
         (dielectric.color, dielectric.thin) = (color, thin);
         dielectric.absorption = if thin { DVec3::ZERO } else { absorption };
@@ -194,13 +218,13 @@ pub fn material_of_paths() -> BoxedStrategy<MaterialDescription> {
             dielectric.anisotropy,
             dielectric.anisotropy_rotation,
             dielectric.energy_compensation,
-        ) = facets;
+        ) = microfacets;
         MaterialDescription::Dielectric(dielectric)
     });
     let any = prop_oneof![4 => diffuse, 1 => conductor, 1 => dielectric, 2 => principled(), 3 => material()];
     (any, emission())
         .prop_map(|(mut material, emission)| {
-            let own = match &mut material {
+            let target = match &mut material {
                 MaterialDescription::Phong(m) => &mut m.emission,
                 MaterialDescription::Mirror(m) => &mut m.emission,
                 MaterialDescription::Glass(m) => &mut m.emission,
@@ -209,7 +233,7 @@ pub fn material_of_paths() -> BoxedStrategy<MaterialDescription> {
                 MaterialDescription::Dielectric(m) => &mut m.emission,
                 MaterialDescription::Principled(m) => &mut m.emission,
             };
-            *own = emission;
+            *target = emission;
             material
         })
         .boxed() // an unboxed strategy would put its value tree on the stack

@@ -57,16 +57,16 @@ pub fn moved(d: &mut Description, scale: f64, offset: DVec3) {
             ShapeDescription::Triangle(s) => s.vertices.iter_mut().for_each(point),
             ShapeDescription::Tetrahedron(s) => s.vertices.iter_mut().for_each(point),
             ShapeDescription::Plane(s) => point(&mut s.point),
-            ShapeDescription::Mesh(s) => placed(&mut s.translate, &mut s.scale, &mut s.matrix, scale, offset),
+            ShapeDescription::Mesh(s) => move_placement(&mut s.translate, &mut s.scale, &mut s.matrix, scale, offset),
             other => panic!("no random scene has the shape {other:?}"),
         }
     }
     for i in &mut d.instances {
-        placed(&mut i.translate, &mut i.scale, &mut i.matrix, scale, offset);
+        move_placement(&mut i.translate, &mut i.scale, &mut i.matrix, scale, offset);
     }
 }
 
-fn placed(
+fn move_placement(
     translate: &mut Option<DVec3>,
     factors: &mut Option<Scale>,
     matrix: &mut Option<Vec<[f64; 4]>>,

@@ -26,13 +26,13 @@ pub fn shape() -> impl Strategy<Value = ShapeDescription> {
         },
     );
     let disk = (material.clone(), point(), frame(), length(), any::<bool>()).prop_map(
-        |(material, center, [normal, tangent], radius, turned)| {
+        |(material, center, [normal, tangent], radius, has_tangent)| {
             ShapeDescription::Disk(DiskDescription {
                 material,
                 center,
                 radius,
                 normal,
-                tangent: turned.then_some(tangent),
+                tangent: has_tangent.then_some(tangent),
             })
         },
     );
@@ -61,13 +61,13 @@ pub fn shape() -> impl Strategy<Value = ShapeDescription> {
             })
         });
     let cylinder = (material.clone(), point(), frame(), [length(), length()], any::<bool>()).prop_map(
-        |(material, start, [axis, tangent], [radius, height], turned)| {
+        |(material, start, [axis, tangent], [radius, height], has_tangent)| {
             ShapeDescription::Cylinder(CylinderDescription {
                 material,
                 start,
                 end: start + axis.normalize() * height,
                 radius,
-                tangent: turned.then_some(tangent),
+                tangent: has_tangent.then_some(tangent),
             })
         },
     );
@@ -95,7 +95,7 @@ pub fn shape() -> impl Strategy<Value = ShapeDescription> {
     ]
 }
 
-/// Translate, rotate and scale, or a matrix.
+/// Translation, rotation and scale, or a matrix.
 pub type Placement = (Option<DVec3>, Option<Rotation>, Option<Scale>, Option<Vec<[f64; 4]>>);
 
 pub fn placement() -> impl Strategy<Value = Placement> {
@@ -104,8 +104,9 @@ pub fn placement() -> impl Strategy<Value = Placement> {
     let about = (direction(), angle()).prop_map(|(axis, degrees)| Rotation::About(RotationAbout { axis, degrees }));
     let rotation = prop_oneof![1 => Just(None), 1 => angles.prop_map(Some), 1 => about.prop_map(Some)];
     let size = || select(&[1.0, 0.7, 0.3, -0.5, 1.0, 1e-3, 1e3][..]);
-    let each = [size(), size(), size()].prop_map(|s| Scale::Each(DVec3::from_array(s)));
-    let scale = prop_oneof![2 => Just(None), 2 => size().prop_map(|s| Some(Scale::All(s))), 1 => each.prop_map(Some)];
+    let per_axis = [size(), size(), size()].prop_map(|s| Scale::Each(DVec3::from_array(s)));
+    let scale =
+        prop_oneof![2 => Just(None), 2 => size().prop_map(|s| Some(Scale::All(s))), 1 => per_axis.prop_map(Some)];
     let parts = (prop::option::of(point()), rotation, scale).prop_map(|(t, r, s)| (t, r, s, None));
     let row = || [coordinate(), coordinate(), coordinate(), coordinate()];
     let matrix = [row(), row(), row()].prop_map(|rows| (None, None, None, Some(rows.to_vec())));
@@ -121,17 +122,17 @@ pub fn up() -> impl Strategy<Value = Up> {
 }
 
 /// Generates materials of mesh groups.
-pub fn materials_of_groups() -> impl Strategy<Value = BTreeMap<String, String>> {
+pub fn group_materials() -> impl Strategy<Value = BTreeMap<String, String>> {
     prop::option::of(select(&["a", "b", "c"][..])).prop_map(|material| {
-        let named = material.map(|material| ("second".to_string(), material.to_string()));
-        named.into_iter().collect()
+        let group_material = material.map(|material| ("second".to_string(), material.to_string()));
+        group_material.into_iter().collect()
     })
 }
 
 pub fn mesh() -> impl Strategy<Value = ShapeDescription> {
     let material = select(&["a", "b", "c"][..]).prop_map(str::to_string);
     let file = select(MESHES).prop_map(|(name, ..)| name.to_string());
-    (file, normals(), up(), material, materials_of_groups(), placement()).prop_map(
+    (file, normals(), up(), material, group_materials(), placement()).prop_map(
         |(file, normals, up, material, materials, (translate, rotate, scale, matrix))| {
             ShapeDescription::Mesh(MeshDescription {
                 file,
@@ -150,7 +151,7 @@ pub fn mesh() -> impl Strategy<Value = ShapeDescription> {
 
 pub fn instance() -> impl Strategy<Value = InstanceDescription> {
     let name = || select(&["a", "b", "c"][..]).prop_map(str::to_string);
-    (name(), name(), materials_of_groups(), placement()).prop_map(
+    (name(), name(), group_materials(), placement()).prop_map(
         |(mesh, material, materials, (translate, rotate, scale, matrix))| InstanceDescription {
             mesh,
             material: Some(material),
@@ -163,7 +164,7 @@ pub fn instance() -> impl Strategy<Value = InstanceDescription> {
     )
 }
 
-/// Generates mesh files and instances; often none.
+/// Generates mesh files and instances, often empty.
 pub fn meshes() -> impl Strategy<Value = (BTreeMap<String, MeshFileDescription>, Vec<InstanceDescription>)> {
     let file = || {
         (select(MESHES), normals(), up()).prop_map(|((name, ..), normals, up)| {
@@ -176,11 +177,12 @@ pub fn meshes() -> impl Strategy<Value = (BTreeMap<String, MeshFileDescription>,
         let names = ["a", "b", "c"].map(str::to_string);
         names.into_iter().zip(files).collect()
     });
-    let some = (files, prop::collection::vec(instance(), 1..5));
-    prop_oneof![3 => Just(Default::default()), 1 => some]
+    let with_instances = (files, prop::collection::vec(instance(), 1..5));
+    prop_oneof![3 => Just(Default::default()), 1 => with_instances]
 }
 
-/// Generates a few shapes, or enough for a BVH. Few meshes, as kernels with mesh traversal take seconds to compile.
+/// Generates a few shapes, or enough for a BVH. Meshes are rare, because kernels with mesh traversal take seconds to
+/// compile.
 pub fn shapes() -> impl Strategy<Value = Vec<ShapeDescription>> {
     let shape = || prop_oneof![9 => shape(), 1 => mesh()];
     let many = MAX_LINEAR_PRIMITIVES + 1..MAX_LINEAR_PRIMITIVES + 20;

@@ -31,7 +31,7 @@ pub fn length() -> impl Strategy<Value = f64> {
     prop_oneof![select(&[1.0, 0.5, 2.0, 0.01][..]), 0.05..2.0]
 }
 
-pub fn color(most: f64) -> impl Strategy<Value = DVec3> {
-    let part = prop_oneof![select(vec![0.5, 0.0, 1.0]), 0.0..most];
-    [part.clone(), part.clone(), part].prop_map(DVec3::from_array)
+pub fn color(max: f64) -> impl Strategy<Value = DVec3> {
+    let component = prop_oneof![select(vec![0.5, 0.0, 1.0]), 0.0..max];
+    [component.clone(), component.clone(), component].prop_map(DVec3::from_array)
 }

@@ -1,6 +1,6 @@
 use super::*;
 
-/// Sets a value, or removes the key if `value` is `none`.
+/// Sets a value, or removes the key if `value` is "none".
 fn set(text: &str, path: &str, value: &str) -> Result<String, String> {
     let value = (value != "none").then(|| {
         let mut table: toml::Table = toml::from_str(&format!("value = {value}")).unwrap();
@@ -64,7 +64,7 @@ const CHANGES: [(&str, &str, &str, &str); 36] = [
         "[1, 2, 3]",
         "[m]\na = [1, 2, 3] # a\n",
     ),
-    // Absent keys.
+    // Missing keys.
     (
         "[camera]\nfov = 45 # c\n\n[render]\n",
         "camera.up",
@@ -205,19 +205,24 @@ const CHANGES: [(&str, &str, &str, &str); 36] = [
 #[test]
 fn only_the_bytes_of_a_value_change() {
     let dos = |text: &str| format!("\u{feff}{}", text.replace('\n', "\r\n"));
-    for (text, path, value, wanted) in CHANGES {
-        toml::from_str::<toml::Table>(wanted).unwrap();
-        assert_eq!(set(text, path, value).as_deref(), Ok(wanted), "{text}{path}");
-        let of_dos = set(&dos(text), path, value).unwrap();
-        assert_eq!(of_dos, dos(wanted), "{path}");
-        assert_eq!(set(wanted, path, value).as_deref(), Ok(wanted));
+    for (text, path, value, expected) in CHANGES {
+        toml::from_str::<toml::Table>(expected).unwrap();
+        assert_eq!(set(text, path, value).as_deref(), Ok(expected), "{text}{path}");
+        let with_dos_endings = set(&dos(text), path, value).unwrap();
+        assert_eq!(with_dos_endings, dos(expected), "{path}");
+        assert_eq!(set(expected, path, value).as_deref(), Ok(expected));
     }
 }
 
 #[test]
 fn values_without_a_location_in_the_file_are_rejected() {
     for (text, path, value, message) in [
-        ("[camera]\nfov = 45\n", "camera.fov.a", "1", "is in no table"),
+        (
+            "[camera]\nfov = 45\n",
+            "camera.fov.a",
+            "1",
+            "does not belong to a table",
+        ),
         (
             "[[shapes]]\nradius = 1\n",
             "shapes[1].radius",
@@ -242,15 +247,15 @@ fn values_without_a_location_in_the_file_are_rejected() {
 fn extents_of_tables_and_values_are_found() {
     let text = "a.b = 1 # a\n[camera] # c\nfov = 45\n[camera.path]\nx = [1,\n 2]\n[[shapes]]\nr = 1\n";
     let layout = Layout::of(text).unwrap();
-    let at = |path: &str| layout.extent(&path.parse().unwrap()).map(|range| &text[range]);
+    let extent = |path: &str| layout.extent(&path.parse().unwrap()).map(|range| &text[range]);
     assert_eq!(
-        at("camera"),
+        extent("camera"),
         Some("[camera] # c\nfov = 45\n[camera.path]\nx = [1,\n 2]")
     );
-    assert_eq!(at("camera.path"), Some("[camera.path]\nx = [1,\n 2]"));
-    assert_eq!(at("camera.fov"), Some("fov = 45"));
-    assert_eq!(at("a.b"), Some("b = 1"));
-    assert_eq!(at("shapes[0]"), Some("[[shapes]]\nr = 1"));
-    assert_eq!(at("shapes[1]"), None);
-    assert_eq!(at("render"), None);
+    assert_eq!(extent("camera.path"), Some("[camera.path]\nx = [1,\n 2]"));
+    assert_eq!(extent("camera.fov"), Some("fov = 45"));
+    assert_eq!(extent("a.b"), Some("b = 1"));
+    assert_eq!(extent("shapes[0]"), Some("[[shapes]]\nr = 1"));
+    assert_eq!(extent("shapes[1]"), None);
+    assert_eq!(extent("render"), None);
 }

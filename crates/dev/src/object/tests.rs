@@ -7,10 +7,10 @@ use crate::edit::edited;
 use wgray_render::pack::pack;
 use wgray_scene::{Overrides, PendingScene, Scene};
 
-fn seen(text: &str, name: &Path, overrides: Overrides) -> SceneView {
+fn scene_view(text: &str, name: &Path, overrides: Overrides) -> SceneView {
     let origin = name.display().to_string();
-    let draft = PendingScene::read(text, &origin, wgray_scene::folder_of(name), &overrides).unwrap();
-    let (scene, description) = draft.check(&mut Default::default()).unwrap();
+    let pending = PendingScene::read(text, &origin, wgray_scene::folder_of(name), &overrides).unwrap();
+    let (scene, description) = pending.check(&mut Default::default()).unwrap();
     let loaded = Loaded::new(text.to_owned(), scene, description);
     SceneView {
         camera: loaded.packed.camera,
@@ -27,76 +27,83 @@ fn table(text: &str) -> Value {
     Value::Table(toml::from_str(text.trim_start_matches('\u{feff}')).unwrap())
 }
 
-fn plain(value: &Value) -> Value {
+/// Returns a copy with all integers as floats, so that only the values are compared.
+fn with_floats(value: &Value) -> Value {
     match value {
         Value::Integer(x) => Value::Float(*x as f64),
-        Value::Array(list) => list.iter().map(plain).collect::<Vec<_>>().into(),
-        Value::Table(all) => Value::Table(all.iter().map(|(key, value)| (key.clone(), plain(value))).collect()),
-        other => other.clone(),
+        Value::Array(list) => list.iter().map(with_floats).collect::<Vec<_>>().into(),
+        Value::Table(table) => Value::Table(
+            table
+                .iter()
+                .map(|(key, value)| (key.clone(), with_floats(value)))
+                .collect(),
+        ),
+        value => value.clone(),
     }
 }
 
 /// Returns a copy with `new` at a path; missing tables are added.
-fn with(whole: &Value, path: &KeyPath, new: &Value) -> Value {
-    let mut whole = whole.clone();
-    let mut place = &mut whole;
+fn with_value(document: &Value, path: &KeyPath, new: &Value) -> Value {
+    let mut document = document.clone();
+    let mut value = &mut document;
     for segment in &path.0 {
-        place = match segment {
-            Segment::Index(i) => place.get_mut(*i).unwrap(),
+        value = match segment {
+            Segment::Index(i) => value.get_mut(*i).unwrap(),
             Segment::Key(key) => {
-                let table = place.as_table_mut().unwrap();
+                let table = value.as_table_mut().unwrap();
                 table.entry(key.clone()).or_insert(Value::Table(Table::new()))
             }
         };
     }
-    *place = new.clone();
-    whole
+    *value = new.clone();
+    document
 }
 
-fn another(field: &Field) -> Json {
-    let now = field.value.as_ref().or(field.default.as_ref());
-    let moved = |now: Option<f64>| {
+/// Returns a valid value that differs from the current value.
+fn different_value(field: &Field) -> Json {
+    let current = field.value.as_ref().or(field.default.as_ref());
+    let different_number = |current: Option<f64>| {
         let (low, high) = field.range.unwrap();
         let slider = field.slider;
         let middle = slider.map_or((low + high) / 2.0, |slider| (slider.from + slider.to) / 2.0);
-        let candidates = [now.unwrap_or(0.0) * 0.75 + 0.01, middle, low, high];
-        let fits = |x: &f64| *x >= low && *x <= high && Some(*x) != now && *x != 0.0;
-        candidates.into_iter().find(fits).unwrap()
+        let candidates = [current.unwrap_or(0.0) * 0.75 + 0.01, middle, low, high];
+        let is_usable = |x: &f64| *x >= low && *x <= high && Some(*x) != current && *x != 0.0;
+        candidates.into_iter().find(is_usable).unwrap()
     };
     match field.kind {
-        wgray_scene::FieldKind::Number => json!(moved(now.and_then(Json::as_f64))),
+        wgray_scene::FieldKind::Number => json!(different_number(current.and_then(Json::as_f64))),
         wgray_scene::FieldKind::Whole => {
-            let now = now.and_then(Json::as_f64);
-            let x = moved(now).round();
-            json!(if Some(x) == now { x as i64 + 1 } else { x as i64 })
+            let current = current.and_then(Json::as_f64);
+            let x = different_number(current).round();
+            json!(if Some(x) == current { x as i64 + 1 } else { x as i64 })
         }
         wgray_scene::FieldKind::Color | wgray_scene::FieldKind::Vector => {
-            let list: Vec<Option<f64>> = match now.and_then(Json::as_array) {
+            let list: Vec<Option<f64>> = match current.and_then(Json::as_array) {
                 Some(list) => list.iter().map(Json::as_f64).collect(),
                 None => vec![None; field.length],
             };
-            json!(list.into_iter().map(moved).collect::<Vec<_>>())
+            json!(list.into_iter().map(different_number).collect::<Vec<_>>())
         }
         wgray_scene::FieldKind::Choice => {
-            let other = field
+            let different = field
                 .choices
                 .iter()
-                .find(|choice| now.and_then(Json::as_str) != Some(choice.as_str()));
-            json!(other.or(field.choices.first()))
+                .find(|choice| current.and_then(Json::as_str) != Some(choice.as_str()));
+            json!(different.or(field.choices.first()))
         }
-        wgray_scene::FieldKind::Switch => json!(now != Some(&json!(true))),
+        wgray_scene::FieldKind::Switch => json!(current != Some(&json!(true))),
         wgray_scene::FieldKind::Text => panic!("{field:?}"),
     }
 }
 
 /// Sets every field to its current value and to a different value. Returns the number of fields.
-fn set_all(seen: &SceneView) -> usize {
-    let text = seen.loaded.text.clone();
-    let whole = table(&text);
-    let names = seen.names();
+fn set_all(view: &SceneView) -> usize {
+    let text = view.loaded.text.clone();
+    let document = table(&text);
+    let names = view.names();
     let mut count = 0;
-    for (name, _) in seen.objects("").objects {
-        let object = seen.object(&name, None);
+    for (name, _) in view.objects("").objects {
+        let object = view.object(&name, None);
         assert_eq!(object.gone, None);
         let group = &object.groups[0];
         assert_eq!(group.name, name);
@@ -109,20 +116,20 @@ fn set_all(seen: &SceneView) -> usize {
                 )
         );
         for field in &group.fields {
-            let case = format!("{}: {}", seen.sources.scene.display(), field.path);
+            let case = format!("{}: {}", view.sources.scene.display(), field.path);
             let path: KeyPath = field.path.parse().unwrap();
-            assert_eq!(seen.field(&path).as_ref(), Some(field), "{case}");
-            if let Some(own) = field.value.as_ref().filter(|_| field.fixed.is_none()) {
-                let value = field.value_of(own, &names).unwrap();
+            assert_eq!(view.field(&path).as_ref(), Some(field), "{case}");
+            if let Some(current) = field.value.as_ref().filter(|_| field.fixed.is_none()) {
+                let value = field.value_of(current, &names).unwrap();
                 assert_eq!(edited(&text, &path, Some(&value)).unwrap(), text, "{case}");
             }
             if field.fixed.is_some() {
                 continue;
             }
-            let value = field.value_of(&another(field), &names).unwrap();
+            let value = field.value_of(&different_value(field), &names).unwrap();
             let after = edited(&text, &path, Some(&value)).unwrap_or_else(|error| panic!("{case}: {error}"));
-            let wanted = with(&plain(&whole), &path, &plain(&value));
-            assert_eq!(plain(&table(&after)), wanted, "{case}");
+            let expected = with_value(&with_floats(&document), &path, &with_floats(&value));
+            assert_eq!(with_floats(&table(&after)), expected, "{case}");
             Description::parse(&after, "s.toml").unwrap_or_else(|error| panic!("{error}"));
             // Removing an added key restores every byte.
             if field.value.is_none()
@@ -145,13 +152,13 @@ fn every_field_of_every_scene_can_be_set() {
     let folder = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenes"));
     for entry in std::fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();
-        if path.extension().is_none_or(|end| end != "toml") {
+        if path.extension().is_none_or(|extension| extension != "toml") {
             continue;
         }
         let text = std::fs::read_to_string(&path).unwrap();
-        count += set_all(&seen(&text, &path, Overrides::default()));
+        count += set_all(&scene_view(&text, &path, Overrides::default()));
         let dos = format!("\u{feff}{}", text.replace('\n', "\r\n"));
-        set_all(&seen(&dos, &path, Overrides::default()));
+        set_all(&scene_view(&dos, &path, Overrides::default()));
     }
     assert!(count > 1000, "{count}");
 }
@@ -193,16 +200,16 @@ color = [4, 4, 4]
 ";
 
 fn small() -> SceneView {
-    seen(SCENE, Path::new("s.toml"), Overrides::default())
+    scene_view(SCENE, Path::new("s.toml"), Overrides::default())
 }
 
 #[test]
 fn sample_counts_of_grid_patterns_are_squares() {
-    let squares = |more: &str| {
+    let square_fields = |render: &str| {
         let text = format!(
-            "image = {{ width = 4, height = 4 }}\n[camera]\nposition = [0, 1, 0]\nlook_at = [0, 0, 0]\nfov = 40\n{more}"
+            "image = {{ width = 4, height = 4 }}\n[camera]\nposition = [0, 1, 0]\nlook_at = [0, 0, 0]\nfov = 40\n{render}"
         );
-        let object = seen(&text, Path::new("s.toml"), Overrides::default()).object("render", None);
+        let object = scene_view(&text, Path::new("s.toml"), Overrides::default()).object("render", None);
         let fields = object.groups[0].fields.iter();
         fields
             .filter(|field| field.squares)
@@ -211,19 +218,19 @@ fn sample_counts_of_grid_patterns_are_squares() {
     };
     let (pixel, light) = ("pixel_samples.count", "light_samples.count");
     assert_eq!(
-        squares("[render]\npixel_samples = { count = 4 }\nlight_samples = { count = 4 }"),
+        square_fields("[render]\npixel_samples = { count = 4 }\nlight_samples = { count = 4 }"),
         [pixel, light]
     );
     assert_eq!(
-        squares(
+        square_fields(
             "[render]\npixel_samples = { pattern = 'halton', count = 5 }\nlight_samples = { pattern = 'jittered', count = 4 }"
         ),
         [light]
     );
     let path = "[render]\nintegrator = 'path'\n";
-    assert!(squares(&format!("{path}pixel_samples = {{ count = 5 }}")).is_empty());
+    assert!(square_fields(&format!("{path}pixel_samples = {{ count = 5 }}")).is_empty());
     assert_eq!(
-        squares(&format!("{path}pixel_samples = {{ pattern = 'grid', count = 4 }}")),
+        square_fields(&format!("{path}pixel_samples = {{ pattern = 'grid', count = 4 }}")),
         [pixel]
     );
 }
@@ -231,31 +238,31 @@ fn sample_counts_of_grid_patterns_are_squares() {
 #[test]
 fn other_layouts_can_be_set_too() {
     assert!(set_all(&small()) > 60);
-    // Checks that `with` only changes a table if the value differs.
-    let whole = plain(&table(SCENE));
+    // Checks that `with_value` changes a document only if the value differs.
+    let document = with_floats(&table(SCENE));
     let path: KeyPath = "shapes[0].radius".parse().unwrap();
-    assert_ne!(with(&whole, &path, &Value::from(0.25)), whole);
-    assert_eq!(with(&whole, &path, &Value::from(0.5)), whole);
+    assert_ne!(with_value(&document, &path, &Value::from(0.25)), document);
+    assert_eq!(with_value(&document, &path, &Value::from(0.5)), document);
 }
 
 #[test]
 fn picks_have_names_lines_and_references() {
-    let seen = small();
-    let ball = seen.at([20, 15]);
+    let view = small();
+    let ball = view.at([20, 15]);
     assert_eq!(
         (ball.name.as_str(), ball.at, &ball.gone),
         ("shapes[0]", Some([20, 15]), &None)
     );
     let groups: Vec<&str> = ball.groups.iter().map(|group| group.name.as_str()).collect();
     assert_eq!(groups, ["shapes[0]", "materials.\"dark red\"", "textures.squares"]);
-    let own = &ball.groups[0];
-    assert_eq!((own.kind.as_str(), own.line, own.more), ("sphere", 13, 0));
+    let group = &ball.groups[0];
+    assert_eq!((group.kind.as_str(), group.line, group.more), ("sphere", 13, 0));
     assert_eq!(
-        own.text,
+        group.text,
         "# the ball\n[[shapes]]\ntype = 'sphere'\nmaterial = 'dark red'\ncenter = [0, 0, 0.5]\nradius = 0.5 # wide"
     );
     assert_eq!(ball.groups[1].line, 7);
-    let radius = own.fields.iter().find(|field| field.name == "radius").unwrap();
+    let radius = group.fields.iter().find(|field| field.name == "radius").unwrap();
     assert_eq!(radius.path, "shapes[0].radius");
     assert_eq!(
         (radius.value.clone(), radius.unit, radius.range),
@@ -266,26 +273,26 @@ fn picks_have_names_lines_and_references() {
             .slider
             .is_some_and(|slider| slider.logarithmic && slider.from < 0.5 && slider.to > 0.5)
     );
-    let fields = |seen: &SceneView, name: &str| seen.object(name, None).groups[0].fields.clone();
-    let shininess = fields(&seen, "materials.red")
+    let fields = |view: &SceneView, name: &str| view.object(name, None).groups[0].fields.clone();
+    let shininess = fields(&view, "materials.red")
         .into_iter()
         .find(|field| field.name == "shininess")
         .unwrap();
     assert_eq!((shininess.value, shininess.default), (None, Some(json!(16.0))));
-    assert_eq!(seen.at([20, 29]).name, "shapes[1]");
-    assert_eq!(seen.at([29, 10]).name, "lights[0]");
-    let sky = seen.at([0, 0]);
+    assert_eq!(view.at([20, 29]).name, "shapes[1]");
+    assert_eq!(view.at([29, 10]).name, "lights[0]");
+    let sky = view.at([0, 0]);
     assert_eq!((sky.name.as_str(), sky.note.is_some()), ("render", true));
     for (object, case) in [
-        (seen.at([40, 0]), "is outside the image"),
-        (seen.object("shapes[2]", None), "shapes[2] is not in the scene"),
-        (seen.object("environment", None), "environment is not in the scene"),
-        (seen.object("shapes", None), "shapes is not in the scene"),
-        (seen.object("] [", None), "is not in the scene"),
-        (seen.object("", None), "is not in the scene"),
+        (view.at([40, 0]), "is outside the image"),
+        (view.object("shapes[2]", None), "shapes[2] is not in the scene"),
+        (view.object("environment", None), "environment is not in the scene"),
+        (view.object("shapes", None), "shapes is not in the scene"),
+        (view.object("] [", None), "is not in the scene"),
+        (view.object("", None), "is not in the scene"),
     ] {
         assert!(
-            object.groups.is_empty() && object.gone.as_ref().is_some_and(|why| why.contains(case)),
+            object.groups.is_empty() && object.gone.as_ref().is_some_and(|reason| reason.contains(case)),
             "{object:?}"
         );
     }
@@ -293,39 +300,39 @@ fn picks_have_names_lines_and_references() {
 
 #[test]
 fn picks_equal_the_first_hits() {
-    let seen = small();
+    let view = small();
     let moved = Scene::parse(&SCENE.replace("[0, -4, 0.5]", "[1, -4, 2]"), "s.toml").unwrap();
-    let looked = SceneView {
+    let moved_view = SceneView {
         camera: pack(&moved).camera,
-        ..seen.clone()
+        ..view.clone()
     };
-    let mut others = 0;
+    let mut different = 0;
     for y in (0..30).step_by(3) {
         for x in (0..40).step_by(3) {
             let hit = pixel_first_hit(&pack(&moved), UVec2::new(x, y));
-            let wanted = match hit.shape {
+            let expected = match hit.shape {
                 NO_INDEX => "render".to_owned(),
                 2 => "lights[0]".to_owned(),
                 shape => format!("shapes[{shape}]"),
             };
-            assert_eq!(looked.at([x, y]).name, wanted);
-            others += usize::from(seen.at([x, y]).name != wanted);
+            assert_eq!(moved_view.at([x, y]).name, expected);
+            different += usize::from(view.at([x, y]).name != expected);
         }
     }
-    assert!(others > 5, "the camera makes a difference");
+    assert!(different > 5, "the camera makes no difference");
 }
 
 #[test]
 fn names_and_files_are_read_only() {
-    let seen = seen(
+    let view = scene_view(
         &std::fs::read_to_string("../../scenes/twisted-tube.toml").unwrap(),
         Path::new("../../scenes/twisted-tube.toml"),
         Overrides::default(),
     );
-    let names = seen.names();
+    let names = view.names();
     let mut files = 0;
-    for (name, _) in seen.objects("").objects {
-        for field in seen.object(&name, None).groups.iter().flat_map(|group| &group.fields) {
+    for (name, _) in view.objects("").objects {
+        for field in view.object(&name, None).groups.iter().flat_map(|group| &group.fields) {
             if field.name.ends_with("file") {
                 files += 1;
                 assert!(field.fixed.is_some(), "{field:?}");
@@ -349,8 +356,8 @@ fn overridden_values_are_read_only() {
         ],
         ..Overrides::default()
     };
-    let seen = seen(SCENE, Path::new("s.toml"), overrides);
-    let fixed = |path: &str| seen.field(&path.parse().unwrap()).unwrap().fixed;
+    let view = scene_view(SCENE, Path::new("s.toml"), overrides);
+    let fixed = |path: &str| view.field(&path.parse().unwrap()).unwrap().fixed;
     assert!(fixed("image.width").unwrap().contains("--size"));
     assert!(
         fixed("camera.position")
@@ -360,30 +367,30 @@ fn overridden_values_are_read_only() {
     assert!(fixed("shapes[0].radius").unwrap().contains("--define"));
     assert_eq!(fixed("shapes[0].center"), None);
     assert_eq!(fixed("image.exposure"), None);
-    assert!(seen.field(&"shapes[0].nothing".parse().unwrap()).is_none());
-    assert!(seen.field(&"shapes[9].radius".parse().unwrap()).is_none());
+    assert!(view.field(&"shapes[0].nothing".parse().unwrap()).is_none());
+    assert!(view.field(&"shapes[9].radius".parse().unwrap()).is_none());
 }
 
 #[test]
 fn objects_are_found_by_a_part_of_their_names() {
-    let seen = small();
-    let listed = seen.objects("RED");
-    let names: Vec<&str> = listed.objects.iter().map(|(name, _)| name.as_str()).collect();
+    let view = small();
+    let list = view.objects("RED");
+    let names: Vec<&str> = list.objects.iter().map(|(name, _)| name.as_str()).collect();
     assert_eq!(
         names,
         ["materials.\"dark red\"", "materials.red", "shapes[0]", "shapes[1]"]
     );
-    assert_eq!(seen.objects("").objects.len(), 9);
+    assert_eq!(view.objects("").objects.len(), 9);
     let many = SCENE.to_owned() + &"[[shapes]]\ntype='sphere'\nmaterial='red'\ncenter=[9,9,9]\nradius=1\n".repeat(200);
-    let listed = self::seen(&many, Path::new("s.toml"), Overrides::default()).objects("sphere");
-    assert_eq!((listed.objects.len(), listed.more), (MAX_LISTED, 201 - MAX_LISTED));
+    let list = scene_view(&many, Path::new("s.toml"), Overrides::default()).objects("sphere");
+    assert_eq!((list.objects.len(), list.more), (MAX_LISTED, 201 - MAX_LISTED));
 }
 
 #[test]
 fn a_camera_must_keep_the_keys_that_its_path_does_not_replace() {
     let required = |camera: &str| {
         let text = format!("image = {{ width = 4, height = 4 }}\n[camera]\n{camera}");
-        let object = seen(&text, Path::new("a.toml"), Overrides::default()).object("camera", None);
+        let object = scene_view(&text, Path::new("a.toml"), Overrides::default()).object("camera", None);
         let fields = object.groups[0].fields.clone().into_iter();
         fields
             .filter(|field| field.required)

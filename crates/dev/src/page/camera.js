@@ -1,6 +1,6 @@
 // The camera: drag tools, history, bookmarks, and saving to the scene file.
 
-import { ask, element, lastState, onState } from "/link.js";
+import { element, lastState, onState, sendCommand } from "/link.js";
 import { enable, make } from "/parts.js";
 
 const MAX_BOOKMARKS = 32; // maximum number of bookmarks per scene
@@ -8,19 +8,19 @@ const MAX_BOOKMARKS = 32; // maximum number of bookmarks per scene
 export function setUpCamera(picture, onKey, showNotice) {
   const tools = { o: "orbit", p: "pan", d: "dolly", v: "fly", h: "hand" };
   picture.tool = () => document.querySelector("input[name=tool]:checked").value;
-  const take = (tool) => {
+  const selectTool = (tool) => {
     document.querySelector(`input[name=tool][value=${tool}]`).checked = true;
     picture.stopFlying();
   };
-  for (const [key, tool] of Object.entries(tools)) onKey(key, () => take(tool));
+  for (const [key, tool] of Object.entries(tools)) onKey(key, () => selectTool(tool));
   element("tools").addEventListener("change", () => picture.stopFlying());
-  onKey("Escape", () => (picture.tool() === "fly" ? take("orbit") : false));
+  onKey("Escape", () => (picture.tool() === "fly" ? selectTool("orbit") : false));
 
   const bookmarks = setUpBookmarks(showNotice);
   const copy = () => copyCamera(showNotice);
   const actions = {
-    copy, save: () => ask("save_camera"), undo: () => ask("undo_write"), reset: () => ask("reset_camera"), back: () => ask("back"),
-    forth: () => ask("forth"), "frame-all": () => ask({ frame: null }), bookmark: bookmarks.add,
+    copy, save: () => sendCommand("save_camera"), undo: () => sendCommand("undo_write"), reset: () => sendCommand("reset_camera"), back: () => sendCommand("back"),
+    forth: () => sendCommand("forth"), "frame-all": () => sendCommand({ frame: null }), bookmark: bookmarks.add,
   };
   for (const [id, act] of Object.entries(actions)) element(id).addEventListener("click", act);
   onKey("c", copy);
@@ -29,7 +29,7 @@ export function setUpCamera(picture, onKey, showNotice) {
   onKey("z", actions.back);
   onKey("Shift+z", actions.forth);
   onKey("Home", actions["frame-all"]);
-  onKey("f", () => ask({ frame: picture.cursor }));
+  onKey("f", () => sendCommand({ frame: picture.cursor }));
 
   onState((state) => {
     element("camera-text").textContent = state.camera;
@@ -41,7 +41,7 @@ export function setUpCamera(picture, onKey, showNotice) {
 
 function showButtons({ camera_moved, steps, undo, read_only }) {
   const enabled = { save: camera_moved && !read_only, reset: camera_moved, back: steps[0], forth: steps[1] };
-  for (const [id, on] of Object.entries(enabled)) enable(element(id), on);
+  for (const [id, isEnabled] of Object.entries(enabled)) enable(element(id), isEnabled);
   element("undo").hidden = undo !== "camera";
   element("save").title = read_only ?? "Write this camera to the scene file";
   element("save").classList.toggle("main", !read_only);
@@ -53,14 +53,13 @@ async function copyCamera(showNotice) {
     await navigator.clipboard.writeText(lastState().camera);
     showNotice("Camera copied");
   } catch {
-    // The clipboard requires a secure connection. On other connections, the text is selected so that the user can copy
-    // it.
+    // The clipboard requires a secure connection. On other connections, the page selects the text for the user to copy.
     getSelection().selectAllChildren(element("camera-text"));
     showNotice("Press Ctrl+C to copy the selected camera");
   }
 }
 
-// Bookmarks are stored in the browser under the name of the scene, never in the scene file.
+// Bookmarks are stored in the browser under the name of the scene, not in the scene file.
 function setUpBookmarks(showNotice) {
   let scene = null;
   const key = () => `bookmarks ${scene}`;
@@ -68,7 +67,7 @@ function setUpBookmarks(showNotice) {
     try {
       return JSON.parse(localStorage.getItem(key())) ?? [];
     } catch {
-      return []; // storage is disabled or holds something else
+      return []; // storage is disabled, or the stored text is not JSON
     }
   };
   const store = (bookmarks) => {
@@ -88,17 +87,17 @@ function setUpBookmarks(showNotice) {
     store([...bookmarks, { name: `view ${Math.max(0, ...numbers) + 1}`, viewpoint }]);
   };
   const rename = (name, i) => {
-    const given = prompt("Bookmark name", name)?.trim();
-    if (given) store(stored().map((bookmark, j) => (j === i ? { ...bookmark, name: given.slice(0, 60) } : bookmark)));
+    const newName = prompt("Bookmark name", name)?.trim();
+    if (newName) store(stored().map((bookmark, j) => (j === i ? { ...bookmark, name: newName.slice(0, 60) } : bookmark)));
   };
   const button = (text, label, act) => {
-    const made = make("button", { type: "button", textContent: text });
-    if (label) made.setAttribute("aria-label", label);
-    made.addEventListener("click", act);
-    return made;
+    const control = make("button", { type: "button", textContent: text });
+    if (label) control.setAttribute("aria-label", label);
+    control.addEventListener("click", act);
+    return control;
   };
   const showAll = () => element("bookmarks").replaceChildren(...stored().map(({ name, viewpoint }, i) => make("li", {},
-    button(name, null, () => ask({ viewpoint })),
+    button(name, null, () => sendCommand({ viewpoint })),
     button("Rename", `Rename ${name}`, () => rename(name, i)),
     button("×", `Delete ${name}`, () => store(stored().filter((_, j) => j !== i))),
   )));

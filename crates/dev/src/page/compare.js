@@ -1,21 +1,21 @@
-// Comparison of two images: counterpart, layout, and error measures.
+// Comparison of the image with a second image: selection of that image, layout, and error measures.
 
-import { ask, element, onFrame, onState } from "/link.js";
+import { element, onFrame, onState, sendCommand } from "/link.js";
 import { choose, viewName } from "/view.js";
 
-const chosen = (name) => document.querySelector(`input[name=${name}]:checked`).value;
+const selected = (name) => document.querySelector(`input[name=${name}]:checked`).value;
 let timer = 0;
 
 export function setUpCompare(picture, onKey, showNotice) {
   element("against").addEventListener("change", () => choose("compare"));
   element("layout").addEventListener("change", arrange);
   element("pace").addEventListener("change", arrange);
-  element("gain").addEventListener("change", ({ target }) => ask({ gain: Number(target.value) }));
+  element("gain").addEventListener("change", ({ target }) => sendCommand({ gain: Number(target.value) }));
   element("wipe").addEventListener("input", ({ target }) => picture.wipe(target.valueAsNumber));
-  picture.wiping = (share) => (element("wipe").value = share);
-  const keep = () => ask("keep");
-  element("keep").addEventListener("click", keep);
-  onKey("t", keep);
+  picture.wiping = (position) => (element("wipe").value = position);
+  const setReference = () => sendCommand("keep");
+  element("keep").addEventListener("click", setReference);
+  onKey("t", setReference);
   onKey("x", () => picture.swap());
   element("reference-file").addEventListener("change", ({ target }) => {
     if (target.files[0]) upload(target.files[0]);
@@ -29,7 +29,7 @@ export function setUpCompare(picture, onKey, showNotice) {
   });
 
   function arrange() {
-    const layout = chosen("layout");
+    const layout = selected("layout");
     picture.arrange(layout);
     clearInterval(timer);
     const pace = Number(element("pace").value);
@@ -52,10 +52,10 @@ export function setUpCompare(picture, onKey, showNotice) {
 
   onState((state, isCurrent) => {
     element("reference-name").textContent = state.comparable[1] ?? "none";
-    const apart = state.apart;
+    const errors = state.apart;
     const number = (value) => (value === null ? "not finite" : value === 0 ? "0" : value.toPrecision(3));
-    element("rmse").textContent = apart ? number(apart.rmse) : "–";
-    element("flip").textContent = apart ? number(apart.flip) : "–";
+    element("rmse").textContent = errors ? number(errors.rmse) : "–";
+    element("flip").textContent = errors ? number(errors.flip) : "–";
     if (!isCurrent) return;
     if (viewName(state.view) === "compare") {
       document.querySelector(`input[name=against][value=${state.view.compare}]`).checked = true;
@@ -66,18 +66,18 @@ export function setUpCompare(picture, onKey, showNotice) {
 
   onFrame(({ differing, done, view }) => {
     const verdict = element("differing");
-    const say = (kind, text) => {
+    const show = (kind, text) => {
       verdict.className = kind;
       if (verdict.textContent !== text) verdict.textContent = text;
     };
     if (differing) {
       const [pixels, largest] = differing;
       const soFar = done ? "" : " so far";
-      const apart = largest === null ? "some by a non-finite amount" : `by at most ${largest.toPrecision(3)}`;
+      const amount = largest === null ? "some by a non-finite amount" : `by at most ${largest.toPrecision(3)}`;
       const count = `${pixels.toLocaleString("en")} ${pixels === 1 ? "pixel differs" : "pixels differ"}`;
-      say(pixels ? "differ" : "same", pixels ? `${count}${soFar}, ${apart}` : `0 pixels differ${soFar}: all bits are the same`);
+      show(pixels ? "differ" : "same", pixels ? `${count}${soFar}, ${amount}` : `0 pixels differ${soFar}: all bits are the same`);
     } else {
-      say("", viewName(view) === "compare" ? "Nothing to compare yet" : "–");
+      show("", viewName(view) === "compare" ? "Nothing to compare yet" : "–");
     }
   });
   arrange();

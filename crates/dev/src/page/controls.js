@@ -1,9 +1,9 @@
-// Controls for the values of an object: number boxes, sliders, colours, vectors, choices, switches and texts. Each of
-// these functions returns {inputs, elements, update}. It calls `change(value, i)` with the new value; `i` is the
-// changed index of a list.
+// Controls for the values of an object: number boxes, sliders, colours, vectors, choices, switches and texts. The
+// function of each kind returns {inputs, elements, update}. The control calls `change(value, i)` with the new value;
+// for a list, `i` is the index of the changed element.
 
 import { colorOf, hexOf } from "/color.js";
-import { digits, fit, numberField, say } from "/numbers.js";
+import { digits, fit, format, numberField } from "/numbers.js";
 import { make } from "/parts.js";
 
 const STEPS = 1000; // positions of a logarithmic slider
@@ -18,58 +18,58 @@ export function controlOf(field, change) {
 
 function numberBox(field, label) {
   const box = make("input", { type: "number", step: field.kind === "whole" ? "1" : "any" });
-  if (field.range) [box.min, box.max] = field.range.map(say);
+  if (field.range) [box.min, box.max] = field.range.map(format);
   box.setAttribute("aria-label", label);
   box.inputMode = "decimal";
   return box;
 }
 
-// Returns a number box, with a slider beside it if the field has one.
+// Returns a number box and, if the field has a slider, a slider.
 function pairOf(field, label, slider, change) {
   const box = numberBox(field, label);
-  let now;
+  let current;
   const range = slider ? make("input", { type: "range" }) : null;
   // If only square numbers are valid, the slider's position is the square root.
-  const placeOf = (x) => {
+  const position = (x) => {
     if (field.squares) return Math.sqrt(x);
     return slider.logarithmic ? (STEPS * Math.log(x / slider.from)) / Math.log(slider.to / slider.from) : x;
   };
-  const number = (at) => {
-    if (field.squares) return at * at;
-    return slider.logarithmic ? digits(slider.from * (slider.to / slider.from) ** (at / STEPS), 3) : at;
+  const numberAt = (position) => {
+    if (field.squares) return position * position;
+    return slider.logarithmic ? digits(slider.from * (slider.to / slider.from) ** (position / STEPS), 3) : position;
   };
-  const ends = () => {
+  const limits = () => {
     if (field.squares) return [Math.ceil(Math.sqrt(slider.from)), Math.floor(Math.sqrt(slider.to)), 1];
     return slider.logarithmic ? [0, STEPS, 1] : [slider.from, slider.to, slider.step];
   };
-  const take = (x) => {
-    now = x;
+  const setNumber = (x) => {
+    current = x;
     if (!range) return;
-    range.value = say(x === undefined ? range.min : placeOf(x));
-    range.setAttribute("aria-valuetext", say(x));
+    range.value = format(x === undefined ? range.min : position(x));
+    range.setAttribute("aria-valuetext", format(x));
   };
   const use = (x) => {
-    take(x);
+    setNumber(x);
     change(x);
   };
-  const show = numberField(box, field, () => [now], use);
+  const show = numberField(box, field, () => [current], use);
   if (range) {
     range.setAttribute("aria-label", `${label}, slider`);
     range.addEventListener("input", () => {
-      now = fit(field, number(range.valueAsNumber), now ?? 0);
-      show(now);
-      range.setAttribute("aria-valuetext", say(now));
-      change(now);
+      current = fit(field, numberAt(range.valueAsNumber), current ?? 0);
+      show(current);
+      range.setAttribute("aria-valuetext", format(current));
+      change(current);
     });
   }
   const update = (x, next) => {
     show(x);
     slider = next ?? slider;
     if (range) {
-      const [low, high, step] = ends();
-      Object.assign(range, { min: say(low), max: say(high), step: say(step) });
+      const [low, high, step] = limits();
+      Object.assign(range, { min: format(low), max: format(high), step: format(step) });
     }
-    take(x);
+    setNumber(x);
   };
   const inputs = range ? [range, box] : [box];
   return { inputs, element: make("div", { className: range ? "pair" : "single" }, ...inputs), update };
@@ -84,39 +84,39 @@ function numberOf(field, change) {
 function colorsOf(field, change) {
   const picker = make("input", { type: "color", title: "Colour as displayed (sRGB)" });
   picker.setAttribute("aria-label", `${field.name}, as displayed (sRGB)`);
-  let now = [0, 0, 0];
+  let current = [0, 0, 0];
   let tint = [1, 1, 1]; // the colour at strength 1; kept when the strength is 0
-  const take = (list) => {
-    now = list;
-    const most = Math.max(...now);
-    if (most > 0) tint = now.map((x) => x / most);
+  const setColor = (list) => {
+    current = list;
+    const largest = Math.max(...current);
+    if (largest > 0) tint = current.map((x) => x / largest);
   };
   picker.addEventListener("input", () => {
-    if (picker.value === hexOf(now)) return;
-    take(colorOf(picker.value, now));
-    parts.show(now);
-    change(now);
+    if (picker.value === hexOf(current)) return;
+    setColor(colorOf(picker.value, current));
+    parts.show(current);
+    change(current);
   });
   const parts = numbersOf(field, ["red", "green", "blue"].map((name) => `${field.name}, linear ${name}`), (list, i) => {
-    take(list);
-    picker.value = hexOf(now);
-    change(now, i);
+    setColor(list);
+    picker.value = hexOf(current);
+    change(current, i);
   });
   // Emission has no upper limit, so a single slider scales the colour and keeps its hue.
-  const strength = field.slider && pairOf({ ...field, kind: "number" }, `${field.name}, strength`, field.slider, (most) => {
-    now = tint.map((x) => digits(x * most, 6));
-    picker.value = hexOf(now);
-    parts.show(now);
-    change(now);
+  const strength = field.slider && pairOf({ ...field, kind: "number" }, `${field.name}, strength`, field.slider, (largest) => {
+    current = tint.map((x) => digits(x * largest, 6));
+    picker.value = hexOf(current);
+    parts.show(current);
+    change(current);
   });
   const legend = make("small", { className: "quiet" });
   const update = (next) => {
-    take(valueOf(next) ?? [0, 0, 0]);
-    picker.value = hexOf(now);
+    setColor(valueOf(next) ?? [0, 0, 0]);
+    picker.value = hexOf(current);
     parts.update(next);
-    const most = Math.max(...now);
-    strength?.update(most, next.slider);
-    const scale = most > 1 ? ` of the colour divided by ${digits(most, 4)}` : "";
+    const largest = Math.max(...current);
+    strength?.update(largest, next.slider);
+    const scale = largest > 1 ? ` of the colour divided by ${digits(largest, 4)}` : "";
     legend.textContent = `Swatch: sRGB${scale}. R, G, B: linear`;
   };
   const elements = [make("div", { className: "color" }, picker, ...parts.inputs), legend];
@@ -124,21 +124,21 @@ function colorsOf(field, change) {
   return { inputs: [picker, ...parts.inputs, ...(strength?.inputs ?? [])], elements, update };
 }
 
-// Number boxes for a list.
+// Returns number boxes for a list.
 function numbersOf(field, labels, change) {
-  let now = [];
+  let current = [];
   const boxes = labels.map((label) => numberBox(field, label));
-  const shows = boxes.map((box, i) => {
+  const showNumber = boxes.map((box, i) => {
     const use = (x) => {
-      now = boxes.map((other, j) => now[j] ?? (Number.isFinite(other.valueAsNumber) ? other.valueAsNumber : 0));
-      now[i] = x;
-      change([...now], i);
+      current = boxes.map((box, j) => current[j] ?? (Number.isFinite(box.valueAsNumber) ? box.valueAsNumber : 0));
+      current[i] = x;
+      change([...current], i);
     };
-    return numberField(box, field, () => now, use);
+    return numberField(box, field, () => current, use);
   });
   const show = (list) => {
-    now = [...list];
-    shows.forEach((show, i) => show(list[i]));
+    current = [...list];
+    showNumber.forEach((show, i) => show(list[i]));
   };
   return { inputs: boxes, show, update: (next) => show(valueOf(next) ?? []) };
 }
@@ -174,6 +174,6 @@ function switchOf(field, change) {
 function textOf(field) {
   const box = make("input", { type: "text", readOnly: true });
   box.setAttribute("aria-label", field.name);
-  const update = (next) => (box.value = say(valueOf(next)));
+  const update = (next) => (box.value = format(valueOf(next)));
   return { inputs: [box], elements: [box], update };
 }

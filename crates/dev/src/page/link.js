@@ -1,14 +1,14 @@
-// The WebSocket to the program: dispatches incoming messages to listeners and matches answers to requests.
+// The WebSocket to the program: passes incoming messages to listeners, and matches answers to requests.
 
-const RETRY = 500; // milliseconds before a reconnection attempt
-const ANSWER = 2000; // timeout in milliseconds of an HTTP request to the program
+const RETRY_DELAY = 500; // milliseconds before a reconnection attempt
+const HTTP_TIMEOUT = 2000; // timeout in milliseconds of an HTTP request to the program
 const ANSWERS = ["asked", "refused", "pixel", "object", "objects"]; // messages that answer a request
 const listeners = { state: [], frame: [], link: [], refused: [] };
-const named = new Map(); // listeners for all other messages, by message name
+const messageListeners = new Map(); // listeners for all other messages, by message name
 let socket = null;
 let state = null;
 let answers = []; // pending requests, {isCommand, resolve}: answers arrive in the order of the requests
-let asked = 0; // the number of the last command that was accepted
+let lastCommand = 0; // the number of the last command that was accepted
 let [received, drawn] = [0, 0]; // frame counters, so that a frame decoded late does not replace a newer one
 
 export const element = (id) => document.getElementById(id);
@@ -17,7 +17,7 @@ export const onState = (f) => listeners.state.push(f); // f(state, isCurrent)
 export const onFrame = (f) => listeners.frame.push(f); // f(header, images by name)
 export const onLink = (f) => listeners.link.push(f); // f(isConnected, isFull)
 export const onRefused = (f) => listeners.refused.push(f); // f(text)
-export const onMessage = (name, f) => named.set(name, [...(named.get(name) ?? []), f]); // f(value)
+export const onMessage = (name, f) => messageListeners.set(name, [...(messageListeners.get(name) ?? []), f]); // f(value)
 
 const emit = (name, ...values) => listeners[name].forEach((f) => f(...values));
 const isOpen = () => socket?.readyState === WebSocket.OPEN;
@@ -30,47 +30,47 @@ function send(message, isCommand) {
 }
 
 // Sends a command; resolves to its number.
-export const ask = (command) => send(command, true);
+export const sendCommand = (command) => send(command, true);
 
 // Sends a read-only request. The answer is also passed to the listeners of its message.
-export const put = (question) => send(question, false);
+export const sendQuery = (query) => send(query, false);
 
 // Resolves to the values of a pixel: {x, y, values}.
-export const askPixel = (pixel) => put({ pixel });
+export const queryPixel = (pixel) => sendQuery({ pixel });
 
-// Returns whether the program has executed all commands of this page. Until then its state must not replace newer
-// input.
-export const isUpToDate = () => !answers.some(({ isCommand }) => isCommand) && state !== null && state.executed >= asked;
+// Returns whether the program has executed all commands of this page. Until then, the program's state must not replace
+// newer input.
+export const isUpToDate = () => !answers.some(({ isCommand }) => isCommand) && state !== null && state.executed >= lastCommand;
 export const lastState = () => state;
 
 export function connect() {
   socket = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/socket`);
   socket.binaryType = "arraybuffer";
-  let isIn = false;
+  let wasOpened = false;
   socket.onopen = () => {
-    [asked, isIn] = [0, true];
+    [lastCommand, wasOpened] = [0, true];
     emit("link", true, false);
   };
-  socket.onmessage = ({ data }) => (typeof data === "string" ? hear(JSON.parse(data)) : showFrame(data));
+  socket.onmessage = ({ data }) => (typeof data === "string" ? handleMessage(JSON.parse(data)) : showFrame(data));
   socket.onclose = async () => {
     for (const { resolve } of answers) resolve(null);
     answers = [];
-    emit("link", false, !isIn && (await isServed()));
-    setTimeout(connect, RETRY);
+    emit("link", false, !wasOpened && (await isServed()));
+    setTimeout(connect, RETRY_DELAY);
   };
 }
 
-// Returns whether the program answers HTTP requests. If it does, but closes the socket, the maximum number of viewers
-// is reached.
+// Returns whether the program answers HTTP requests. If the program answers, but closes the socket, the maximum number
+// of viewers is reached.
 async function isServed() {
   try {
-    return (await fetch("/", { signal: AbortSignal.timeout(ANSWER) })).ok;
+    return (await fetch("/", { signal: AbortSignal.timeout(HTTP_TIMEOUT) })).ok;
   } catch {
     return false;
   }
 }
 
-function hear(message) {
+function handleMessage(message) {
   if (message.state) {
     state = message.state;
     emit("state", state, isUpToDate());
@@ -79,24 +79,24 @@ function hear(message) {
   const [[name, value]] = Object.entries(message);
   if (ANSWERS.includes(name)) {
     const { isCommand, resolve } = answers.shift();
-    if (name === "asked") asked = value;
+    if (name === "asked") lastCommand = value;
     if (name === "refused") emit("refused", value);
     resolve(name === "refused" ? null : value);
     if (isCommand && isUpToDate()) emit("state", state, true);
   }
-  named.get(name)?.forEach((f) => f(value));
+  messageListeners.get(name)?.forEach((f) => f(value));
 }
 
 // Decodes and shows a frame. A frame consists of the header length, the header as JSON, and the PNG files that the
 // header lists.
 async function showFrame(data) {
-  const [order, from] = [++received, socket];
+  const [order, source] = [++received, socket];
   const length = new DataView(data).getUint32(0, true);
   const header = JSON.parse(new TextDecoder().decode(new Uint8Array(data, 4, length)));
-  let at = 4 + length;
+  let offset = 4 + length;
   const decoded = header.parts.map(async ([name, size]) => {
-    const blob = new Blob([new Uint8Array(data, at, size)], { type: "image/png" });
-    at += size;
+    const blob = new Blob([new Uint8Array(data, offset, size)], { type: "image/png" });
+    offset += size;
     return [name, await createImageBitmap(blob, { colorSpaceConversion: "none" })];
   });
   try {
@@ -105,14 +105,14 @@ async function showFrame(data) {
     drawn = order;
     emit("frame", header, images);
   } finally {
-    acknowledge(from, header.number); // even if decoding fails; otherwise the program would wait for this frame forever
+    acknowledge(source, header.number); // also if decoding fails, because the program waits for this frame
   }
 }
 
 // Acknowledges a frame, and all earlier frames, once the browser has drawn it. The program keeps few frames in flight,
 // so that newer frames are not delayed on a slow connection.
-function acknowledge(from, number) {
+function acknowledge(source, number) {
   requestAnimationFrame(() => {
-    if (from.readyState === WebSocket.OPEN) from.send(JSON.stringify({ shown: number }));
+    if (source.readyState === WebSocket.OPEN) source.send(JSON.stringify({ shown: number }));
   });
 }

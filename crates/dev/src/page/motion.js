@@ -1,22 +1,22 @@
-// Camera moves: accumulated between animation frames and sent together.
+// Camera moves, which are accumulated between animation frames and sent together.
 
-import { ask } from "/link.js";
+import { sendCommand } from "/link.js";
 
 const FLY_SPEED = 0.7; // flight speed: distances to the look-at point per second
-const FAST = 4; // speed multiplier while Shift is held
+const FAST_FACTOR = 4; // speed multiplier while Shift is held
 
 // Flight directions of the keys: right, up, forward.
 const FLIGHT = {
   KeyW: [0, 0, 1], KeyS: [0, 0, -1], KeyA: [-1, 0, 0], KeyD: [1, 0, 0], KeyE: [0, 1, 0], KeyQ: [0, -1, 0],
 };
 
-const none = () => ({ orbit: [0, 0], pan: [0, 0], dolly: 0, look: [0, 0], fly: [0, 0, 0] });
+const noMoves = () => ({ orbit: [0, 0], pan: [0, 0], dolly: 0, look: [0, 0], fly: [0, 0, 0] });
 
-export const flies = (code) => code in FLIGHT;
+export const isFlightKey = (code) => code in FLIGHT;
 
 export class Motion {
   constructor() {
-    this.pending = none();
+    this.pending = noMoves();
     this.held = new Set(); // flight keys that are down
     this.speed = 1;
     this.flying = false;
@@ -25,25 +25,25 @@ export class Motion {
   // Sends the collected moves, one message per kind.
   send() {
     const { orbit, pan, dolly, look, fly } = this.pending;
-    if (orbit[0] || orbit[1]) ask({ move: { orbit } });
-    if (pan[0] || pan[1]) ask({ move: { pan } });
-    if (dolly) ask({ move: { dolly } });
-    if (look[0] || look[1]) ask({ move: { look } });
-    if (fly.some((v) => v)) ask({ move: { fly } });
-    this.pending = none();
+    if (orbit[0] || orbit[1]) sendCommand({ move: { orbit } });
+    if (pan[0] || pan[1]) sendCommand({ move: { pan } });
+    if (dolly) sendCommand({ move: { dolly } });
+    if (look[0] || look[1]) sendCommand({ move: { look } });
+    if (fly.some((v) => v)) sendCommand({ move: { fly } });
+    this.pending = noMoves();
   }
 
   // Flies while flight keys are held.
   press(code, fast) {
-    if (!this.held.size) ask("grab");
+    if (!this.held.size) sendCommand("grab");
     this.held.add(code);
     this.fast = fast;
     if (this.flying) return;
     let last = performance.now();
     const step = (now) => {
-      const way = ((now - last) / 1000) * FLY_SPEED * this.speed * (this.fast ? FAST : 1);
+      const distance = ((now - last) / 1000) * FLY_SPEED * this.speed * (this.fast ? FAST_FACTOR : 1);
       last = now;
-      for (const code of this.held) FLIGHT[code].forEach((v, i) => (this.pending.fly[i] += v * way));
+      for (const code of this.held) FLIGHT[code].forEach((v, i) => (this.pending.fly[i] += v * distance));
       this.flying = this.held.size > 0;
       if (this.flying) requestAnimationFrame(step);
       this.send();

@@ -1,25 +1,25 @@
 // Number boxes that accept typing, horizontal drags and key steps.
 
-const SLACK = 3; // movement in pixels after which a press becomes a drag
-const PIXELS = 10; // drag distance in pixels per step
-const FINE = 0.1; // step multiplier while Shift is held
-const LINE = 20; // pixels per line, for wheel events with deltaMode DOM_DELTA_LINE
+const DRAG_THRESHOLD = 3; // movement in pixels after which a press becomes a drag
+const PIXELS_PER_STEP = 10; // drag distance in pixels per step
+const FINE_FACTOR = 0.1; // step multiplier while Shift is held
+const PIXELS_PER_LINE = 20; // pixels per line, for wheel events with deltaMode DOM_DELTA_LINE
 const KEYS = { ArrowUp: 1, ArrowDown: -1, PageUp: 10, PageDown: -10 };
 const HINT = "Drag sideways or press ↑/↓. Shift: 0.1×. Page Up/Down: 10×.";
 
 let typing = null; // the box with an unfinished input, if any
 
 export const digits = (x, count) => Number(x.toPrecision(count));
-export const say = (x) => (x === undefined || x === null ? "" : String(x));
+export const format = (x) => (x === undefined || x === null ? "" : String(x));
 
-// Returns the nearest value that a field accepts. Values in the gap, and non-squares if only squares are valid, are
-// skipped in the direction of the change.
-export function fit({ kind, range, gap, squares }, x, from) {
-  let found = kind === "whole" ? Math.round(x) : digits(x, 12);
-  if (squares) found = (x < from ? Math.floor : Math.ceil)(Math.sqrt(Math.max(found, 0))) ** 2;
-  if (gap && found > gap[0] && found < gap[1]) found = x < from ? gap[0] : gap[1];
-  if (range) found = Math.min(Math.max(found, range[0]), range[1]);
-  return found;
+// Returns the valid value of a field that is nearest to `x`. Values in the gap, and non-squares if only squares are
+// valid, are skipped in the direction of the change from the `old` value.
+export function fit({ kind, range, gap, squares }, x, old) {
+  let value = kind === "whole" ? Math.round(x) : digits(x, 12);
+  if (squares) value = (x < old ? Math.floor : Math.ceil)(Math.sqrt(Math.max(value, 0))) ** 2;
+  if (gap && value > gap[0] && value < gap[1]) value = x < old ? gap[0] : gap[1];
+  if (range) value = Math.min(Math.max(value, range[0]), range[1]);
+  return value;
 }
 
 // Returns the square number that is `steps` squares away from `x`.
@@ -39,7 +39,7 @@ function stepOf({ kind, unit, range }, list) {
 // function that shows a value unless the user is typing.
 export function numberField(box, field, numbers, use) {
   let last;
-  const take = (x) => {
+  const setValue = (x) => {
     last = x;
     use(x);
   };
@@ -48,20 +48,20 @@ export function numberField(box, field, numbers, use) {
   box.addEventListener("change", () => {
     if (typing !== box) return;
     typing = null;
-    if (box.value !== "") take(box.valueAsNumber);
+    if (box.value !== "") setValue(box.valueAsNumber);
   });
   box.addEventListener("blur", () => {
     forget(box);
-    if (box.value === "") box.value = say(last);
+    if (box.value === "") box.value = format(last);
   });
-  steppable(box, field, numbers, take);
+  addSteps(box, field, numbers, setValue);
   return (x) => {
     last = x;
-    if (typing !== box && box.value !== say(x)) box.value = say(x);
+    if (typing !== box && box.value !== format(x)) box.value = format(x);
   };
 }
 
-// Discards an unfinished input in a part of the page.
+// Discards an unfinished input in `part`, an element of the page.
 export function forget(part) {
   if (typing && part.contains(typing)) typing = null;
 }
@@ -73,23 +73,23 @@ export function setUpWheel() {
     if (box !== document.activeElement || !box.matches("input[type=number]")) return;
     event.preventDefault();
     if (event.ctrlKey) return; // a zoom gesture
-    const unit = event.deltaMode === WheelEvent.DOM_DELTA_PIXEL ? 1 : LINE;
+    const unit = event.deltaMode === WheelEvent.DOM_DELTA_PIXEL ? 1 : PIXELS_PER_LINE;
     const panel = box.closest("aside");
-    const scrolled = panel && panel.scrollHeight > panel.clientHeight ? panel : document.scrollingElement;
-    scrolled.scrollBy(event.deltaX * unit, event.deltaY * unit);
+    const scroller = panel && panel.scrollHeight > panel.clientHeight ? panel : document.scrollingElement;
+    scroller.scrollBy(event.deltaX * unit, event.deltaY * unit);
   }, { passive: false });
 }
 
 // Makes a box respond to drags and step keys. See `numberField` for `numbers()` and `use(x)`.
-function steppable(box, field, numbers, use) {
+function addSteps(box, field, numbers, use) {
   let press = null; // the state of the pointer press in progress
   let step = 0; // step size while a key is held: constant although the number's magnitude changes
-  const now = () => (Number.isFinite(box.valueAsNumber) ? box.valueAsNumber : 0);
-  const show = (x, from) => {
-    const next = fit(field, x, from);
-    if (box.value !== "" && next === now()) return;
+  const current = () => (Number.isFinite(box.valueAsNumber) ? box.valueAsNumber : 0);
+  const show = (x, old) => {
+    const next = fit(field, x, old);
+    if (box.value !== "" && next === current()) return;
     forget(box);
-    box.value = say(next);
+    box.value = format(next);
     use(next);
   };
   box.title = HINT;
@@ -97,39 +97,39 @@ function steppable(box, field, numbers, use) {
     const steps = KEYS[event.key];
     if (!steps || event.ctrlKey || event.metaKey || event.altKey) return;
     event.preventDefault();
-    if (!event.repeat || !step) step = stepOf(field, [...numbers(), now()]);
-    const factor = event.shiftKey && field.kind !== "whole" ? FINE : 1;
-    show(field.squares ? square(now(), steps) : now() + steps * factor * step, now());
+    if (!event.repeat || !step) step = stepOf(field, [...numbers(), current()]);
+    const factor = event.shiftKey && field.kind !== "whole" ? FINE_FACTOR : 1;
+    show(field.squares ? square(current(), steps) : current() + steps * factor * step, current());
   });
   box.addEventListener("pointerdown", (event) => {
-    // In a focused box the pointer selects text.
+    // In a focused box, the pointer selects text.
     if (event.button !== 0 || box.disabled || document.activeElement === box) return;
-    const size = stepOf(field, [...numbers(), now()]) / PIXELS;
+    const size = stepOf(field, [...numbers(), current()]) / PIXELS_PER_STEP;
     box.setPointerCapture(event.pointerId); // a fast drag leaves the box immediately
-    press = { id: event.pointerId, left: event.clientX, top: event.clientY, at: event.clientX, from: now(), moved: 0, size, dragged: false };
+    press = { id: event.pointerId, left: event.clientX, top: event.clientY, lastX: event.clientX, start: current(), moved: 0, size, dragged: false };
   });
-  // Prevents a drag from selecting text. On touch screens `mousedown` is fired after the release.
+  // Prevents a drag from selecting text. On touch screens, `mousedown` is fired after the release.
   box.addEventListener("mousedown", (event) => press && event.preventDefault());
   box.addEventListener("pointermove", (event) => {
     if (press?.id !== event.pointerId) return;
     if (!press.dragged) {
       const [x, y] = [Math.abs(event.clientX - press.left), Math.abs(event.clientY - press.top)];
-      if (x < SLACK || (event.pointerType !== "mouse" && x < y)) return; // a finger may be about to scroll
+      if (x < DRAG_THRESHOLD || (event.pointerType !== "mouse" && x < y)) return; // a finger may be about to scroll
       press.dragged = true;
       window.addEventListener("keydown", cancelByKey, true);
     }
-    press.moved += (event.clientX - press.at) * press.size * (event.shiftKey ? FINE : 1);
-    press.at = event.clientX;
-    show(press.from + press.moved, press.from);
+    press.moved += (event.clientX - press.lastX) * press.size * (event.shiftKey ? FINE_FACTOR : 1);
+    press.lastX = event.clientX;
+    show(press.start + press.moved, press.start);
   });
   const end = () => {
     window.removeEventListener("keydown", cancelByKey, true);
     press = null;
   };
   const cancel = () => {
-    const { from, dragged } = press;
+    const { start, dragged } = press;
     end();
-    if (dragged) show(from, from);
+    if (dragged) show(start, start);
   };
   const cancelByKey = (event) => {
     if (event.key !== "Escape" || !press) return;

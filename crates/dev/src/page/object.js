@@ -1,58 +1,58 @@
 // The selected object: its lines in the scene file, and controls that write its values to the file.
 
 import { controlOf, valueOf } from "/controls.js";
-import { ask, element, lastState, onLink, onMessage, onState, put } from "/link.js";
-import { enable, keep, make, place } from "/parts.js";
+import { element, lastState, onLink, onMessage, onState, sendCommand, sendQuery } from "/link.js";
+import { enable, make, reuse, setChildren } from "/parts.js";
 
-const MOVING = /^(Arrow|Page|Home$|End$)/; // keys that change a control's value
-const TYPED = 250; // milliseconds after the last key before matching names are requested
+const VALUE_KEYS = /^(Arrow|Page|Home$|End$)/; // keys that change a control's value
+const SEARCH_DELAY = 250; // milliseconds after the last key before matching names are requested
 
-let asked = null; // the request for the shown object: a pixel, or a name and a material
-let scenes = null; // the scene's number when `asked` was sent
+let request = null; // the request for the shown object: a pixel, or a name and a material
+let scenes = null; // the number of valid scenes when `request` was sent
 let shown = null; // the last answer about the object
 let groups = new Map(); // the tables that are shown, by name
-let gesture = Math.floor(Math.random() * 2 ** 40); // number of the current gesture, whose changes form one undo step
+let gesture = Math.floor(Math.random() * 2 ** 40); // the current gesture's number; its changes form one undo step
 let held = null; // the path of the value whose control is held
-let [pointer, key] = [false, false]; // whether a pointer or a key holds it
+let [pointer, key] = [false, false]; // whether a pointer or a key holds the control
 let stale = false; // whether the tables must be rebuilt when the control is released
 let sending = null; // the change that awaits the program's answer
 let waiting = new Map(); // later changes: the newest per value and gesture
 
 // Selects the object at a pixel of the image.
 export function select(pixel) {
-  asked = { at: pixel };
+  request = { at: pixel };
   element("object").open = true;
   scenes = lastState()?.scenes;
-  put({ object: pixel });
+  sendQuery({ object: pixel });
 }
 
 function inspect(name, material) {
-  asked = { name, material };
+  request = { name, material };
   scenes = lastState()?.scenes;
-  put({ inspect: asked });
+  sendQuery({ inspect: request });
 }
 
 // Repeats the last request.
-function again() {
-  if (asked?.at) put({ object: asked.at });
-  else if (asked) inspect(asked.name, asked.material);
+function repeatRequest() {
+  if (request?.at) sendQuery({ object: request.at });
+  else if (request) inspect(request.name, request.material);
 }
 
 export function setUpObject() {
   setUpSearch();
   onMessage("object", showObject);
-  element("undo-write").addEventListener("click", () => ask("undo_write"));
-  element("redo-write").addEventListener("click", () => ask("redo_write"));
+  element("undo-write").addEventListener("click", () => sendCommand("undo_write"));
+  element("redo-write").addEventListener("click", () => sendCommand("redo_write"));
   document.addEventListener("keydown", (event) => {
     const isText = event.target.matches?.("textarea, input:not([type=range], [type=checkbox], [type=radio], [type=color])");
     if (!(event.ctrlKey || event.metaKey) || event.altKey || isText || event.key.toLowerCase() !== "z") return;
     event.preventDefault();
-    ask(event.shiftKey ? "redo_write" : "undo_write");
+    sendCommand(event.shiftKey ? "redo_write" : "undo_write");
   });
   // A press can end with a click, with a scroll, or outside of the window, even while a key is held.
   for (const end of ["pointerup", "pointercancel", "blur"]) {
     window.addEventListener(end, () => setTimeout(() => {
-      if (pointer && !key) letGo();
+      if (pointer && !key) release();
       pointer = false;
     }));
   }
@@ -66,7 +66,7 @@ export function setUpObject() {
     settle(state);
     if (state.scenes !== scenes) {
       scenes = state.scenes;
-      again();
+      repeatRequest();
     }
   });
 }
@@ -74,12 +74,12 @@ export function setUpObject() {
 function setUpSearch() {
   const find = element("object-find");
   let timer = 0;
-  const list = () => put({ objects: find.value });
+  const list = () => sendQuery({ objects: find.value });
   find.addEventListener("input", () => {
     clearTimeout(timer);
-    const known = [...element("object-names").children].some((option) => option.value === find.value);
-    if (known) inspect(find.value);
-    else timer = setTimeout(list, TYPED);
+    const isKnown = [...element("object-names").children].some((option) => option.value === find.value);
+    if (isKnown) inspect(find.value);
+    else timer = setTimeout(list, SEARCH_DELAY);
   });
   find.addEventListener("focus", list);
   find.addEventListener("change", () => find.value && inspect(find.value));
@@ -90,13 +90,13 @@ function setUpSearch() {
   });
 }
 
-// If another program changes the file, the undo history is cleared, and the tooltips of the buttons give the reason.
+// Shows what the undo and redo buttons change, or why nothing can be undone.
 function showUndo({ undo, redo, undo_blocked }) {
-  for (const [id, what, word, keys] of [["undo-write", undo, "Undo", "Ctrl+Z"], ["redo-write", redo, "Redo", "Ctrl+Shift+Z"]]) {
+  for (const [id, changed, word, keys] of [["undo-write", undo, "Undo", "Ctrl+Z"], ["redo-write", redo, "Redo", "Ctrl+Shift+Z"]]) {
     const button = element(id);
-    enable(button, Boolean(what));
-    button.textContent = what ? `${word} ${what}` : word;
-    button.title = what ? `${word} ${what} (${keys})` : undo_blocked?.replace("Undo", word) ?? `Nothing to ${word.toLowerCase()}`;
+    enable(button, Boolean(changed));
+    button.textContent = changed ? `${word} ${changed}` : word;
+    button.title = changed ? `${word} ${changed} (${keys})` : undo_blocked?.replace("Undo", word) ?? `Nothing to ${word.toLowerCase()}`;
   }
 }
 
@@ -115,10 +115,10 @@ async function send() {
   const [key, change] = first;
   waiting.delete(key);
   sending = change;
-  change.number = await ask({ set: change.set });
+  change.number = await sendCommand({ set: change.set });
   if (sending !== change) return;
   if (change.number !== null) return settle(lastState());
-  sending = null; // refused; a notice shows why
+  sending = null; // the change is refused, and a notice shows the reason
   send();
 }
 
@@ -131,28 +131,28 @@ function settle(state) {
   send();
 }
 
-function letGo() {
+function release() {
   held = null;
   gesture++;
-  if (stale) again();
+  if (stale) repeatRequest();
   stale = false;
 }
 
-// While a value is being changed, its control shows the user's value instead of the value in the file.
+// Returns whether a value is being changed. Its control then shows the user's value instead of the value in the file.
 const isBusy = (path) => path === held || [sending, ...waiting.values()].some((change) => change?.field === path);
 
 function showObject(object) {
   // The answer may belong to an earlier request.
-  if (asked?.at ? String(object.at) !== String(asked.at) : object.at || object.name !== asked?.name) return;
-  if (object.name) asked = { name: object.name, material: object.material };
+  if (request?.at ? String(object.at) !== String(request.at) : object.at || object.name !== request?.name) return;
+  if (object.name) request = { name: object.name, material: object.material };
   if (element("object-name").textContent !== object.name) held = null;
   element("object-name").textContent = object.name;
   shown = object;
   showNote();
-  stale = held !== null; // controls are not added or removed while one is held
-  groups = keep(groups, object.groups, ({ name }) => name, groupOf);
+  stale = held !== null; // while a control is held, no controls are added or removed
+  groups = reuse(groups, object.groups, ({ name }) => name, groupOf);
   for (const group of object.groups) groups.get(group.name).show(group, object.file);
-  if (!stale) place([element("object-groups"), [...groups.values()].map(({ item }) => item)]);
+  if (!stale) setChildren([element("object-groups"), [...groups.values()].map(({ item }) => item)]);
 }
 
 function showNote() {
@@ -162,7 +162,7 @@ function showNote() {
   if (element("object-note").textContent !== text) element("object-note").textContent = text;
 }
 
-// A table of the scene file: its source lines, the values in the file, and the values that have their defaults.
+// A table of the scene file: its source lines, the values in the file, and the values that the file leaves at defaults.
 function groupOf({ name }) {
   const pre = make("pre", { tabIndex: 0 });
   const kind = new Text();
@@ -175,15 +175,15 @@ function groupOf({ name }) {
   const show = (group, file) => {
     kind.data = group.kind && group.kind !== name ? ` ${group.kind}` : "";
     showLines(pre, group, file);
-    rows = keep(rows, group.fields, keyOf, fieldOf);
+    rows = reuse(rows, group.fields, keyOf, fieldOf);
     for (const field of group.fields) rows.get(keyOf(field)).show(field);
     if (held !== null) return;
     const itemsOf = (isAbsent) => group.fields.filter(({ value }) => (value === undefined) === isAbsent).map((field) => rows.get(keyOf(field)).item);
     const missing = itemsOf(true);
     absent.hidden = !missing.length;
     count.textContent = missing.length === 1 ? "1 default" : `${missing.length} defaults`;
-    if (missing.some((row) => row.contains(document.activeElement))) absent.open = true; // the focus moves there
-    place([present, itemsOf(false)], [absent, [count, ...missing]]);
+    if (missing.some((row) => row.contains(document.activeElement))) absent.open = true; // keeps the focus visible
+    setChildren([present, itemsOf(false)], [absent, [count, ...missing]]);
   };
   return { item, show };
 }
@@ -210,8 +210,8 @@ function fieldOf(field) {
   const title = make("span", { className: "name", textContent: field.name, title: field.about });
   const unit = make("small", { textContent: field.unit && field.unit !== "linear" ? field.unit : "" });
   const origin = make("small");
-  const out = make("button", { type: "button", textContent: "default" });
-  const head = make("div", { className: "head" }, title, unit, origin, out);
+  const remove = make("button", { type: "button", textContent: "default" });
+  const head = make("div", { className: "head" }, title, unit, origin, remove);
   const item = make("div", { className: "field", role: "group" }, head);
   item.dataset.path = field.path;
   item.setAttribute("aria-label", field.unit ? `${field.name}, ${field.unit}` : field.name);
@@ -222,50 +222,50 @@ function fieldOf(field) {
   };
   let newest = field;
   let accepted = field.value;
-  let kept = null; // the value in the file while the error of a refused value is shown
+  let valueInFile = null; // the value in the file while the error of a refused value is shown
   const change = (value, i) =>
     write(newest, value, i, (text) => {
-      if (text) kept = JSON.stringify(accepted);
+      if (text) valueInFile = JSON.stringify(accepted);
       else accepted = value;
       note(text);
     });
-  const made = controlOf(field, change);
+  const control = controlOf(field, change);
   if (field.fixed) {
     head.append(make("small", { className: "fixed", textContent: field.fixed }));
-    for (const input of made.inputs) input.disabled = true;
+    for (const input of control.inputs) input.disabled = true;
   }
-  out.addEventListener("click", () => {
-    if (out.matches(":focus-visible")) made.inputs[0].focus(); // the button disappears
+  remove.addEventListener("click", () => {
+    if (remove.matches(":focus-visible")) control.inputs[0].focus(); // the button disappears
     change(null);
-    letGo();
+    release();
   });
-  made.inputs.forEach((input, i) => {
+  control.inputs.forEach((input, i) => {
     input.dataset.control = `${field.path} ${i}`;
     hold(input, field.path);
   });
-  item.append(...made.elements, error);
+  item.append(...control.elements, error);
   let isNew = true;
   const show = (next) => {
-    const before = newest.value;
+    const previous = newest.value;
     newest = next;
     const isAbsent = next.value === undefined;
     origin.textContent = !isAbsent || next.fixed ? "" : next.default === undefined ? "absent" : "default";
     origin.hidden = !origin.textContent;
-    out.title = next.default === undefined ? `Remove ${next.name} from the file` : `Remove ${next.name} from the file and use the default`;
-    out.hidden = isAbsent || next.required || Boolean(next.fixed);
+    remove.title = next.default === undefined ? `Remove ${next.name} from the file` : `Remove ${next.name} from the file and use the default`;
+    remove.hidden = isAbsent || next.required || Boolean(next.fixed);
     if (isBusy(next.path) && !isNew) return;
     isNew = false;
     // A late answer to an earlier change does not replace the error and the refused value.
-    const isLate = !error.hidden && JSON.stringify(next.value) === kept && JSON.stringify(before) !== kept;
+    const isLate = !error.hidden && JSON.stringify(next.value) === valueInFile && JSON.stringify(previous) !== valueInFile;
     if (isLate) return;
     accepted = next.value;
-    note(""); // the error was about an earlier value
-    made.update(next);
+    note(""); // an error would be about an earlier value
+    control.update(next);
   };
   return { item, show };
 }
 
-// Tracks whether an input is being moved. A drag or a held key is one gesture.
+// Tracks whether the user is changing an input's value. A drag or a held key is one gesture.
 function hold(input, path) {
   if (input.matches("[type=range], [type=number]")) {
     input.addEventListener("pointerdown", () => {
@@ -275,17 +275,17 @@ function hold(input, path) {
   }
   if (input.matches("[type=range], [type=color]")) input.addEventListener("input", () => (held = path), true);
   input.addEventListener("keydown", (event) => {
-    if (!MOVING.test(event.key)) return;
+    if (!VALUE_KEYS.test(event.key)) return;
     held = path;
     key = true;
   });
   input.addEventListener("keyup", () => {
     key = false;
-    if (!pointer) letGo();
+    if (!pointer) release();
   });
-  input.addEventListener("change", () => key || letGo());
+  input.addEventListener("change", () => key || release());
   input.addEventListener("blur", () => {
     key = false;
-    if (held === path) letGo();
+    if (held === path) release();
   });
 }

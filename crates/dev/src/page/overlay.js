@@ -1,9 +1,9 @@
 // Marks drawn over the image: frames around pixels, rings around invalid pixels, and the divider of a wipe.
 
-const MAX_RINGS = 8; // maximum number of invalid pixels that get rings; more are visible without
-const HANDLE = 11; // radius of the divider's handle, in CSS pixels
+const MAX_RINGS = 8; // maximum number of invalid pixels that get rings; more pixels are visible without rings
+const HANDLE_RADIUS = 11; // radius of the divider's handle, in CSS pixels
 
-// Draws a path in black, then with a thinner line in white, so that it is visible on any image.
+// Draws a path in black, then with a thinner line in white, so that the path is visible on any image.
 function outline(context, widths, path) {
   for (const [color, lineWidth] of [["#000", widths[0]], ["#fff", widths[1]]]) {
     Object.assign(context, { strokeStyle: color, lineWidth });
@@ -23,11 +23,11 @@ export function frame(context, pixel, scale, distance) {
   }
 }
 
-// Draws rings around invalid pixels, so that isolated ones are not overlooked.
+// Draws rings around invalid pixels, so that isolated pixels are not overlooked.
 export function rings(context, part, { width, height, sent, faults }, scale) {
-  const found = faults.find(([name]) => name === part)?.[1];
-  if (!found || found.nan + found.infinite + found.negative > MAX_RINGS) return;
-  for (const [x, y] of found.places) {
+  const invalid = faults.find(([name]) => name === part)?.[1];
+  if (!invalid || invalid.nan + invalid.infinite + invalid.negative > MAX_RINGS) return;
+  for (const [x, y] of invalid.places) {
     const center = [((x + 0.5) * width) / sent[0], ((y + 0.5) * height) / sent[1]].map((v) => v * scale);
     outline(context, [4, 2], () => context.arc(...center, 8, 0, 2 * Math.PI));
   }
@@ -42,7 +42,7 @@ export function divider(context, x, top, bottom) {
   const y = (top + bottom) / 2;
   context.fillStyle = "#000a";
   context.beginPath();
-  context.arc(x, y, HANDLE, 0, 2 * Math.PI);
+  context.arc(x, y, HANDLE_RADIUS, 0, 2 * Math.PI);
   context.fill();
   outline(context, [3, 1.5], () => {
     for (const side of [-1, 1]) {

@@ -16,16 +16,16 @@ import { setUpTimes } from "/times.js";
 import { setUpTouch } from "/touch.js";
 import { setUpView, viewName } from "/view.js";
 
-let isLinked = null; // null until the first connection attempt has finished
+let isConnected = null; // null until the first connection attempt has ended
 let isFull = false; // whether the viewer limit is reached
-let noticesSeen = null;
-let numberShown = 0; // the number of the displayed frame
-// Keyboard actions: those available everywhere, and those available only while the image has the focus.
-const [everywhere, atPicture] = [new Map(), new Map()];
+let lastNotice = null; // the number of the last notice; null until the first state of a connection
+let shownFrame = 0; // the number of the displayed frame
+// Keyboard actions: actions that are always available, and actions that need the focus on the image.
+const [pageKeys, pictureKeys] = [new Map(), new Map()];
 
 // Registers a key's action; `key` is a `KeyboardEvent.key`.
-const onKey = (key, act) => everywhere.set(key, act);
-const onPictureKey = (key, act) => atPicture.set(key, act);
+const onKey = (key, act) => pageKeys.set(key, act);
+const onPictureKey = (key, act) => pictureKeys.set(key, act);
 
 const picture = new Picture([...document.querySelectorAll("#panels figure")]);
 setUpView(picture, onKey, showNotice);
@@ -42,9 +42,9 @@ setUpWheel();
 setUpFocus();
 picture.clicked = select;
 
-onLink((isConnected, full) => {
-  [isLinked, isFull] = [isConnected, full];
-  if (isConnected) [noticesSeen, numberShown] = [null, 0];
+onLink((connected, full) => {
+  [isConnected, isFull] = [connected, full];
+  if (connected) [lastNotice, shownFrame] = [null, 0];
   showBadge();
 });
 
@@ -59,7 +59,7 @@ onFrame((header, images) => {
   const [width, height] = header.finest;
   element("smaller").parentElement.hidden = width === header.width && height === header.height;
   element("smaller").textContent = `${width} × ${height}`;
-  numberShown = header.number;
+  shownFrame = header.number;
   // Attributes for scripts that control the page.
   const { revision, samples, done } = header;
   Object.assign(element("panels").dataset, { revision, samples, done, view: viewName(header.view), sent: header.sent.join("x") });
@@ -69,7 +69,7 @@ onFrame((header, images) => {
 // least `commands` commands of all viewers.
 window.isSettled = (commands) => {
   const state = lastState();
-  return isUpToDate() && state.executed >= commands && picture.isSettled() && !state.busy && state.frame > 0 && numberShown >= state.frame;
+  return isUpToDate() && state.executed >= commands && picture.isSettled() && !state.busy && state.frame > 0 && shownFrame >= state.frame;
 };
 
 onState((state) => {
@@ -78,22 +78,22 @@ onState((state) => {
   element("scene").textContent = state.scene;
   element("device").textContent = state.device;
   element("shaders").textContent = state.shaders ?? "built in";
-  element("compile").textContent = state.compile_seconds === null ? "–" : seconds(state.compile_seconds);
+  element("compile").textContent = state.compile_seconds === null ? "–" : duration(state.compile_seconds);
   picture.marks = state.marks;
   picture.describe(state);
   showBadge();
   showProblems(state, Boolean(picture.header));
   const { number = 0, text, bad } = state.notice ?? {};
-  if (noticesSeen !== null && number > noticesSeen) showNotice(text, bad);
-  noticesSeen = number;
+  if (lastNotice !== null && number > lastNotice) showNotice(text, bad);
+  lastNotice = number;
 });
 
-// Shows why the image is not up to date. While there is no connection, the controls are disabled.
+// Shows why the image is not up to date. Without a connection, disables the controls.
 function showBadge() {
   const state = lastState();
-  const [text, kind] = isLinked === null ? ["Connecting…", "waits"]
+  const [text, kind] = isConnected === null ? ["Connecting…", "waits"]
     : isFull ? ["Viewer limit reached. Waiting for a free slot…", "lost"]
-    : !isLinked ? ["Connection lost. Reconnecting…", "lost"]
+    : !isConnected ? ["Connection lost. Reconnecting…", "lost"]
     : state?.compiling ? ["Compiling…", "waits"]
     : state?.reading ? ["Reading files…", "waits"]
     : !picture.header && state?.problems.length ? [errorBadge(state), "lost"]
@@ -104,10 +104,10 @@ function showBadge() {
   const badge = element("badge");
   if (badge.textContent !== text) badge.textContent = text;
   badge.className = kind;
-  const works = Boolean(isLinked && state && picture.header);
-  for (const part of [document.querySelector("aside"), element("toolbar")]) {
-    part.classList.toggle("off", !works);
-    for (const control of part.querySelectorAll("fieldset, button, input, select")) setOff(control, !works);
+  const isUsable = Boolean(isConnected && state && picture.header);
+  for (const panel of [document.querySelector("aside"), element("toolbar")]) {
+    panel.classList.toggle("off", !isUsable);
+    for (const control of panel.querySelectorAll("fieldset, button, input, select")) setOff(control, !isUsable);
   }
 }
 
@@ -137,13 +137,13 @@ function showNotice(text, bad) {
   noticeTimer = setTimeout(() => (notice.hidden = true), bad ? 8000 : 3000);
 }
 
-function seconds(s) {
-  return s < 1 ? `${Math.round(s * 1000)} ms` : `${s.toFixed(2)} s`;
+function duration(seconds) {
+  return seconds < 1 ? `${Math.round(seconds * 1000)} ms` : `${seconds.toFixed(2)} s`;
 }
 
-// Returns whether a control handles a key itself. In the value editor, an accidental key press must not trigger an
+// Returns whether a control handles a key. In the value editor, an accidental key press must not trigger an
 // action that affects all viewers.
-function isTaken(control, key) {
+function handlesKey(control, key) {
   if (control.closest("#object-groups, #sliders")) return true;
   if (control.matches("select, textarea, input:not([type=radio], [type=checkbox], [type=range])")) return true;
   if (control.matches("input[type=range]")) return /^(Arrow|Page|Home$|End$)/.test(key);
@@ -151,9 +151,9 @@ function isTaken(control, key) {
 }
 
 document.addEventListener("keydown", (event) => {
-  if (event.ctrlKey || event.metaKey || event.altKey || event.defaultPrevented || isTaken(event.target, event.key)) return;
+  if (event.ctrlKey || event.metaKey || event.altKey || event.defaultPrevented || handlesKey(event.target, event.key)) return;
   const names = [event.key, event.shiftKey ? `Shift+${event.key.toLowerCase()}` : event.key.toLowerCase()];
-  const maps = event.target.closest("#panels figure") ? [atPicture, everywhere] : [everywhere];
+  const maps = event.target.closest("#panels figure") ? [pictureKeys, pageKeys] : [pageKeys];
   const act = maps.flatMap((map) => names.map((name) => map.get(name))).find(Boolean);
   if (act && act(event) !== false) event.preventDefault();
 });

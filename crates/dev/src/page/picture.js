@@ -1,23 +1,23 @@
 // The image: zooming, panning, pointing and camera drags. The panels of a comparison share one zoom.
 
-import { ask } from "/link.js";
-import { Motion, flies } from "/motion.js";
+import { sendCommand } from "/link.js";
+import { isFlightKey, Motion } from "/motion.js";
 import { divider, frame, rings } from "/overlay.js";
 import { viewName } from "/view.js";
 
-const STEP = 1.25; // zoom factor per notch of the wheel
+const ZOOM_FACTOR = 1.25; // zoom factor per notch of the wheel
 const MAX_SCALE = 64;
-const CLICK = 4; // maximum pointer movement of a click, in CSS pixels
-const PAUSE = 400; // minimum pause between two wheel gestures, in milliseconds
-const GRIP = { mouse: 7, touch: 22 }; // maximum distance in CSS pixels at which a press grabs the divider
+const MAX_CLICK_DISTANCE = 4; // maximum pointer movement of a click, in CSS pixels
+const GESTURE_PAUSE = 400; // minimum pause between two wheel gestures, in milliseconds
+const GRIP_DISTANCE = { mouse: 7, touch: 22 }; // maximum distance in CSS pixels at which a press grabs the divider
 
 export class Picture {
   constructor(figures) {
     this.panels = figures.map((figure) => new Panel(figure));
     this.pointed = () => {}; // called when the pointer moves to another pixel
     this.clicked = () => {}; // called with the clicked pixel
-    this.zoomed = () => {};
-    this.wiping = () => {}; // called with the divider's position while it is dragged
+    this.zoomed = () => {}; // called with (whether the image fits the panel, the scale)
+    this.wiping = () => {}; // called with the divider's position while the divider is dragged
     this.tool = () => "orbit";
     this.header = null;
     this.marks = true; // whether invalid pixels get rings
@@ -53,19 +53,19 @@ export class Picture {
   // Selects the layout of a comparison: "side", "wipe", "flicker" or "difference".
   arrange(layout) {
     this.layout = layout;
-    const alone = { wipe: "first", flicker: "first", difference: "difference" }[layout];
+    const only = { wipe: "first", flicker: "first", difference: "difference" }[layout]; // the only visible part
     const focused = this.panels.find((panel) => panel.canvas === document.activeElement);
     for (const panel of this.panels) {
-      const compared = panel.part !== "picture";
-      panel.figure.hidden = !panel.image || (compared && alone !== undefined && panel.part !== alone);
-      if (compared) panel.caption(this.#caption(panel.part));
+      const isCompared = panel.part !== "picture";
+      panel.figure.hidden = !panel.image || (isCompared && only !== undefined && panel.part !== only);
+      if (isCompared) panel.caption(this.#caption(panel.part));
     }
     if (focused?.figure.hidden) this.#visible()?.canvas.focus({ preventScroll: true });
-    document.getElementById("wipe").hidden = !this.#wipes();
+    document.getElementById("wipe").hidden = !this.#isWiping();
     this.#schedule();
   }
 
-  #wipes() {
+  #isWiping() {
     return this.layout === "wipe" && Boolean(this.#part("second")?.image);
   }
 
@@ -84,8 +84,8 @@ export class Picture {
   }
 
   // Moves the divider of a wipe.
-  wipe(share) {
-    this.wiped = Math.min(1, Math.max(0, share));
+  wipe(position) {
+    this.wiped = Math.min(1, Math.max(0, position));
     this.#schedule();
   }
 
@@ -118,18 +118,18 @@ export class Picture {
   }
 
   // Zooms by a factor around a point of a panel, by default around its center.
-  zoom(factor, panel = this.#visible(), at = null) {
-    if (panel) this.zoomTo(this.#view(panel).scale * factor, panel, at);
+  zoom(factor, panel = this.#visible(), point = null) {
+    if (panel) this.zoomTo(this.#view(panel).scale * factor, panel, point);
   }
 
-  zoomTo(scale, panel = this.#visible(), at = null) {
+  zoomTo(scale, panel = this.#visible(), point = null) {
     if (!panel || !this.header) return;
     const old = this.#view(panel);
-    at ??= [panel.canvas.clientWidth / 2, panel.canvas.clientHeight / 2];
-    const fixed = [(at[0] - old.left) / old.scale, (at[1] - old.top) / old.scale];
+    point ??= [panel.canvas.clientWidth / 2, panel.canvas.clientHeight / 2];
+    const fixed = [(point[0] - old.left) / old.scale, (point[1] - old.top) / old.scale];
     this.scale = Math.min(MAX_SCALE, Math.max(Math.min(1, old.fit) / 4, scale));
     const half = [panel.canvas.clientWidth / 2, panel.canvas.clientHeight / 2];
-    this.middle = fixed.map((v, i) => v - (at[i] - half[i]) / this.scale);
+    this.middle = fixed.map((v, i) => v - (point[i] - half[i]) / this.scale);
     this.#schedule();
   }
 
@@ -142,8 +142,8 @@ export class Picture {
   moveCursor(dx, dy) {
     if (!this.header) return;
     const [x, y] = this.cursor ?? [this.header.width >> 1, this.header.height >> 1];
-    const inside = (v, size) => Math.min(size - 1, Math.max(0, v));
-    this.#point([inside(x + dx, this.header.width), inside(y + dy, this.header.height)]);
+    const clamp = (v, size) => Math.min(size - 1, Math.max(0, v));
+    this.#point([clamp(x + dx, this.header.width), clamp(y + dy, this.header.height)]);
   }
 
   #visible() {
@@ -185,76 +185,76 @@ export class Picture {
       context.clearRect(0, 0, w, h);
       const ratio = devicePixelRatio;
       context.setTransform(ratio, 0, 0, ratio, view.left * ratio, view.top * ratio);
-      // Pixels are drawn as squares if they are large or cover whole screen pixels; a coarse image is smoothed.
+      // Pixels are drawn as squares if they are large or a whole number of screen pixels wide. A coarse image is smoothed.
       const side = view.scale * ratio;
       context.imageSmoothingEnabled = sent[0] < width || (side < 4 && !Number.isInteger(side));
       context.imageSmoothingQuality = "high";
-      const other = this.#part("second").image;
-      const flickers = panel.part === "first" && this.layout === "flicker" && this.swapped && other;
-      context.drawImage(flickers ? other : image, 0, 0, width * view.scale, height * view.scale);
-      if (panel.part === "first" && this.#wipes()) this.#drawWipe(context, canvas, view, other);
+      const second = this.#part("second").image;
+      const showsSecond = panel.part === "first" && this.layout === "flicker" && this.swapped && second;
+      context.drawImage(showsSecond ? second : image, 0, 0, width * view.scale, height * view.scale);
+      if (panel.part === "first" && this.#isWiping()) this.#drawWipe(context, canvas, view, second);
       if (this.marks && view.scale < 4) rings(context, panel.part, this.header, view.scale);
       if (this.cursor && view.scale >= 6) frame(context, this.cursor, view.scale, 0);
       for (const pin of this.pins) frame(context, pin, view.scale, Math.max(0, 5 - view.scale / 2));
       Object.assign(canvas.dataset, { left: view.left, top: view.top, scale: view.scale });
     }
-    const shown = this.#visible();
-    if (shown) this.zoomed(this.scale === null, this.#view(shown).scale);
+    const visible = this.#visible();
+    if (visible) this.zoomed(this.scale === null, this.#view(visible).scale);
   }
 
   // Draws the second image to the right of the divider.
-  #drawWipe(context, canvas, view, other) {
+  #drawWipe(context, canvas, view, second) {
     const { width, height } = this.header;
     const x = this.wiped * canvas.clientWidth - view.left;
     context.save();
     context.beginPath();
     context.rect(x, -view.top, canvas.clientWidth, canvas.clientHeight);
     context.clip();
-    context.drawImage(other, 0, 0, width * view.scale, height * view.scale);
+    context.drawImage(second, 0, 0, width * view.scale, height * view.scale);
     context.restore();
     divider(context, x, -view.top, canvas.clientHeight - view.top);
   }
 
   // Returns whether a pointer is at the divider of a wipe.
   #isAtDivider(panel, event) {
-    const grip = GRIP[event.pointerType] ?? GRIP.mouse;
-    return panel.part === "first" && this.#wipes() && Math.abs(event.offsetX - this.wiped * panel.canvas.clientWidth) <= grip;
+    const grip = GRIP_DISTANCE[event.pointerType] ?? GRIP_DISTANCE.mouse;
+    return panel.part === "first" && this.#isWiping() && Math.abs(event.offsetX - this.wiped * panel.canvas.clientWidth) <= grip;
   }
 
   #listen(panel) {
     const { canvas } = panel;
     const fingers = new Map();
-    let start = null; // position of a press until it moves
-    let wipes = false; // whether the divider is dragged
+    let start = null; // position of a press until the pointer moves
+    let isWiping = false; // whether the divider is dragged
     canvas.addEventListener("pointerdown", (event) => {
       if (event.button === 2) return; // the browser's context menu
       if (event.button === 1) event.preventDefault(); // no autoscroll
       canvas.setPointerCapture(event.pointerId);
       canvas.classList.add("dragging");
-      const place = [event.offsetX, event.offsetY];
-      fingers.set(event.pointerId, place);
-      wipes = fingers.size === 1 && event.button === 0 && this.#isAtDivider(panel, event);
-      start = fingers.size === 1 && event.button === 0 && !wipes ? place : null;
-      if (!wipes) ask("grab");
-      this.#point(this.#pixelAt(panel, place));
+      const position = [event.offsetX, event.offsetY];
+      fingers.set(event.pointerId, position);
+      isWiping = fingers.size === 1 && event.button === 0 && this.#isAtDivider(panel, event);
+      start = fingers.size === 1 && event.button === 0 && !isWiping ? position : null;
+      if (!isWiping) sendCommand("grab");
+      this.#point(this.#pixelAt(panel, position));
     });
     canvas.addEventListener("pointermove", (event) => {
-      const now = [event.offsetX, event.offsetY];
+      const position = [event.offsetX, event.offsetY];
       const last = fingers.get(event.pointerId);
-      this.#point(this.#pixelAt(panel, now));
-      canvas.classList.toggle("wiping", wipes || this.#isAtDivider(panel, event));
+      this.#point(this.#pixelAt(panel, position));
+      canvas.classList.toggle("wiping", isWiping || this.#isAtDivider(panel, event));
       if (!last) return;
-      if (start && Math.hypot(now[0] - start[0], now[1] - start[1]) < CLICK) return;
+      if (start && Math.hypot(position[0] - start[0], position[1] - start[1]) < MAX_CLICK_DISTANCE) return;
       start = null;
-      if (wipes) this.#dragDivider(panel, now[0]);
-      else if (fingers.size === 2) this.#pinch(panel, fingers, event.pointerId, now);
-      else this.#drag(panel, this.#toolOf(event), now[0] - last[0], now[1] - last[1]);
-      fingers.set(event.pointerId, now);
+      if (isWiping) this.#dragDivider(panel, position[0]);
+      else if (fingers.size === 2) this.#pinch(panel, fingers, event.pointerId, position);
+      else this.#drag(panel, this.#toolOf(event), position[0] - last[0], position[1] - last[1]);
+      fingers.set(event.pointerId, position);
     });
     const end = (event) => {
       fingers.delete(event.pointerId);
       if (fingers.size > 0) return;
-      wipes = false;
+      isWiping = false;
       canvas.classList.remove("dragging");
     };
     canvas.addEventListener("pointerup", (event) => {
@@ -288,7 +288,7 @@ export class Picture {
     const view = this.#view(panel);
     const { pending } = this.motion;
     // A drag across the shorter side of the panel orbits by half a turn.
-    const turn = Math.PI / Math.min(panel.canvas.clientWidth, panel.canvas.clientHeight);
+    const angle = Math.PI / Math.min(panel.canvas.clientWidth, panel.canvas.clientHeight); // per CSS pixel
     if (tool === "hand") {
       const [x, y] = this.scale === null ? [this.header.width / 2, this.header.height / 2] : this.middle;
       this.middle = [x - dx / view.scale, y - dy / view.scale];
@@ -300,41 +300,41 @@ export class Picture {
     } else if (tool === "dolly") {
       pending.dolly -= dy / 200;
     } else if (tool === "fly") {
-      pending.look[0] += (dx * turn) / 2;
-      pending.look[1] -= (dy * turn) / 2;
+      pending.look[0] += (dx * angle) / 2;
+      pending.look[1] -= (dy * angle) / 2;
     } else {
-      pending.orbit[0] += dx * turn;
-      pending.orbit[1] += dy * turn;
+      pending.orbit[0] += dx * angle;
+      pending.orbit[1] += dy * angle;
     }
     this.#schedule();
   }
 
   // Two fingers pan and dolly, so that the image follows the fingers.
-  #pinch(panel, fingers, moving, now) {
-    const [, other] = [...fingers].find(([id]) => id !== moving);
-    const before = fingers.get(moving);
+  #pinch(panel, fingers, movedFinger, position) {
+    const [, otherPosition] = [...fingers].find(([id]) => id !== movedFinger);
+    const last = fingers.get(movedFinger);
     const distance = (a, b) => Math.max(1, Math.hypot(a[0] - b[0], a[1] - b[1]));
-    this.motion.pending.dolly += Math.log(distance(now, other) / distance(before, other));
-    this.#drag(panel, "pan", (now[0] - before[0]) / 2, (now[1] - before[1]) / 2);
+    this.motion.pending.dolly += Math.log(distance(position, otherPosition) / distance(last, otherPosition));
+    this.#drag(panel, "pan", (position[0] - last[0]) / 2, (position[1] - last[1]) / 2);
   }
 
-  // The wheel dollies the camera. With Ctrl, the wheel zooms the image; browsers report a pinch on a touchpad as the
-  // wheel with Ctrl.
+  // The wheel dollies the camera. With Ctrl, the wheel zooms the image. Browsers report a pinch on a touchpad as a wheel
+  // event with Ctrl.
   #wheel(panel, event) {
     event.preventDefault();
-    const place = [event.offsetX, event.offsetY];
+    const position = [event.offsetX, event.offsetY];
     const lines = Math.max(-4, Math.min(4, event.deltaMode === 0 ? event.deltaY / 100 : event.deltaY / 3));
     if (event.ctrlKey || event.metaKey) {
-      this.zoom(STEP ** -lines, panel, place);
+      this.zoom(ZOOM_FACTOR ** -lines, panel, position);
     } else if (this.tool() === "fly") {
-      this.motion.speed = Math.min(100, Math.max(0.01, this.motion.speed * STEP ** -lines));
+      this.motion.speed = Math.min(100, Math.max(0.01, this.motion.speed * ZOOM_FACTOR ** -lines));
     } else {
-      if (event.timeStamp - this.wheeled > PAUSE) ask("grab");
+      if (event.timeStamp - this.wheeled > GESTURE_PAUSE) sendCommand("grab");
       this.wheeled = event.timeStamp;
       this.motion.pending.dolly -= lines * 0.1;
       this.#schedule();
     }
-    this.#point(this.#pixelAt(panel, place));
+    this.#point(this.#pixelAt(panel, position));
   }
 
   #key(event) {
@@ -343,17 +343,17 @@ export class Picture {
     const neighbour = { j: [-1, 0], l: [1, 0], i: [0, -1], k: [0, 1] }[event.key];
     const isFlying = this.tool() === "fly";
     const { motion } = this;
-    const moves = arrow || event.key === "PageUp" || event.key === "PageDown";
-    if (moves && !event.repeat) ask("grab");
-    if (isFlying && flies(event.code)) {
+    const isMove = arrow || event.key === "PageUp" || event.key === "PageDown";
+    if (isMove && !event.repeat) sendCommand("grab");
+    if (isFlying && isFlightKey(event.code)) {
       motion.press(event.code, event.shiftKey);
     } else if (arrow && event.shiftKey) {
       motion.pending.pan[0] += arrow[0] * 0.05;
       motion.pending.pan[1] -= arrow[1] * 0.05;
     } else if (arrow) {
-      const turned = isFlying ? motion.pending.look : motion.pending.orbit;
-      turned[0] += arrow[0] * 0.1;
-      turned[1] += arrow[1] * (isFlying ? -0.1 : 0.1);
+      const angles = isFlying ? motion.pending.look : motion.pending.orbit;
+      angles[0] += arrow[0] * 0.1;
+      angles[1] += arrow[1] * (isFlying ? -0.1 : 0.1);
     } else if (event.key === "PageUp" || event.key === "PageDown") {
       motion.pending.dolly += event.key === "PageUp" ? 0.1 : -0.1;
     } else if (neighbour) {
@@ -374,8 +374,8 @@ export class Picture {
     if (!this.header) return null;
     const view = this.#view(panel);
     const pixel = [Math.floor((x - view.left) / view.scale), Math.floor((y - view.top) / view.scale)];
-    const inside = pixel[0] >= 0 && pixel[1] >= 0 && pixel[0] < this.header.width && pixel[1] < this.header.height;
-    return inside ? pixel : null;
+    const isInside = pixel[0] >= 0 && pixel[1] >= 0 && pixel[0] < this.header.width && pixel[1] < this.header.height;
+    return isInside ? pixel : null;
   }
 
   #point(pixel) {

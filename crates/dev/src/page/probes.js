@@ -1,11 +1,11 @@
 // The values of the pixel under the pointer and of pinned pixels, with their history.
 
-import { askPixel, element, onFrame, onLink } from "/link.js";
+import { element, onFrame, onLink, queryPixel } from "/link.js";
 import { enable } from "/parts.js";
 
 const MAX_PINS = 16;
-const HISTORY = 60; // maximum number of values in the history of a pin
-let asking = false;
+const MAX_HISTORY = 60; // maximum number of values in the history of a pin
+let isReading = false;
 let pins = []; // {pixel, history: [{revision, samples, view, values}]}
 
 export function setUpProbes(picture, onKey) {
@@ -13,7 +13,7 @@ export function setUpProbes(picture, onKey) {
   const pin = () => add(picture.cursor, picture);
   onKey("n", pin);
   element("pin").addEventListener("click", pin);
-  onLink(() => (asking = false));
+  onLink(() => (isReading = false));
   onFrame((header) => {
     read(picture);
     pins.forEach((pin) => refresh(pin, header));
@@ -21,7 +21,7 @@ export function setUpProbes(picture, onKey) {
   showPins(picture);
 }
 
-// Reads the pixel under the pointer, with at most one request pending.
+// Reads the pixel under the pointer. At most one request is pending.
 async function read(picture) {
   const pixel = picture.cursor;
   enable(element("pin"), Boolean(pixel));
@@ -30,10 +30,10 @@ async function read(picture) {
     element("values").textContent = "Point at a pixel to read its value";
     return;
   }
-  if (asking) return;
-  asking = true;
-  const answer = await askPixel(pixel);
-  asking = false;
+  if (isReading) return;
+  isReading = true;
+  const answer = await queryPixel(pixel);
+  isReading = false;
   if (!answer) return;
   if (String(picture.cursor) !== String(pixel)) return read(picture);
   show(answer, picture.header);
@@ -50,7 +50,7 @@ function show({ x, y, values }, header) {
   if (shown) element("swatch").style.background = `rgb(${shown})`;
 }
 
-// Returns the caption of a comparison's side, or the name itself.
+// Returns the caption of a side of a comparison; returns other names unchanged.
 const nameOf = (name, header) => ({ first: header?.sides?.[0], second: header?.sides?.[1] })[name] ?? name;
 
 function add(pixel, picture) {
@@ -63,14 +63,14 @@ function add(pixel, picture) {
 }
 
 async function refresh(pin, { revision, samples, view }) {
-  const answer = await askPixel(pin.pixel);
+  const answer = await queryPixel(pin.pixel);
   if (!answer || !pins.includes(pin)) return;
   // Only the newest value of each revision is kept.
   const entry = { revision, samples, view: JSON.stringify(view), values: answer.values };
   const last = pin.history.at(-1);
   if (last && last.revision === revision && last.view === entry.view) pin.history.pop();
   pin.history.push(entry);
-  pin.history.splice(0, pin.history.length - HISTORY);
+  pin.history.splice(0, pin.history.length - MAX_HISTORY);
   showPin(pin);
 }
 
@@ -82,7 +82,7 @@ function showPins(picture) {
     const remove = Object.assign(document.createElement("button"), { type: "button", textContent: "×" });
     remove.setAttribute("aria-label", `Remove the probe at ${pin.pixel.join(" ")}`);
     remove.addEventListener("click", () => {
-      pins = pins.filter((other) => other !== pin);
+      pins = pins.filter((entry) => entry !== pin);
       showPins(picture);
     });
     pin.output = document.createElement("div");
@@ -92,7 +92,7 @@ function showPins(picture) {
   }));
 }
 
-// Shows all current values of a pin, the curve of the first value, and its earlier values, newest first.
+// Shows all current values of a pin, the curve of the first value, and the first value's history, newest first.
 function showPin(pin) {
   const make = (tag, text) => Object.assign(document.createElement(tag), { textContent: text });
   const newest = pin.history.at(-1);
@@ -100,16 +100,16 @@ function showPin(pin) {
   const list = document.createElement("dl");
   for (const [name, value] of newest.values) list.append(make("dt", name), make("dd", value));
   const parts = [list];
-  const before = pin.history.slice(0, -1).filter(({ view }) => view === newest.view);
-  if (before.length) {
+  const earlier = pin.history.slice(0, -1).filter(({ view }) => view === newest.view);
+  if (earlier.length) {
     const history = document.createElement("details");
-    const rows = before.reverse().map(({ values, samples }) => make("li", `${values[0]?.[1] ?? "–"} (${samples} samples)`));
+    const rows = earlier.reverse().map(({ values, samples }) => make("li", `${values[0]?.[1] ?? "–"} (${samples} samples)`));
     const older = document.createElement("ol");
     older.append(...rows);
-    history.append(make("summary", `${before.length} earlier ${before.length === 1 ? "value" : "values"}`), older);
+    history.append(make("summary", `${earlier.length} earlier ${earlier.length === 1 ? "value" : "values"}`), older);
     history.open = pin.open ?? false;
     history.addEventListener("toggle", () => (pin.open = history.open));
-    parts.push(curve([...before.reverse(), newest]), history);
+    parts.push(curve([...earlier.reverse(), newest]), history);
   }
   pin.output.replaceChildren(...parts);
 }

@@ -7,14 +7,14 @@ import { make } from "/parts.js";
 const capitalized = (text) => text[0].toUpperCase() + text.slice(1);
 let shown = "";
 
-// `hasImage`: whether an image from before the error is on the screen.
+// Shows the errors. `hasImage` is true if an image from before the error is on the screen.
 export function showProblems({ problems, editor, reading }, hasImage) {
   const count = problems.length === 1 ? "1 problem" : `${problems.length} problems`;
   element("problems").querySelector("summary").textContent = reading ? `${count}. Reading the changed files…` : count;
   // An unchanged list is not rebuilt, so that selected text stays selected.
-  const all = JSON.stringify([problems, editor, hasImage]);
-  if (all === shown) return;
-  shown = all;
+  const content = JSON.stringify([problems, editor, hasImage]);
+  if (content === shown) return;
+  shown = content;
   const dock = element("problems");
   dock.hidden = !problems.length;
   element("problem-list").replaceChildren(...problems.map((problem) => articleOf(problem, editor, hasImage)));
@@ -27,8 +27,8 @@ function articleOf(problem, editor, hasImage) {
   if (link) title.replaceChildren(make("a", { textContent: place ?? kind, href: link, title: "Open in the editor" }));
   const article = make("article", {}, title, make("p", { textContent: message }));
   if (excerpt) article.append(make("pre", { textContent: excerpt }));
-  const stays = hasImage ? " Showing the last good image." : "";
-  article.append(make("small", { textContent: `${capitalized(kind)} error.${stays}` }));
+  const fallback = hasImage ? " Showing the last good image." : "";
+  article.append(make("small", { textContent: `${capitalized(kind)} error.${fallback}` }));
   return article;
 }
 

@@ -1,38 +1,38 @@
 // Progress, pause, limits, and downloads of the image.
 
-import { ask, element, lastState, onFrame, onLink, onState } from "/link.js";
+import { element, lastState, onFrame, onLink, onState, sendCommand } from "/link.js";
 import { viewName } from "/view.js";
 
 const MAX_SAMPLES = 65536;
 const KINDS = ["png", "exr"];
 
 export function setUpRender(onKey, showNotice) {
-  const pause = () => ask({ pause: element("pause").getAttribute("aria-pressed") !== "true" });
+  const pause = () => sendCommand({ pause: element("pause").getAttribute("aria-pressed") !== "true" });
   element("pause").addEventListener("click", pause);
   onKey(" ", pause);
-  element("restart").addEventListener("click", () => ask("restart"));
+  element("restart").addEventListener("click", () => sendCommand("restart"));
   element("most-samples").addEventListener("change", ({ target }) => {
-    const { value, valueAsNumber: most, validity } = target;
+    const { value, valueAsNumber: count, validity } = target;
     const isNone = value === "" && !validity.badInput;
-    if (isNone || (Number.isInteger(most) && most >= 1 && most <= MAX_SAMPLES)) {
+    if (isNone || (Number.isInteger(count) && count >= 1 && count <= MAX_SAMPLES)) {
       showNotice("");
-      ask({ samples: isNone ? null : most });
+      sendCommand({ samples: isNone ? null : count });
     } else {
-      const got = value ? `, not ${value}` : "";
-      showNotice(`Max samples must be a whole number from 1 to ${MAX_SAMPLES.toLocaleString("en")}${got}`, true);
+      const actual = value ? `, not ${value}` : "";
+      showNotice(`Max samples must be a whole number from 1 to ${MAX_SAMPLES.toLocaleString("en")}${actual}`, true);
       target.value = lastState()?.samples[0] ?? "";
     }
   });
-  element("preview").addEventListener("change", ({ target }) => ask({ preview: Number(target.value) }));
+  element("preview").addEventListener("change", ({ target }) => sendCommand({ preview: Number(target.value) }));
   onState((state, isCurrent) => {
     if (!isCurrent) return;
     element("pause").setAttribute("aria-pressed", state.paused);
     element("pause").textContent = state.paused ? "Resume" : "Pause";
     element("pause").title = state.paused ? "Resume rendering (Space)" : "Pause rendering (Space)";
-    const [most, all] = state.samples;
+    const [max, sceneSamples] = state.samples;
     const field = element("most-samples");
-    if (document.activeElement !== field) field.value = most ?? "";
-    field.placeholder = all || "all";
+    if (document.activeElement !== field) field.value = max ?? "";
+    field.placeholder = sceneSamples || "all";
     element("preview").value = state.preview;
   });
   onFrame(showProgress);
@@ -41,15 +41,15 @@ export function setUpRender(onKey, showNotice) {
 
 function showProgress(header) {
   const { samples, total, speed, view, latency } = header;
-  const counts = !header.first_hits;
-  element("bar").value = !counts ? 1 : total ? samples / total : 0;
-  element("samples").textContent = counts ? `${samples} of ${total}` : "1 ray per pixel";
-  element("speed").textContent = counts && speed ? withPrefix(speed) : "–";
+  const hasSamples = !header.first_hits;
+  element("bar").value = !hasSamples ? 1 : total ? samples / total : 0;
+  element("samples").textContent = hasSamples ? `${samples} of ${total}` : "1 ray per pixel";
+  element("speed").textContent = hasSamples && speed ? withPrefix(speed) : "–";
   if (latency !== null) element("latency").textContent = latency < 1 ? `${Math.round(latency * 1000)} ms` : `${latency.toFixed(2)} s`;
-  const isWhole = String(header.sent) === String(header.finest) && (!counts || samples > 0);
+  const isComplete = String(header.sent) === String(header.finest) && (!hasSamples || samples > 0);
   const name = element("scene").textContent.split(/[/\\]/).at(-1).replace(/\.[^.]*$/, "") || "image";
   for (const kind of KINDS) {
-    allowSave(kind, isWhole);
+    allowSave(kind, isComplete);
     element(`save-${kind}`).download = viewName(view) === "color" ? `${name}.${kind}` : `${name}-${viewName(view)}.${kind}`;
   }
 }

@@ -1,13 +1,13 @@
 // Sliders for overrides of shaders.
 
 import { editorLink } from "/editor.js";
-import { ask, element, lastState, onState } from "/link.js";
+import { element, lastState, onState, sendCommand } from "/link.js";
 import { numberField } from "/numbers.js";
-import { enable, keep, make, place } from "/parts.js";
+import { enable, make, reuse, setChildren } from "/parts.js";
 
 let rows = new Map(); // the rows of the sliders, by file, name and kind
-let made = 0; // number of rows made so far, for their ids
-let [underWay, waiting] = [false, new Map()]; // values that are not sent yet, by file and name
+let rowCount = 0; // number of rows made so far, for the ids of the rows
+let [isSending, waiting] = [false, new Map()]; // whether a value is being sent, and the next values by file and name
 
 const keyOf = ({ file, name }) => JSON.stringify([file, name]);
 const rowKey = (slider) => JSON.stringify([keyOf(slider), slider.kind]);
@@ -15,11 +15,11 @@ const isMoved = (slider) => slider.value !== slider.default;
 
 export function setUpShader(showNotice) {
   element("copy-sliders").addEventListener("click", () => copy(showNotice));
-  element("reset-sliders").addEventListener("click", () => ask("reset_sliders"));
+  element("reset-sliders").addEventListener("click", () => sendCommand("reset_sliders"));
   onState((state, isCurrent) => {
-    rows = keep(rows, state.sliders, rowKey, rowOf);
-    for (const slider of state.sliders) rows.get(rowKey(slider)).show(slider, state, isCurrent && !underWay);
-    place([element("sliders"), [...rows.values()].map(({ item }) => item)]);
+    rows = reuse(rows, state.sliders, rowKey, rowOf);
+    for (const slider of state.sliders) rows.get(rowKey(slider)).show(slider, state, isCurrent && !isSending);
+    setChildren([element("sliders"), [...rows.values()].map(({ item }) => item)]);
     const moved = state.sliders.some(isMoved);
     for (const id of ["copy-sliders", "reset-sliders"]) enable(element(id), moved);
     element("sliders-help").hidden = state.sliders.length > 0;
@@ -39,26 +39,26 @@ async function copy(showNotice) {
   }
 }
 
-// Sends one value at a time, the newest of each slider, because a drag produces more values than the program can
+// Sends the newest value of each slider, one value at a time, because a drag produces more values than the program can
 // render.
 function slide({ file, name }, value) {
   waiting.set(keyOf({ file, name }), { file, name, value });
-  if (!underWay) next();
+  if (!isSending) sendWaiting();
 }
 
-async function next() {
-  underWay = true;
+async function sendWaiting() {
+  isSending = true;
   while (waiting.size) {
     const [key, value] = waiting.entries().next().value;
     waiting.delete(key);
-    await ask({ slide: value });
+    await sendCommand({ slide: value });
   }
-  underWay = false;
+  isSending = false;
 }
 
 // Returns a slider's row and the function that updates it.
 function rowOf(slider) {
-  const id = `slider-${made++}`;
+  const id = `slider-${rowCount++}`;
   const name = make("label", { textContent: slider.name, htmlFor: id });
   const link = make("a");
   const reset = make("button", { type: "button", textContent: "Reset" });
@@ -68,17 +68,17 @@ function rowOf(slider) {
   inputs[0].id = id;
   reset.addEventListener("click", () => {
     if (reset.matches(":focus-visible")) inputs[0].focus(); // the button disappears
-    ask({ reset_slider: [slider.file, slider.name] });
+    sendCommand({ reset_slider: [slider.file, slider.name] });
   });
   const item = make("li", {}, head, make("span", { className: "pair" }, ...inputs));
   let isNew = true;
-  const show = (now, { editor }, isCurrent) => {
-    link.textContent = `${now.file}:${now.line}`;
-    const href = editorLink(editor, { file: now.path, line: now.line });
+  const show = (slider, { editor }, isCurrent) => {
+    link.textContent = `${slider.file}:${slider.line}`;
+    const href = editorLink(editor, { file: slider.path, line: slider.line });
     if (href) link.href = href;
     else link.removeAttribute("href");
-    reset.hidden = !isMoved(now);
-    if (isCurrent || isNew) update(now);
+    reset.hidden = !isMoved(slider);
+    if (isCurrent || isNew) update(slider);
     isNew = false;
   };
   return { item, show };
@@ -91,7 +91,7 @@ function switchOf(slider) {
 }
 
 function numberOf(slider) {
-  const field = { kind: slider.kind === "f32" ? "number" : "whole" }; // the range follows the file
+  const field = { kind: slider.kind === "f32" ? "number" : "whole" }; // `update` sets the range
   let last = slider.value;
   const range = make("input", { type: "range" });
   const box = make("input", { type: "number", step: "any" });

@@ -1,32 +1,32 @@
-// Sliders on touch screens: a finger that scrolls the page does not move the slider under it.
+// Sliders on touch screens: a finger that scrolls the page does not move the slider under the finger.
 
-const SLACK = 3; // sideways movement in pixels after which a touch becomes a drag
+const DRAG_THRESHOLD = 3; // sideways movement in pixels after which a touch becomes a drag
 
 let press = null; // the touch on a slider: its initial value, and whether input events are held back
 
 export function setUpTouch() {
   const on = (type, act) => window.addEventListener(type, act, true);
-  const ofPress = (act) => (event) => event.pointerId === press?.id && act(event);
+  const forPress = (act) => (event) => event.pointerId === press?.id && act(event);
   on("pointerdown", ({ target, pointerType, pointerId, isPrimary, clientX, clientY }) => {
     if (!isPrimary) return;
     const isSlider = pointerType !== "mouse" && target.matches("input[type=range]:enabled");
-    press = isSlider ? { range: target, from: target.value, id: pointerId, left: clientX, top: clientY, waits: true } : null;
+    press = isSlider ? { range: target, initial: target.value, id: pointerId, left: clientX, top: clientY, waits: true } : null;
   });
   for (const type of ["input", "change"]) {
     on(type, (event) => event.target === press?.range && press.waits && event.stopImmediatePropagation());
   }
-  on("pointermove", ofPress(({ clientX, clientY }) => {
+  on("pointermove", forPress(({ clientX, clientY }) => {
     const [x, y] = [Math.abs(clientX - press.left), Math.abs(clientY - press.top)];
-    if (press.waits && x > SLACK && x > y) release();
+    if (press.waits && x > DRAG_THRESHOLD && x > y) release();
   }));
-  on("pointerup", ofPress(() => press.waits && release()));
+  on("pointerup", forPress(() => press.waits && release()));
   // The browser takes over the touch for scrolling.
-  on("pointercancel", ofPress(() => {
-    const { range, from, waits } = press;
-    range.value = from;
+  on("pointercancel", forPress(() => {
+    const { range, initial, waits } = press;
+    range.value = initial;
     if (!waits) release();
   }));
-  // The browser fires its own input events for the touch right after this one.
+  // The browser fires input events for the touch right after this event.
   for (const type of ["touchend", "touchcancel"]) on(type, () => setTimeout(() => (press = null)));
 }
 

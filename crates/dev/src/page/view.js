@@ -1,16 +1,16 @@
 // Views and layers, exposure, view transform, false colours and the histogram.
 
-import { ask, element, onFrame, onState } from "/link.js";
+import { element, onFrame, onState, sendCommand } from "/link.js";
 import { numberField } from "/numbers.js";
 import { enable } from "/parts.js";
 
 const VIEWS = ["color", "normal", "depth", "uv", "primitive", "samples", "compare"];
 const radios = () => [...document.querySelectorAll("input[name=view]")];
-const LIMIT = 100; // maximum exposure in stops, positive or negative
-const STOPS = { kind: "number", range: [-LIMIT, LIMIT] };
+const MAX_EXPOSURE = 100; // maximum exposure in stops, positive or negative
+const EXPOSURE_FIELD = { kind: "number", range: [-MAX_EXPOSURE, MAX_EXPOSURE] };
 let stops = 0; // current exposure
 let showStops = null; // shows an exposure in its box and slider
-let choice = { exposure: null, transform: null, false_color: false };
+let overrides = { exposure: null, transform: null, false_color: false };
 
 // Returns the name of a view: "normal" for "normal", and "compare" for {"compare": "cpu"}.
 export const viewName = (view) => (typeof view === "string" ? view : Object.keys(view)[0]);
@@ -32,9 +32,9 @@ export function setUpView(picture, onKey, showNotice) {
   };
 
   setUpExposure(showNotice);
-  element("transform").addEventListener("change", ({ target }) => look({ transform: target.value }));
-  element("false-color").addEventListener("change", ({ target }) => look({ false_color: target.checked }));
-  element("reset-look").addEventListener("click", () => look({ exposure: null, transform: null, false_color: false }));
+  element("transform").addEventListener("change", ({ target }) => setOverrides({ transform: target.value }));
+  element("false-color").addEventListener("change", ({ target }) => setOverrides({ false_color: target.checked }));
+  element("reset-look").addEventListener("click", () => setOverrides({ exposure: null, transform: null, false_color: false }));
   onState(showState);
   onFrame((header) => {
     drawHistogram(header);
@@ -45,37 +45,36 @@ export function setUpView(picture, onKey, showNotice) {
 
 function setUpExposure(showNotice) {
   const slider = element("exposure");
-  const expose = (asked) => {
-    const exposure = Math.max(-LIMIT, Math.min(LIMIT, asked));
-    if (exposure === asked) showNotice("");
-    else showNotice(`Exposure must be from -${LIMIT} to ${LIMIT} stops: ${asked} became ${exposure}`, true);
-    look({ exposure });
+  const setExposure = (requested) => {
+    const exposure = Math.max(-MAX_EXPOSURE, Math.min(MAX_EXPOSURE, requested));
+    if (exposure === requested) showNotice("");
+    else showNotice(`Exposure must be from -${MAX_EXPOSURE} to ${MAX_EXPOSURE} stops: ${requested} became ${exposure}`, true);
+    setOverrides({ exposure });
   };
-  const showInBox = numberField(element("exposure-number"), STOPS, () => [stops], expose);
+  const showInBox = numberField(element("exposure-number"), EXPOSURE_FIELD, () => [stops], setExposure);
   showStops = (stops) => {
-    // The slider usually has a smaller range than the box. The range is widened for a value outside it, and stays wide
-    // during a drag.
-    if (Math.abs(stops) > Number(slider.max)) [slider.min, slider.max] = [-LIMIT, LIMIT];
+    // The slider has a smaller range than the box until the value is outside the slider's range.
+    if (Math.abs(stops) > Number(slider.max)) [slider.min, slider.max] = [-MAX_EXPOSURE, MAX_EXPOSURE];
     slider.value = stops;
     showInBox(stops);
   };
   slider.addEventListener("input", () => {
     showInBox(slider.valueAsNumber);
-    expose(slider.valueAsNumber);
+    setExposure(slider.valueAsNumber);
   });
 }
 
-// Switches to a view; the comparison uses the selected counterpart.
+// Switches to a view. A comparison uses the selected second image.
 export function choose(view) {
   const against = document.querySelector("input[name=against]:checked").value;
   for (const radio of radios()) radio.checked = radio.value === view;
   if (view === "compare") element("compare").open = true;
-  ask({ view: view === "compare" ? { compare: against } : view });
+  sendCommand({ view: view === "compare" ? { compare: against } : view });
 }
 
-function look(change) {
-  choice = { ...choice, ...change };
-  ask({ look: choice });
+function setOverrides(change) {
+  overrides = { ...overrides, ...change };
+  sendCommand({ look: overrides });
 }
 
 function showState(state, isCurrent) {
@@ -90,16 +89,16 @@ function showState(state, isCurrent) {
   layers.classList.toggle("chosen", isLayer);
   reveal(isLayer ? layers : document.querySelector("input[name=view]:checked")?.parentElement);
 
-  choice = state.look;
+  overrides = state.look;
   const [exposure, transform] = state.scene_look;
-  stops = choice.exposure ?? exposure;
+  stops = overrides.exposure ?? exposure;
   showStops(stops);
-  element("transform").value = choice.transform ?? transform;
-  element("false-color").checked = choice.false_color;
-  enable(element("reset-look"), choice.exposure !== null || choice.transform !== null || choice.false_color);
+  element("transform").value = overrides.transform ?? transform;
+  element("false-color").checked = overrides.false_color;
+  enable(element("reset-look"), overrides.exposure !== null || overrides.transform !== null || overrides.false_color);
 }
 
-// Scrolls the toolbar of a narrow screen to another view's button.
+// Scrolls the toolbar of a narrow screen to the button of a newly selected view.
 let revealed = null;
 function reveal(button) {
   if (!button || button === revealed) return;
@@ -142,7 +141,7 @@ function showLegend(legend) {
   });
 }
 
-// Draws the number of pixels per value, in stops. A line marks the value that the exposure maps to 1.
+// Draws the number of pixels per value; values are in stops. A line marks the value that the exposure maps to 1.
 let lastHeader = null;
 function drawHistogram(header = lastHeader) {
   lastHeader = header;
@@ -155,7 +154,7 @@ function drawHistogram(header = lastHeader) {
   [canvas.width, canvas.height] = [canvas.clientWidth, canvas.clientHeight].map((v) => Math.round(v * ratio));
   const context = canvas.getContext("2d");
   const style = getComputedStyle(canvas);
-  const most = Math.sqrt(Math.max(1, ...counts.flat()));
+  const maxHeight = Math.sqrt(Math.max(1, ...counts.flat()));
   const x = (bin) => (bin / bins) * canvas.width;
   const isDark = matchMedia("(prefers-color-scheme: dark)").matches;
   context.globalCompositeOperation = isDark ? "lighter" : "multiply";
@@ -163,7 +162,7 @@ function drawHistogram(header = lastHeader) {
   counts.forEach((channel, i) => {
     context.fillStyle = colors[i];
     channel.forEach((count, bin) => {
-      const height = (Math.sqrt(count) / most) * canvas.height;
+      const height = (Math.sqrt(count) / maxHeight) * canvas.height;
       context.fillRect(x(bin), canvas.height - height, x(bin + 1) - x(bin), height);
     });
   });
@@ -173,8 +172,8 @@ function drawHistogram(header = lastHeader) {
   context.fillRect(Math.round(x(white)), 0, Math.max(1, ratio), canvas.height);
   const above = Math.max(...above_white) / Math.max(1, header.sent[0] * header.sent[1]);
   const stop = (bin) => power(first + Math.floor(bin / of_a_stop));
-  const seen = counts[0].map((_, bin) => counts.some((channel) => channel[bin] > 0));
-  const [low, high] = [seen.indexOf(true), seen.lastIndexOf(true)];
+  const isUsed = counts[0].map((_, bin) => counts.some((channel) => channel[bin] > 0));
+  const [low, high] = [isUsed.indexOf(true), isUsed.lastIndexOf(true)];
   const range = low < 0 ? "No light" : `Range ${stop(low)} to ${stop(high + of_a_stop)}`;
   text.textContent = `${range}; ${(100 * above).toFixed(1)}% clipped`;
   canvas.setAttribute("aria-label", `Histogram: ${text.textContent}`);

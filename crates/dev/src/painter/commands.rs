@@ -13,19 +13,19 @@ use wgray_render::pack::pack_camera;
 use wgray_render::records::{Camera, Packed};
 
 impl Painter {
-    pub(super) fn take_command(&mut self, command: Command) {
+    pub(super) fn execute(&mut self, command: Command) {
         match command {
-            Command::Grab => self.walk.end_step(),
-            Command::Move(by) => self.move_camera(by),
-            Command::Viewpoint(viewpoint) => self.place_camera(viewpoint),
-            Command::Frame(pixel) => self.frame(pixel),
+            Command::Grab => self.camera_history.end_step(),
+            Command::Move(camera_move) => self.move_camera(camera_move),
+            Command::Viewpoint(viewpoint) => self.set_viewpoint(viewpoint),
+            Command::Frame(pixel) => self.frame_object(pixel),
             Command::Back => self.retrace(false),
             Command::Forth => self.retrace(true),
             Command::ResetCamera => self.reset_camera(),
             Command::SaveCamera => self.save_camera(),
             Command::Set(set) => self.set(&set),
-            Command::UndoWrite => self.turn(false),
-            Command::RedoWrite => self.turn(true),
+            Command::UndoWrite => self.undo_or_redo(false),
+            Command::RedoWrite => self.undo_or_redo(true),
             Command::View(view) => self.choose_view(view),
             Command::Gain(gain) => {
                 self.gain = gain.clamp(1.0, 1e9);
@@ -40,41 +40,41 @@ impl Painter {
                 self.marks = marks;
                 self.show();
             }
-            Command::DisplaySettings(choice) => match choice.checked() {
-                Ok(look) => {
-                    self.look = look;
+            Command::DisplaySettings(overrides) => match overrides.checked() {
+                Ok(overrides) => {
+                    self.display_overrides = overrides;
                     self.show();
                 }
                 Err(error) => self.notice(&Err(error), String::new()),
             },
             Command::Pause(paused) => self.paused = paused,
             Command::Restart => {
-                self.camera_waits = true; // starts again from the current camera
+                self.restart_pending = true;
                 if let Some(running) = &mut self.running {
                     running.halted = false;
                 }
             }
-            Command::Samples(most) => {
-                let samples = most.map_or(u32::MAX, NonZeroU32::get);
-                self.limit(Limits { samples, ..self.limits });
+            Command::Samples(max) => {
+                let samples = max.map_or(u32::MAX, NonZeroU32::get);
+                self.set_limits(Limits { samples, ..self.limits });
             }
             Command::Preview(preview) => {
                 let scale = preview.scale();
-                self.limit(Limits { scale, ..self.limits });
+                self.set_limits(Limits { scale, ..self.limits });
             }
-            Command::Keep => self.keep(),
+            Command::Keep => self.keep_reference(),
         }
     }
 
-    fn limit(&mut self, limits: Limits) {
+    fn set_limits(&mut self, limits: Limits) {
         if limits == self.limits {
             return;
         }
         self.limits = limits;
-        let view = self.seen();
+        let view = self.shown_view();
         let Some(running) = &mut self.running else { return };
         match guarded(|| running.canvas.set_limits(limits, view)) {
-            Ok(()) => self.begun((Instant::now(), false)),
+            Ok(()) => self.record_start((Instant::now(), false)),
             Err(error) => return self.fail(&error),
         }
         if self.is_done() {
@@ -82,10 +82,11 @@ impl Painter {
         }
     }
 
-    pub(super) fn notice(&mut self, result: &Result<(), String>, good: String) {
+    /// Shows a notice: the error of `result`, or `message`.
+    pub(super) fn notice(&mut self, result: &Result<(), String>, message: String) {
         let number = self.state.notice.as_ref().map_or(0, |notice| notice.number) + 1;
         let (text, bad) = match result {
-            Ok(()) => (good, false),
+            Ok(()) => (message, false),
             Err(error) => (error.clone(), true),
         };
         self.state.notice = Some(Notice {
@@ -96,27 +97,27 @@ impl Painter {
         });
     }
 
-    /// A value was accepted: withdraws earlier errors.
-    pub(super) fn taken(&mut self) {
+    /// Withdraws an error notice, after a later value was accepted.
+    pub(super) fn clear_error(&mut self) {
         if self.state.notice.as_ref().is_some_and(|notice| notice.bad) {
             self.notice(&Ok(()), String::new());
         }
     }
 
     pub(super) fn packed_camera(&self, loaded: &Loaded) -> Camera {
-        let (own, origin) = (loaded.packed.camera, loaded.packed.origin);
-        let camera = self.camera.as_ref().and_then(|camera| camera.validate().ok());
-        camera.map_or(own, |camera| {
-            pack_camera(&camera, origin, own.width, own.height, own.seed)
+        let (file_camera, origin) = (loaded.packed.camera, loaded.packed.origin);
+        let moved = self.camera.as_ref().and_then(|camera| camera.validate().ok());
+        moved.map_or(file_camera, |camera| {
+            pack_camera(&camera, origin, file_camera.width, file_camera.height, file_camera.seed)
         })
     }
 
-    /// For the selected view.
+    /// Returns the kernel constants for the selected view.
     pub(super) fn constants(&self, loaded: &Loaded) -> Constants {
         constants(&loaded.packed, self.view)
     }
 
-    /// With the current camera, for the selected view.
+    /// Returns the packed scene with the current camera, for the selected view.
     pub(super) fn packed(&self, loaded: &Loaded) -> Packed {
         let (specialization, ..) = self.constants(loaded);
         Packed {

@@ -5,16 +5,16 @@ use std::sync::Arc;
 use super::Painter;
 use crate::messages::Event;
 use crate::picture::{Against, Content, Frame, View};
-use crate::reference::{Apart, Reference};
+use crate::reference::{ErrorMeasures, Reference};
 use wgray_image::Pixels;
 
 #[derive(Default)]
 pub struct Comparison {
     /// The last complete image from before the last saved change.
     pub before: Option<Reference>,
-    /// The reference: an image that was kept or uploaded.
+    /// An image that a viewer kept or uploaded.
     pub reference: Option<Reference>,
-    apart: Option<Apart>,
+    errors: Option<ErrorMeasures>,
     measuring: bool,
 }
 
@@ -25,7 +25,7 @@ impl Comparison {
         (self.before.is_some(), name)
     }
 
-    fn with(&self, against: Against) -> Option<&Reference> {
+    fn counterpart(&self, against: Against) -> Option<&Reference> {
         match against {
             Against::Cpu => None,
             Against::Before => self.before.as_ref(),
@@ -36,18 +36,18 @@ impl Comparison {
 
 impl Painter {
     /// Returns the displayed image if it is complete, in color and up to date.
-    fn whole_picture(&self) -> Option<Pixels> {
+    fn complete_image(&self) -> Option<Pixels> {
         let frame = self.frame_sender.borrow().clone()?;
         let header = &frame.header;
-        let is_whole = header.sent == header.finest && header.samples > 0 && header.revision == self.revision;
+        let is_complete = header.sent == header.finest && header.samples > 0 && header.revision == self.revision;
         match &frame.content {
-            Content::Color(pixels) | Content::Compare(pixels, _) if is_whole => Some(pixels.clone()),
+            Content::Color(pixels) | Content::Compare(pixels, _) if is_complete => Some(pixels.clone()),
             _ => None,
         }
     }
 
-    pub(super) fn keep_before(&mut self) {
-        if let Some(pixels) = self.whole_picture() {
+    pub(super) fn keep_previous_image(&mut self) {
+        if let Some(pixels) = self.complete_image() {
             self.comparison.before = Some(Reference {
                 name: "before the change".to_string(),
                 pixels: Arc::new(pixels),
@@ -55,10 +55,10 @@ impl Painter {
         }
     }
 
-    pub(super) fn keep(&mut self) {
-        match self.whole_picture() {
+    pub(super) fn keep_reference(&mut self) {
+        match self.complete_image() {
             Some(pixels) => {
-                self.take_reference(Reference {
+                self.set_reference(Reference {
                     name: "kept image".to_string(),
                     pixels: Arc::new(pixels),
                 });
@@ -68,23 +68,25 @@ impl Painter {
         }
     }
 
-    pub(super) fn take_reference(&mut self, reference: Reference) {
+    pub(super) fn set_reference(&mut self, reference: Reference) {
         self.comparison.reference = Some(reference);
-        self.comparison.apart = None;
+        self.comparison.errors = None;
         if self.view == View::Compare(Against::Reference) && self.running.is_some() {
             self.show();
         }
     }
 
     /// Returns the content together with the image to compare with, and the names of both images.
-    pub(super) fn beside(&self, content: Content, whole: [u32; 2]) -> (Content, Option<[String; 2]>) {
+    pub(super) fn with_counterpart(&self, content: Content, full_size: [u32; 2]) -> (Content, Option<[String; 2]>) {
         let View::Compare(against) = self.view else {
             return (content, None);
         };
-        let picture = "picture".to_string();
-        match (content, self.comparison.with(against)) {
-            (Content::Color(pixels), Some(other)) => match other.at(whole, [pixels.width, pixels.height]) {
-                Some(second) => (Content::Compare(pixels, second), Some([picture, other.name.clone()])),
+        match (content, self.comparison.counterpart(against)) {
+            (Content::Color(pixels), Some(reference)) => match reference.at(full_size, [pixels.width, pixels.height]) {
+                Some(second) => {
+                    let names = ["picture".to_string(), reference.name.clone()];
+                    (Content::Compare(pixels, second), Some(names))
+                }
                 None => (Content::Color(pixels), None),
             },
             (content @ Content::Compare(..), _) => (content, Some(["GPU".to_string(), "CPU".to_string()])),
@@ -92,53 +94,54 @@ impl Painter {
         }
     }
 
-    /// Measures a finished comparison on a separate thread, because this takes longer than a frame.
+    /// Measures a finished comparison on a separate thread, because the measurement takes longer than a frame.
     pub(super) fn measure(&mut self, frame: &Arc<Frame>) {
         if frame.header.done && !self.comparison.measuring && matches!(frame.content, Content::Compare(..)) {
             self.comparison.measuring = true;
             let (frame, events) = (frame.clone(), self.events.clone());
-            let work = move || {
+            let measure = move || {
                 if let Content::Compare(first, second) = &frame.content {
-                    let apart = Apart::of(frame.header.number, first, second);
-                    let _ = events.send(Event::Measured(apart)); // fails only after the end of the session
+                    let errors = ErrorMeasures::of(frame.header.number, first, second);
+                    let _ = events.send(Event::Measured(errors)); // fails only after the end of the session
                 }
             };
-            let started = std::thread::Builder::new().name("measure".to_string()).spawn(work);
+            let started = std::thread::Builder::new().name("measure".to_string()).spawn(measure);
             self.comparison.measuring = started.is_ok();
         }
     }
 
-    pub(super) fn take_measured(&mut self, apart: Apart) {
+    pub(super) fn set_errors(&mut self, errors: ErrorMeasures) {
         self.comparison.measuring = false;
-        self.comparison.apart = Some(apart);
+        self.comparison.errors = Some(errors);
         // A different image may be shown by now.
         let newest = self.frame_sender.borrow().clone();
-        if let Some(frame) = newest.filter(|frame| frame.header.number != apart.frame) {
+        if let Some(frame) = newest.filter(|frame| frame.header.number != errors.frame) {
             self.measure(&frame);
         }
     }
 
-    pub(super) fn apart(&self) -> Option<Apart> {
-        self.comparison.apart.filter(|apart| apart.frame == self.frames)
+    /// Returns the error measures of the current frame, if they are measured.
+    pub(super) fn errors(&self) -> Option<ErrorMeasures> {
+        self.comparison.errors.filter(|errors| errors.frame == self.frames)
     }
 
     /// Returns the reason if the comparison cannot be shown.
     pub(super) fn no_comparison(&self) -> Option<String> {
         let View::Compare(against) = self.view else { return None };
-        let whole = self.running.as_ref()?.canvas.finest_size();
+        let size = self.running.as_ref()?.canvas.final_size();
         let missing = match against {
             Against::Cpu => return None,
             Against::Before => "No change has been saved since the camera moved",
             Against::Reference => "No reference yet. Set the image as the reference, or open a file.",
         };
-        match self.comparison.with(against) {
+        match self.comparison.counterpart(against) {
             None => Some(missing.to_string()),
-            Some(other) if other.at(whole, [1, 1]).is_none() => {
-                let Pixels { width, height, .. } = *other.pixels;
-                let [w, h] = whole;
+            Some(reference) if reference.at(size, [1, 1]).is_none() => {
+                let Pixels { width, height, .. } = *reference.pixels;
+                let [w, h] = size;
                 Some(format!(
                     "{} is {width} × {height}, but the image is {w} × {h}",
-                    other.name
+                    reference.name
                 ))
             }
             Some(_) => None,

@@ -48,66 +48,66 @@ pub struct Painter {
     sources: Sources,
     builder: Builder,
     out: Option<PathBuf>,
-    /// Number of viewers; `None` renders without viewers.
-    looking: Option<Arc<AtomicUsize>>,
+    /// Number of viewers; `None` renders even without viewers.
+    viewers: Option<Arc<AtomicUsize>>,
     /// The revision that was last written to the output file.
     written: Option<u64>,
     report: Box<dyn Fn(Report) + Send>,
     state_sender: watch::Sender<Arc<State>>,
     frame_sender: watch::Sender<Option<Arc<Frame>>>,
-    seen_sender: watch::Sender<Option<Arc<SceneView>>>,
+    scene_view_sender: watch::Sender<Option<Arc<SceneView>>>,
     state: State,
 
     /// The last valid scene.
     loaded: Option<Arc<Loaded>>,
     /// The newest readable shaders.
     shaders: Option<Arc<Shaders>>,
-    /// The last shaders that rendered an image.
-    good: Option<Arc<Shaders>>,
-    /// Shaders that were refused for these constants.
-    refused: Vec<(Arc<Shaders>, Constants)>,
-    /// The last shaders whose loops the driver truncated. In a different scene, the driver may not truncate them.
-    cut: Option<(Arc<Shaders>, Constants)>,
+    /// The last shaders that rendered a complete image.
+    last_good: Option<Arc<Shaders>>,
+    /// Shaders with errors, and the constants with which the errors occur.
+    rejected: Vec<(Arc<Shaders>, Constants)>,
+    /// The last shaders whose loops the driver truncated. In a different scene, the loops may be shorter.
+    truncated: Option<(Arc<Shaders>, Constants)>,
     device: Option<Device>,
     running: Option<Running>,
     /// The color kernel while a layer kernel runs; otherwise the last layer kernel.
     parked: Option<Running>,
     pending: Option<Pending>,
     requests: u64,
-    /// The first request whose kernel may still be shown.
-    oldest: u64,
+    /// The number of the first request whose kernel may still be shown.
+    first_valid_request: u64,
     failures: u32,
     problems: Problems,
 
     /// The camera, if it differs from the camera in the file.
     camera: Option<CameraDescription>,
     sliders: Sliders,
-    /// True if the camera or a slider moved since the image was started.
-    camera_waits: bool,
+    /// True if the camera or a slider was moved since the image was started.
+    restart_pending: bool,
     history: History,
-    /// The changes that this session made to the scene file, so that the watcher need not read them again.
+    /// The changes that this session made to the scene file. The watcher does not read these changes again.
     writes: Arc<Mutex<Writes>>,
     files: Vec<(PathBuf, FileStamp)>,
     view: View,
     times: Times,
     gain: f32,
     marks: bool,
-    look: DisplayOverrides,
+    display_overrides: DisplayOverrides,
     limits: Limits,
     paused: bool,
-    walk: CameraHistory,
+    camera_history: CameraHistory,
     comparison: Comparison,
-    /// The inbox of the session, for results of other threads.
+    /// Sends results of other threads to the painter.
     events: SyncSender<Event>,
-    /// The last reported sizes of an image that is too large to display: the full size, and the displayed size.
-    smaller: Option<([u32; 2], [u32; 2])>,
+    /// The full size and the displayed size of an image that is too large to display, as last reported.
+    reported_sizes: Option<([u32; 2], [u32; 2])>,
 
     executed: u64,
     frames: u64,
     /// Number of images started so far.
     revision: u64,
-    /// The time when the newest change that is not displayed yet was noticed, and whether the change was a save.
-    since: Option<(Instant, bool)>,
+    /// The oldest change that is not displayed yet: the time when it was noticed, and whether it was a save.
+    change: Option<(Instant, bool)>,
     /// Seconds from the last change to its first image.
     latency: Option<f64>,
     /// Seconds spent on compiling for the next frame.
@@ -126,7 +126,7 @@ struct Running {
     constants: Constants,
     /// The sliders of the kernel, as declared in the current shaders.
     sliders: Vec<Slider>,
-    /// The bits of their values.
+    /// The slider values as bits.
     slider_values: Vec<u32>,
 }
 
@@ -145,7 +145,7 @@ pub struct SessionChannels {
     /// The template of links to an editor.
     pub editor: Option<String>,
     /// The scene and the camera, for queries about objects.
-    pub seen: watch::Sender<Option<Arc<SceneView>>>,
+    pub scene_views: watch::Sender<Option<Arc<SceneView>>>,
     pub events: SyncSender<Event>,
 }
 
@@ -154,7 +154,7 @@ impl Painter {
         sources: Sources,
         device: Device,
         builder: Builder,
-        (out, looking): (Option<PathBuf>, Option<Arc<AtomicUsize>>),
+        (out, viewers): (Option<PathBuf>, Option<Arc<AtomicUsize>>),
         writes: Arc<Mutex<Writes>>,
         channels: SessionChannels,
     ) -> Painter {
@@ -164,7 +164,7 @@ impl Painter {
             frames: frame_sender,
             times,
             editor,
-            seen: seen_sender,
+            scene_views: scene_view_sender,
             events,
         } = channels;
         let state = State {
@@ -180,29 +180,29 @@ impl Painter {
             sources,
             builder,
             out,
-            looking,
+            viewers,
             written: None,
             report,
             state_sender,
             frame_sender,
-            seen_sender,
+            scene_view_sender,
             state,
             loaded: None,
             shaders: None,
-            good: None,
-            refused: Vec::new(),
-            cut: None,
+            last_good: None,
+            rejected: Vec::new(),
+            truncated: None,
             device: Some(device),
             running: None,
             parked: None,
             pending: None,
             requests: 0,
-            oldest: 0,
+            first_valid_request: 0,
             failures: 0,
             problems: Problems::default(),
             camera: None,
             sliders: Sliders::default(),
-            camera_waits: false,
+            restart_pending: false,
             history: History::default(),
             writes,
             files: Vec::new(),
@@ -210,17 +210,17 @@ impl Painter {
             times,
             gain: GAIN,
             marks: true,
-            look: DisplayOverrides::default(),
+            display_overrides: DisplayOverrides::default(),
             limits: Limits::default(),
             paused: false,
-            walk: CameraHistory::default(),
+            camera_history: CameraHistory::default(),
             comparison: Comparison::default(),
             events,
-            smaller: None,
+            reported_sizes: None,
             executed: 0,
             frames: 0,
             revision: 0,
-            since: None,
+            change: None,
             latency: None,
             compiled: None,
             first_frame: None,
@@ -229,21 +229,21 @@ impl Painter {
         }
     }
 
-    pub fn take(&mut self, event: Event) {
+    pub fn handle(&mut self, event: Event) {
         match event {
-            Event::Files(snapshot, noticed, writes) => self.take_files(*snapshot, noticed, writes),
-            Event::BuildResult(built) => self.take_built(*built),
+            Event::Files(snapshot, noticed, writes) => self.handle_files(*snapshot, noticed, writes),
+            Event::BuildResult(built) => self.handle_build(*built),
             Event::Command(command) => {
-                self.take_command(command);
+                self.execute(command);
                 self.executed += 1;
             }
-            Event::Reference(reference) => self.take_reference(reference),
-            Event::Measured(apart) => self.take_measured(apart),
+            Event::Reference(reference) => self.set_reference(reference),
+            Event::Measured(errors) => self.set_errors(errors),
             Event::Viewers => {
                 // Restarts the latency measurement: no viewer has been waiting for the image, or for a compilation that
                 // has already finished.
                 if self.pending.is_none() {
-                    self.since = self.since.map(|(_, saved)| (Instant::now(), saved));
+                    self.change = self.change.map(|(_, saved)| (Instant::now(), saved));
                     self.compiled = None;
                 }
             }
@@ -252,42 +252,42 @@ impl Painter {
             Event::Lose => self.device.iter().for_each(|device| device.wgpu().0.destroy()),
             Event::Stop => {}
         }
-        self.tell();
+        self.publish();
     }
 
-    fn take_files(&mut self, snapshot: Snapshot, noticed: Instant, writes: u64) {
+    fn handle_files(&mut self, snapshot: Snapshot, noticed: Instant, writes: u64) {
         self.state.reading = false;
-        for (part, took) in ["read files", "pack"].into_iter().zip(snapshot.took) {
-            if !took.is_zero() {
-                self.times.part(part, took);
+        for (stage, duration) in ["read files", "pack"].into_iter().zip(snapshot.durations) {
+            if !duration.is_zero() {
+                self.times.record_stage(stage, duration);
             }
         }
         // Snapshots from before the last write are outdated.
         let is_new = writes == self.writes.lock().unwrap_or_else(PoisonError::into_inner).count;
-        let known = self.loaded.as_ref().map(|loaded| loaded.text.as_bytes());
+        let loaded_text = self.loaded.as_ref().map(|loaded| loaded.text.as_bytes());
         if let (true, Some((_, FileStamp::Content(content)))) = (is_new, snapshot.files.first())
-            && known != Some(content)
+            && loaded_text != Some(content)
         {
             self.forget_writes();
         }
-        let mut shown_otherwise = false;
+        let mut display_changed = false;
         if is_new {
             self.files = snapshot.files;
-            shown_otherwise = self.take_scene(snapshot.scene);
+            display_changed = self.set_scene(snapshot.scene);
         }
         match snapshot.shaders {
             Ok(shaders) => {
                 self.problems.files = None;
-                self.take_shaders(shaders);
+                self.set_shaders(shaders);
             }
             Err(problem) => self.problems.files = Some(*problem),
         }
-        self.show_files(noticed, shown_otherwise);
+        self.show_files(noticed, display_changed);
     }
 
-    /// Takes a loaded scene or its errors. Returns true if the display settings changed.
-    fn take_scene(&mut self, scene: Result<Arc<Loaded>, Vec<Diagnostic>>) -> bool {
-        let mut shown_otherwise = false;
+    /// Sets the scene or its errors. Returns true if the display settings changed.
+    fn set_scene(&mut self, scene: Result<Arc<Loaded>, Vec<Diagnostic>>) -> bool {
+        let mut display_changed = false;
         match scene {
             Ok(loaded) => {
                 self.problems.scene.clear();
@@ -296,75 +296,80 @@ impl Painter {
                     self.camera = merged(camera, &old.camera, &loaded.camera);
                 }
                 if self.loaded.as_ref().is_some_and(|old| old.packed != loaded.packed) {
-                    self.keep_before();
-                    let cut = self.cut.take();
-                    self.refused.retain(|known| Some(known) != cut.as_ref());
+                    self.keep_previous_image();
+                    let truncated = self.truncated.take();
+                    self.rejected.retain(|shaders| Some(shaders) != truncated.as_ref());
                 }
-                let known = self.loaded.as_ref().map_or(&[][..], |old| &old.scene.notes);
-                for note in loaded.scene.notes.iter().filter(|note| !known.contains(note)) {
+                let old = self.loaded.as_ref();
+                let old_notes = old.map_or(&[][..], |old| &old.scene.notes);
+                for note in loaded.scene.notes.iter().filter(|note| !old_notes.contains(note)) {
                     (self.report)(Report::Note(note.to_string()));
                 }
-                let known = self.loaded.as_ref();
-                shown_otherwise = known.is_some_and(|old| old.scene.view != loaded.scene.view);
+                display_changed = old.is_some_and(|old| old.scene.view != loaded.scene.view);
                 self.loaded = Some(loaded);
                 self.state.scenes += 1;
             }
             Err(problems) => self.problems.scene = problems,
         }
-        shown_otherwise
+        display_changed
     }
 
-    fn show_files(&mut self, noticed: Instant, shown_otherwise: bool) {
+    fn show_files(&mut self, noticed: Instant, display_changed: bool) {
         self.failures = 0;
         self.keep_view();
-        self.settle((noticed, true));
+        self.synchronize((noticed, true));
         self.upload_sliders((noticed, true));
         // If only the display settings changed, shows the current image again. The first image of a new rendering is
         // shown later.
-        let picture = self.running.as_ref().filter(|running| !running.canvas.is_new());
-        if shown_otherwise && self.pending.is_none() && picture.is_some() {
-            self.changed((noticed, true));
+        let has_image = self.running.as_ref().is_some_and(|running| !running.canvas.is_new());
+        if display_changed && self.pending.is_none() && has_image {
+            self.record_change((noticed, true));
             self.show();
         }
     }
 
-    /// Returns the scene and the shaders to render: the newest ones, or the last good ones if the newest have errors.
-    fn wanted(&self) -> Option<(Arc<Loaded>, Arc<Shaders>)> {
+    /// Returns the scene and the shaders to render: the newest shaders, or the last good shaders if the newest shaders
+    /// have errors.
+    fn target(&self) -> Option<(Arc<Loaded>, Arc<Shaders>)> {
         let (loaded, newest) = (self.loaded.clone()?, self.shaders.clone()?);
         let constants = self.constants(&loaded);
-        let mut candidates = [Some(newest), self.good.clone()].into_iter().flatten();
-        let shaders = candidates.find(|shaders| !self.refused.contains(&(shaders.clone(), constants)))?;
+        let mut candidates = [Some(newest), self.last_good.clone()].into_iter().flatten();
+        let shaders = candidates.find(|shaders| !self.rejected.contains(&(shaders.clone(), constants)))?;
         Some((loaded, shaders))
     }
 
     /// Makes the rendering match the current scene and shaders.
-    fn settle(&mut self, since: (Instant, bool)) {
-        let Some((loaded, shaders)) = self.wanted() else { return };
+    fn synchronize(&mut self, change: (Instant, bool)) {
+        let Some((loaded, shaders)) = self.target() else { return };
         if self.shaders.as_ref() == Some(&shaders) {
             self.problems.shader.clear();
         }
         let constants = self.constants(&loaded);
-        let fits = |known: &Arc<Shaders>, of| *known == shaders && constants == of;
+        let matches =
+            |other_shaders: &Arc<Shaders>, other_constants| *other_shaders == shaders && constants == other_constants;
         let running = self.running.as_ref();
-        let fitting = running.is_some_and(|running| fits(&running.shaders, running.constants));
-        if fitting || self.take_parked(&shaders, &constants) {
+        let is_running = running.is_some_and(|running| matches(&running.shaders, running.constants));
+        if is_running || self.unpark(&shaders, &constants) {
             self.pending = None;
-            self.oldest = self.requests + 1;
-            if !fitting {
-                self.show_parked(since);
+            self.first_valid_request = self.requests + 1;
+            if !is_running {
+                self.show_parked(change);
             }
-            self.draw_scene(since);
-        } else if !(self.pending.as_ref()).is_some_and(|pending| fits(&pending.shaders, pending.constants)) {
-            self.since.get_or_insert(since);
-            self.request(&loaded, shaders, since.0);
+            self.draw_scene(change);
+        } else if !(self.pending.as_ref()).is_some_and(|pending| matches(&pending.shaders, pending.constants)) {
+            self.change.get_or_insert(change);
+            self.request(&loaded, shaders, change.0);
         }
     }
 
     fn request(&mut self, loaded: &Loaded, shaders: Arc<Shaders>, noticed: Instant) {
         let constants = self.constants(loaded);
         let running = self.running.as_ref();
-        let stays = running.is_some_and(|running| running.constants == constants);
-        let fallback = self.good.clone().filter(|good| !stays && *good != shaders);
+        let can_show_scene = running.is_some_and(|running| running.constants == constants);
+        let fallback = self
+            .last_good
+            .clone()
+            .filter(|last_good| !can_show_scene && *last_good != shaders);
         self.requests += 1;
         self.builder.request(Request {
             id: self.requests,
@@ -382,43 +387,43 @@ impl Painter {
         });
     }
 
-    fn draw_scene(&mut self, since: (Instant, bool)) {
+    fn draw_scene(&mut self, change: (Instant, bool)) {
         let Some(loaded) = self.loaded.clone() else { return };
         let packed = self.packed(&loaded);
-        let (view, times) = (self.seen(), self.times.clone());
+        let (view, times) = (self.shown_view(), self.times.clone());
         let Some(running) = &mut self.running else { return };
         if running.canvas.shows(&packed) {
-            if !self.camera_waits {
-                self.since = None;
+            if !self.restart_pending {
+                self.change = None;
             }
             return;
         }
         running.halted = false;
-        match guarded(|| times.of("upload", || running.canvas.update(&packed, view))) {
-            Ok(true) => self.begun(since),
-            Ok(false) => {} // impossible, because it fits
+        match guarded(|| times.measure("upload", || running.canvas.update(&packed, view))) {
+            Ok(true) => self.record_start(change),
+            Ok(false) => {} // impossible, because the kernel matches the scene
             Err(error) => self.fail(&error),
         }
     }
 
     /// Records that an image was started with the current camera.
-    fn begun(&mut self, since: (Instant, bool)) {
-        self.camera_waits = false;
-        self.tell_size();
-        self.changed(since);
+    fn record_start(&mut self, change: (Instant, bool)) {
+        self.restart_pending = false;
+        self.report_size();
+        self.record_change(change);
     }
 
     /// Records that a different image is shown from now on.
-    fn changed(&mut self, since: (Instant, bool)) {
+    fn record_change(&mut self, change: (Instant, bool)) {
         self.revision += 1;
-        self.since.get_or_insert(since);
+        self.change.get_or_insert(change);
     }
 
-    pub fn has_work(&self) -> bool {
+    pub fn has_next_step(&self) -> bool {
         if self
-            .looking
+            .viewers
             .as_ref()
-            .is_some_and(|looking| looking.load(Ordering::SeqCst) == 0)
+            .is_some_and(|viewers| viewers.load(Ordering::SeqCst) == 0)
         {
             return false;
         }
@@ -426,41 +431,41 @@ impl Painter {
             .as_ref()
             .filter(|running| !running.halted)
             .is_some_and(|running| {
-                let more = !running.canvas.is_done(self.seen());
-                let first = running.canvas.is_new();
+                let is_unfinished = !running.canvas.is_done(self.shown_view());
+                let is_first = running.canvas.is_new();
                 // While a kernel is compiled, only camera moves are rendered.
-                self.camera_waits || (more && (first || (self.pending.is_none() && !self.paused)))
+                self.restart_pending || (is_unfinished && (is_first || (self.pending.is_none() && !self.paused)))
             })
     }
 
-    pub fn work(&mut self) {
-        let (view, waits) = (self.seen(), self.camera_waits);
+    pub fn render_step(&mut self) {
+        let view = self.shown_view();
         let Some(loaded) = self.loaded.clone() else { return };
         let camera = self.packed_camera(&loaded);
         let Some(running) = &mut self.running else { return };
-        // A first image is only interrupted once it is complete, so that images are shown while the camera moves.
-        if waits && (!running.canvas.is_new() || running.canvas.is_done(view)) {
+        // The first image after a restart is never interrupted, so that images are shown while the camera moves.
+        if self.restart_pending && (!running.canvas.is_new() || running.canvas.is_done(view)) {
             running.slider_values = self.sliders.bits(&running.sliders);
             let restarted = guarded(|| {
                 running.canvas.set_sliders(&running.slider_values)?;
                 running.canvas.restart(camera, view)
             });
             match restarted {
-                Ok(()) => self.begun((Instant::now(), false)),
+                Ok(()) => self.record_start((Instant::now(), false)),
                 Err(error) => self.fail(&error),
             }
             return;
         }
-        let stepped = guarded(|| self.times.of("render", || running.canvas.step(view)));
+        let stepped = guarded(|| self.times.measure("render", || running.canvas.step(view)));
         running
             .canvas
             .dispatches()
             .iter()
-            .for_each(|call| self.times.call(call));
+            .for_each(|dispatch| self.times.record_dispatch(dispatch));
         match stepped {
             Ok(show) => {
-                let due = self.last_frame.elapsed() > BETWEEN_FRAMES.max(10 * self.frame_cost);
-                if show || (due && !running.canvas.is_new()) {
+                let is_due = self.last_frame.elapsed() > BETWEEN_FRAMES.max(10 * self.frame_cost);
+                if show || (is_due && !running.canvas.is_new()) {
                     self.show();
                 }
             }

@@ -10,20 +10,16 @@ use wgray_render::gpu::compose::Shaders;
 use wgray_render::gpu::sliders::{Value, sliders};
 
 impl Painter {
-    pub(super) fn take_shaders(&mut self, shaders: Arc<Shaders>) {
+    pub(super) fn set_shaders(&mut self, shaders: Arc<Shaders>) {
         if self.shaders.as_ref() == Some(&shaders) {
             return;
         }
-        if self
-            .shaders
-            .as_ref()
-            .is_some_and(|known| !known.has_same_code(&shaders))
-        {
-            self.keep_before();
+        if self.shaders.as_ref().is_some_and(|old| !old.has_same_code(&shaders)) {
+            self.keep_previous_image();
         }
-        let good = self.good.as_ref();
-        self.refused
-            .retain(|(known, _)| *known == shaders || Some(known) == good);
+        let last_good = self.last_good.as_ref();
+        self.rejected
+            .retain(|(rejected, _)| *rejected == shaders || Some(rejected) == last_good);
         // A kernel with unchanged code keeps running, but errors and sliders refer to the new text.
         let kernels = [&mut self.running, &mut self.parked].into_iter().flatten();
         for kernel in kernels.filter(|kernel| kernel.shaders.has_same_code(&shaders)) {
@@ -31,8 +27,8 @@ impl Painter {
             kernel.sliders = sliders(&shaders, integrator, adaptive);
             kernel.shaders = shaders.clone();
         }
-        if let Some(good) = self.good.as_mut().filter(|good| good.has_same_code(&shaders)) {
-            *good = shaders.clone();
+        if let Some(last_good) = self.last_good.as_mut().filter(|old| old.has_same_code(&shaders)) {
+            *last_good = shaders.clone();
         }
         self.shaders = Some(shaders);
     }
@@ -41,7 +37,7 @@ impl Painter {
         let sliders = self.running.as_ref().map_or(&[][..], |running| &running.sliders);
         match self.sliders.slide(sliders, file, name, value) {
             Ok(is_new) => {
-                self.taken();
+                self.clear_error();
                 if is_new {
                     self.upload_sliders((Instant::now(), false));
                 }
@@ -50,49 +46,50 @@ impl Painter {
         }
     }
 
-    pub(super) fn reset_sliders(&mut self, one: Option<(String, String)>) {
-        self.sliders.reset(one);
+    /// Resets all sliders, or one slider, given by file and name.
+    pub(super) fn reset_sliders(&mut self, slider: Option<(String, String)>) {
+        self.sliders.reset(slider);
         self.upload_sliders((Instant::now(), false));
     }
 
     /// Uploads the slider values, which apply from the next image on.
-    pub(super) fn upload_sliders(&mut self, since: (Instant, bool)) {
+    pub(super) fn upload_sliders(&mut self, change: (Instant, bool)) {
         let Some(running) = &mut self.running else { return };
         if self.sliders.bits(&running.sliders) != running.slider_values {
             running.halted = false;
-            self.camera_waits = true;
-            self.since.get_or_insert(since);
+            self.restart_pending = true;
+            self.change.get_or_insert(change);
         }
     }
 
-    /// Switches back to the previous kernel, if needed.
-    pub(super) fn take_parked(&mut self, shaders: &Arc<Shaders>, constants: &Constants) -> bool {
-        let fits = |parked: &Running| parked.shaders == *shaders && parked.constants == *constants;
-        let found = self.parked.as_ref().is_some_and(fits);
-        if found {
+    /// Switches to the parked kernel if it has these shaders and constants. Returns whether it has.
+    pub(super) fn unpark(&mut self, shaders: &Arc<Shaders>, constants: &Constants) -> bool {
+        let matches = |parked: &Running| parked.shaders == *shaders && parked.constants == *constants;
+        let is_match = self.parked.as_ref().is_some_and(matches);
+        if is_match {
             std::mem::swap(&mut self.running, &mut self.parked);
         }
-        found
+        is_match
     }
 
-    /// Shows the parked kernel with its current image.
-    pub(super) fn show_parked(&mut self, since: (Instant, bool)) {
-        let (view, limits) = (self.seen(), self.limits);
+    /// Shows the current image of a kernel that was parked.
+    pub(super) fn show_parked(&mut self, change: (Instant, bool)) {
+        let (view, limits) = (self.shown_view(), self.limits);
         let packed = self.loaded.as_ref().map(|loaded| self.packed(loaded));
         let Some(running) = &mut self.running else { return };
         running.halted = false;
-        let shown = guarded(|| {
+        let result = guarded(|| {
             running.canvas.set_limits(limits, view)?;
             running.canvas.change_view(view)
         });
         // If the scene or the camera changed, the image restarts immediately.
         let is_current = packed.is_some_and(|packed| running.canvas.shows(&packed));
-        match shown {
+        match result {
             Ok(()) => {
-                self.changed(since);
-                self.upload_sliders(since);
+                self.record_change(change);
+                self.upload_sliders(change);
                 if is_current {
-                    self.show_what_is_there();
+                    self.show_if_available();
                 }
             }
             Err(error) => self.fail(&error),

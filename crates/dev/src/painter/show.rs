@@ -21,16 +21,16 @@ pub struct Problems {
     pub scene: Vec<Diagnostic>,
     pub files: Option<Diagnostic>,
     pub shader: Vec<Diagnostic>,
-    /// The driver truncates the image: it cannot be rendered completely.
-    pub cut: Option<Diagnostic>,
+    /// The driver truncates loops of the kernel, so the image cannot be rendered completely.
+    pub truncated: Option<Diagnostic>,
     pub device: Option<Diagnostic>,
     pub out: Option<Diagnostic>,
 }
 
 impl Problems {
     fn all(&self) -> impl Iterator<Item = &Diagnostic> {
-        let of_shaders = self.files.iter().chain(&self.shader).chain(&self.cut);
-        of_shaders.chain(&self.scene).chain(&self.device).chain(&self.out)
+        let shader_problems = self.files.iter().chain(&self.shader).chain(&self.truncated);
+        shader_problems.chain(&self.scene).chain(&self.device).chain(&self.out)
     }
 }
 
@@ -38,32 +38,32 @@ impl Painter {
     pub(super) fn is_done(&self) -> bool {
         self.running
             .as_ref()
-            .is_some_and(|running| running.canvas.is_done(self.seen()))
+            .is_some_and(|running| running.canvas.is_done(self.shown_view()))
     }
 
     pub(super) fn show(&mut self) {
-        let (view, done) = (self.seen(), self.is_done());
+        let (view, done) = (self.shown_view(), self.is_done());
         let Some(running) = &mut self.running else { return };
         let canvas = &mut running.canvas;
         let start = Instant::now();
-        let (content, sent) = match guarded(|| self.times.of("read back", || canvas.content(view))) {
+        let (content, sent) = match guarded(|| self.times.measure("read back", || canvas.content(view))) {
             Ok(content) => content,
             Err(error) => return self.fail(&error),
         };
         let ([width, height], (samples, total), speed) = (canvas.size(), canvas.samples(), canvas.speed());
-        let finest = canvas.finest_size();
-        let whole = sent == finest && samples > 0;
+        let finest = canvas.final_size();
+        let is_complete = sent == finest && samples > 0;
         let settings = (self.loaded.as_ref()).map_or(ViewSettings::default(), |loaded| loaded.scene.view);
-        if let (Content::Color(colors), true) = (&content, whole) {
-            let look = DisplaySettings {
+        if let (Content::Color(colors), true) = (&content, is_complete) {
+            let display = DisplaySettings {
                 view: settings,
                 ..DisplaySettings::default()
             };
-            self.write_out(|| png_of(colors, look), done);
+            self.write_out(|| png_of(colors, display), done);
         }
-        let (content, sides) = self.beside(content, finest);
-        let since = self.since.take();
-        self.latency = since
+        let (content, sides) = self.with_counterpart(content, finest);
+        let change = self.change.take();
+        self.latency = change
             .map(|(noticed, _)| noticed.elapsed().as_secs_f64())
             .or(self.latency);
         self.frames += 1;
@@ -92,25 +92,25 @@ impl Painter {
             .loaded
             .iter()
             .flat_map(|loaded| &loaded.packed.sampling.filter_table);
-        let look = DisplaySettings {
+        let display = DisplaySettings {
             gain: self.gain,
             marks: self.marks,
-            negative: bins.into_iter().any(|bin| bin.z < 0.0),
-            view: self.look.over(settings),
-            false_color: self.look.false_color,
+            allow_negative: bins.into_iter().any(|bin| bin.z < 0.0),
+            view: self.display_overrides.apply_to(settings),
+            false_color: self.display_overrides.false_color,
         };
-        let make = || Frame::new(header, content, names.unwrap_or_default(), look);
-        let frame = Arc::new(self.times.of("make PNG", make));
+        let encode = || Frame::new(header, content, names.unwrap_or_default(), display);
+        let frame = Arc::new(self.times.measure("make PNG", encode));
         self.frame_sender.send_replace(Some(frame.clone()));
         self.measure(&frame);
         self.last_frame = Instant::now();
         self.frame_cost = start.elapsed();
         self.failures = 0;
-        self.problems.cut = None;
-        if let Some(running) = self.running.as_ref().filter(|_| done || whole) {
-            self.good = Some(running.shaders.clone());
+        self.problems.truncated = None;
+        if let Some(running) = self.running.as_ref().filter(|_| done || is_complete) {
+            self.last_good = Some(running.shaders.clone());
         }
-        if let Some((noticed, saved)) = since {
+        if let Some((noticed, saved)) = change {
             self.first_frame = saved.then_some(self.last_frame);
             if saved {
                 let compiled = self.compiled.take();
@@ -125,7 +125,7 @@ impl Painter {
                 seconds: first.elapsed().as_secs_f64(),
             });
         }
-        self.tell();
+        self.publish();
     }
 
     /// Replaces the file of `--out` when each pixel has a sample, and when the image is finished.
@@ -133,36 +133,36 @@ impl Painter {
         let Some(out) = &self.out else { return };
         if done || self.written != Some(self.revision) {
             self.written = Some(self.revision);
-            let failed = replace(out, &png()).err();
+            let error = replace(out, &png()).err();
             let problem = |error| Diagnostic::plain("file", format!("{}: cannot be written: {error}", out.display()));
-            self.problems.out = failed.map(problem);
+            self.problems.out = error.map(problem);
         }
     }
 
-    /// Reports once per size that an image is too large to display.
-    pub(super) fn tell_size(&mut self) {
+    /// Reports that the image is too large to display, once per size.
+    pub(super) fn report_size(&mut self) {
         let scale = self.limits.scale;
         let sizes = self
             .running
             .as_ref()
-            .map(|running| (running.canvas.size(), running.canvas.finest_size()));
+            .map(|running| (running.canvas.size(), running.canvas.final_size()));
         // A reduction that a viewer requested with the preview scale is not reported.
-        let smaller = sizes.filter(|(asked, shown)| asked.map(|side| side.div_ceil(scale)) != *shown);
-        if self.smaller != smaller {
-            self.smaller = smaller;
-            if let Some((asked, shown)) = smaller {
-                (self.report)(Report::Smaller(asked, shown));
+        let reduced = sizes.filter(|(full, displayed)| full.map(|side| side.div_ceil(scale)) != *displayed);
+        if self.reported_sizes != reduced {
+            self.reported_sizes = reduced;
+            if let Some((full, displayed)) = reduced {
+                (self.report)(Report::Smaller(full, displayed));
             }
         }
     }
 
     /// Publishes the scene and the camera, for queries about objects.
-    fn tell_seen(&self) {
+    fn publish_scene_view(&self) {
         let Some(loaded) = &self.loaded else { return };
         let camera = self.packed_camera(loaded);
-        let is_known = |seen: &Arc<SceneView>| Arc::ptr_eq(&seen.loaded, loaded) && seen.camera == camera;
-        if !self.seen_sender.borrow().as_ref().is_some_and(is_known) {
-            self.seen_sender.send_replace(Some(Arc::new(SceneView {
+        let is_current = |view: &Arc<SceneView>| Arc::ptr_eq(&view.loaded, loaded) && view.camera == camera;
+        if !self.scene_view_sender.borrow().as_ref().is_some_and(is_current) {
+            self.scene_view_sender.send_replace(Some(Arc::new(SceneView {
                 loaded: Arc::clone(loaded),
                 camera,
                 sources: self.sources.clone(),
@@ -170,8 +170,9 @@ impl Painter {
         }
     }
 
-    pub(super) fn tell(&mut self) {
-        self.tell_seen();
+    /// Publishes the state, and reports new errors.
+    pub(super) fn publish(&mut self) {
+        self.publish_scene_view();
         let camera = self
             .camera
             .as_ref()
@@ -181,33 +182,33 @@ impl Painter {
             (self.report)(Report::Problem(problem.clone()));
         }
         if problems.is_empty() && !self.state.problems.is_empty() {
-            (self.report)(Report::Mended);
+            (self.report)(Report::AllFixed);
         }
         self.state.viewpoint = camera.map(Viewpoint::of);
         self.state.camera = camera.map(text).unwrap_or_default();
-        self.state.steps = self.walk.steps();
-        self.state.look = self.look;
+        self.state.steps = self.camera_history.steps();
+        self.state.look = self.display_overrides;
         let scene = self.loaded.as_ref().map(|loaded| &loaded.scene);
         let settings = scene.map(|scene| scene.view).unwrap_or_default();
         self.state.scene_look = (settings.exposure, settings.transform);
         self.state.paused = self.paused;
-        let most = NonZeroU32::new(self.limits.samples).filter(|most| most.get() != u32::MAX);
-        let of_scene = self
+        let max_samples = NonZeroU32::new(self.limits.samples).filter(|max| max.get() != u32::MAX);
+        let scene_samples = self
             .loaded
             .as_ref()
             .map_or(0, |loaded| loaded.packed.sampling.pixel_samples);
-        self.state.samples = (most, of_scene);
+        self.state.samples = (max_samples, scene_samples);
         self.state.preview = Preview::try_from(self.limits.scale).unwrap_or_default();
         self.state.comparable = self.comparison.comparable();
         self.state.no_comparison = self.no_comparison();
-        self.state.apart = self.apart();
+        self.state.apart = self.errors();
         self.state.camera_moved = self.camera.is_some();
         (self.state.executed, self.state.frame) = (self.executed, self.frames);
-        let rests = self.paused && !self.running.as_ref().is_some_and(|running| running.canvas.is_new());
-        let renders = self.running.is_some() && !self.is_done() && !rests;
-        self.state.busy = self.camera_waits || self.pending.is_some() || renders;
+        let is_pausing = self.paused && !self.running.as_ref().is_some_and(|running| running.canvas.is_new());
+        let is_rendering = self.running.is_some() && !self.is_done() && !is_pausing;
+        self.state.busy = self.restart_pending || self.pending.is_some() || is_rendering;
         [self.state.undo, self.state.redo] =
-            [false, true].map(|again| self.history.last(again).map(|step| step.what.clone()));
+            [false, true].map(|redo| self.history.last(redo).map(|step| step.key.clone()));
         self.state.problems = problems;
         self.state.compiling = self.pending.is_some();
         (self.state.view, self.state.gain, self.state.marks) = (self.view, self.gain, self.marks);

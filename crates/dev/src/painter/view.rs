@@ -1,11 +1,11 @@
-//! The view: which one is selected, what the scene provides, and what the running kernel can show.
+//! The selected view, the views that the scene provides, and the views that the running kernel can show.
 
 use std::time::Instant;
 
 use super::Painter;
 use crate::build::guarded;
 use crate::picture::View;
-use crate::source::shown;
+use crate::source::supported_view;
 
 impl Painter {
     pub(super) fn choose_view(&mut self, view: View) {
@@ -13,21 +13,22 @@ impl Painter {
         let before = kernel(self);
         self.view = view;
         self.keep_view();
-        let view = self.seen();
+        let view = self.shown_view();
         if let Some(running) = &mut self.running {
             running.halted = false;
             match guarded(|| running.canvas.change_view(view)) {
-                Ok(()) => self.changed((Instant::now(), false)), // the camera may have moved meanwhile
+                Ok(()) => self.record_change((Instant::now(), false)), // the camera may have moved meanwhile
                 Err(error) => return self.fail(&error),
             }
-            self.show_what_is_there();
+            self.show_if_available();
         }
         if kernel(self) != before {
-            self.settle((Instant::now(), false)); // needs another kernel
+            self.synchronize((Instant::now(), false)); // the view needs a different kernel
         }
     }
 
-    pub(super) fn show_what_is_there(&mut self) {
+    /// Shows the current image, if the canvas has a result.
+    pub(super) fn show_if_available(&mut self) {
         if self.is_done() || self.running.as_ref().is_some_and(|running| !running.canvas.is_new()) {
             self.show();
         }
@@ -51,16 +52,16 @@ impl Painter {
         view.aov()?.missing(packed.integrator, packed.sampling.adaptive)
     }
 
-    /// Returns the views that the scene does not provide, each with the reason.
+    /// Returns the views that the scene does not provide, and the reasons.
     pub(super) fn missing_views(&self) -> Vec<(View, &'static str)> {
         let rules = View::LAYERS.iter().map(|view| (*view, self.missing(*view)));
         rules.filter_map(|(view, rule)| Some((view, rule?))).collect()
     }
 
     /// Returns the view that is shown: the selected view, unless it needs a different kernel.
-    pub(super) fn seen(&self) -> View {
+    pub(super) fn shown_view(&self) -> View {
         match &self.running {
-            Some(running) => shown(&running.constants, self.view),
+            Some(running) => supported_view(&running.constants, self.view),
             None => View::Color,
         }
     }

@@ -5,7 +5,7 @@ use std::time::Instant;
 use glam::DVec3;
 
 use super::Painter;
-use crate::camera::{Move, Viewpoint, dollied, framed, moved, placed};
+use crate::camera::{Move, Viewpoint, dollied, framed, moved, with_viewpoint};
 use wgray_image::Region;
 use wgray_render::backend::Backend as _;
 use wgray_render::cpu::Cpu;
@@ -13,7 +13,7 @@ use wgray_render::records::NO_INDEX;
 use wgray_scene::{Bounds, CameraDescription, Geometry, Light, Scene};
 
 /// Maximum number of viewpoints that are kept.
-const STEPS: usize = 256;
+const MAX_STEPS: usize = 256;
 
 #[derive(Default)]
 pub struct CameraHistory {
@@ -33,10 +33,10 @@ impl CameraHistory {
         self.in_step = false;
     }
 
-    fn leave(&mut self, camera: &CameraDescription) {
+    fn push(&mut self, camera: &CameraDescription) {
         if !std::mem::replace(&mut self.in_step, true) {
             self.forth.clear();
-            if self.back.len() == STEPS {
+            if self.back.len() == MAX_STEPS {
                 self.back.remove(0);
             }
             self.back.push(camera.clone());
@@ -45,26 +45,28 @@ impl CameraHistory {
 }
 
 impl Painter {
-    fn seen_by(&self) -> Option<&CameraDescription> {
+    fn current_camera(&self) -> Option<&CameraDescription> {
         self.camera
             .as_ref()
             .or(self.loaded.as_ref().map(|loaded| &loaded.camera))
     }
 
-    pub(super) fn move_camera(&mut self, by: Move) {
-        let (Some(old), Some(loaded)) = (self.seen_by().cloned(), &self.loaded) else {
+    pub(super) fn move_camera(&mut self, camera_move: Move) {
+        let (Some(old), Some(loaded)) = (self.current_camera().cloned(), &self.loaded) else {
             return;
         };
-        let new = match by {
-            Move::Dolly(by) => dollied(&old, by, &loaded.camera),
-            other => moved(&old, other),
+        let new = match camera_move {
+            Move::Dolly(amount) => dollied(&old, amount, &loaded.camera),
+            camera_move => moved(&old, camera_move),
         };
-        self.go(&old, new);
+        self.move_to(&old, new);
     }
 
-    pub(super) fn place_camera(&mut self, viewpoint: Viewpoint) {
-        let Some(old) = self.seen_by().cloned() else { return };
-        match placed(&old, viewpoint) {
+    pub(super) fn set_viewpoint(&mut self, viewpoint: Viewpoint) {
+        let Some(old) = self.current_camera().cloned() else {
+            return;
+        };
+        match with_viewpoint(&old, viewpoint) {
             Ok(new) => self.step(&old, new),
             Err(error) => self.notice(&Err(error), String::new()),
         }
@@ -79,8 +81,8 @@ impl Painter {
     }
 
     /// Frames the finite object at a pixel, or the whole scene.
-    pub(super) fn frame(&mut self, pixel: Option<[u32; 2]>) {
-        let (Some(loaded), Some(old)) = (self.loaded.clone(), self.seen_by().cloned()) else {
+    pub(super) fn frame_object(&mut self, pixel: Option<[u32; 2]>) {
+        let (Some(loaded), Some(old)) = (self.loaded.clone(), self.current_camera().cloned()) else {
             return;
         };
         let object = pixel.and_then(|pixel| self.bounds_at(pixel, &loaded.scene));
@@ -89,7 +91,10 @@ impl Painter {
                 let (center, radius) = (0.5 * low + 0.5 * high, 0.5 * (high - low).length());
                 self.step(&old, framed(&old, center, radius));
             }
-            None => self.notice(&Err("Nothing here has a finite extent".to_string()), String::new()),
+            None => self.notice(
+                &Err("The scene has no object of finite extent".to_string()),
+                String::new(),
+            ),
         }
     }
 
@@ -119,45 +124,47 @@ impl Painter {
     }
 
     pub(super) fn retrace(&mut self, forth: bool) {
-        let Some(now) = self.seen_by().cloned() else { return };
-        let walk = &mut self.walk;
+        let Some(current) = self.current_camera().cloned() else {
+            return;
+        };
+        let history = &mut self.camera_history;
         let (from, to) = match forth {
-            true => (&mut walk.forth, &mut walk.back),
-            false => (&mut walk.back, &mut walk.forth),
+            true => (&mut history.forth, &mut history.back),
+            false => (&mut history.back, &mut history.forth),
         };
         let Some(camera) = from.pop() else { return };
-        walk.in_step = false;
+        history.in_step = false;
         // The camera in the file may be of a different kind.
-        if std::mem::discriminant(&camera) == std::mem::discriminant(&now) {
-            to.push(now);
-            self.look_through(camera);
+        if std::mem::discriminant(&camera) == std::mem::discriminant(&current) {
+            to.push(current);
+            self.set_camera(camera);
         } else {
-            *walk = CameraHistory::default();
+            *history = CameraHistory::default();
         }
     }
 
-    /// Moves the camera as a separate step.
+    /// Moves the camera as a separate step of the viewpoint history.
     fn step(&mut self, old: &CameraDescription, new: CameraDescription) {
-        self.walk.in_step = false;
-        self.go(old, new);
-        self.walk.in_step = false;
+        self.camera_history.in_step = false;
+        self.move_to(old, new);
+        self.camera_history.in_step = false;
     }
 
-    fn go(&mut self, old: &CameraDescription, new: CameraDescription) {
+    fn move_to(&mut self, old: &CameraDescription, new: CameraDescription) {
         if new != *old {
-            self.walk.leave(old);
-            self.look_through(new);
+            self.camera_history.push(old);
+            self.set_camera(new);
         }
     }
 
-    fn look_through(&mut self, camera: CameraDescription) {
-        let files = self.loaded.as_ref().map(|loaded| &loaded.camera);
-        self.camera = Some(camera).filter(|camera| Some(camera) != files);
-        self.camera_waits = true;
-        self.comparison.before = None; // seen from another viewpoint
+    fn set_camera(&mut self, camera: CameraDescription) {
+        let file_camera = self.loaded.as_ref().map(|loaded| &loaded.camera);
+        self.camera = Some(camera).filter(|camera| Some(camera) != file_camera);
+        self.restart_pending = true;
+        self.comparison.before = None; // it shows the scene from another viewpoint
         if let Some(running) = &mut self.running {
             running.halted = false;
         }
-        self.since.get_or_insert((Instant::now(), false));
+        self.change.get_or_insert((Instant::now(), false));
     }
 }

@@ -16,12 +16,12 @@ const KNOTS: [[u8; 3]; 9] = [
 
 /// Returns the display color of a value from 0 to 255.
 pub fn color(value: u8) -> [u8; 3] {
-    let place = f64::from(value) / 255.0 * (KNOTS.len() - 1) as f64;
-    let knot = (place as usize).min(KNOTS.len() - 2);
-    let part = place - knot as f64;
+    let position = f64::from(value) / 255.0 * (KNOTS.len() - 1) as f64;
+    let knot = (position as usize).min(KNOTS.len() - 2);
+    let fraction = position - knot as f64;
     std::array::from_fn(|i| {
         let (low, high) = (f64::from(KNOTS[knot][i]), f64::from(KNOTS[knot + 1][i]));
-        (low + (high - low) * part + 0.5) as u8
+        (low + (high - low) * fraction + 0.5) as u8
     })
 }
 
@@ -30,12 +30,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn colours_grow_brighter_from_black_to_pale_yellow() {
+    fn colors_grow_brighter_from_black_to_pale_yellow() {
         assert_eq!((color(0), color(255)), (KNOTS[0], KNOTS[8]));
-        let light = |value| {
+        let luminance = |value| {
             let [r, g, b] = color(value).map(f64::from);
             0.2126 * r + 0.7152 * g + 0.0722 * b
         };
-        assert!((1..=255).all(|value| light(value) > light(value - 1)));
+        assert!((1..=255).all(|value| luminance(value) > luminance(value - 1)));
     }
 }

@@ -4,12 +4,13 @@ use std::ops::Range;
 
 use super::picture::{Kind, Picture, Plane};
 
-/// Exponent of the display curve of linear values.
+/// Exponent of the curve that encodes linear values for display.
 pub const DISPLAY: f64 = 1.0 / 2.2;
 
 /// Red, green and blue of a range of pixels.
 pub type Rgb = [Vec<f64>; 3];
 
+/// The colors of two images of the same size and kind.
 #[derive(Clone, Debug)]
 pub struct Colors<'a> {
     pub width: usize,
@@ -37,15 +38,15 @@ impl<'a> Planes<'a> {
     }
 
     fn values(&self, pixels: Range<usize>) -> Rgb {
-        let mut shares = vec![1.0; pixels.len()];
+        let mut alphas = vec![1.0; pixels.len()];
         if let Some(alpha) = self.alpha {
-            alpha.values(pixels.clone(), &mut shares);
+            alpha.values(pixels.clone(), &mut alphas);
         }
         self.colors.map(|plane| {
             let mut values = vec![0.0; pixels.len()];
             plane.values(pixels.clone(), &mut values);
-            for (value, share) in values.iter_mut().zip(&shares) {
-                *value *= share;
+            for (value, alpha) in values.iter_mut().zip(&alphas) {
+                *value *= alpha;
             }
             values
         })
@@ -53,7 +54,7 @@ impl<'a> Planes<'a> {
 }
 
 impl<'a> Colors<'a> {
-    /// Returns `None` if either image has no colors.
+    /// Returns the colors of two images; `None` if either image has no colors.
     pub fn of(a: &'a Picture, b: &'a Picture) -> Option<Colors<'a>> {
         Some(Colors {
             width: b.width as usize,
@@ -65,7 +66,7 @@ impl<'a> Colors<'a> {
     }
 
     /// Returns part of a row of both images, composited over black. Linear values that are non-finite in either image
-    /// are replaced by 0 in both.
+    /// are replaced by 0 in both images.
     pub fn values(&self, y: usize, x: Range<usize>) -> (Rgb, Rgb) {
         let pixels = y * self.width + x.start..y * self.width + x.end;
         let (mut a, mut b) = (self.a.values(pixels.clone()), self.b.values(pixels));
@@ -79,8 +80,8 @@ impl<'a> Colors<'a> {
         (a, b)
     }
 
-    /// Like `values`, but encoded for display, 0 to 1.
-    pub fn shown(&self, y: usize, x: Range<usize>) -> (Rgb, Rgb) {
+    /// Like [`Self::values`], but encoded for display, 0 to 1.
+    pub fn display_values(&self, y: usize, x: Range<usize>) -> (Rgb, Rgb) {
         let (mut a, mut b) = self.values(y, x);
         if self.kind == Kind::Linear {
             for value in a.iter_mut().chain(&mut b).flatten() {
@@ -90,15 +91,15 @@ impl<'a> Colors<'a> {
         (a, b)
     }
 
-    /// See [`Plane::is_plainly`].
-    pub fn is_plainly_same(&self, y: usize, x: Range<usize>) -> bool {
+    /// Returns [`Plane::stores_same_integers`] for all channels.
+    pub fn stores_same_integers(&self, y: usize, x: Range<usize>) -> bool {
         let pixels = y * self.width + x.start..y * self.width + x.end;
         let mut planes = self.a.colors.iter().zip(&self.b.colors);
-        let alphas = match (self.a.alpha, self.b.alpha) {
+        let same_alpha = match (self.a.alpha, self.b.alpha) {
             (None, None) => true,
-            (Some(a), Some(b)) => a.is_plainly(b, pixels.clone()),
+            (Some(a), Some(b)) => a.stores_same_integers(b, pixels.clone()),
             _ => false,
         };
-        alphas && planes.all(|(a, b)| a.is_plainly(b, pixels.clone()))
+        same_alpha && planes.all(|(a, b)| a.stores_same_integers(b, pixels.clone()))
     }
 }

@@ -18,10 +18,10 @@ use crate::color::srgb_to_linear;
 pub const PIXELS_PER_DEGREE: f64 = 3840.0 * PI / 180.0;
 
 const TILE: usize = 256;
-/// Maximum number of tiles whose errors are in memory.
-const TILES: usize = 64;
+/// Maximum number of tiles whose errors are in memory at the same time.
+const MAX_TILES_IN_MEMORY: usize = 64;
 
-/// Result of the comparison.
+/// Result of a comparison.
 #[derive(Clone, Debug)]
 pub struct Flip {
     /// Mean error, 0 to 1.
@@ -57,13 +57,13 @@ impl Map {
     pub fn raise(&mut self, x: usize, y: usize, value: f64) {
         let steps = (value * 255.0 + 0.5) as u8;
         let steps = if value > 0.0 { steps.max(1) } else { 0 };
-        if let Some(own) = self.values.get_mut(y / self.step * self.width + x / self.step) {
-            *own = steps.max(*own);
+        if let Some(stored) = self.values.get_mut(y / self.step * self.width + x / self.step) {
+            *stored = steps.max(*stored);
         }
     }
 }
 
-/// Compares the colors of two images; `b` is the reference. With a `step`, returns an error map too. `None` if either
+/// Compares the colors of two images; `b` is the reference. With a `step`, also returns an error map. `None` if either
 /// image has no colors.
 pub fn flip(a: &Picture, b: &Picture, pixels_per_degree: f64, step: Option<usize>) -> Option<Flip> {
     let colors = Colors::of(a, b)?;
@@ -78,7 +78,7 @@ pub fn flip(a: &Picture, b: &Picture, pixels_per_degree: f64, step: Option<usize
         tiles.extend((0..colors.width).step_by(TILE).map(|x| (x, y)));
     }
     let mut sum = 0.0;
-    for tiles in tiles.chunks(TILES) {
+    for tiles in tiles.chunks(MAX_TILES_IN_MEMORY) {
         let errors = tiles.par_iter().map(|(x, y)| {
             let tile = Tile {
                 x: *x,
@@ -90,8 +90,8 @@ pub fn flip(a: &Picture, b: &Picture, pixels_per_degree: f64, step: Option<usize
             let sum: f64 = errors.iter().map(|error| f64::from(*error)).sum();
             (tile, sum, if step.is_some() { errors } else { Vec::new() })
         });
-        for (tile, part, errors) in errors.collect::<Vec<_>>() {
-            sum += part;
+        for (tile, tile_sum, errors) in errors.collect::<Vec<_>>() {
+            sum += tile_sum;
             if let Some(map) = &mut map {
                 for (i, error) in errors.iter().enumerate() {
                     map.raise(tile.x + i % tile.width, tile.y + i / tile.width, f64::from(*error));
@@ -105,11 +105,13 @@ pub fn flip(a: &Picture, b: &Picture, pixels_per_degree: f64, step: Option<usize
     })
 }
 
-// Constants from sections 4.1.1, 4.1.2, 4.2 and 4.3 and table 1 of the paper. Exponent of the color difference.
+// Constants from sections 4.1.1, 4.1.2, 4.2 and 4.3 and table 1 of the paper.
+
+/// Exponent of the color difference.
 const QC: f64 = 0.7;
-/// Fraction of the maximum color difference that is mapped ...
+/// Color difference at the knee of the error curve, as a fraction of the maximum color difference.
 const PC: f64 = 0.4;
-/// ... to this fraction of the error range.
+/// Error at the knee.
 const PT: f64 = 0.95;
 /// Width of the edge detection filter in degrees.
 const W: f64 = 0.082;
@@ -117,13 +119,13 @@ const W: f64 = 0.082;
 const QF: f64 = 0.5;
 
 /// Contrast sensitivity functions as sums of Gaussians (amplitude, width): achromatic, red-green, blue-yellow.
-const LIGHT: (f64, f64) = (1.0, 0.0047);
+const ACHROMATIC: (f64, f64) = (1.0, 0.0047);
 const RED_GREEN: (f64, f64) = (1.0, 0.0053);
 const BLUE_YELLOW: [(f64, f64); 2] = [(34.1, 0.04), (13.5, 0.025)];
 
 struct Filters {
     radius: usize,
-    light: Vec<f32>,
+    achromatic: Vec<f32>,
     red_green: Vec<f32>,
     /// Two separable filters; their results are added.
     blue_yellow: [Vec<f32>; 2],
@@ -141,19 +143,25 @@ impl Filters {
         let deviation = 0.5 * W * pixels_per_degree;
         let feature = (3.0 * deviation).ceil() as usize;
         let radius = spatial.max(feature);
-        let taps = |reach: usize, weight: &dyn Fn(f64) -> f64| -> Vec<f64> {
+        let taps = |filter_radius: usize, weight: &dyn Fn(f64) -> f64| -> Vec<f64> {
             let tap = |i: usize| i as f64 - radius as f64;
-            let weight = |x: f64| if x.abs() <= reach as f64 { weight(x) } else { 0.0 };
+            let weight = |x: f64| {
+                if x.abs() <= filter_radius as f64 {
+                    weight(x)
+                } else {
+                    0.0
+                }
+            };
             (0..2 * radius + 1).map(|i| weight(tap(i))).collect()
         };
-        let seen = |x: f64, (a, b): (f64, f64)| {
+        let gaussian = |x: f64, (a, b): (f64, f64)| {
             let x = x / pixels_per_degree;
             a * (PI / b).sqrt() * (-PI * PI * x * x / b).exp()
         };
-        // A 2D Gaussian is the product of two 1D Gaussians; each has the square root of the amplitude.
-        let root = |x: f64, (a, b): (f64, f64)| seen(x, ((a / (PI / b).sqrt()).sqrt(), b));
-        let light = taps(spatial, &|x| seen(x, LIGHT));
-        let red_green = taps(spatial, &|x| seen(x, RED_GREEN));
+        // A 2D Gaussian is the product of two 1D Gaussians that have the square root of its amplitude.
+        let root = |x: f64, (a, b): (f64, f64)| gaussian(x, ((a / (PI / b).sqrt()).sqrt(), b));
+        let achromatic = taps(spatial, &|x| gaussian(x, ACHROMATIC));
+        let red_green = taps(spatial, &|x| gaussian(x, RED_GREEN));
         let blue_yellow = BLUE_YELLOW.map(|gauss| taps(spatial, &|x| root(x, gauss)));
         let sum = |weights: &[f64]| weights.iter().sum::<f64>();
         let blue_yellow_sum = blue_yellow
@@ -165,20 +173,23 @@ impl Filters {
         let gauss = taps(feature, &bell);
         let edge = taps(feature, &|x| -x * bell(x));
         let point = taps(feature, &|x| (x * x / (deviation * deviation) - 1.0) * bell(x));
-        let over = |weights: &[f64], sum: f64| weights.iter().map(|weight| (weight / sum) as f32).collect::<Vec<f32>>();
-        // Positive weights sum to 1, negative weights to -1.
+        let divided = |weights: &[f64], sum: f64| {
+            let weights = weights.iter().map(|weight| (weight / sum) as f32);
+            weights.collect::<Vec<f32>>()
+        };
+        // Scales positive weights to a sum of 1, and negative weights to a sum of -1.
         let balanced = |weights: &[f64]| {
             let above: f64 = weights.iter().filter(|weight| **weight > 0.0).sum();
             let below: f64 = weights.iter().filter(|weight| **weight < 0.0).sum();
-            let part = |weight: &f64| (if *weight > 0.0 { weight / above } else { -weight / below }) as f32;
-            weights.iter().map(part).collect::<Vec<f32>>()
+            let scaled = |weight: &f64| (if *weight > 0.0 { weight / above } else { -weight / below }) as f32;
+            weights.iter().map(scaled).collect::<Vec<f32>>()
         };
         Filters {
             radius,
-            light: over(&light, sum(&light)),
-            red_green: over(&red_green, sum(&red_green)),
-            blue_yellow: blue_yellow.map(|weights| over(&weights, blue_yellow_sum)),
-            gauss: over(&gauss, sum(&gauss)),
+            achromatic: divided(&achromatic, sum(&achromatic)),
+            red_green: divided(&red_green, sum(&red_green)),
+            blue_yellow: blue_yellow.map(|weights| divided(&weights, blue_yellow_sum)),
+            gauss: divided(&gauss, sum(&gauss)),
             edge: balanced(&edge),
             point: balanced(&point),
             curve: std::array::from_fn(|i| srgb_to_linear(i as f64 / 255.0)),
@@ -247,8 +258,8 @@ struct Tile {
     height: usize,
 }
 
-/// Three planes of a tile and its filter margin. Pixels beyond the image repeat its edge.
-struct Around {
+/// Three planes of a tile with a margin for the filters. Pixels outside the image repeat the edge of the image.
+struct PaddedTile {
     width: usize,
     values: [Vec<f32>; 3],
 }
@@ -259,11 +270,11 @@ impl Tile {
         let columns = self.x.saturating_sub(radius)..colors.width.min(self.x + self.width + radius);
         let rows = self.y.saturating_sub(radius)..colors.height.min(self.y + self.height + radius);
         let mut errors = vec![0.0; self.width * self.height];
-        if rows.clone().all(|y| colors.is_plainly_same(y, columns.clone())) {
+        if rows.clone().all(|y| colors.stores_same_integers(y, columns.clone())) {
             return errors;
         }
         let width = self.width + 2 * radius;
-        let empty = || Around {
+        let empty = || PaddedTile {
             width,
             values: [const { Vec::new() }; 3],
         };
@@ -271,8 +282,8 @@ impl Tile {
         for i in 0..self.height + 2 * radius {
             let y = (self.y + i).saturating_sub(radius).min(colors.height - 1);
             let (row_a, row_b) = colors.values(y, columns.clone());
-            for (around, row) in [(&mut a, row_a), (&mut b, row_b)] {
-                for (to, from) in around.values.iter_mut().zip(row) {
+            for (padded, row) in [(&mut a, row_a), (&mut b, row_b)] {
+                for (to, from) in padded.values.iter_mut().zip(row) {
                     to.extend((0..width).map(|j| {
                         let x = (self.x + j).saturating_sub(radius).min(colors.width - 1);
                         from[x - columns.start].max(0.0) as f32
@@ -285,59 +296,60 @@ impl Tile {
         }
         match exposures {
             None => {
-                let seen = |value: f64| screen_to_linear(&filters.curve, value);
-                self.add(&opponents(&a, seen), &opponents(&b, seen), filters, &mut errors);
+                let linear = |value: f64| screen_to_linear(&filters.curve, value);
+                self.raise_errors(&opponents(&a, linear), &opponents(&b, linear), filters, &mut errors);
             }
             Some(exposures) => {
                 for exposure in exposures {
                     let factor = exposure.exp2();
-                    let seen = |value: f64| tone(value * factor).clamp(0.0, 1.0);
-                    self.add(&opponents(&a, seen), &opponents(&b, seen), filters, &mut errors);
+                    let linear = |value: f64| tone(value * factor).clamp(0.0, 1.0);
+                    self.raise_errors(&opponents(&a, linear), &opponents(&b, linear), filters, &mut errors);
                 }
             }
         }
         errors
     }
 
-    fn add(&self, a: &Around, b: &Around, filters: &Filters, errors: &mut [f32]) {
+    /// Raises `errors` to the errors between two opponent images.
+    fn raise_errors(&self, a: &PaddedTile, b: &PaddedTile, filters: &Filters, errors: &mut [f32]) {
         let (lines_a, lines_b) = (
-            Lines::across(a, self.width, filters),
-            Lines::across(b, self.width, filters),
+            Lines::filter_horizontally(a, self.width, filters),
+            Lines::filter_horizontally(b, self.width, filters),
         );
-        let greatest = greatest();
-        let (mut seen_a, mut seen_b) = (EdgesAndPoints::new(self.width), EdgesAndPoints::new(self.width));
+        let max_distance = max_distance();
+        let (mut row_a, mut row_b) = (FilteredRow::new(self.width), FilteredRow::new(self.width));
         for (y, errors) in errors.chunks_mut(self.width).enumerate() {
-            seen_a.down(&lines_a, y, filters);
-            seen_b.down(&lines_b, y, filters);
+            row_a.filter_vertically(&lines_a, y, filters);
+            row_b.filter_vertically(&lines_b, y, filters);
             for (x, error) in errors.iter_mut().enumerate() {
-                let color = color_difference(seen_a.color(x), seen_b.color(x), greatest);
-                let ((edge_a, point_a), (edge_b, point_b)) = (seen_a.features(x), seen_b.features(x));
+                let color = color_difference(row_a.color(x), row_b.color(x), max_distance);
+                let ((edge_a, point_a), (edge_b, point_b)) = (row_a.features(x), row_b.features(x));
                 let feature = (edge_a - edge_b).abs().max((point_a - point_b).abs());
                 let feature = (f64::from(feature) * std::f64::consts::FRAC_1_SQRT_2).powf(QF);
-                let found = if color > 0.0 { color.powf(1.0 - feature) } else { 0.0 };
-                *error = error.max(found as f32);
+                let new = if color > 0.0 { color.powf(1.0 - feature) } else { 0.0 };
+                *error = error.max(new as f32);
             }
         }
     }
 }
 
-/// Converts to the opponent space Y Cx Cz.
-fn opponents(around: &Around, seen: impl Fn(f64) -> f64) -> Around {
-    let count = around.values[0].len();
+/// Converts to the opponent space Y Cx Cz. `linear` converts a value to linear display light.
+fn opponents(padded: &PaddedTile, linear: impl Fn(f64) -> f64) -> PaddedTile {
+    let count = padded.values[0].len();
     let mut values = [const { Vec::new() }; 3].map(|mut list: Vec<f32>| {
         list.reserve_exact(count);
         list
     });
-    let [r, g, b] = &around.values;
+    let [r, g, b] = &padded.values;
     for ((r, g), b) in r.iter().zip(g).zip(b) {
-        let [x, y, z] = white_xyz([*r, *g, *b].map(|value| seen(f64::from(value))));
+        let [x, y, z] = white_xyz([*r, *g, *b].map(|value| linear(f64::from(value))));
         let opponent = [116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z)];
         for (to, value) in values.iter_mut().zip(opponent) {
             to.push(value as f32);
         }
     }
-    Around {
-        width: around.width,
+    PaddedTile {
+        width: padded.width,
         values,
     }
 }
@@ -375,8 +387,12 @@ fn hunt_lab(color: [f64; 3]) -> [f64; 3] {
             value / (3.0 * DELTA * DELTA) + 4.0 / 29.0
         }
     });
-    let light = 116.0 * y - 16.0;
-    [light, 0.01 * light * 500.0 * (x - y), 0.01 * light * 200.0 * (y - z)]
+    let lightness = 116.0 * y - 16.0;
+    [
+        lightness,
+        0.01 * lightness * 500.0 * (x - y),
+        0.01 * lightness * 200.0 * (y - z),
+    ]
 }
 
 /// HyAB distance of two colors, raised to `QC`.
@@ -385,37 +401,37 @@ fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
 }
 
 /// Returns the maximum distance, which is the distance between green and blue.
-fn greatest() -> f64 {
+fn max_distance() -> f64 {
     distance(hunt_lab([0.0, 1.0, 0.0]), hunt_lab([0.0, 0.0, 1.0]))
 }
 
 /// Returns the error, 0 to 1, between two filtered opponent colors.
-fn color_difference(a: [f32; 3], b: [f32; 3], greatest: f64) -> f64 {
+fn color_difference(a: [f32; 3], b: [f32; 3], max_distance: f64) -> f64 {
     if a == b {
         return 0.0;
     }
     let lab = |color: [f32; 3]| hunt_lab(linear(color.map(f64::from)));
-    let (found, knee) = (distance(lab(a), lab(b)), PC * greatest);
-    if found < knee {
-        found * PT / knee
+    let (distance, knee) = (distance(lab(a), lab(b)), PC * max_distance);
+    if distance < knee {
+        distance * PT / knee
     } else {
-        PT + (found - knee) / (greatest - knee) * (1.0 - PT)
+        PT + (distance - knee) / (max_distance - knee) * (1.0 - PT)
     }
 }
 
-/// A horizontally filtered tile. Channels: achromatic, red-green, two of blue-yellow; then the achromatic channel
-/// filtered by a Gaussian and by its two derivatives.
+/// A horizontally filtered tile. The channels are achromatic, red-green and two of blue-yellow; then the achromatic
+/// channel, filtered by a Gaussian and by the two derivatives of the Gaussian.
 struct Lines {
     width: usize,
     values: [Vec<f32>; 7],
 }
 
 impl Lines {
-    fn across(around: &Around, width: usize, filters: &Filters) -> Lines {
-        let [light, red_green, blue_yellow] = &around.values;
-        let one = |from: &[f32], weights: &[f32]| {
-            let mut lines = vec![0.0; from.len() / around.width * width];
-            for (to, from) in lines.chunks_mut(width).zip(from.chunks(around.width)) {
+    fn filter_horizontally(padded: &PaddedTile, width: usize, filters: &Filters) -> Lines {
+        let [achromatic, red_green, blue_yellow] = &padded.values;
+        let filter = |from: &[f32], weights: &[f32]| {
+            let mut lines = vec![0.0; from.len() / padded.width * width];
+            for (to, from) in lines.chunks_mut(width).zip(from.chunks(padded.width)) {
                 for (i, weight) in weights.iter().enumerate().filter(|(_, weight)| **weight != 0.0) {
                     add(to, &from[i..i + width], *weight);
                 }
@@ -425,34 +441,35 @@ impl Lines {
         Lines {
             width,
             values: [
-                one(light, &filters.light),
-                one(red_green, &filters.red_green),
-                one(blue_yellow, &filters.blue_yellow[0]),
-                one(blue_yellow, &filters.blue_yellow[1]),
-                one(light, &filters.gauss),
-                one(light, &filters.edge),
-                one(light, &filters.point),
+                filter(achromatic, &filters.achromatic),
+                filter(red_green, &filters.red_green),
+                filter(blue_yellow, &filters.blue_yellow[0]),
+                filter(blue_yellow, &filters.blue_yellow[1]),
+                filter(achromatic, &filters.gauss),
+                filter(achromatic, &filters.edge),
+                filter(achromatic, &filters.point),
             ],
         }
     }
 }
 
-/// A row filtered in both directions: the four color channels, and the first and second derivatives in x, then in y.
-struct EdgesAndPoints {
+/// A row that is filtered in both directions: the four color channels, the first and second derivatives in x, and the
+/// first and second derivatives in y.
+struct FilteredRow {
     values: [Vec<f32>; 8],
 }
 
-impl EdgesAndPoints {
-    fn new(width: usize) -> EdgesAndPoints {
-        EdgesAndPoints {
+impl FilteredRow {
+    fn new(width: usize) -> FilteredRow {
+        FilteredRow {
             values: std::array::from_fn(|_| vec![0.0; width]),
         }
     }
 
-    fn down(&mut self, lines: &Lines, y: usize, filters: &Filters) {
-        let from = [0, 1, 2, 3, 5, 6, 4, 4];
+    fn filter_vertically(&mut self, lines: &Lines, y: usize, filters: &Filters) {
+        let channels = [0, 1, 2, 3, 5, 6, 4, 4];
         let weights = [
-            &filters.light,
+            &filters.achromatic,
             &filters.red_green,
             &filters.blue_yellow[0],
             &filters.blue_yellow[1],
@@ -461,9 +478,9 @@ impl EdgesAndPoints {
             &filters.edge,
             &filters.point,
         ];
-        for ((to, from), weights) in self.values.iter_mut().zip(from).zip(weights) {
+        for ((to, channel), weights) in self.values.iter_mut().zip(channels).zip(weights) {
             to.fill(0.0);
-            let rows = lines.values[from].chunks(lines.width).skip(y);
+            let rows = lines.values[channel].chunks(lines.width).skip(y);
             for (row, weight) in rows.zip(weights).filter(|(_, weight)| **weight != 0.0) {
                 add(to, row, *weight);
             }
@@ -471,8 +488,8 @@ impl EdgesAndPoints {
     }
 
     fn color(&self, x: usize) -> [f32; 3] {
-        let [light, red_green, first, second, ..] = &self.values;
-        [light[x], red_green[x], first[x] + second[x]]
+        let [achromatic, red_green, first, second, ..] = &self.values;
+        [achromatic[x], red_green[x], first[x] + second[x]]
     }
 
     /// Returns the edge and point features. The achromatic channel is scaled to 0 ... 1; derivatives ignore its offset.
@@ -488,8 +505,8 @@ fn add(to: &mut [f32], from: &[f32], weight: f32) {
     }
 }
 
-/// Converts a display value to a linear value. The 256 values of an 8-bit display use the table; other values have been
-/// rounded to `f32`.
+/// Converts a display value to a linear value. The 256 values of an 8-bit image use the table. They are recognized
+/// although `value` has been rounded to `f32`.
 fn screen_to_linear(curve: &[f64; 256], value: f64) -> f64 {
     let step = (value * 255.0 + 0.5) as u8;
     if value as f32 == (f64::from(step) / 255.0) as f32 {

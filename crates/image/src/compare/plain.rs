@@ -16,7 +16,7 @@ const CHUNK: usize = 1 << 16;
 pub struct Layer<'a> {
     /// `color` for `R`, `G`, `B`, `A` and `Y`; `normal` for `normal.X`; otherwise the name of the channel.
     pub name: String,
-    /// For each channel: its name, and its values in both images.
+    /// For each channel: the name, and the values in both images.
     pub channels: Vec<(&'a str, &'a Plane, &'a Plane)>,
     kind: Kind,
 }
@@ -56,7 +56,7 @@ impl Values {
 pub struct LargestDifference {
     /// Absolute difference.
     pub difference: f64,
-    /// The pixel, or the first of several in row-major order.
+    /// The first pixel with this difference in row-major order.
     pub pixel: PixelCoord,
     /// Name of the channel.
     pub channel: String,
@@ -66,8 +66,8 @@ pub struct LargestDifference {
     pub b: f64,
 }
 
-/// Differences between two images in one layer. Values that are non-finite in either image count as 0 in both, except
-/// for `different` and `beyond`.
+/// Differences between two images in one layer. Values that are non-finite in either image count as 0 in both images,
+/// except for `different` and `beyond`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Difference {
     /// Pixels with a value that is not bit-identical; signed zeros differ.
@@ -76,7 +76,7 @@ pub struct Difference {
     pub first: Option<PixelCoord>,
     /// Pixels with a value that differs by more than the threshold, or that is neither finite nor bit-identical.
     pub beyond: u64,
-    /// The largest difference, if it is above 0.
+    /// The largest difference; `None` if all differences are 0.
     pub largest: Option<LargestDifference>,
     /// Root mean square of all differences.
     pub rmse: f64,
@@ -99,12 +99,12 @@ pub fn layers<'a>(a: &'a Picture, b: &'a Picture) -> (Vec<Layer<'a>>, Vec<&'a st
     let mut layers: Vec<Layer> = Vec::new();
     let mut only_a = Vec::new();
     for channel in &a.channels {
-        let Some(other) = b.channel(&channel.name) else {
+        let Some(plane_b) = b.channel(&channel.name) else {
             only_a.push(channel.name.as_str());
             continue;
         };
         let name = layer_of(&channel.name);
-        let entry = (channel.name.as_str(), &*channel.plane, &**other);
+        let entry = (channel.name.as_str(), &*channel.plane, &**plane_b);
         match layers.iter_mut().find(|layer| layer.name == name) {
             Some(layer) => layer.channels.push(entry),
             None => layers.push(Layer {
@@ -118,7 +118,7 @@ pub fn layers<'a>(a: &'a Picture, b: &'a Picture) -> (Vec<Layer<'a>>, Vec<&'a st
         // EXR files store channels alphabetically: A, B, G, R.
         layer
             .channels
-            .sort_by_key(|(name, ..)| ["R", "G", "B", "A"].iter().position(|known| known == name));
+            .sort_by_key(|(name, ..)| ["R", "G", "B", "A"].iter().position(|color| color == name));
     }
     layers.sort_by_key(|layer| layer.name != COLOR);
     let only_b = b.channels.iter().map(|channel| channel.name.as_str());
@@ -157,15 +157,15 @@ impl DifferenceSums {
         self.different += next.different;
         self.first = self.first.or(next.first);
         self.beyond += next.beyond;
-        if next.largest.map(|found| found.0) > self.largest.map(|found| found.0) {
+        if next.largest.map(|largest| largest.0) > self.largest.map(|largest| largest.0) {
             self.largest = next.largest;
         }
         self.squares += next.squares;
         self.relative += next.relative;
         self.peak = self.peak.max(next.peak);
-        for (own, next) in [(&mut self.a, next.a), (&mut self.b, next.b)] {
-            own.nan += next.nan;
-            own.infinite += next.infinite;
+        for (sum, next) in [(&mut self.a, next.a), (&mut self.b, next.b)] {
+            sum.nan += next.nan;
+            sum.infinite += next.infinite;
         }
         self.first_non_finite = self.first_non_finite.or(next.first_non_finite);
     }
@@ -176,26 +176,26 @@ impl<'a> Layer<'a> {
     pub fn difference(&self, width: u32, height: u32, threshold: f64) -> Difference {
         let pixels = width as usize * height as usize;
         let chunks = (0..pixels.div_ceil(CHUNK)).into_par_iter();
-        let found = chunks.map(|i| self.chunk(i * CHUNK, pixels.min((i + 1) * CHUNK), threshold));
-        let mut all = DifferenceSums::default();
-        for found in found.collect::<Vec<_>>() {
-            all.join(&found);
+        let chunk_sums = chunks.map(|i| self.chunk(i * CHUNK, pixels.min((i + 1) * CHUNK), threshold));
+        let mut sums = DifferenceSums::default();
+        for chunk in chunk_sums.collect::<Vec<_>>() {
+            sums.join(&chunk);
         }
         let coord = |pixel: usize| PixelCoord {
             x: (pixel % width as usize) as u32,
             y: (pixel / width as usize) as u32,
         };
         let values = pixels as f64 * self.channels.len() as f64;
-        let rmse = (all.squares / values).sqrt();
+        let rmse = (sums.squares / values).sqrt();
         let peak = match self.kind {
-            Kind::Linear if all.peak > 0.0 => all.peak,
+            Kind::Linear if sums.peak > 0.0 => sums.peak,
             _ => 1.0,
         };
         Difference {
-            different: all.different,
-            first: all.first.map(coord),
-            beyond: all.beyond,
-            largest: all.largest.and_then(|(difference, pixel, channel)| {
+            different: sums.different,
+            first: sums.first.map(coord),
+            beyond: sums.beyond,
+            largest: sums.largest.and_then(|(difference, pixel, channel)| {
                 let (name, a, b) = self.channels.get(channel)?;
                 Some(LargestDifference {
                     difference,
@@ -206,17 +206,17 @@ impl<'a> Layer<'a> {
                 })
             }),
             rmse,
-            rel_mse: all.relative / values,
+            rel_mse: sums.relative / values,
             psnr: 20.0 * (peak / rmse).log10(),
-            a: all.a,
-            b: all.b,
-            first_non_finite: all.first_non_finite.map(coord),
+            a: sums.a,
+            b: sums.b,
+            first_non_finite: sums.first_non_finite.map(coord),
         }
     }
 
     /// Returns a mask of differing or non-finite pixels, and the differences divided by the largest difference.
     pub(super) fn maps(&self, picture: &Picture, step: usize) -> (Map, Map) {
-        let (mut differing, mut apart) = (Map::new(picture, step), Map::new(picture, step));
+        let (mut differing, mut differences) = (Map::new(picture, step), Map::new(picture, step));
         let largest = self.difference(picture.width, picture.height, 0.0).largest;
         let scale = largest.map_or(1.0, |largest| largest.difference);
         let width = picture.width as usize;
@@ -224,21 +224,21 @@ impl<'a> Layer<'a> {
         for (_, plane_a, plane_b) in &self.channels {
             for y in 0..picture.height as usize {
                 let pixels = y * width..(y + 1) * width;
-                if plane_a.is_plainly(plane_b, pixels.clone()) {
+                if plane_a.stores_same_integers(plane_b, pixels.clone()) {
                     continue;
                 }
                 plane_a.values(pixels.clone(), &mut a);
                 plane_b.values(pixels, &mut b);
                 for (x, (a, b)) in a.iter().zip(&b).enumerate() {
                     if a.to_bits() != b.to_bits() || !a.is_finite() {
-                        let part = (a - b).abs() / scale;
+                        let relative = (a - b).abs() / scale;
                         differing.raise(x, y, 1.0);
-                        apart.raise(x, y, if part.is_finite() { part } else { 1.0 });
+                        differences.raise(x, y, if relative.is_finite() { relative } else { 1.0 });
                     }
                 }
             }
         }
-        (differing, apart)
+        (differing, differences)
     }
 
     /// Returns the first three channels except alpha, with the value range of the second image.
@@ -262,45 +262,44 @@ impl<'a> Layer<'a> {
     fn chunk(&self, start: usize, end: usize, threshold: f64) -> DifferenceSums {
         let count = end - start;
         let (mut a, mut b) = (vec![0.0; count], vec![0.0; count]);
-        let (mut unlike, mut beyond) = (vec![false; count], vec![false; count]);
-        let mut found = DifferenceSums::default();
+        let (mut different, mut beyond) = (vec![false; count], vec![false; count]);
+        let mut sums = DifferenceSums::default();
         for (channel, (_, plane_a, plane_b)) in self.channels.iter().enumerate() {
-            if plane_a.is_plainly(plane_b, start..end) {
+            if plane_a.stores_same_integers(plane_b, start..end) {
                 continue;
             }
             plane_a.values(start..end, &mut a);
             plane_b.values(start..end, &mut b);
             for (i, (a, b)) in a.iter().zip(&b).enumerate() {
-                let (mut apart, mut reference) = ((a - b).abs(), *b);
+                let (mut difference, mut reference) = ((a - b).abs(), *b);
                 if !(a.is_finite() && b.is_finite()) {
-                    found.a.count(*a);
-                    found.b.count(*b);
-                    found.first_non_finite = Some(
-                        found
-                            .first_non_finite
+                    sums.a.count(*a);
+                    sums.b.count(*b);
+                    sums.first_non_finite = Some(
+                        sums.first_non_finite
                             .map_or(start + i, |first_non_finite| first_non_finite.min(start + i)),
                     );
                     beyond[i] |= a.to_bits() != b.to_bits();
-                    (apart, reference) = (0.0, 0.0);
+                    (difference, reference) = (0.0, 0.0);
                 }
-                unlike[i] |= a.to_bits() != b.to_bits();
-                beyond[i] |= apart > threshold;
-                found.squares += apart * apart;
-                found.relative += apart * apart / (reference * reference + EPSILON);
-                found.peak = found.peak.max(reference.abs());
-                let farther = match found.largest {
-                    None => apart > 0.0,
-                    Some((largest, pixel, _)) => apart > largest || (apart == largest && start + i < pixel),
+                different[i] |= a.to_bits() != b.to_bits();
+                beyond[i] |= difference > threshold;
+                sums.squares += difference * difference;
+                sums.relative += difference * difference / (reference * reference + EPSILON);
+                sums.peak = sums.peak.max(reference.abs());
+                let is_larger = match sums.largest {
+                    None => difference > 0.0,
+                    Some((largest, pixel, _)) => difference > largest || (difference == largest && start + i < pixel),
                 };
-                if farther {
-                    found.largest = Some((apart, start + i, channel));
+                if is_larger {
+                    sums.largest = Some((difference, start + i, channel));
                 }
             }
         }
         let count = |flags: &[bool]| flags.iter().filter(|flag| **flag).count() as u64;
-        found.different = count(&unlike);
-        found.first = unlike.iter().position(|flag| *flag).map(|i| start + i);
-        found.beyond = count(&beyond);
-        found
+        sums.different = count(&different);
+        sums.first = different.iter().position(|flag| *flag).map(|i| start + i);
+        sums.beyond = count(&beyond);
+        sums
     }
 }

@@ -8,8 +8,9 @@ use rayon::prelude::*;
 use super::colors::Colors;
 use super::picture::Picture;
 
-/// Radius of a window in pixels, and standard deviation of its Gaussian.
+/// Radius of a window in pixels.
 const RADIUS: usize = 5;
+/// Standard deviation of the Gaussian of a window, in pixels.
 const SIGMA: f64 = 1.5;
 /// (K1 L)² and (K2 L)² for L = 1.
 const C1: f64 = 0.01 * 0.01;
@@ -17,20 +18,21 @@ const C2: f64 = 0.03 * 0.03;
 const TILE: usize = 256;
 
 /// Returns the mean SSIM over all windows and the channels red, green and blue, encoded for display; 1 for equal
-/// images. Windows lie inside the image, clipped along shorter sides. `None` if either image has no colors.
+/// images; `None` if either image has no colors. Windows lie inside the image. Along a side that is shorter than a
+/// window, the windows are clipped.
 pub fn ssim(a: &Picture, b: &Picture) -> Option<f64> {
     let colors = Colors::of(a, b)?;
-    let (across, down) = (Axis::of(colors.width), Axis::of(colors.height));
+    let (x_axis, y_axis) = (Axis::of(colors.width), Axis::of(colors.height));
     let mut tiles = Vec::new();
-    for y in (0..down.count).step_by(TILE) {
-        tiles.extend((0..across.count).step_by(TILE).map(|x| (x, y)));
+    for y in (0..y_axis.count).step_by(TILE) {
+        tiles.extend((0..x_axis.count).step_by(TILE).map(|x| (x, y)));
     }
     let sums = tiles.par_iter().map(|(x, y)| {
-        let across = across.part(*x);
-        tile(&colors, &across, &down.part(*y))
+        let x_axis = x_axis.tile_axis(*x);
+        tile(&colors, &x_axis, &y_axis.tile_axis(*y))
     });
     let sum = sums.collect::<Vec<_>>().iter().sum::<f64>();
-    Some(sum / (3 * across.count * down.count) as f64)
+    Some(sum / (3 * x_axis.count * y_axis.count) as f64)
 }
 
 /// The windows along one axis.
@@ -50,7 +52,7 @@ impl Axis {
         Axis { first, count, side }
     }
 
-    fn part(self, start: usize) -> Axis {
+    fn tile_axis(self, start: usize) -> Axis {
         Axis {
             first: self.first + start,
             count: TILE.min(self.count - start),
@@ -62,54 +64,55 @@ impl Axis {
         self.first.saturating_sub(RADIUS)..self.side.min(self.first + self.count + RADIUS)
     }
 
-    /// For each filter tap, calls `call` with a range of windows (relative to this axis), the pixels under the tap
-    /// (relative to `pixels`) and the weight. Clipped windows differ in weights, so each of them has its own calls.
-    fn each(self, mut call: impl FnMut(Range<usize>, Range<usize>, f64)) {
+    /// For each filter tap, calls `visit` with a range of windows (relative to this axis), the pixels under the tap
+    /// (relative to `pixels`) and the weight. Clipped windows differ in weights, so each clipped window is visited
+    /// separately.
+    fn for_each_tap(self, mut visit: impl FnMut(Range<usize>, Range<usize>, f64)) {
         let kernel: [f64; 2 * RADIUS + 1] = std::array::from_fn(|i| {
             let x = i as f64 - RADIUS as f64;
             (-x * x / (2.0 * SIGMA * SIGMA)).exp()
         });
         let start = self.pixels().start;
         if self.side > 2 * RADIUS {
-            let whole: f64 = kernel.iter().sum();
+            let sum: f64 = kernel.iter().sum();
             for (tap, weight) in kernel.iter().enumerate() {
-                call(0..self.count, tap..tap + self.count, weight / whole);
+                visit(0..self.count, tap..tap + self.count, weight / sum);
             }
             return;
         }
         for window in 0..self.count {
-            let middle = self.first + window;
-            let inside = |tap: &usize| (RADIUS..self.side + RADIUS).contains(&(middle + tap));
-            let taps = || (0..kernel.len()).filter(inside);
-            let whole: f64 = taps().map(|tap| kernel[tap]).sum();
+            let center = self.first + window;
+            let is_inside = |tap: &usize| (RADIUS..self.side + RADIUS).contains(&(center + tap));
+            let taps = || (0..kernel.len()).filter(is_inside);
+            let sum: f64 = taps().map(|tap| kernel[tap]).sum();
             for tap in taps() {
-                let pixel = middle + tap - RADIUS - start;
-                call(window..window + 1, pixel..pixel + 1, kernel[tap] / whole);
+                let pixel = center + tap - RADIUS - start;
+                visit(window..window + 1, pixel..pixel + 1, kernel[tap] / sum);
             }
         }
     }
 }
 
-fn tile(colors: &Colors, across: &Axis, down: &Axis) -> f64 {
-    let (columns, rows) = (across.pixels(), down.pixels());
-    if rows.clone().all(|y| colors.is_plainly_same(y, columns.clone())) {
-        return (3 * across.count * down.count) as f64;
+fn tile(colors: &Colors, x_axis: &Axis, y_axis: &Axis) -> f64 {
+    let (columns, rows) = (x_axis.pixels(), y_axis.pixels());
+    if rows.clone().all(|y| colors.stores_same_integers(y, columns.clone())) {
+        return (3 * x_axis.count * y_axis.count) as f64;
     }
     let mut taps = Vec::new();
-    across.each(|windows, pixels, weight| taps.push((windows, pixels, weight)));
+    x_axis.for_each_tap(|windows, pixels, weight| taps.push((windows, pixels, weight)));
     let mut sums = vec![[const { Vec::new() }; 5]; 3];
     for sum in sums.iter_mut().flatten() {
-        *sum = vec![0.0; across.count * down.count];
+        *sum = vec![0.0; x_axis.count * y_axis.count];
     }
-    let mut rows_of = vec![Vec::new(); rows.len()];
-    down.each(|windows, pixels, weight| {
+    let mut windows_of_row = vec![Vec::new(); rows.len()];
+    y_axis.for_each_tap(|windows, pixels, weight| {
         for (window, pixel) in windows.zip(pixels) {
-            rows_of[pixel].push((window, weight));
+            windows_of_row[pixel].push((window, weight));
         }
     });
-    let mut line = vec![0.0; across.count];
-    for (y, windows) in rows.zip(rows_of) {
-        let (a, b) = colors.shown(y, columns.clone());
+    let mut line = vec![0.0; x_axis.count];
+    for (y, windows) in rows.zip(windows_of_row) {
+        let (a, b) = colors.display_values(y, columns.clone());
         for ((a, b), sums) in a.iter().zip(&b).zip(&mut sums) {
             let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).collect::<Vec<f64>>();
             let products = [a.clone(), b.clone(), product(a, a), product(b, b), product(a, b)];
@@ -119,7 +122,7 @@ fn tile(colors: &Colors, across: &Axis, down: &Axis) -> f64 {
                     add(&mut line[windows.clone()], &product[pixels.clone()], *weight);
                 }
                 for (window, weight) in &windows {
-                    add(&mut sums[window * across.count..][..across.count], &line, *weight);
+                    add(&mut sums[window * x_axis.count..][..x_axis.count], &line, *weight);
                 }
             }
         }
@@ -127,9 +130,9 @@ fn tile(colors: &Colors, across: &Axis, down: &Axis) -> f64 {
     let mut sum = 0.0;
     for [a, b, aa, bb, ab] in &sums {
         for ((((a, b), aa), bb), ab) in a.iter().zip(b).zip(aa).zip(bb).zip(ab) {
-            let (of_a, of_b, of_both) = (aa - a * a, bb - b * b, ab - a * b);
-            let alike = (2.0 * a * b + C1) * (2.0 * of_both + C2);
-            sum += alike / ((a * a + b * b + C1) * (of_a + of_b + C2));
+            let (variance_a, variance_b, covariance) = (aa - a * a, bb - b * b, ab - a * b);
+            let numerator = (2.0 * a * b + C1) * (2.0 * covariance + C2);
+            sum += numerator / ((a * a + b * b + C1) * (variance_a + variance_b + C2));
         }
     }
     sum

@@ -1,6 +1,6 @@
 //! Top-down construction of a binary BVH by the surface area heuristic (SAH), for the wide BVH.
 //!
-//! Splits are found by binning (Wald, "On fast Construction of SAH-based Bounding Volume Hierarchies", RT 2007), in
+//! Splits are found by binning (Wald, "On fast Construction of SAH-based Bounding Volume Hierarchies", RT 2007), and in
 //! small nodes by a sweep along each axis.
 
 use bytemuck::{Pod, Zeroable};
@@ -30,9 +30,9 @@ pub struct BuildItem {
 }
 
 impl BuildItem {
-    fn new(number: usize, bounds: &Aabb) -> BuildItem {
-        let whole = bounds.low.cmple(bounds.high).all(); // false if any bound is NaN
-        let Aabb { low, high } = if whole {
+    fn new(index: usize, bounds: &Aabb) -> BuildItem {
+        let is_valid = bounds.low.cmple(bounds.high).all(); // false if any bound is NaN
+        let Aabb { low, high } = if is_valid {
             *bounds
         } else {
             Aabb {
@@ -43,12 +43,12 @@ impl BuildItem {
         // Adding 0 turns -0 into 0: otherwise a minimum's bits would depend on the order of operands.
         let finite = |v: Vec3| v.clamp(Vec3::MIN, Vec3::MAX) + Vec3::ZERO;
         BuildItem {
-            low: finite(low).extend(f32::from_bits(number as u32)),
+            low: finite(low).extend(f32::from_bits(index as u32)),
             high: finite(high).extend(1.0),
         }
     }
 
-    pub fn number(&self) -> u32 {
+    pub fn index(&self) -> u32 {
         self.low.w.to_bits()
     }
 
@@ -71,7 +71,7 @@ impl BuildItem {
 pub struct Inner {
     pub low: Vec3,
     pub high: Vec3,
-    /// Items in the first half.
+    /// Number of items in the first half.
     pub first: u32,
     /// SAH cost in a wide BVH if the items may occupy up to 1, 2, .. 7 slots of the parent.
     pub costs: [f32; SLOTS - 1],
@@ -86,31 +86,31 @@ pub struct Binary {
 
 impl Binary {
     /// Builds at most `levels` levels of inner nodes, for at most 2^`levels` boxes.
-    pub fn build(boxes: &[Aabb], levels: u32, most_in_leaf: usize) -> Binary {
+    pub fn build(boxes: &[Aabb], levels: u32, max_leaf_size: usize) -> Binary {
         let items = boxes.par_iter().enumerate().with_min_len(CHUNK);
         let mut items: Vec<BuildItem> = items.map(|(i, bounds)| BuildItem::new(i, bounds)).collect();
         let mut inner = bytemuck::zeroed_vec(boxes.len().saturating_sub(1));
-        build(&mut items, &mut inner, levels, most_in_leaf);
+        build(&mut items, &mut inner, levels, max_leaf_size);
         Binary { items, inner }
     }
 }
 
-fn build(items: &mut [BuildItem], inner: &mut [Inner], levels: u32, most_in_leaf: usize) {
+fn build(items: &mut [BuildItem], inner: &mut [Inner], levels: u32, max_leaf_size: usize) {
     let Some((node, below)) = inner.split_first_mut() else {
         return;
     };
     let count = items.len();
-    let bounds = Bounds::over(items);
+    let bounds = Bounds::of(items);
     let first = split(items, &bounds, levels);
     let halves = items.split_at_mut(first);
     let inner = below.split_at_mut(first - 1);
-    let mut one = || build(halves.0, inner.0, levels - 1, most_in_leaf);
-    let mut other = || build(halves.1, inner.1, levels - 1, most_in_leaf);
+    let mut build_first = || build(halves.0, inner.0, levels - 1, max_leaf_size);
+    let mut build_second = || build(halves.1, inner.1, levels - 1, max_leaf_size);
     if count >= JOIN {
-        rayon::join(one, other);
+        rayon::join(build_first, build_second);
     } else {
-        one();
-        other();
+        build_first();
+        build_second();
     }
     let sides = [(&*halves.0, &*inner.0), (&*halves.1, &*inner.1)].map(|(items, inner)| costs_of(items, inner));
     let Aabb { low, high } = bounds.aabb();
@@ -118,7 +118,7 @@ fn build(items: &mut [BuildItem], inner: &mut [Inner], levels: u32, most_in_leaf
         low,
         high,
         first: first as u32,
-        costs: costs(area(bounds.low, bounds.high), count, most_in_leaf, &sides),
+        costs: costs(area(bounds.low, bounds.high), count, max_leaf_size, &sides),
     };
 }
 
@@ -145,7 +145,7 @@ impl Bounds {
         high_middle: Vec4::NEG_INFINITY,
     };
 
-    fn of(items: &[BuildItem]) -> Bounds {
+    fn of_chunk(items: &[BuildItem]) -> Bounds {
         items.iter().fold(Bounds::EMPTY, |bounds, item| Bounds {
             low: bounds.low.min(item.low),
             high: bounds.high.max(item.high),
@@ -154,11 +154,11 @@ impl Bounds {
         })
     }
 
-    fn over(items: &[BuildItem]) -> Bounds {
+    fn of(items: &[BuildItem]) -> Bounds {
         if items.len() < PARALLEL {
-            return Bounds::of(items);
+            return Bounds::of_chunk(items);
         }
-        items.par_chunks(CHUNK).map(Bounds::of).reduce(
+        items.par_chunks(CHUNK).map(Bounds::of_chunk).reduce(
             || Bounds::EMPTY,
             |a, b| Bounds {
                 low: a.low.min(b.low),
@@ -192,13 +192,13 @@ fn split(items: &mut [BuildItem], bounds: &Bounds, levels: u32) -> usize {
     if count == 2 {
         return 1;
     }
-    let needed = usize::BITS - (count - 1).leading_zeros(); // levels of a balanced tree
-    let found = match () {
-        _ if levels <= needed || area(bounds.low, bounds.high) < 2.0 * MIN_AREA => None,
+    let min_levels = usize::BITS - (count - 1).leading_zeros(); // levels of a balanced tree
+    let first_size = match () {
+        _ if levels <= min_levels || area(bounds.low, bounds.high) < 2.0 * MIN_AREA => None,
         _ if count <= SMALL => split_small(items),
         _ => split_by_bins(items, bounds),
     };
-    found.unwrap_or_else(|| split_in_half(items, bounds))
+    first_size.unwrap_or_else(|| split_in_half(items, bounds))
 }
 
 fn split_in_half(items: &mut [BuildItem], bounds: &Bounds) -> usize {
@@ -206,7 +206,7 @@ fn split_in_half(items: &mut [BuildItem], bounds: &Bounds) -> usize {
     let extent = (bounds.high_middle - bounds.low_middle).xyz();
     if extent.max_element() > 0.0 {
         let axis = extent.max_position();
-        let key = |item: &BuildItem| (item.middle()[axis], item.number());
+        let key = |item: &BuildItem| (item.middle()[axis], item.index());
         items.select_nth_unstable_by(half, |a, b| {
             let (a, b) = (key(a), key(b));
             a.0.total_cmp(&b.0).then(a.1.cmp(&b.1))
@@ -269,13 +269,13 @@ const EMPTY_BINS: Bins = [[Bin {
 /// Returns the split of lowest SAH cost between bins, or `None` if all items share a bin.
 fn split_by_bins(items: &mut [BuildItem], bounds: &Bounds) -> Option<usize> {
     let low = bounds.low_middle;
-    let per_unit = (BINS - 1) as f32 / (bounds.high_middle - low);
+    let bins_per_unit = (BINS - 1) as f32 / (bounds.high_middle - low);
     // Adding 2^23 rounds to an integer, which the low mantissa bits hold.
     let bins_of = |item: &BuildItem| {
-        let place = (item.middle() - low) * per_unit + 8_388_608.0;
-        [place.x, place.y, place.z].map(|x| x.to_bits() as usize % BINS)
+        let position = (item.middle() - low) * bins_per_unit + 8_388_608.0;
+        [position.x, position.y, position.z].map(|x| x.to_bits() as usize % BINS)
     };
-    let fill = |items: &[BuildItem]| {
+    let bin_items = |items: &[BuildItem]| {
         let mut bins = EMPTY_BINS;
         for item in items {
             for (bins, i) in bins.iter_mut().zip(bins_of(item)) {
@@ -288,9 +288,9 @@ fn split_by_bins(items: &mut [BuildItem], bounds: &Bounds) -> Option<usize> {
         bins
     };
     let bins = if items.len() < PARALLEL {
-        fill(items)
+        bin_items(items)
     } else {
-        items.par_chunks(CHUNK).map(fill).reduce(|| EMPTY_BINS, together)
+        items.par_chunks(CHUNK).map(bin_items).reduce(|| EMPTY_BINS, merge_bins)
     };
     let mut best: Option<(f32, usize, usize)> = None;
     for (axis, bins) in bins.iter().enumerate() {
@@ -317,7 +317,7 @@ fn split_by_bins(items: &mut [BuildItem], bounds: &Bounds) -> Option<usize> {
     Some(partition(items, |item| bins_of(item)[axis] < end))
 }
 
-fn together(mut a: Bins, b: Bins) -> Bins {
+fn merge_bins(mut a: Bins, b: Bins) -> Bins {
     for (a, b) in a.iter_mut().flatten().zip(b.iter().flatten()) {
         a.low = a.low.min(b.low);
         a.high = a.high.max(b.high);

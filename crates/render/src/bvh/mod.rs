@@ -4,9 +4,9 @@
 //! HPG 2017, section 4: 80 bytes, with child boxes quantized to 256 steps per axis.
 //!
 //! Measured on two cores of an AMD EPYC: a million triangles take 0.26 to 0.36 s, with 90 MB during the build and 10 to
-//! 12 MB after it; 100,000 spheres take 0.03 s. With the same collapse, obvhs 0.4 (PLOC and reinsertion) gave an SAH
-//! cost 3 % lower to 13 % higher in 1 to 4 times the time (distance 6, 15 % reinserted), or 7 % lower to 7 % higher in
-//! 7 to 80 times the time (distance 14, all reinserted), over seven scenes.
+//! 12 MB after it; 100,000 spheres take 0.03 s. With the same collapse, the crate obvhs 0.4 (PLOC and reinsertion) gave
+//! an SAH cost 3 % lower to 13 % higher in 1 to 4 times the time (distance 6, 15 % reinserted), or 7 % lower to 7 %
+//! higher in 7 to 80 times the time (distance 14, all reinserted), over seven scenes.
 
 mod binary;
 mod node;
@@ -35,9 +35,9 @@ impl Aabb {
 
     /// Returns the bounding box of points.
     pub fn around(points: &[Vec3]) -> Aabb {
-        points.iter().fold(Aabb::EMPTY, |all, p| Aabb {
-            low: all.low.min(*p),
-            high: all.high.max(*p),
+        points.iter().fold(Aabb::EMPTY, |bounds, p| Aabb {
+            low: bounds.low.min(*p),
+            high: bounds.high.max(*p),
         })
     }
 
@@ -67,12 +67,12 @@ pub const MAX_LEAF_SIZE: u32 = 4;
 
 /// Builds the BVH over boxes. The result does not depend on the number of threads.
 ///
-/// `most_in_leaf` is the maximum number of items per leaf, 1 to [`MAX_LEAF_SIZE`]. Bounds are clamped to finite
-/// numbers. Boxes that are empty or contain NaN are replaced by the point 0.
-pub fn build(boxes: &[Aabb], most_in_leaf: u32) -> Tree {
-    let most_in_leaf = most_in_leaf.clamp(1, MAX_LEAF_SIZE) as usize;
-    // At most as many levels as the binary BVH, in practice a third.
-    wide::collapse(&Binary::build(boxes, BUILD_MAX_DEPTH, most_in_leaf), most_in_leaf)
+/// `max_leaf_size` is the maximum number of items per leaf, clamped to 1..=[`MAX_LEAF_SIZE`]. Bounds are clamped to
+/// finite numbers. Boxes that are empty or contain NaN are replaced by the point 0.
+pub fn build(boxes: &[Aabb], max_leaf_size: u32) -> Tree {
+    let max_leaf_size = max_leaf_size.clamp(1, MAX_LEAF_SIZE) as usize;
+    // The wide BVH has at most as many levels as the binary BVH, in practice a third.
+    wide::collapse(&Binary::build(boxes, BUILD_MAX_DEPTH, max_leaf_size), max_leaf_size)
 }
 
 #[cfg(test)]

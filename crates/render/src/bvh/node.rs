@@ -15,12 +15,12 @@ pub struct Node {
     pub exponents: [u8; 3],
     /// Bit c: child c is an inner node.
     pub inner: u8,
-    /// Index of the first inner child. Others follow in the order of their slots.
+    /// Index of the first inner child. The other inner children follow in the order of their slots.
     pub first_child: u32,
-    /// First item of its leaves in [`Tree::order`](super::Tree::order).
+    /// First item of the node's leaves in [`Tree::order`](super::Tree::order).
     pub first_item: u32,
-    /// Per leaf: number of items in bits 5 to 7, and offset of the first from `first_item` in bits 0 to 4; 0 for other
-    /// slots.
+    /// Per leaf: number of items in bits 5 to 7, and offset of the first item from `first_item` in bits 0 to 4; 0 for
+    /// other slots.
     pub leaves: [u8; 8],
     /// Lower bounds along x, y and z in grid steps; 255 in an empty slot.
     pub low: [[u8; 8]; 3],
@@ -49,15 +49,15 @@ impl Node {
     pub(super) fn set_bounds(&mut self, slot: usize, bounds: &Aabb) {
         let (base, scale) = (self.base(), self.scale());
         for axis in 0..3 {
-            let at = |q: u8| bound(base[axis], q, scale[axis]);
+            let decode = |q: u8| bound(base[axis], q, scale[axis]);
             let steps = |x: f32| (x - base[axis]) / scale[axis];
             // The casts saturate and map NaN to 0.
             let mut low = steps(bounds.low[axis]) as u8;
-            while low > 0 && at(low) > bounds.low[axis] {
+            while low > 0 && decode(low) > bounds.low[axis] {
                 low -= 1;
             }
             let mut high = steps(bounds.high[axis]).ceil() as u8;
-            while high < 255 && at(high) < bounds.high[axis] {
+            while high < 255 && decode(high) < bounds.high[axis] {
                 high += 1;
             }
             self.low[axis][slot] = low;
@@ -91,8 +91,8 @@ impl Node {
 
     /// Returns a child's node index, or `None` if it is not an inner node.
     pub fn child(&self, child: usize) -> Option<u32> {
-        let before = self.inner & ((1 << child) - 1);
-        (self.inner >> child & 1 == 1).then(|| self.first_child + before.count_ones())
+        let preceding = self.inner & ((1 << child) - 1);
+        (self.inner >> child & 1 == 1).then(|| self.first_child + preceding.count_ones())
     }
 
     /// Returns a child's items in [`Tree::order`](super::Tree::order), none if it is not a leaf.
@@ -114,8 +114,8 @@ fn bound(base: f32, q: u8, scale: f32) -> f32 {
 
 /// Returns the exponent of the smallest step that spans `low` to `high`.
 fn exponent(low: f32, high: f32) -> u8 {
-    let step_at_least = (high - low).min(f32::MAX) / 255.0;
-    let mut exponent = (step_at_least.to_bits() >> 23) as u8;
+    let min_step = (high - low).min(f32::MAX) / 255.0;
+    let mut exponent = (min_step.to_bits() >> 23) as u8;
     while bound(low, 255, step(exponent)) < high {
         exponent += 1; // at most 254: 255 * 2^127 is infinite
     }

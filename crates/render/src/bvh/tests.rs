@@ -22,17 +22,17 @@ impl Random {
     }
 }
 
-fn around(middle: Vec3, extent: Vec3) -> Aabb {
+fn box_around(middle: Vec3, extent: Vec3) -> Aabb {
     Aabb {
         low: middle - extent,
         high: middle + extent,
     }
 }
 
-fn soup(count: usize) -> Vec<Aabb> {
+fn random_boxes(count: usize) -> Vec<Aabb> {
     let mut random = Random(1);
     (0..count)
-        .map(|_| around(random.point(), random.point() * 0.02))
+        .map(|_| box_around(random.point(), random.point() * 0.02))
         .collect()
 }
 
@@ -41,13 +41,13 @@ fn decoded(base: f32, q: u8, exponent: u8) -> f32 {
 }
 
 /// Asserts invariants and returns the number of levels.
-fn check(tree: &Tree, boxes: &[Aabb], most_in_leaf: u32) -> u32 {
+fn check(tree: &Tree, boxes: &[Aabb], max_leaf_size: u32) -> u32 {
     let mut nodes = vec![0; tree.nodes.len()];
     let mut items = vec![0; boxes.len()];
     let mut levels = 0;
     // Index, level, boxes of all ancestors.
     let mut pending: Vec<(u32, u32, Vec<Aabb>)> = vec![(0, 1, Vec::new())];
-    while let Some((number, level, outer)) = pending.pop() {
+    while let Some((number, level, ancestors)) = pending.pop() {
         levels = levels.max(level);
         nodes[number as usize] += 1;
         let node = &tree.nodes[number as usize];
@@ -55,23 +55,23 @@ fn check(tree: &Tree, boxes: &[Aabb], most_in_leaf: u32) -> u32 {
             let [low, high] = [node.low, node.high]
                 .map(|q| Vec3::from_array([0, 1, 2].map(|a| decoded(node.base[a], q[a][c], node.exponents[a]))));
             assert_eq!((low, high), (node.low(c), node.high(c)));
-            let mut outer = outer.clone();
-            outer.push(Aabb { low, high });
+            let mut ancestors = ancestors.clone();
+            ancestors.push(Aabb { low, high });
             let range = node.items(c);
             if let Some(child) = node.child(c) {
                 assert_eq!(node.leaves[c], 0);
-                pending.push((child, level + 1, outer.clone()));
+                pending.push((child, level + 1, ancestors.clone()));
             } else if range.is_empty() {
                 assert_eq!(node.leaves[c], 0);
                 assert_eq!((node.low.map(|q| q[c]), node.high.map(|q| q[c])), ([255; 3], [0; 3]));
             }
-            assert!(range.len() <= most_in_leaf as usize);
+            assert!(range.len() <= max_leaf_size as usize);
             for item in &tree.order[range] {
                 items[*item as usize] += 1;
-                let inside = &boxes[*item as usize];
-                for Aabb { low, high } in &outer {
-                    assert!(low.cmple(inside.low.max(Vec3::MIN)).all(), "{low} {inside:?}");
-                    assert!(high.cmpge(inside.high.min(Vec3::MAX)).all(), "{high} {inside:?}");
+                let bounds = &boxes[*item as usize];
+                for Aabb { low, high } in &ancestors {
+                    assert!(low.cmple(bounds.low.max(Vec3::MIN)).all(), "{low} {bounds:?}");
+                    assert!(high.cmpge(bounds.high.min(Vec3::MAX)).all(), "{high} {bounds:?}");
                 }
             }
         }
@@ -84,52 +84,53 @@ fn check(tree: &Tree, boxes: &[Aabb], most_in_leaf: u32) -> u32 {
 }
 
 fn check_builds(boxes: &[Aabb]) -> u32 {
-    let levels = [1, 2, 3, MAX_LEAF_SIZE].map(|most| check(&build(boxes, most), boxes, most));
+    let levels =
+        [1, 2, 3, MAX_LEAF_SIZE].map(|max_leaf_size| check(&build(boxes, max_leaf_size), boxes, max_leaf_size));
     levels.into_iter().max().unwrap()
 }
 
 #[test]
 fn few_items() {
     for count in [0, 1, 2, 3, 4, 5, 7, 8, 9, 10, 17] {
-        check_builds(&soup(count));
+        check_builds(&random_boxes(count));
     }
     let tree = build(&[], 4);
     assert_eq!(
         (tree.nodes.len(), tree.nodes[0].inner, tree.nodes[0].leaves),
         (1, 0, [0; 8])
     );
-    let tree = build(&soup(1), 4);
+    let tree = build(&random_boxes(1), 4);
     assert_eq!((tree.nodes.len(), tree.nodes[0].inner, &*tree.order), (1, 0, &[0][..]));
 }
 
 #[test]
 fn many_items() {
-    let boxes = soup(100_000);
+    let boxes = random_boxes(100_000);
     assert!(check_builds(&boxes) <= 9);
 }
 
 #[test]
-fn an_invalid_bvh_is_found() {
-    let boxes = soup(100);
+fn invalid_bvhs_are_detected() {
+    let boxes = random_boxes(100);
     let tree = build(&boxes, 4);
-    let fails = |change: &dyn Fn(&mut Tree)| {
+    let is_rejected = |change: &dyn Fn(&mut Tree)| {
         let mut tree = tree.clone();
         change(&mut tree);
         std::panic::catch_unwind(|| check(&tree, &boxes, 4)).is_err()
     };
-    assert!(!fails(&|_| ()));
-    assert!(fails(&|tree| tree.order[3] = tree.order[4]));
-    assert!(fails(&|tree| tree.nodes[1].leaves.swap(0, 7)));
+    assert!(!is_rejected(&|_| ()));
+    assert!(is_rejected(&|tree| tree.order[3] = tree.order[4]));
+    assert!(is_rejected(&|tree| tree.nodes[1].leaves.swap(0, 7)));
     let slot = (0..8).find(|c| tree.nodes[0].child(*c).is_some()).unwrap();
-    assert!(fails(&|tree| tree.nodes[0].low[1][slot] += 1));
-    assert!(fails(&|tree| tree.nodes[0].high[2][slot] -= 1));
-    assert!(fails(&|tree| tree.nodes[0].exponents[0] -= 1));
-    assert!(fails(&|tree| tree.nodes[0].base[0] += 1e-3));
+    assert!(is_rejected(&|tree| tree.nodes[0].low[1][slot] += 1));
+    assert!(is_rejected(&|tree| tree.nodes[0].high[2][slot] -= 1));
+    assert!(is_rejected(&|tree| tree.nodes[0].exponents[0] -= 1));
+    assert!(is_rejected(&|tree| tree.nodes[0].base[0] += 1e-3));
 }
 
 #[test]
 fn the_bvh_does_not_depend_on_the_number_of_threads() {
-    for boxes in [soup(200_000), vec![around(Vec3::ONE, Vec3::ONE); 100_000]] {
+    for boxes in [random_boxes(200_000), vec![box_around(Vec3::ONE, Vec3::ONE); 100_000]] {
         let [one, two, five] = [1, 2, 5].map(|threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             let tree = pool.install(|| build(&boxes, 4));
@@ -162,9 +163,9 @@ fn zeros_of_both_signs() {
 #[test]
 fn equal_boxes() {
     for extent in [0.0, 1.0, 1e30] {
-        assert!(check_builds(&vec![around(Vec3::splat(0.3), Vec3::splat(extent)); 3000]) <= 12);
+        assert!(check_builds(&vec![box_around(Vec3::splat(0.3), Vec3::splat(extent)); 3000]) <= 12);
     }
-    let boxes = vec![around(Vec3::NEG_ONE, Vec3::ONE); 1_000_000];
+    let boxes = vec![box_around(Vec3::NEG_ONE, Vec3::ONE); 1_000_000];
     check(&build(&boxes, 4), &boxes, 4);
 }
 
@@ -172,10 +173,10 @@ fn equal_boxes() {
 fn boxes_in_geometric_progression() {
     for axis in [Vec3::X, Vec3::new(1.0, 0.0, 1.0), Vec3::ONE] {
         // Equal, touching, nested and degenerate boxes, down to denormal numbers.
-        let at = |i: i32| 2f32.powi(-i);
+        let distance = |i: i32| 2f32.powi(-i);
         let boxes = |extent: f32, offset: f32| -> Vec<Aabb> {
             (-120..150)
-                .map(|i| around(axis * at(i), Vec3::splat(extent) + axis * (offset * at(i))))
+                .map(|i| box_around(axis * distance(i), Vec3::splat(extent) + axis * (offset * distance(i))))
                 .collect()
         };
         for (extent, offset) in [(0.0, 0.0), (0.0, 0.25), (0.0, 1.0), (1e-30, 0.0), (1.0, 0.0)] {
@@ -186,7 +187,7 @@ fn boxes_in_geometric_progression() {
     }
     // With slow growth, a binary tree of unlimited depth would degenerate into a chain.
     let boxes: Vec<Aabb> = (0..2000)
-        .map(|i| around(Vec3::X * 1.05f32.powi(-i), Vec3::splat(1e-25)))
+        .map(|i| box_around(Vec3::X * 1.05f32.powi(-i), Vec3::splat(1e-25)))
         .collect();
     check_builds(&boxes);
 }
@@ -202,10 +203,10 @@ fn binary_levels(inner: &[Inner]) -> u32 {
 fn the_depth_is_limited() {
     // Each box is twice as large as the next box.
     let boxes: Vec<Aabb> = (0..240)
-        .map(|i| around(Vec3::splat(2f32.powi(120 - i)), Vec3::splat(2f32.powi(120 - i))))
+        .map(|i| box_around(Vec3::splat(2f32.powi(120 - i)), Vec3::splat(2f32.powi(120 - i))))
         .collect();
     let levels = |levels| binary_levels(&Binary::build(&boxes, levels, 4).inner);
-    assert!(levels(200) > BUILD_MAX_DEPTH, "too easy: {}", levels(200));
+    assert!(levels(200) > BUILD_MAX_DEPTH, "only {} levels", levels(200));
     assert_eq!(levels(BUILD_MAX_DEPTH), BUILD_MAX_DEPTH);
     assert_eq!(levels(8), 8);
     check_builds(&boxes);
@@ -219,36 +220,36 @@ fn huge_tiny_and_infinite_boxes() {
     let mut random = Random(7);
     for scale in [1e-45, 1e-40, 1e-38, 1e-20, 1e9, 1e18, 1e25, 1e37, f32::MAX] {
         let boxes: Vec<Aabb> = (0..500)
-            .map(|_| around((random.point() - 0.5) * scale, random.point() * (0.1 * scale)))
+            .map(|_| box_around((random.point() - 0.5) * scale, random.point() * (0.1 * scale)))
             .collect();
         check_builds(&boxes);
     }
     // Small boxes far from the origin: grid steps below the float spacing.
-    for far in [1e3, 1e6, 1e9, -1e9] {
+    for offset in [1e3, 1e6, 1e9, -1e9] {
         let boxes: Vec<Aabb> = (0..500)
-            .map(|_| around(random.point() + far, random.point() * 1e-3))
+            .map(|_| box_around(random.point() + offset, random.point() * 1e-3))
             .collect();
         check_builds(&boxes);
     }
     // Planes and half-spaces among small boxes.
-    let mut boxes = soup(1000);
+    let mut boxes = random_boxes(1000);
     for i in 0..10 {
-        let at = Vec3::splat(0.1 * i as f32);
-        boxes.push(around(at, Vec3::new(1e9, 1e9, 0.0)));
-        boxes.push(around(at, Vec3::new(f32::INFINITY, f32::INFINITY, 0.0)));
-        boxes.push(around(at, Vec3::INFINITY));
-        boxes.push(around(at, Vec3::new(0.0, f32::MAX, 0.0)));
+        let center = Vec3::splat(0.1 * i as f32);
+        boxes.push(box_around(center, Vec3::new(1e9, 1e9, 0.0)));
+        boxes.push(box_around(center, Vec3::new(f32::INFINITY, f32::INFINITY, 0.0)));
+        boxes.push(box_around(center, Vec3::INFINITY));
+        boxes.push(box_around(center, Vec3::new(0.0, f32::MAX, 0.0)));
     }
     check_builds(&boxes);
-    check_builds(&[around(Vec3::ZERO, Vec3::INFINITY)]);
+    check_builds(&[box_around(Vec3::ZERO, Vec3::INFINITY)]);
 }
 
 #[test]
 fn empty_and_nan_boxes_are_replaced() {
-    let mut boxes = soup(100);
+    let mut boxes = random_boxes(100);
     boxes.push(Aabb::EMPTY);
-    boxes.push(around(Vec3::NAN, Vec3::ONE));
-    boxes.push(around(Vec3::ONE, -Vec3::X));
+    boxes.push(box_around(Vec3::NAN, Vec3::ONE));
+    boxes.push(box_around(Vec3::ONE, -Vec3::X));
     let tree = build(&boxes, 4);
     let mut order = tree.order.clone();
     order.sort_unstable();
@@ -258,7 +259,7 @@ fn empty_and_nan_boxes_are_replaced() {
             .iter()
             .all(|node| (0..8).all(|c| !node.low(c).is_nan() && !node.high(c).is_nan()))
     );
-    boxes[100..].fill(around(Vec3::ZERO, Vec3::ZERO));
+    boxes[100..].fill(box_around(Vec3::ZERO, Vec3::ZERO));
     assert_eq!(build(&boxes, 4), tree);
     check(&tree, &boxes, 4);
 }
@@ -266,7 +267,10 @@ fn empty_and_nan_boxes_are_replaced() {
 #[test]
 fn slots_lie_in_their_octants() {
     let corners = (0..8).map(|c| Vec3::new((c & 1) as f32, (c >> 1 & 1) as f32, (c >> 2) as f32));
-    let boxes: Vec<Aabb> = corners.rev().map(|corner| around(corner, Vec3::splat(0.1))).collect();
+    let boxes: Vec<Aabb> = corners
+        .rev()
+        .map(|corner| box_around(corner, Vec3::splat(0.1)))
+        .collect();
     let tree = build(&boxes, 1);
     let items: Vec<u32> = (0..8).map(|c| tree.order[tree.nodes[0].items(c)][0]).collect();
     assert_eq!(items, [7, 6, 5, 4, 3, 2, 1, 0]);

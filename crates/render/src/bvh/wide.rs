@@ -23,22 +23,22 @@ pub fn leaf_cost(area: f32, count: usize) -> f32 {
 
 /// Returns the costs of a binary node that occupies up to 1, 2, .. 7 slots of a wide parent, given the costs of its
 /// halves.
-pub fn costs(area: f32, count: usize, most_in_leaf: usize, sides: &[[f32; SLOTS - 1]; 2]) -> [f32; SLOTS - 1] {
-    let shared = |slots: usize| share(slots, |k| sides[0][k - 1], |k| sides[1][k - 1]).0;
+pub fn costs(area: f32, count: usize, max_leaf_size: usize, sides: &[[f32; SLOTS - 1]; 2]) -> [f32; SLOTS - 1] {
+    let split_cost = |slots: usize| distribute(slots, |k| sides[0][k - 1], |k| sides[1][k - 1]).0;
     let mut costs = [0.0; SLOTS - 1];
-    costs[0] = shared(SLOTS) + area * NODE_COST;
-    if count <= most_in_leaf {
+    costs[0] = split_cost(SLOTS) + area * NODE_COST;
+    if count <= max_leaf_size {
         costs[0] = costs[0].min(leaf_cost(area, count));
     }
     for slots in 2..SLOTS {
-        costs[slots - 1] = shared(slots).min(costs[slots - 2]);
+        costs[slots - 1] = split_cost(slots).min(costs[slots - 2]);
     }
     costs
 }
 
 /// Distributes slots over two sides, at least one each, at the lowest cost. Returns the cost and the number of slots of
 /// the first side.
-fn share(slots: usize, first: impl Fn(usize) -> f32, second: impl Fn(usize) -> f32) -> (f32, usize) {
+fn distribute(slots: usize, first: impl Fn(usize) -> f32, second: impl Fn(usize) -> f32) -> (f32, usize) {
     let mut best = (first(1) + second(slots - 1), 1);
     for k in 2..slots {
         let cost = first(k) + second(slots - k);
@@ -94,50 +94,50 @@ impl<'a> Part<'a> {
         ]
     }
 
-    fn is_leaf(&self, most_in_leaf: usize) -> bool {
+    fn is_leaf(&self, max_leaf_size: usize) -> bool {
         let count = self.items.len();
-        count == 1 || (count <= most_in_leaf && leaf_cost(self.area(), count) <= self.cost(1))
+        count == 1 || (count <= max_leaf_size && leaf_cost(self.area(), count) <= self.cost(1))
     }
 
     /// Collects the parts that fill this number of slots of a wide node. This part must have at least two items.
-    fn spread(&self, slots: usize, children: &mut Vec<Part<'a>>) {
+    fn collect_children(&self, slots: usize, children: &mut Vec<Part<'a>>) {
         let halves = self.halves();
-        let (_, first) = share(slots, |k| halves[0].cost(k), |k| halves[1].cost(k));
+        let (_, first) = distribute(slots, |k| halves[0].cost(k), |k| halves[1].cost(k));
         for (half, mut slots) in halves.into_iter().zip([first, slots - first]) {
             while slots > 1 && half.cost(slots) == half.cost(slots - 1) {
                 slots -= 1;
             }
             match slots {
                 1 => children.push(half),
-                _ => half.spread(slots, children),
+                _ => half.collect_children(slots, children),
             }
         }
     }
 }
 
-pub fn collapse(binary: &Binary, most_in_leaf: usize) -> Tree {
+pub fn collapse(binary: &Binary, max_leaf_size: usize) -> Tree {
     let root = Part {
         items: &binary.items,
         inner: &binary.inner,
     };
-    let mut below = Below {
-        most_in_leaf,
+    let mut builder = Builder {
+        max_leaf_size,
         tree: Tree {
             nodes: vec![Node::zeroed()],
             order: Vec::with_capacity(binary.items.len()),
         },
     };
-    below.tree.nodes[0] = below.add(root);
-    below.tree
+    builder.tree.nodes[0] = builder.add(root);
+    builder.tree
 }
 
-struct Below {
-    most_in_leaf: usize,
+struct Builder {
+    max_leaf_size: usize,
     tree: Tree,
 }
 
-impl Below {
-    /// Adds the descendants of a part and returns its node.
+impl Builder {
+    /// Adds the descendants of a part and returns the node of the part.
     fn add(&mut self, part: Part) -> Node {
         if part.items.is_empty() {
             return Node::around(&Aabb {
@@ -148,7 +148,7 @@ impl Below {
         let mut children = Vec::with_capacity(SLOTS);
         match part.items.len() {
             1 => children.push(part),
-            _ => part.spread(SLOTS, &mut children),
+            _ => part.collect_children(SLOTS, &mut children),
         }
         let bounds = part.bounds();
         let mut node = Node::around(&bounds);
@@ -160,10 +160,10 @@ impl Below {
                 continue;
             };
             node.set_bounds(slot, &child.bounds());
-            if child.is_leaf(self.most_in_leaf) {
+            if child.is_leaf(self.max_leaf_size) {
                 let offset = self.tree.order.len() as u32 - node.first_item;
                 node.leaves[slot] = (child.items.len() << 5) as u8 | offset as u8;
-                self.tree.order.extend(child.items.iter().map(BuildItem::number));
+                self.tree.order.extend(child.items.iter().map(BuildItem::index));
             } else {
                 node.inner |= 1 << slot;
                 inner.push(child);
@@ -176,31 +176,31 @@ impl Below {
                 self.tree.nodes[first_child + i] = self.add(child);
             }
         } else {
-            let below = inner.into_par_iter().map(|child| {
-                let mut below = Below {
-                    most_in_leaf: self.most_in_leaf,
+            let subtrees = inner.into_par_iter().map(|child| {
+                let mut subtree = Builder {
+                    max_leaf_size: self.max_leaf_size,
                     tree: Tree::default(),
                 };
-                let node = below.add(child);
-                (node, below)
+                let node = subtree.add(child);
+                (node, subtree)
             });
-            for (i, (node, below)) in below.collect::<Vec<_>>().into_iter().enumerate() {
-                self.tree.nodes[first_child + i] = self.append(node, below);
+            for (i, (node, subtree)) in subtrees.collect::<Vec<_>>().into_iter().enumerate() {
+                self.tree.nodes[first_child + i] = self.append(node, subtree);
             }
         }
         node
     }
 
-    /// Appends nodes built separately, in the order of `add`.
-    fn append(&mut self, node: Node, below: Below) -> Node {
+    /// Appends a subtree that was built separately, and returns its root with offset indices.
+    fn append(&mut self, node: Node, subtree: Builder) -> Node {
         let (nodes, items) = (self.tree.nodes.len() as u32, self.tree.order.len() as u32);
         let moved = |node: Node| Node {
             first_child: node.first_child + nodes,
             first_item: node.first_item + items,
             ..node
         };
-        self.tree.nodes.extend(below.tree.nodes.into_iter().map(moved));
-        self.tree.order.extend(below.tree.order);
+        self.tree.nodes.extend(subtree.tree.nodes.into_iter().map(moved));
+        self.tree.order.extend(subtree.tree.order);
         moved(node)
     }
 }
@@ -208,15 +208,15 @@ impl Below {
 /// Assigns children to slots. Slot c is meant for octant c of the node (bit 0: +x, bit 1: +y, bit 2: +z), so that c ^
 /// octant of a ray approximates front-to-back order. The pair with the largest projected distance is assigned first.
 fn slots_of(bounds: &Aabb, children: &[Part]) -> [Option<usize>; SLOTS] {
-    // Halved, to avoid overflow.
+    // The corners are halved before the addition, to avoid overflow.
     let middle = |bounds: &Aabb| bounds.low * 0.5 + bounds.high * 0.5;
     let center = middle(bounds);
-    let mut towards = [[0.0; SLOTS]; SLOTS];
-    for (child, towards) in children.iter().zip(&mut towards) {
+    let mut projections = [[0.0; SLOTS]; SLOTS];
+    for (child, distances) in children.iter().zip(&mut projections) {
         let [x, y, z] = (middle(&child.bounds()) - center).to_array();
-        for (slot, towards) in towards.iter_mut().enumerate() {
-            let along = |x: f32, bit: usize| if slot >> bit & 1 == 1 { x } else { -x };
-            *towards = along(x, 0) + along(y, 1) + along(z, 2);
+        for (slot, distance) in distances.iter_mut().enumerate() {
+            let signed = |x: f32, bit: usize| if slot >> bit & 1 == 1 { x } else { -x };
+            *distance = signed(x, 0) + signed(y, 1) + signed(z, 2);
         }
     }
     let mut slots = [None; SLOTS];
@@ -225,9 +225,9 @@ fn slots_of(bounds: &Aabb, children: &[Part]) -> [Option<usize>; SLOTS] {
         let mut best: Option<(f32, usize, usize)> = None;
         for child in (0..children.len()).filter(|child| unassigned >> child & 1 == 1) {
             for slot in (0..SLOTS).filter(|slot| slots[*slot].is_none()) {
-                let far = towards[child][slot];
-                if best.is_none_or(|best| far > best.0) {
-                    best = Some((far, child, slot));
+                let distance = projections[child][slot];
+                if best.is_none_or(|best| distance > best.0) {
+                    best = Some((distance, child, slot));
                 }
             }
         }

@@ -54,21 +54,21 @@ pub fn pilot_finish(pilot: Vec4, sum: Vec4, moments: Vec4) -> Vec4 {
     Vec4::new(display_variance(sum, moments), pilot.y, pilot.z, 1.0)
 }
 
-pub fn samples_wanted(pilot_sum: Vec4, first: u32, squared_error: f32, most: u32) -> u32 {
-    // Not `<=`, which is false for NaN.
+pub fn samples_wanted(pilot_sum: Vec4, pilot_samples: u32, squared_error: f32, max_samples: u32) -> u32 {
+    // Not `x <= 0.0`, which is false for NaN.
     if !(pilot_sum.w > 0.0) | !(squared_error > 0.0) {
-        return most;
+        return max_samples;
     }
-    let variance = pilot_sum.x / pilot_sum.w * first as f32;
-    let mut count = first;
-    while count < most {
-        let enough = variance <= squared_error * count as f32;
-        let evident = pilot_sum.y * pilot_sum.y
-            >= pilot_sum.z * (EFFECTIVE_SAMPLES_PER_DOUBLING * ((2 * count / first) as f32 - 1.0));
-        if enough | !evident {
+    let variance = pilot_sum.x / pilot_sum.w * pilot_samples as f32;
+    let mut count = pilot_samples;
+    while count < max_samples {
+        let is_enough = variance <= squared_error * count as f32;
+        let is_reliable = pilot_sum.y * pilot_sum.y
+            >= pilot_sum.z * (EFFECTIVE_SAMPLES_PER_DOUBLING * ((2 * count / pilot_samples) as f32 - 1.0));
+        if is_enough | !is_reliable {
             break;
         }
         count *= 2;
     }
-    count.min(most)
+    count.min(max_samples)
 }

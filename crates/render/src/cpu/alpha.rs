@@ -35,9 +35,9 @@ pub fn alpha_accepts(
     }
     let key = hash4(UVec4::new(pixel.x, pixel.y, scene.camera.seed, sample));
     let face = u32::from(side > 0.0);
-    let decision = key.y.wrapping_add(2 * bounce).wrapping_add(purpose);
-    let set_uv = hit.primitive.wrapping_mul(2).wrapping_add(face);
-    let bits = hash4(UVec4::new(key.x, decision, hit.instance, set_uv));
+    let purpose_key = key.y.wrapping_add(2 * bounce).wrapping_add(purpose);
+    let side_index = hit.primitive.wrapping_mul(2).wrapping_add(face);
+    let bits = hash4(UVec4::new(key.x, purpose_key, hit.instance, side_index));
     unit_float(bits.x) < material.opacity
 }
 
@@ -74,22 +74,22 @@ pub fn opacity_at(scene: &Packed, before: &Material, prim: &HitPrimitive, hit: H
 #[expect(clippy::too_many_arguments, reason = "the twin of a WGSL function has its arguments")]
 pub fn is_occluded_alpha(
     scene: &Packed,
-    before: bool,
+    already_occluded: bool,
     surface: &Surface,
-    to: Vec3,
+    to_light: Vec3,
     t_max: f32,
     target_prim: u32,
     pixel: UVec2,
     sample: u32,
     bounce: u32,
 ) -> bool {
-    if before {
+    if already_occluded {
         return true;
     }
-    let distance = dot(to, to).sqrt();
+    let distance = dot(to_light, to_light).sqrt();
     let mut ray = Ray {
         origin: surface.ray_origin,
-        direction: to * (1.0 / distance),
+        direction: to_light * (1.0 / distance),
     };
     let mut origin_prim = surface.exclude_front;
     let mut inside_prim = surface.exclude_back;
@@ -125,12 +125,12 @@ pub fn skip_transparent(scene: &Packed, ray: Ray, first: Hit) -> Hit {
         let prim = fetch_hit_primitive(scene, hit);
         let surface = surface_of(scene, &prim, hit, continued);
         let material = with_opacity_at(scene, material_of(scene, &prim), &prim, hit, surface.uv);
-        let least = if material.alpha_mode == MASK {
+        let min_opacity = if material.alpha_mode == MASK {
             material.cutoff
         } else {
             0.5
         };
-        if (material.alpha_mode == OPAQUE) | (material.opacity >= least) {
+        if (material.alpha_mode == OPAQUE) | (material.opacity >= min_opacity) {
             break;
         }
         distance += hit.t;

@@ -86,8 +86,8 @@ fn closest_of_item(
     nearer_hit(before, found)
 }
 
-fn closest_of_mesh(scene: &Packed, before: Hit, number: u32, ray: Ray, start: f32, origin_prim: UVec2) -> Hit {
-    let i = &scene.bvh.instances[number as usize];
+fn closest_of_mesh(scene: &Packed, before: Hit, instance_index: u32, ray: Ray, start: f32, origin_prim: UVec2) -> Hit {
+    let i = &scene.bvh.instances[instance_index as usize];
     let packed = &*scene.bvh.meshes[i.mesh as usize];
     let direction = vector_to_mesh(i, ray.direction);
     let origin = point_to_mesh(i, ray.origin) + direction * start;
@@ -95,16 +95,20 @@ fn closest_of_mesh(scene: &Packed, before: Hit, number: u32, ray: Ray, start: f3
     // At equal distance, this instance wins only over instances with larger indices.
     let best = Nearest {
         t: before.t,
-        number: if number + 1 < before.instance { NO_INDEX } else { 0 },
+        number: if instance_index + 1 < before.instance {
+            NO_INDEX
+        } else {
+            0
+        },
         slot: NO_INDEX,
     };
-    let skip = if origin_prim.x == number + 1 {
+    let skip = if origin_prim.x == instance_index + 1 {
         origin_prim.y
     } else {
         NO_INDEX
     };
     let line = Line::new(origin, direction, pad);
-    let found = traversal::closest(*LEVEL, &walked(packed), &line, start, skip, best);
+    let found = traversal::closest(*LEVEL, &traversal_mesh(packed), &line, start, skip, best);
     if found.slot == NO_INDEX {
         return before;
     }
@@ -113,14 +117,14 @@ fn closest_of_mesh(scene: &Packed, before: Hit, number: u32, ray: Ray, start: f3
     let Crossing { barycentric, .. } = triangle_crossing(v0, v1, v2, origin, shear_of(direction), s);
     Hit {
         t: found.t,
-        instance: number + 1,
+        instance: instance_index + 1,
         primitive: found.number,
         slot: found.slot,
         barycentric,
     }
 }
 
-fn walked(mesh: &PackedMesh) -> traversal::Mesh<'_> {
+fn traversal_mesh(mesh: &PackedMesh) -> traversal::Mesh<'_> {
     traversal::Mesh {
         nodes: cast_slice(&mesh.nodes),
         vertices: cast_slice(&mesh.vertices),
@@ -133,11 +137,12 @@ fn corners(mesh: &PackedMesh, slot: usize) -> [Vec3; 3] {
     [triangle.x, triangle.y, triangle.z].map(|vertex| mesh.vertices[vertex as usize].xyz())
 }
 
+/// The shadow rays from a surface to a block of light samples.
 struct Rays<'a> {
     surface: &'a Surface,
     light: &'a Light,
     block: SampleBlock,
-    to: LightSegments,
+    light_segments: LightSegments,
     samples: Samples,
 }
 
@@ -149,24 +154,30 @@ fn bits_of(mut bits: u32) -> impl Iterator<Item = u32> {
     })
 }
 
-/// Returns the mask of the block's samples that an item occludes, or that are set in `before`.
-pub fn occluded_by_bvh(scene: &Packed, before: u32, surface: &Surface, light: &Light, block: SampleBlock) -> u32 {
-    let all = u32::MAX >> (32 - block.count);
-    let wanted = all & !before;
-    if wanted == 0 {
-        return all;
+/// Returns the mask of the block's samples that an item occludes or that are set in `already_occluded`.
+pub fn occluded_by_bvh(
+    scene: &Packed,
+    already_occluded: u32,
+    surface: &Surface,
+    light: &Light,
+    block: SampleBlock,
+) -> u32 {
+    let all_samples = u32::MAX >> (32 - block.count);
+    let untested = all_samples & !already_occluded;
+    if untested == 0 {
+        return all_samples;
     }
     let rays = Rays {
         surface,
         light,
         block,
-        to: segments_to_light(light, surface.ray_origin),
+        light_segments: segments_to_light(light, surface.ray_origin),
         samples: Samples::of(block),
     };
     let segments = traversal::Segments {
         o: surface.ray_origin,
         pad: item_pad(scene, surface.ray_origin),
-        directions: &rays.samples.segments(*LEVEL, rays.to),
+        directions: &rays.samples.segments(*LEVEL, rays.light_segments),
         t_max: light.t_max,
         skip: NO_INDEX,
     };
@@ -174,11 +185,12 @@ pub fn occluded_by_bvh(scene: &Packed, before: u32, surface: &Surface, light: &L
         let BvhItem { low, high, kind, .. } = scene.bvh.items[i];
         (kind & CASTS_SHADOW != 0).then_some(Aabb { low, high })
     };
-    let visit = |i: usize, passing| occluded_by_item(scene, &scene.bvh.items[i], passing, &rays);
-    (before & all) | traversal::occluded_items(*LEVEL, cast_slice(&scene.bvh.nodes), &segments, wanted, bounds, visit)
+    let visit = |i: usize, candidates| occluded_by_item(scene, &scene.bvh.items[i], candidates, &rays);
+    (already_occluded & all_samples)
+        | traversal::occluded_items(*LEVEL, cast_slice(&scene.bvh.nodes), &segments, untested, bounds, visit)
 }
 
-fn occluded_by_item(scene: &Packed, item: &BvhItem, wanted: u32, rays: &Rays) -> u32 {
+fn occluded_by_item(scene: &Packed, item: &BvhItem, candidates: u32, rays: &Rays) -> u32 {
     let i = item.index;
     let kind = item.kind & 0xff;
     if kind != INSTANCE && i == standalone_prim(rays.surface.exclude_front) {
@@ -186,9 +198,9 @@ fn occluded_by_item(scene: &Packed, item: &BvhItem, wanted: u32, rays: &Rays) ->
     }
     let is_inside = i == standalone_prim(rays.surface.exclude_back);
     let q = scene.primitives.get(i as usize);
-    wanted
+    candidates
         & match kind {
-            INSTANCE => occluded_by_mesh(scene, i, wanted, rays),
+            INSTANCE => occluded_by_mesh(scene, i, candidates, rays),
             kind => with_primitive_kind!(kind, |kind| {
                 let start = rays.surface.ray_origin;
                 q.map_or(0, |q| occlusion_mask(kind, q, start, is_inside, rays.light, rays.block))
@@ -196,36 +208,40 @@ fn occluded_by_item(scene: &Packed, item: &BvhItem, wanted: u32, rays: &Rays) ->
         }
 }
 
-fn occluded_by_mesh(scene: &Packed, number: u32, wanted: u32, rays: &Rays) -> u32 {
-    let i = &scene.bvh.instances[number as usize];
+fn occluded_by_mesh(scene: &Packed, instance_index: u32, candidates: u32, rays: &Rays) -> u32 {
+    let i = &scene.bvh.instances[instance_index as usize];
     let mesh = &*scene.bvh.meshes[i.mesh as usize];
     let origin = point_to_mesh(i, rays.surface.ray_origin);
-    let to = LightSegments {
-        towards: vector_to_mesh(i, rays.to.towards),
-        u: vector_to_mesh(i, rays.to.u),
-        v: vector_to_mesh(i, rays.to.v),
+    let mesh_segments = LightSegments {
+        towards: vector_to_mesh(i, rays.light_segments.towards),
+        u: vector_to_mesh(i, rays.light_segments.u),
+        v: vector_to_mesh(i, rays.light_segments.v),
     };
-    let own = rays.surface.exclude_front;
+    let excluded = rays.surface.exclude_front;
     let segments = traversal::Segments {
         o: origin,
         pad: mesh_pad(i, origin),
-        directions: &rays.samples.segments(*LEVEL, to),
+        directions: &rays.samples.segments(*LEVEL, mesh_segments),
         t_max: rays.light.t_max,
-        skip: if own.x == number + 1 { own.y } else { NO_INDEX },
+        skip: if excluded.x == instance_index + 1 {
+            excluded.y
+        } else {
+            NO_INDEX
+        },
     };
     if i.shadows == SOME_SHADOWS {
-        return occluded_by_groups(scene, i, mesh, &segments, wanted);
+        return occluded_by_groups(scene, i, mesh, &segments, candidates);
     }
-    traversal::occluded(*LEVEL, &walked(mesh), &segments, wanted)
+    traversal::occluded(*LEVEL, &traversal_mesh(mesh), &segments, candidates)
 }
 
-/// Like [`traversal::occluded`], for a mesh in which some groups cast no shadow.
+/// Like [`traversal::occluded`], for a mesh with groups that cast no shadow.
 fn occluded_by_groups(
     scene: &Packed,
     i: &Instance,
     mesh: &PackedMesh,
     segments: &traversal::Segments,
-    wanted: u32,
+    candidates: u32,
 ) -> u32 {
     let bounds = |slot: usize| {
         let casts = mesh.triangles[slot].w != segments.skip && triangle_casts(scene, i, slot as u32);
@@ -235,12 +251,12 @@ fn occluded_by_groups(
         *LEVEL,
         cast_slice(&mesh.nodes),
         segments,
-        wanted,
+        candidates,
         bounds,
-        |slot, passing| {
+        |slot, box_hits| {
             let [v0, v1, v2] = corners(mesh, slot);
             let mut occluded = 0;
-            for sample in bits_of(passing) {
+            for sample in bits_of(box_hits) {
                 let d = segments.directions.get(sample as usize);
                 let s = slabs(segments.o, d, segments.pad);
                 let found = triangle_crossing(v0, v1, v2, segments.o, shear_of(d), s);
@@ -253,20 +269,20 @@ fn occluded_by_groups(
     )
 }
 
-/// Returns true if an item, except `target_prim`, occludes the segment to `t_max * to`.
-pub fn is_occluded_by_bvh(scene: &Packed, surface: &Surface, to: Vec3, t_max: f32, target_prim: u32) -> bool {
+/// Returns true if an item, except `target_prim`, occludes the segment from the surface along `t_max * to_light`.
+pub fn is_occluded_by_bvh(scene: &Packed, surface: &Surface, to_light: Vec3, t_max: f32, target_prim: u32) -> bool {
     let pad = item_pad(scene, surface.ray_origin);
-    let s = slabs(surface.ray_origin, to, pad);
+    let s = slabs(surface.ray_origin, to_light, pad);
     let occludes = |item: &BvhItem| {
         let casts = item.kind & CASTS_SHADOW != 0;
         casts
             && interval_hits(box_interval(item.low, item.high, s), t_max)
-            && is_occluded_by_item(scene, item, surface, to, t_max, target_prim)
+            && is_occluded_by_item(scene, item, surface, to_light, t_max, target_prim)
     };
     if scene.bvh.items.len() <= FEW_ITEMS {
         return scene.bvh.items.iter().any(occludes);
     }
-    let line = Line::new(surface.ray_origin, to, pad);
+    let line = Line::new(surface.ray_origin, to_light, pad);
     let mut occluded = false;
     traversal::leaves(*LEVEL, cast_slice(&scene.bvh.nodes), &line, t_max, |items, limit| {
         occluded |= scene.bvh.items[items].iter().any(occludes);
@@ -279,24 +295,42 @@ fn is_occluded_by_item(
     scene: &Packed,
     item: &BvhItem,
     surface: &Surface,
-    to: Vec3,
+    to_light: Vec3,
     t_max: f32,
     target_prim: u32,
 ) -> bool {
     let i = item.index;
     match item.kind & 0xff {
-        INSTANCE => is_occluded_by_mesh(scene, i, surface, to, t_max),
+        INSTANCE => is_occluded_by_mesh(scene, i, surface, to_light, t_max),
         kind => with_primitive_kind!(kind, |kind| {
-            is_occluded_by_primitive(kind, &scene.primitives[i as usize], i, surface, to, t_max, target_prim)
+            is_occluded_by_primitive(
+                kind,
+                &scene.primitives[i as usize],
+                i,
+                surface,
+                to_light,
+                t_max,
+                target_prim,
+            )
         }),
     }
 }
 
-fn is_occluded_by_mesh(scene: &Packed, number: u32, surface: &Surface, to: Vec3, t_max: f32) -> bool {
-    let i = &scene.bvh.instances[number as usize];
+fn is_occluded_by_mesh(scene: &Packed, instance_index: u32, surface: &Surface, to_light: Vec3, t_max: f32) -> bool {
+    let i = &scene.bvh.instances[instance_index as usize];
     let origin = point_to_mesh(i, surface.ray_origin);
-    let line = Line::new(origin, vector_to_mesh(i, to), mesh_pad(i, origin));
-    let own = surface.exclude_front;
-    let skip = if own.x == number + 1 { own.y } else { NO_INDEX };
-    traversal::any(*LEVEL, &walked(&scene.bvh.meshes[i.mesh as usize]), &line, skip, t_max)
+    let line = Line::new(origin, vector_to_mesh(i, to_light), mesh_pad(i, origin));
+    let excluded = surface.exclude_front;
+    let skip = if excluded.x == instance_index + 1 {
+        excluded.y
+    } else {
+        NO_INDEX
+    };
+    traversal::any(
+        *LEVEL,
+        &traversal_mesh(&scene.bvh.meshes[i.mesh as usize]),
+        &line,
+        skip,
+        t_max,
+    )
 }

@@ -64,40 +64,40 @@ pub fn four_hit(node: &Node, low: UVec3, high: UVec3, s: Slabs, limit: f32) -> u
     hit_bits(near, far, limit)
 }
 
-pub fn children_in_interval(node: &Node, f: RayInterval, limit: f32) -> u32 {
+pub fn children_in_interval(node: &Node, rays: RayInterval, limit: f32) -> u32 {
     let first = four_in_interval(
         node,
         UVec3::new(node.low_x.x, node.low_y.x, node.low_z.x),
         UVec3::new(node.high_x.x, node.high_y.x, node.high_z.x),
-        f,
+        rays,
         limit,
     );
     let second = four_in_interval(
         node,
         UVec3::new(node.low_x.y, node.low_y.y, node.low_z.y),
         UVec3::new(node.high_x.y, node.high_y.y, node.high_z.y),
-        f,
+        rays,
         limit,
     );
     first | (second << 4)
 }
 
-pub fn four_in_interval(node: &Node, low: UVec3, high: UVec3, f: RayInterval, limit: f32) -> u32 {
+pub fn four_in_interval(node: &Node, low: UVec3, high: UVec3, rays: RayInterval, limit: f32) -> u32 {
     let x = step_length(node, 0);
     let y = step_length(node, 1);
     let z = step_length(node, 2);
-    let low_x = node.base.x + steps(low.x) * x - f.low_origin.x;
-    let high_x = node.base.x + steps(high.x) * x - f.high_origin.x;
-    let low_y = node.base.y + steps(low.y) * y - f.low_origin.y;
-    let high_y = node.base.y + steps(high.y) * y - f.high_origin.y;
-    let low_z = node.base.z + steps(low.z) * z - f.low_origin.z;
-    let high_z = node.base.z + steps(high.z) * z - f.high_origin.z;
-    let near_x = larger(low_x * f.near_low.x, high_x * f.near_high.x);
-    let near_y = larger(low_y * f.near_low.y, high_y * f.near_high.y);
-    let near_z = larger(low_z * f.near_low.z, high_z * f.near_high.z);
-    let far_x = far_side(low_x, high_x, f.far_low.x, f.far_high.x);
-    let far_y = far_side(low_y, high_y, f.far_low.y, f.far_high.y);
-    let far_z = far_side(low_z, high_z, f.far_low.z, f.far_high.z);
+    let low_x = node.base.x + steps(low.x) * x - rays.low_origin.x;
+    let high_x = node.base.x + steps(high.x) * x - rays.high_origin.x;
+    let low_y = node.base.y + steps(low.y) * y - rays.low_origin.y;
+    let high_y = node.base.y + steps(high.y) * y - rays.high_origin.y;
+    let low_z = node.base.z + steps(low.z) * z - rays.low_origin.z;
+    let high_z = node.base.z + steps(high.z) * z - rays.high_origin.z;
+    let near_x = larger(low_x * rays.near_low.x, high_x * rays.near_high.x);
+    let near_y = larger(low_y * rays.near_low.y, high_y * rays.near_high.y);
+    let near_z = larger(low_z * rays.near_low.z, high_z * rays.near_high.z);
+    let far_x = far_side(low_x, high_x, rays.far_low.x, rays.far_high.x);
+    let far_y = far_side(low_y, high_y, rays.far_low.y, rays.far_high.y);
+    let far_z = far_side(low_z, high_z, rays.far_low.z, rays.far_high.z);
     hit_bits(
         larger(larger(near_x, near_y), near_z),
         smaller(smaller(far_x, far_y), far_z),
@@ -113,10 +113,18 @@ pub fn far_side(low: Vec4, high: Vec4, far_low: f32, far_high: f32) -> Vec4 {
 }
 
 pub fn in_order(bits: u32, octant: u32) -> u32 {
-    let swapped = |bits: u32, mask: u32, by: u32| ((bits & mask) << by) | ((bits >> by) & mask);
-    let by_x = if octant & 1 != 0 { swapped(bits, 0x55, 1) } else { bits };
-    let by_y = if octant & 2 != 0 { swapped(by_x, 0x33, 2) } else { by_x };
-    if octant & 4 != 0 { swapped(by_y, 0x0f, 4) } else { by_y }
+    let swapped = |bits: u32, mask: u32, shift: u32| ((bits & mask) << shift) | ((bits >> shift) & mask);
+    let after_x = if octant & 1 != 0 { swapped(bits, 0x55, 1) } else { bits };
+    let after_y = if octant & 2 != 0 {
+        swapped(after_x, 0x33, 2)
+    } else {
+        after_x
+    };
+    if octant & 4 != 0 {
+        swapped(after_y, 0x0f, 4)
+    } else {
+        after_y
+    }
 }
 
 pub fn octant_of(direction: Vec3) -> u32 {

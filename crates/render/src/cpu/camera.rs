@@ -7,8 +7,8 @@ use super::math::{dot, normalize};
 use super::ray::Ray;
 use crate::records::{Camera, ORTHOGRAPHIC};
 
-pub fn camera_ray(camera: &Camera, at: Vec2) -> Ray {
-    let offset = image_plane_offset(camera, at);
+pub fn camera_ray(camera: &Camera, raster: Vec2) -> Ray {
+    let offset = image_plane_offset(camera, raster);
     if camera.projection == ORTHOGRAPHIC {
         return Ray {
             origin: camera.position + offset,
@@ -21,21 +21,21 @@ pub fn camera_ray(camera: &Camera, at: Vec2) -> Ray {
     }
 }
 
-pub fn camera_differential(camera: &Camera, at: Vec2, spacing: f32) -> Differential {
+pub fn camera_differential(camera: &Camera, raster: Vec2, spacing: f32) -> Differential {
     Differential {
-        x: camera_derivative(camera, at, camera.right * (2.0 / camera.width as f32 * spacing)),
-        y: camera_derivative(camera, at, camera.up * (-2.0 / camera.height as f32 * spacing)),
+        x: camera_derivative(camera, raster, camera.right * (2.0 / camera.width as f32 * spacing)),
+        y: camera_derivative(camera, raster, camera.up * (-2.0 / camera.height as f32 * spacing)),
     }
 }
 
-pub fn camera_derivative(camera: &Camera, at: Vec2, step: Vec3) -> Derivative {
+pub fn camera_derivative(camera: &Camera, raster: Vec2, step: Vec3) -> Derivative {
     if camera.projection == ORTHOGRAPHIC {
         return Derivative {
             position: step,
             direction: Vec3::ZERO,
         };
     }
-    let d = camera.forward + image_plane_offset(camera, at);
+    let d = camera.forward + image_plane_offset(camera, raster);
     let dd = dot(d, d);
     Derivative {
         position: Vec3::ZERO,
@@ -74,16 +74,16 @@ mod tests {
     #[test]
     fn perspective_rays_leave_one_point() {
         let camera = camera(PERSPECTIVE);
-        for (at, direction) in [
+        for (raster, direction) in [
             ((4.0, 2.0), (0.0, 1.0, 0.0)),
             ((0.0, 0.0), (-2.0, 1.0, 1.0)),
             ((8.0, 4.0), (2.0, 1.0, -1.0)),
         ] {
-            let ray = camera_ray(&camera, at.into());
+            let ray = camera_ray(&camera, raster.into());
             assert_eq!(ray.origin, camera.position);
             assert!(
                 (ray.direction - Vec3::from(direction).normalize()).length() < 1e-6,
-                "{at:?}: {}",
+                "{raster:?}: {}",
                 ray.direction
             );
         }
@@ -92,13 +92,13 @@ mod tests {
     #[test]
     fn orthographic_rays_are_parallel() {
         let camera = camera(ORTHOGRAPHIC);
-        for (at, origin) in [
+        for (raster, origin) in [
             ((4.0, 2.0), (1.0, 2.0, 3.0)),
             ((0.0, 0.0), (-1.0, 2.0, 4.0)),
             ((8.0, 4.0), (3.0, 2.0, 2.0)),
         ] {
-            let ray = camera_ray(&camera, at.into());
-            assert_eq!((ray.origin, ray.direction), (origin.into(), Vec3::Y), "{at:?}");
+            let ray = camera_ray(&camera, raster.into());
+            assert_eq!((ray.origin, ray.direction), (origin.into(), Vec3::Y), "{raster:?}");
         }
     }
 }

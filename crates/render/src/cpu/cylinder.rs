@@ -57,11 +57,11 @@ pub fn cylinder_interval(o: Vec3, d: Vec3, levels: Vec2) -> Vec2 {
 pub fn intersect_cylinder(q: &Primitive, from_inside: bool, ray: Ray, limit: f32) -> f32 {
     let from_anchor = vector_to_local(q, ray.origin - q.anchor);
     let d = vector_to_local(q, ray.direction);
-    let free = cylinder_levels(q, from_anchor);
+    let raw_levels = cylinder_levels(q, from_anchor);
     let levels = if from_inside {
-        levels_on_surface(free, 0.0)
+        levels_on_surface(raw_levels, 0.0)
     } else {
-        free
+        raw_levels
     };
     nearest_end(cylinder_interval(from_anchor - q.middle, d, levels), limit)
 }
@@ -217,8 +217,8 @@ mod tests {
             ([0.6, 0.8, 0.0], [-0.6, -0.8, 0.0], 2.0),
             ([0.0, 0.0, -1.0], [1.0, 0.0, 1.0], 2.0f32.sqrt()),
         ] {
-            for off in [-1e-6, 0.0, 1e-6] {
-                let origin = Vec3::from(origin) * (1.0 + off);
+            for offset in [-1e-6, 0.0, 1e-6] {
+                let origin = Vec3::from(origin) * (1.0 + offset);
                 let ray = Ray {
                     origin,
                     direction: normalize(direction.into()),
@@ -252,20 +252,23 @@ mod tests {
     #[test]
     fn segments_that_cross_the_surface_are_occluded() {
         let q = cylinder(DVec3::ZERO, 1.0, 2.0);
-        let cut = |p: [f32; 3], to: [f32; 3], from_inside| {
+        let occludes = |p: [f32; 3], d: [f32; 3], from_inside| {
             let levels = solid_levels(CYLINDER, &q, vector_to_local(&q, Vec3::from(p) - q.anchor), from_inside);
-            cylinder_occludes(p.into(), to.into(), levels, 1.0)
+            cylinder_occludes(p.into(), d.into(), levels, 1.0)
         };
-        assert!(cut([-3.0, 0.0, 0.0], [6.0, 0.0, 0.0], false), "through");
-        assert!(cut([-3.0, 0.0, 0.0], [3.0, 0.0, 0.0], false), "into");
-        assert!(cut([0.0, 0.0, 0.0], [0.0, 0.0, 3.0], false), "out of");
-        assert!(!cut([-0.5, 0.0, 0.0], [1.0, 0.0, 0.5], false), "inside");
-        assert!(!cut([-3.0, 0.0, 0.0], [1.9, 0.0, 0.0], false), "ends before");
-        assert!(!cut([-3.0, 0.0, 1.1], [6.0, 0.0, 0.0], false), "above");
-        assert!(!cut([1.5, 0.0, 1.5], [3.0, 0.0, 3.0], false), "away");
-        assert!(cut([1.0, 0.0, 0.0], [-3.0, 0.0, 0.0], true), "from the surface inwards");
+        assert!(occludes([-3.0, 0.0, 0.0], [6.0, 0.0, 0.0], false), "through");
+        assert!(occludes([-3.0, 0.0, 0.0], [3.0, 0.0, 0.0], false), "into");
+        assert!(occludes([0.0, 0.0, 0.0], [0.0, 0.0, 3.0], false), "out of");
+        assert!(!occludes([-0.5, 0.0, 0.0], [1.0, 0.0, 0.5], false), "inside");
+        assert!(!occludes([-3.0, 0.0, 0.0], [1.9, 0.0, 0.0], false), "ends before");
+        assert!(!occludes([-3.0, 0.0, 1.1], [6.0, 0.0, 0.0], false), "above");
+        assert!(!occludes([1.5, 0.0, 1.5], [3.0, 0.0, 3.0], false), "away");
         assert!(
-            !cut([1.0, 0.0, 0.0], [-1.5, 0.0, 0.0], true),
+            occludes([1.0, 0.0, 0.0], [-3.0, 0.0, 0.0], true),
+            "from the surface inwards"
+        );
+        assert!(
+            !occludes([1.0, 0.0, 0.0], [-1.5, 0.0, 0.0], true),
             "from the surface to the inside"
         );
     }

@@ -35,14 +35,14 @@ pub fn refracts_inwards(surface: &Surface, material: &Material, normal: Vec3) ->
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DielectricSample {
     pub path: Path,
-    pub passes: bool,
+    pub is_transmitted: bool,
     pub eta: f32,
 }
 
 pub fn dielectric_sample(
     path: Path,
     surface: Surface,
-    at: HitDifferential,
+    hit_diff: HitDifferential,
     material: &Material,
     random: f32,
 ) -> DielectricSample {
@@ -51,15 +51,15 @@ pub fn dielectric_sample(
     let cosine_t = refracted_cosine(cosine_i, eta);
     if random < fresnel(cosine_i, cosine_t, eta) {
         return DielectricSample {
-            path: reflected_path(path, surface, at, path.throughput),
-            passes: false,
+            path: reflected_path(path, surface, hit_diff, path.throughput),
+            is_transmitted: false,
             eta: 1.0,
         };
     }
     let throughput = path.throughput * material.tint * (eta * eta);
     DielectricSample {
-        path: refracted_path(path, surface, at, throughput, eta, cosine_i, cosine_t),
-        passes: true,
+        path: refracted_path(path, surface, hit_diff, throughput, eta, cosine_i, cosine_t),
+        is_transmitted: true,
         eta,
     }
 }

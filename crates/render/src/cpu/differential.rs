@@ -70,7 +70,13 @@ pub struct HitDifferential {
     pub normal_y: Vec3,
 }
 
-pub fn arrival(q: &Primitive, differential: Differential, ray: Ray, t: f32, surface: Surface) -> HitDifferential {
+pub fn primitive_hit_differential(
+    q: &Primitive,
+    differential: Differential,
+    ray: Ray,
+    t: f32,
+    surface: Surface,
+) -> HitDifferential {
     let local = point_to_local(q, surface.position);
     let x = transferred(differential.x, ray, t, surface.normal);
     let y = transferred(differential.y, ray, t, surface.normal);
@@ -84,16 +90,16 @@ pub fn arrival(q: &Primitive, differential: Differential, ray: Ray, t: f32, surf
     }
 }
 
-pub fn reflected_differential(at: HitDifferential, d: Vec3, n: Vec3) -> Differential {
+pub fn reflected_differential(hit_diff: HitDifferential, d: Vec3, n: Vec3) -> Differential {
     Differential {
-        x: reflected_derivative(at.x, d, n, at.normal_x),
-        y: reflected_derivative(at.y, d, n, at.normal_y),
+        x: reflected_derivative(hit_diff.x, d, n, hit_diff.normal_x),
+        y: reflected_derivative(hit_diff.y, d, n, hit_diff.normal_y),
     }
 }
 
-pub fn refracted_differential(at: HitDifferential, d: Vec3, n: Vec3, eta: f32, cosine: f32) -> Differential {
+pub fn refracted_differential(hit_diff: HitDifferential, d: Vec3, n: Vec3, eta: f32, cosine: f32) -> Differential {
     Differential {
-        x: refracted_derivative(at.x, d, n, at.normal_x, eta, cosine),
-        y: refracted_derivative(at.y, d, n, at.normal_y, eta, cosine),
+        x: refracted_derivative(hit_diff.x, d, n, hit_diff.normal_x, eta, cosine),
+        y: refracted_derivative(hit_diff.y, d, n, hit_diff.normal_y, eta, cosine),
     }
 }

@@ -31,19 +31,19 @@ pub fn rough_diffuse_eval(material: &Material, angles: Angles) -> Vec3 {
     let wi = max(angles.wi, 0.0);
     let wo = max(angles.wo, 0.0);
     let r = material.roughness;
-    let whole = 1.0 / (1.0 + r * 0.287_793_4);
+    let scale = 1.0 / (1.0 + r * 0.287_793_4);
     let s = angles.between - wi * wo;
-    let single = whole * (1.0 + r * s / if s > 0.0 { max(max(wi, wo), 1e-6) } else { 1.0 });
-    let lost_i = max(1.0 - whole * (1.0 + r * rough_share(wi)), 1e-6);
-    let lost_o = max(1.0 - whole * (1.0 + r * rough_share(wo)), 1e-6);
-    let mean = whole * (1.0 + r * 0.072_488_21);
+    let single = scale * (1.0 + r * s / if s > 0.0 { max(max(wi, wo), 1e-6) } else { 1.0 });
+    let lost_i = max(1.0 - scale * (1.0 + r * albedo_growth(wi)), 1e-6);
+    let lost_o = max(1.0 - scale * (1.0 + r * albedo_growth(wo)), 1e-6);
+    let mean = scale * (1.0 + r * 0.072_488_21);
     let lost = max(1.0 - mean, 1e-6);
     let color = material.diffuse;
     let multiple = color * color * (mean * lost_i * lost_o / lost) / (Vec3::ONE - color * (1.0 - mean));
     (color * single + multiple) * (wi * FRAC_1_PI)
 }
 
-pub fn rough_share(cosine: f32) -> f32 {
+pub fn albedo_growth(cosine: f32) -> f32 {
     let s = max(1.0 - cosine * cosine, 0.0).sqrt();
     let angle = atan2(s, cosine);
     let tangent = s * cosine * (1.0 + s + s * s) / (1.0 + s);

@@ -12,12 +12,12 @@ pub fn ellipsoid_level(q: &Primitive, from_anchor: Vec3) -> f32 {
     dot(from_anchor, from_anchor - q.middle * 2.0) + q.level
 }
 
-pub fn ellipsoid_discriminant(o: Vec3, d: Vec3, start: f32) -> f32 {
+pub fn ellipsoid_discriminant(o: Vec3, d: Vec3, start_level: f32) -> f32 {
     let a = dot(d, d);
     let b = dot(o, d);
     let moment = cross(o, d);
-    if start < 1.0 {
-        b * b - a * start
+    if start_level < 1.0 {
+        b * b - a * start_level
     } else {
         a - dot(moment, moment)
     }
@@ -34,15 +34,15 @@ pub fn intersect_ellipsoid(q: &Primitive, from_inside: bool, ray: Ray, limit: f3
     let d = vector_to_local(q, ray.direction);
     let a = dot(d, d);
     let b = dot(o, d);
-    let start = if from_inside {
+    let start_level = if from_inside {
         0.0
     } else {
         ellipsoid_level(q, from_anchor)
     };
-    let discriminant = ellipsoid_discriminant(o, d, start);
+    let discriminant = ellipsoid_discriminant(o, d, start_level);
     let root = max(discriminant, 0.0).sqrt();
     let sum = if b < 0.0 { root - b } else { -b - root };
-    let t0 = start / sum;
+    let t0 = start_level / sum;
     let t1 = sum / a;
     let near = min(t0, t1);
     let t = if near > 0.0 { near } else { max(t0, t1) };
@@ -53,12 +53,12 @@ pub fn intersect_ellipsoid(q: &Primitive, from_inside: bool, ray: Ray, limit: f3
     }
 }
 
-pub fn ellipsoid_occludes(o: Vec3, d: Vec3, start: f32, t_max: f32) -> bool {
+pub fn ellipsoid_occludes(o: Vec3, d: Vec3, start_level: f32, t_max: f32) -> bool {
     let a = dot(d, d);
     let b = dot(o, d);
-    let end = start + t_max * (2.0 * b + t_max * a);
-    let passes = (b < 0.0) & (-b < t_max * a) & (ellipsoid_discriminant(o, d, start) >= 0.0);
-    ((start < 0.0) != (end < 0.0)) | ((start > 0.0) & passes)
+    let end_level = start_level + t_max * (2.0 * b + t_max * a);
+    let crosses_twice = (b < 0.0) & (-b < t_max * a) & (ellipsoid_discriminant(o, d, start_level) >= 0.0);
+    ((start_level < 0.0) != (end_level < 0.0)) | ((start_level > 0.0) & crosses_twice)
 }
 
 #[cfg(test)]
@@ -144,7 +144,7 @@ mod tests {
 
     #[test]
     fn grazing_rays_hit_or_miss_precisely() {
-        let at = |z: f32| {
+        let hit_at_height = |z: f32| {
             intersect_ellipsoid(
                 &unit_sphere(),
                 false,
@@ -152,8 +152,12 @@ mod tests {
                 INFINITE_T,
             )
         };
-        assert!((at(0.999_999) - 1000.0).abs() < 0.01, "{}", at(0.999_999));
-        assert_eq!(at(1.000_001), INFINITE_T);
+        assert!(
+            (hit_at_height(0.999_999) - 1000.0).abs() < 0.01,
+            "{}",
+            hit_at_height(0.999_999)
+        );
+        assert_eq!(hit_at_height(1.000_001), INFINITE_T);
     }
 
     #[test]

@@ -9,7 +9,7 @@ use super::geometry::{fetch_hit_primitive, material_of};
 use super::light::spot_falloff;
 use super::light_choice::EmitterSelection;
 use super::light_sample::{
-    cylinder_sample, cylinder_share, ellipsoid_area, ellipsoid_pdf, ellipsoid_sample, solid_angle_pdf, whole_below,
+    cylinder_sample, cylinder_share, ellipsoid_area, ellipsoid_pdf, ellipsoid_sample, solid_angle_pdf, uniform_below,
 };
 use super::math::{dot, normalize};
 use super::mesh::{HitPrimitive, face_uv, standalone_hit_primitive};
@@ -38,7 +38,7 @@ pub fn select_emitter(scene: &Packed, bits: UVec2) -> Emitter {
     if scene.lighting.emitters.len() == 1 {
         return scene.lighting.emitters[0];
     }
-    let first = whole_below(bits.x, scene.lighting.emitters.len() as u32);
+    let first = uniform_below(bits.x, scene.lighting.emitters.len() as u32);
     let emitter = scene.lighting.emitters[first as usize];
     if unit_float(bits.y) < emitter.threshold {
         emitter
@@ -47,67 +47,67 @@ pub fn select_emitter(scene: &Packed, bits: UVec2) -> Emitter {
     }
 }
 
-pub fn sample_emitter(scene: &Packed, chosen: EmitterSelection, p: Vec3, normal: Vec3, u: Vec2) -> LightSample {
-    let emitter = chosen.emitter;
+pub fn sample_emitter(scene: &Packed, selection: EmitterSelection, p: Vec3, normal: Vec3, u: Vec2) -> LightSample {
+    let emitter = selection.emitter;
     if emitter.instance != 0 {
-        return sample_face(scene, chosen, p, u);
+        return sample_face(scene, selection, p, u);
     }
     let light = &scene.lighting.lights[emitter.index as usize];
     if light.kind == ENVIRONMENT {
         return sample_environment(scene, light, normal, u);
     }
-    if chosen.density > 0.0 {
-        let density = chosen.density;
+    if selection.density > 0.0 {
+        let density = selection.density;
         return sample_light(scene, &Light { density, ..*light }, p, u);
     }
     sample_light(scene, light, p, u)
 }
 
 pub fn sample_light(scene: &Packed, light: &Light, p: Vec3, u: Vec2) -> LightSample {
-    let at = match light.kind {
+    let position = match light.kind {
         RECTANGLE => u * 2.0 - 1.0,
         DISK => disk_sample(u),
         TRIANGLE => triangle_sample(u),
         _ => Vec2::ZERO,
     };
-    let mut to = (light.center - p * light.finite) + light.u * at.x + light.v * at.y;
+    let mut to_light = (light.center - p * light.finite) + light.u * position.x + light.v * position.y;
     let is_delta = light.kind >= POINT;
     let mut behind = false;
     let mut pdf = light.density;
     let mut radiance = light.color;
     if light.kind == POINT {
-        radiance = light.color / dot(to, to);
+        radiance = light.color / dot(to_light, to_light);
     }
     if light.kind == SPOT {
-        radiance = light.color * (spot_falloff(light, to) / dot(to, to));
+        radiance = light.color * (spot_falloff(light, to_light) / dot(to_light, to_light));
     }
     if light.kind == ELLIPSOID {
         let q = &scene.primitives[light.primitive as usize];
-        to = ellipsoid_sample(q, p, u);
-        pdf = light.density * ellipsoid_area(q) * ellipsoid_pdf(q, p, normalize(to));
+        to_light = ellipsoid_sample(q, p, u);
+        pdf = light.density * ellipsoid_area(q) * ellipsoid_pdf(q, p, normalize(to_light));
     } else if light.kind == CYLINDER {
         let q = &scene.primitives[light.primitive as usize];
         let point = cylinder_sample(q, p, u);
-        to = point.to;
-        pdf = solid_angle_pdf(light.density * cylinder_share(q, p), to, point.normal);
+        to_light = point.to;
+        pdf = solid_angle_pdf(light.density * cylinder_share(q, p), to_light, point.normal);
     } else if !is_delta {
-        pdf = solid_angle_pdf(pdf, to, light.normal);
-        behind = (light.sides == 1) & (dot(light.normal, to) >= 0.0);
+        pdf = solid_angle_pdf(pdf, to_light, light.normal);
+        behind = (light.sides == 1) & (dot(light.normal, to_light) >= 0.0);
     }
     if scene.specialization.emission_textures != 0 && !is_delta {
         let q = &scene.primitives[light.primitive as usize];
-        let uv = primitive_uv(q, point_to_local(q, p + to));
+        let uv = primitive_uv(q, point_to_local(q, p + to_light));
         let (material, hit) = (&scene.materials[q.material as usize], hit_on_primitive(light.primitive));
         radiance = emission_at(scene, material, &standalone_hit_primitive(q), hit, uv);
     }
     if scene.specialization.alpha_surfaces != 0 && !is_delta {
         let q = &scene.primitives[light.primitive as usize];
-        let uv = primitive_uv(q, point_to_local(q, p + to));
+        let uv = primitive_uv(q, point_to_local(q, p + to_light));
         let (material, hit) = (&scene.materials[q.material as usize], hit_on_primitive(light.primitive));
         radiance *= opacity_at(scene, material, &standalone_hit_primitive(q), hit, uv);
     }
     LightSample {
-        to,
+        to: to_light,
         radiance: if behind { Vec3::ZERO } else { radiance },
         pdf,
         is_delta,
@@ -126,8 +126,8 @@ pub fn hit_on_primitive(primitive: u32) -> Hit {
     }
 }
 
-pub fn sample_face(scene: &Packed, chosen: EmitterSelection, p: Vec3, u: Vec2) -> LightSample {
-    let emitter = chosen.emitter;
+pub fn sample_face(scene: &Packed, selection: EmitterSelection, p: Vec3, u: Vec2) -> LightSample {
+    let emitter = selection.emitter;
     let b = triangle_sample(u);
     let hit = Hit {
         t: 0.0,
@@ -138,7 +138,7 @@ pub fn sample_face(scene: &Packed, chosen: EmitterSelection, p: Vec3, u: Vec2) -
     };
     let face = fetch_hit_primitive(scene, hit);
     let material = material_of(scene, &face);
-    let to = face.primitive.anchor + (face.edge_1 * b.x + face.edge_2 * b.y) - p;
+    let to_light = face.primitive.anchor + (face.edge_1 * b.x + face.edge_2 * b.y) - p;
     let mut radiance = material.emission;
     if scene.specialization.emission_textures != 0 {
         radiance = emission_at(scene, material, &face, hit, face_uv(&face, b));
@@ -151,14 +151,14 @@ pub fn sample_face(scene: &Packed, chosen: EmitterSelection, p: Vec3, u: Vec2) -
         radiance *= opacity_at(scene, material, &face, hit, face_uv(&face, b));
     }
     let density = if scene.specialization.light_tree != 0 {
-        chosen.density
+        selection.density
     } else {
         material.density
     };
     LightSample {
-        to,
+        to: to_light,
         radiance,
-        pdf: solid_angle_pdf(density, to, face.primitive.z),
+        pdf: solid_angle_pdf(density, to_light, face.primitive.z),
         is_delta: false,
         t_max: scene.environment.t_max,
         primitive: NO_INDEX,

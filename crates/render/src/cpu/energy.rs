@@ -18,21 +18,21 @@ pub fn single_scatter_albedo(scene: &Packed, energy: u32, alpha: Vec2, wo: Vec3,
     let word = |i: u32| f32::from_bits(scene.textures.texels[i as usize]);
     let finer = Vec2::new(word(start), word(start + 1));
     let rougher = Vec2::new(word(start + ENERGY_SIZE), word(start + ENERGY_SIZE + 1));
-    let both = finer + (rougher - finer) * (row - i);
-    both.x + (both.y - both.x) * (column - j)
+    let pair = finer + (rougher - finer) * (row - i);
+    pair.x + (pair.y - pair.x) * (column - j)
 }
 
 pub fn single_scatter_albedo_aniso(scene: &Packed, material: &Material, alpha: Vec2, wo: Vec3, part: u32) -> f32 {
     let word = |i: u32| scene.textures.texels[i as usize];
     let start = material.aniso_table - 1;
     let rows = [word(start), word(start + 1)];
-    let rough = min(max(material.roughness, 0.0), 1.0) * (rows[0] - 1) as f32;
-    let long = min(max(material.anisotropy, 0.0), 1.0) * (rows[1] - 1) as f32;
+    let roughness_row = min(max(material.roughness, 0.0), 1.0) * (rows[0] - 1) as f32;
+    let anisotropy_row = min(max(material.anisotropy, 0.0), 1.0) * (rows[1] - 1) as f32;
     let position = aniso_table_position(alpha, wo);
     let line = position.x * (ANISO_LINES - 1) as f32;
     let column = position.y * (ANISO_COLUMNS - 1) as f32;
-    let r = max(min(floor(rough), rows[0] as f32 - 2.0), 0.0);
-    let s = max(min(floor(long), rows[1] as f32 - 2.0), 0.0);
+    let r = max(min(floor(roughness_row), rows[0] as f32 - 2.0), 0.0);
+    let s = max(min(floor(anisotropy_row), rows[1] as f32 - 2.0), 0.0);
     let i = min(floor(line), ANISO_LINES as f32 - 2.0);
     let j = min(floor(column), ANISO_COLUMNS as f32 - 2.0);
     let first = start + 2 + part * rows[0] * rows[1] * (ANISO_LINES * ANISO_COLUMNS);
@@ -41,13 +41,21 @@ pub fn single_scatter_albedo_aniso(scene: &Packed, material: &Material, alpha: V
     for k in 0..if rows[0] > 1 { 2 } else { 1 } {
         for l in 0..if rows[1] > 1 { 2 } else { 1 } {
             let row = (r as u32 + k) * rows[1] + s as u32 + l;
-            let at = first + (row * ANISO_LINES + i as u32) * ANISO_COLUMNS + j as u32;
-            let across = Vec2::new(value(at), value(at + 1));
-            let along = Vec2::new(value(at + ANISO_COLUMNS), value(at + ANISO_COLUMNS + 1));
-            let both = across + (along - across) * (line - i);
-            let rougher = if k == 1 { rough - r } else { 1.0 - (rough - r) };
-            let longer = if l == 1 { long - s } else { 1.0 - (long - s) };
-            sum += (both.x + (both.y - both.x) * (column - j)) * (rougher * longer);
+            let entry = first + (row * ANISO_LINES + i as u32) * ANISO_COLUMNS + j as u32;
+            let line_values = Vec2::new(value(entry), value(entry + 1));
+            let next_values = Vec2::new(value(entry + ANISO_COLUMNS), value(entry + ANISO_COLUMNS + 1));
+            let pair = line_values + (next_values - line_values) * (line - i);
+            let roughness_weight = if k == 1 {
+                roughness_row - r
+            } else {
+                1.0 - (roughness_row - r)
+            };
+            let anisotropy_weight = if l == 1 {
+                anisotropy_row - s
+            } else {
+                1.0 - (anisotropy_row - s)
+            };
+            sum += (pair.x + (pair.y - pair.x) * (column - j)) * (roughness_weight * anisotropy_weight);
         }
     }
     sum
@@ -55,21 +63,21 @@ pub fn single_scatter_albedo_aniso(scene: &Packed, material: &Material, alpha: V
 
 pub fn single_scatter_albedo_glass(scene: &Packed, material: &Material, alpha: Vec2, wo: Vec3, side: f32) -> f32 {
     if material.aniso_table != 0 {
-        let behind = if material.kind == ROUGH_GLASS { 0 } else { 2 } + if side > 0.0 { 0 } else { 1 };
-        return single_scatter_albedo_aniso(scene, material, alpha, wo, behind);
+        let part = if material.kind == ROUGH_GLASS { 0 } else { 2 } + if side > 0.0 { 0 } else { 1 };
+        return single_scatter_albedo_aniso(scene, material, alpha, wo, part);
     }
     single_scatter_albedo(scene, material.energy, alpha, wo, side)
 }
 
 pub fn principled_energy(scene: &Packed, material: &Material, wo: Vec3, side: f32) -> Vec3 {
-    let mut found = Vec3::ONE;
+    let mut albedos = Vec3::ONE;
     let alpha = facet_alpha(material);
     if material.aniso_table != 0 {
-        found.x = single_scatter_albedo_aniso(scene, material, alpha, wo, 0);
-        found.y = single_scatter_albedo_aniso(scene, material, alpha, wo, 1);
+        albedos.x = single_scatter_albedo_aniso(scene, material, alpha, wo, 0);
+        albedos.y = single_scatter_albedo_aniso(scene, material, alpha, wo, 1);
     }
     if (material.thin == 0) & (material.transmission > 0.0) {
-        found.z = single_scatter_albedo_glass(scene, material, alpha, wo, side);
+        albedos.z = single_scatter_albedo_glass(scene, material, alpha, wo, side);
     }
-    found
+    albedos
 }

@@ -18,22 +18,22 @@ pub fn cell_towards(d: Vec3, width: u32, height: u32) -> EnvironmentCell {
     let v = atan2((d.x * d.x + d.y * d.y).sqrt(), d.z) * std::f32::consts::FRAC_1_PI * height as f32 + 0.5;
     let column = floor(u);
     let row = min(floor(v), height as f32);
-    let at = v - row;
-    let first = row == 0.0;
-    let last = row == height as f32;
-    let y = if first {
-        2.0 * at - 1.0
-    } else if last {
-        2.0 * at
+    let fraction = v - row;
+    let is_first = row == 0.0;
+    let is_last = row == height as f32;
+    let y = if is_first {
+        2.0 * fraction - 1.0
+    } else if is_last {
+        2.0 * fraction
     } else {
-        at
+        fraction
     };
-    let inside = min(max(y, 0.0), 1.0);
+    let clamped_y = min(max(y, 0.0), 1.0);
     EnvironmentCell {
         column: if column >= 0.0 { column } else { width as f32 - 1.0 } as u32,
         row: row as u32,
         x: u - column,
-        y: inside,
+        y: clamped_y,
     }
 }
 
@@ -62,8 +62,8 @@ pub fn normal_bin(normal: Vec3) -> u32 {
 
 pub fn direction_in_cell(column: u32, row: u32, u: Vec2, width: u32, height: u32) -> Vec3 {
     let turn = 1.0 - 2.0 * ((column as f32 + 0.5 + u.x) / width as f32);
-    let below = row > height / 2;
-    let from_pole = if below { height - row } else { row };
+    let is_lower_half = row > height / 2;
+    let from_pole = if is_lower_half { height - row } else { row };
     let inner = cap_above(from_pole, height);
     let cap = inner + (cap_above(from_pole + 1, height) - inner) * u.y;
     let radius = max(cap * (2.0 - cap), 0.0).sqrt();
@@ -71,6 +71,6 @@ pub fn direction_in_cell(column: u32, row: u32, u: Vec2, width: u32, height: u32
     Vec3::new(
         radius * sine(turn + 0.5),
         radius * sine(turn),
-        if below { -z } else { z },
+        if is_lower_half { -z } else { z },
     )
 }

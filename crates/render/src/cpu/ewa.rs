@@ -1,6 +1,6 @@
-//! Elliptical weighted average with cached weights. Textures of the same size that a material looks up at a point share
-//! the weights. Usually all textures do, and weights take most of the time. The results are bit-identical to
-//! [`super::texture::ewa_color`].
+//! Elliptical weighted average with cached weights. Textures of the same size that a material looks up at the same
+//! point share the weights. Usually all textures of a material have the same size, and computing the weights takes most
+//! of the time. The results are bit-identical to [`super::texture::ewa_color`].
 
 use std::cell::RefCell;
 use std::sync::LazyLock;
@@ -15,7 +15,7 @@ use crate::records::{FLOAT, LINEAR8, Packed, SRGB8, Texture};
 
 /// Returns the same color as `ewa_color`.
 pub fn color(scene: &Packed, t: &Texture, f: Footprint) -> Vec3 {
-    LAST.with_borrow_mut(|kernel| {
+    CACHED.with_borrow_mut(|kernel| {
         let key = Key::of(t, f);
         if kernel.key != key {
             kernel.set(key, t, f);
@@ -25,7 +25,7 @@ pub fn color(scene: &Packed, t: &Texture, f: Footprint) -> Vec3 {
 }
 
 thread_local! {
-    static LAST: RefCell<Kernel> = const { RefCell::new(Kernel::NONE) };
+    static CACHED: RefCell<Kernel> = const { RefCell::new(Kernel::NONE) };
 }
 
 /// The values that the weights depend on.
@@ -35,7 +35,7 @@ struct Key {
     levels: u32,
     wrap: u32,
     /// Footprint and maximum anisotropy, as bits.
-    place: [u32; 7],
+    footprint: [u32; 7],
 }
 
 impl Key {
@@ -44,7 +44,7 @@ impl Key {
             size: [t.width, t.height],
             levels: t.levels,
             wrap: t.wrap,
-            place: [uv.x, uv.y, dx.x, dx.y, dy.x, dy.y, t.parameter].map(f32::to_bits),
+            footprint: [uv.x, uv.y, dx.x, dx.y, dy.x, dy.y, t.parameter].map(f32::to_bits),
         }
     }
 }
@@ -55,11 +55,11 @@ struct Kernel {
     levels: [Weights; 2],
     finer: u32,
     /// Weight of the coarser level.
-    between: f32,
+    blend: f32,
 }
 
 struct Weights {
-    /// Index within the level.
+    /// Indices of the texels within the level.
     texels: Vec<u32>,
     weights: Vec<f32>,
     /// First texel with a positive weight; differences from this texel are summed.
@@ -74,11 +74,11 @@ impl Kernel {
             size: [0; 2],
             levels: 0,
             wrap: 0,
-            place: [0; 7],
+            footprint: [0; 7],
         },
         levels: [Weights::NONE, Weights::NONE],
         finer: 0,
-        between: 0.0,
+        blend: 0.0,
     };
 
     fn set(&mut self, key: Key, t: &Texture, f: Footprint) {
@@ -88,14 +88,14 @@ impl Kernel {
         let lod = level_of_length(t, 0.45 * minor);
         let finer = floor(lod);
         self.finer = finer as u32;
-        self.between = max(4.0 * (lod - finer) - 3.0, 0.0);
+        self.blend = max(4.0 * (lod - finer) - 3.0, 0.0);
         let coarsest = lod >= (t.levels - 1) as f32;
         let f = Footprint {
             uv: f.uv,
             dx: if coarsest { Vec2::ZERO } else { f.dx },
             dy: if coarsest { Vec2::ZERO } else { f.dy },
         };
-        let count = if self.between > 0.0 { 2 } else { 1 };
+        let count = if self.blend > 0.0 { 2 } else { 1 };
         for (level, weights) in (self.finer..).zip(&mut self.levels[..count]) {
             weights.set(t, level, f);
         }
@@ -107,8 +107,8 @@ impl Kernel {
             self.levels[i as usize].mean(&scene.textures.texels[start..], t.format)
         };
         let color = level(0);
-        match self.between > 0.0 {
-            true => color + (level(1) - color) * self.between,
+        match self.blend > 0.0 {
+            true => color + (level(1) - color) * self.blend,
             false => color,
         }
     }
@@ -135,27 +135,27 @@ impl Weights {
         );
         let ellipse = footprint_ellipse(f.dx * edges, f.dy * edges, t.parameter);
         let m = ellipse.m;
-        let least = 1.0 - ellipse.minor * ellipse.minor;
-        let xx = m.x + max((4.0 * (q.x * q.x) - 1.0) / 3.0, least);
-        let yy = m.z + max((4.0 * (q.y * q.y) - 1.0) / 3.0, least);
+        let min_increase = 1.0 - ellipse.minor * ellipse.minor;
+        let xx = m.x + max((4.0 * (q.x * q.x) - 1.0) / 3.0, min_increase);
+        let yy = m.z + max((4.0 * (q.y * q.y) - 1.0) / 3.0, min_increase);
         let slope = m.y / yy;
-        let across = xx - m.y * slope;
+        let half_width2 = xx - m.y * slope;
         let x = near_coordinate(f.uv.x, wrap_u(t)) * size.x - 0.5;
         let y = near_coordinate(f.uv.y, wrap_v(t)) * size.y - 0.5;
-        let t_max = yy.sqrt();
-        let first_row = -(floor(t_max - y) as i32);
-        let last_row = floor(y + t_max) as i32;
+        let half_height = yy.sqrt();
+        let first_row = -(floor(half_height - y) as i32);
+        let last_row = floor(y + half_height) as i32;
         let mut total = 0.0;
         for row in first_row..=last_row {
             let start = wrapped_index(row, height, wrap_v(t)) * width;
             let h = row as f32 - y;
-            let along = h * h / yy;
+            let row_r2 = h * h / yy;
             let middle = x + h * slope;
-            let half = (across * max(1.0 - along, 0.0)).sqrt();
+            let half = (half_width2 * max(1.0 - row_r2, 0.0)).sqrt();
             let last = floor(middle + half) as i32;
             for column in -(floor(half - middle) as i32)..=last {
                 let w = column as f32 - middle;
-                let weight = max(gaussian_weight(along + w * w / across), 0.0);
+                let weight = max(gaussian_weight(row_r2 + w * w / half_width2), 0.0);
                 if total == 0.0 {
                     self.base = self.texels.len();
                 }

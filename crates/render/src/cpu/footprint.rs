@@ -41,11 +41,11 @@ pub fn texture_footprint(t: &Texture, f: Footprint) -> Footprint {
     );
     let x = (wrap_u(t) == CLAMP) & ((uv.x < 0.0) | (uv.x > 1.0));
     let y = (wrap_v(t) == CLAMP) & ((uv.y < 0.0) | (uv.y > 1.0));
-    let along = |d: Vec2| Vec2::new(if x { 0.0 } else { d.x }, if y { 0.0 } else { d.y });
+    let clamped = |d: Vec2| Vec2::new(if x { 0.0 } else { d.x }, if y { 0.0 } else { d.y });
     Footprint {
         uv,
-        dx: along(dx),
-        dy: along(dy),
+        dx: clamped(dx),
+        dy: clamped(dy),
     }
 }
 
@@ -64,8 +64,8 @@ pub fn footprint_ellipse(dx: Vec2, dy: Vec2, anisotropy: f32) -> Ellipse {
     let root = (half * half + q * q).sqrt();
     let large = 0.5 * (p + r) + root;
     let area = dx.x * dy.y - dx.y * dy.x;
-    let least = large / (anisotropy * anisotropy);
-    let small = min(max(area * area / max(large, 1e-30), least), large);
+    let lower_bound = large / (anisotropy * anisotropy);
+    let small = min(max(area * area / max(large, 1e-30), lower_bound), large);
     let wide = half >= 0.0;
     let e = if wide {
         Vec2::new(half + root, q)

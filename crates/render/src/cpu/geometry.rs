@@ -6,7 +6,7 @@ use glam::{UVec2, UVec4, Vec2, Vec3, Vec4Swizzles as _};
 use super::alpha::skip_transparent;
 use super::bvh::{closest_in_bvh, is_occluded_by_bvh, occluded_by_bvh};
 use super::camera::camera_ray;
-use super::differential::{Differential, HitDifferential, arrival};
+use super::differential::{Differential, HitDifferential, primitive_hit_differential};
 use super::footprint::{Footprint, surface_footprint};
 use super::linear_primitives::{closest_primitive, is_occluded_by_primitives, occluded_by_primitives};
 use super::math::dot;
@@ -41,12 +41,19 @@ pub fn occluded_samples(scene: &Packed, surface: &Surface, light: &Light, block:
     occluded_by_bvh(scene, bits | unlit, surface, light, block)
 }
 
-pub fn is_occluded(scene: &Packed, before: bool, surface: &Surface, to: Vec3, t_max: f32, target_prim: u32) -> bool {
-    let occluded = before || is_occluded_by_primitives(scene, surface, to, t_max, target_prim);
+pub fn is_occluded(
+    scene: &Packed,
+    already_occluded: bool,
+    surface: &Surface,
+    to_light: Vec3,
+    t_max: f32,
+    target_prim: u32,
+) -> bool {
+    let occluded = already_occluded || is_occluded_by_primitives(scene, surface, to_light, t_max, target_prim);
     if scene.specialization.tlas_kinds == 0 {
         return occluded;
     }
-    occluded || is_occluded_by_bvh(scene, surface, to, t_max, target_prim)
+    occluded || is_occluded_by_bvh(scene, surface, to_light, t_max, target_prim)
 }
 
 pub fn is_on_mesh(hit: Hit) -> bool {
@@ -155,14 +162,14 @@ pub fn hit_differential(
     if is_on_mesh(hit) {
         return face_hit_differential(prim, hit.barycentric, differential, ray, hit.t, surface);
     }
-    arrival(&prim.primitive, differential, ray, hit.t, surface)
+    primitive_hit_differential(&prim.primitive, differential, ray, hit.t, surface)
 }
 
-pub fn footprint_of(prim: &HitPrimitive, hit: Hit, surface: Surface, at: HitDifferential) -> Footprint {
+pub fn footprint_of(prim: &HitPrimitive, hit: Hit, surface: Surface, hit_diff: HitDifferential) -> Footprint {
     if is_on_mesh(hit) {
-        return face_footprint(prim, surface, at.x.position, at.y.position);
+        return face_footprint(prim, surface, hit_diff.x.position, hit_diff.y.position);
     }
-    surface_footprint(&prim.primitive, surface, at.x.position, at.y.position)
+    surface_footprint(&prim.primitive, surface, hit_diff.x.position, hit_diff.y.position)
 }
 
 pub fn view_ray(scene: &Packed, raster: Vec2) -> Ray {
@@ -188,8 +195,8 @@ pub fn skip_camera_invisible(scene: &Packed, start: Path) -> Path {
         if (visibility == CULL_BACKFACE) & (surface.side > 0.0) {
             break;
         }
-        let at = hit_differential(scene, &prim, hit, surface, path.ray, path.differential);
-        path = pass_through_path(path, surface, at);
+        let hit_diff = hit_differential(scene, &prim, hit, surface, path.ray, path.differential);
+        path = pass_through_path(path, surface, hit_diff);
     }
     path
 }

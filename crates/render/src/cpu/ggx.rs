@@ -67,18 +67,18 @@ pub fn ggx_albedo_fit(alpha: f32, t: f32, l: f32) -> Vec2 {
     let lost_0 = 0.005_480_34 + t * (0.063_229_1 + t * (1.183_11 - t * 1.249_38));
     let lost_1 = -0.009_514_8 + t * (0.365_153 - t * (0.350_613 + t * 0.129_283));
     let lost_2 = 0.008_129_75 + t * (1.568_84 + t * (1.185_46 - t * 1.092_09));
-    let over_0 = 1.0 + t * (3.349_08 - t * (1.559_2 + t * 1.920_2));
-    let over_1 = t * (t * 1.209_1 - 0.391_082) - 1.120_89;
-    let over_2 = 0.644_689 + t * 1.026_91;
-    let lost = (lost_0 + a * (lost_1 + a * lost_2)) / (over_0 + a * (over_1 + a * over_2));
+    let divisor_0 = 1.0 + t * (3.349_08 - t * (1.559_2 + t * 1.920_2));
+    let divisor_1 = t * (t * 1.209_1 - 0.391_082) - 1.120_89;
+    let divisor_2 = 0.644_689 + t * 1.026_91;
+    let lost = (lost_0 + a * (lost_1 + a * lost_2)) / (divisor_0 + a * (divisor_1 + a * divisor_2));
     let edge_0 = 0.966_613 + l * (2.475_01 - l * (12.614_7 - l * (22.980_2 - l * (18.285_2 - l * 5.389_7))));
     let edge_1 = -0.386_341 - l * (7.148_16 - l * (8.055_95 - l * (7.343_51 - l * 1.950_36)));
     let edge_2 = -0.489_888 + l * (9.380_23 - l * (2.590_02 - l * 2.932_96));
     let edge_3 = 0.498_131 - l * (5.664_61 + l * 1.885_25);
     let edge_4 = -0.553_876 + l * 2.072_51;
     let edge = edge_0 + t * (edge_1 + t * (edge_2 + t * (edge_3 + t * (edge_4 + t * 0.267_055))));
-    let wide = 1.0 + l * (17.865 + l * 1.841_66) - t * (0.237_295 + l * 15.323_6 + t * 0.459_621);
-    let y = max(edge / wide, 0.0);
+    let edge_divisor = 1.0 + l * (17.865 + l * 1.841_66) - t * (0.237_295 + l * 15.323_6 + t * 0.459_621);
+    let y = max(edge / edge_divisor, 0.0);
     Vec2::new(max(1.0 - lost - y, 0.0), y)
 }
 
@@ -113,7 +113,7 @@ mod tests {
     }
 
     /// Integrates over microfacet normals. The slopes are x = ax tan(angle) cos(longitude) and y = ay tan(angle)
-    /// sin(longitude), which concentrates steps where the distribution is large.
+    /// sin(longitude); thus steps are dense where the distribution is large.
     fn over_normals((ax, ay): (f64, f64), mut f: impl FnMut(DVec3) -> f64) -> f64 {
         let (rings, spokes) = (400, 400);
         let mut sum = 0.0;
@@ -149,8 +149,8 @@ mod tests {
                 let facing = over_normals(alpha, |m| {
                     f64::from(ggx_d(pair(alpha), m.as_vec3())) * m.dot(wo.as_dvec3()).max(0.0)
                 });
-                let seen = facing * f64::from(ggx_g1(pair(alpha), wo));
-                assert!((seen / cosine - 1.0).abs() < 3e-3, "{alpha:?} {wo}: {seen}");
+                let visible = facing * f64::from(ggx_g1(pair(alpha), wo));
+                assert!((visible / cosine - 1.0).abs() < 3e-3, "{alpha:?} {wo}: {visible}");
                 let density = over_normals(alpha, |m| f64::from(ggx_pdf(pair(alpha), wo, m.as_vec3())));
                 assert!((density - 1.0).abs() < 3e-3, "{alpha:?} {wo}: {density}");
             }
@@ -162,21 +162,21 @@ mod tests {
         for alpha in ALPHAS {
             let alpha = pair(alpha);
             for (wo, wi) in [(unit(0.9, 0.2), unit(0.2, 3.0)), (unit(0.1, 1.0), unit(0.4, 1.2))] {
-                let both = ggx_g2(alpha, wo, wi);
+                let g2 = ggx_g2(alpha, wo, wi);
                 let (o, i) = (ggx_g1(alpha, wo), ggx_g1(alpha, wi));
-                assert!(both <= o.min(i) * 1.000_001 && both >= o * i * 0.999_999);
+                assert!(g2 <= o.min(i) * 1.000_001 && g2 >= o * i * 0.999_999);
                 // Heitz, equation 99, from two values of Lambda.
                 let lambda = |g: f32| (1.0 - f64::from(g)) / f64::from(g);
                 let expected = 1.0 / (1.0 + lambda(o) + lambda(i));
-                assert!((f64::from(both) / expected - 1.0).abs() < 1e-5, "{both} {expected}");
+                assert!((f64::from(g2) / expected - 1.0).abs() < 1e-5, "{g2} {expected}");
             }
         }
     }
 
     /// Returns the chi-square statistic of sampled normals, in standard deviations above its expected value. Cells are
-    /// uniform in the angle and longitude of stretched slopes. `wrong` is a factor of the pdf on half of the
-    /// hemisphere.
-    fn chi_square(alpha: (f64, f64), wo: Vec3, wrong: f64) -> f64 {
+    /// uniform in the angle and longitude of stretched slopes. The pdf is multiplied by `pdf_factor` on one half of the
+    /// hemisphere, and by 2 - `pdf_factor` on the other half.
+    fn chi_square(alpha: (f64, f64), wo: Vec3, pdf_factor: f64) -> f64 {
         const CELLS: usize = 20;
         const SAMPLES: u32 = 100_000;
         let (ax, ay) = alpha;
@@ -184,8 +184,8 @@ mod tests {
             let (x, y) = (m.x / ax / m.z, m.y / ay / m.z);
             let angle = x.hypot(y).atan() / (PI / 2.0);
             let longitude = y.atan2(x) / TAU + 0.5;
-            let at = |part: f64| ((part * CELLS as f64) as usize).min(CELLS - 1);
-            at(angle) * CELLS + at(longitude)
+            let cell_index = |fraction: f64| ((fraction * CELLS as f64) as usize).min(CELLS - 1);
+            cell_index(angle) * CELLS + cell_index(longitude)
         };
         let mut counts = vec![0.0; CELLS * CELLS];
         for i in 0..SAMPLES {
@@ -196,25 +196,25 @@ mod tests {
         }
         let mut expected = vec![0.0; CELLS * CELLS];
         let _ = over_normals(alpha, |m| {
-            let density =
-                f64::from(ggx_pdf(pair(alpha), wo, m.as_vec3())) * if m.x > 0.0 { wrong } else { 2.0 - wrong };
+            let density = f64::from(ggx_pdf(pair(alpha), wo, m.as_vec3()))
+                * if m.x > 0.0 { pdf_factor } else { 2.0 - pdf_factor };
             let slope = (m.x / ax / m.z).hypot(m.y / ay / m.z);
             // The step of `over_normals`.
             let step = ax * ay * slope * (1.0 + slope * slope) * m.z.powi(3) * (PI / 2.0 / 400.0) * (TAU / 400.0);
             expected[cell(m)] += density * step * f64::from(SAMPLES);
             0.0
         });
-        let (mut sum, mut freedom, mut rest) = (0.0, -1.0, (0.0, 0.0));
+        let (mut sum, mut freedom, mut pooled) = (0.0, -1.0, (0.0, 0.0));
         for (count, expected) in counts.iter().zip(&expected) {
             if *expected < 10.0 {
-                rest = (rest.0 + count, rest.1 + expected);
+                pooled = (pooled.0 + count, pooled.1 + expected);
             } else {
                 sum += (count - expected) * (count - expected) / expected;
                 freedom += 1.0;
             }
         }
-        if rest.1 > 10.0 {
-            sum += (rest.0 - rest.1) * (rest.0 - rest.1) / rest.1;
+        if pooled.1 > 10.0 {
+            sum += (pooled.0 - pooled.1) * (pooled.0 - pooled.1) / pooled.1;
             freedom += 1.0;
         }
         assert!(freedom > 20.0, "{freedom}");
@@ -225,12 +225,12 @@ mod tests {
     fn sampled_normals_follow_their_pdf() {
         for alpha in ALPHAS {
             for wo in [unit(0.95, 0.4), unit(0.3, 2.5), unit(0.6, 1.5)] {
-                let right = chi_square(alpha, wo, 1.0);
-                assert!(right < 6.0, "{alpha:?}, {wo}: {right}");
-                let wrong = chi_square(alpha, wo, 1.06);
+                let correct = chi_square(alpha, wo, 1.0);
+                assert!(correct < 6.0, "{alpha:?}, {wo}: {correct}");
+                let incorrect = chi_square(alpha, wo, 1.06);
                 assert!(
-                    wrong > 6.0,
-                    "{alpha:?}, {wo}: a wrong density was not detected: {wrong}"
+                    incorrect > 6.0,
+                    "{alpha:?}, {wo}: a wrong density was not detected: {incorrect}"
                 );
             }
         }
@@ -268,11 +268,11 @@ mod tests {
                 let wo = unit(cosine, 0.4);
                 let (x, y) = albedo((alpha, alpha), wo.as_dvec3());
                 let found = ggx_albedo(alpha as f32, wo.z).as_dvec2();
-                let place = format!("{alpha} {cosine}: {found} {x} {y}");
-                assert!((found.y - y).abs() < 4.5e-3, "{place}");
-                assert!((found.x + found.y - x - y).abs() < 5.5e-3 * (x + y), "{place}");
-                let along = ggx_albedo_along(Vec2::splat(alpha as f32), wo).as_dvec2();
-                assert!(along.abs_diff_eq(found, 1e-5), "{place} {along}");
+                let label = format!("{alpha} {cosine}: {found} {x} {y}");
+                assert!((found.y - y).abs() < 4.5e-3, "{label}");
+                assert!((found.x + found.y - x - y).abs() < 5.5e-3 * (x + y), "{label}");
+                let anisotropic = ggx_albedo_along(Vec2::splat(alpha as f32), wo).as_dvec2();
+                assert!(anisotropic.abs_diff_eq(found, 1e-5), "{label} {anisotropic}");
             }
         }
         let mut errors = Vec::new();

@@ -8,9 +8,9 @@ use super::ray::Ray;
 use super::warp::{disk_sample, triangle_sample};
 use crate::records::Camera;
 
-pub fn lens_ray(camera: &Camera, at: Vec2, p: Vec2) -> Ray {
+pub fn lens_ray(camera: &Camera, raster: Vec2, p: Vec2) -> Ray {
     let start = camera.lens_u * p.x + camera.lens_v * p.y;
-    let through_middle = camera.forward + image_plane_offset(camera, at);
+    let through_middle = camera.forward + image_plane_offset(camera, raster);
     Ray {
         origin: camera.position + start,
         direction: normalize(through_middle - start * camera.inverse_focus),

@@ -21,21 +21,21 @@ pub fn segments_to_light(light: &Light, p: Vec3) -> LightSegments {
     }
 }
 
-pub fn segments_to_local(q: &Primitive, to: LightSegments) -> LightSegments {
+pub fn segments_to_local(q: &Primitive, segments: LightSegments) -> LightSegments {
     LightSegments {
-        towards: vector_to_local(q, to.towards),
-        u: vector_to_local(q, to.u),
-        v: vector_to_local(q, to.v),
+        towards: vector_to_local(q, segments.towards),
+        u: vector_to_local(q, segments.u),
+        v: vector_to_local(q, segments.v),
     }
 }
 
-pub fn segment(to: LightSegments, at: Vec2) -> Vec3 {
-    to.towards + to.u * (2.0 * at.x - 1.0) + to.v * (2.0 * at.y - 1.0)
+pub fn segment(segments: LightSegments, at: Vec2) -> Vec3 {
+    segments.towards + segments.u * (2.0 * at.x - 1.0) + segments.v * (2.0 * at.y - 1.0)
 }
 
-pub fn spot_falloff(light: &Light, to: Vec3) -> f32 {
-    let away = normalize(to) + light.normal;
-    let ramp = (light.cone - 0.5 * dot(away, away)) * light.falloff;
+pub fn spot_falloff(light: &Light, to_light: Vec3) -> f32 {
+    let difference = normalize(to_light) + light.normal;
+    let ramp = (light.cone - 0.5 * dot(difference, difference)) * light.falloff;
     let bounded = min(max(ramp, 0.0), 1.0);
     bounded * bounded
 }

@@ -22,18 +22,18 @@ pub fn light_tree_select(
     key: UVec2,
     sample: u32,
 ) -> EmitterSelection {
-    let mut chosen = EmitterSelection { emitter, density: 0.0 };
+    let mut selection = EmitterSelection { emitter, density: 0.0 };
     if emitter.index != NO_INDEX {
-        return chosen;
+        return selection;
     }
     let mut probability = 1.0;
-    let mut at = 0;
+    let mut node_index = 0;
     let mut node = &scene.lighting.nodes[0];
     let mut child = 0;
     let mut level = 0;
     let mut bits = UVec2::ZERO;
-    while at != NO_INDEX {
-        node = &scene.lighting.nodes[at as usize];
+    while node_index != NO_INDEX {
+        node = &scene.lighting.nodes[node_index as usize];
         let shares = light_shares(light_importances(node, p, n));
         if level & 1 == 0 {
             let level_key = hash4(UVec4::new(key.x, key.y, level, 1));
@@ -41,29 +41,29 @@ pub fn light_tree_select(
         }
         child = light_child(shares, unit_float(if level & 1 == 1 { bits.y } else { bits.x })) as usize;
         probability *= shares.as_ref()[child];
-        at = node.children.as_ref()[child];
+        node_index = node.children.as_ref()[child];
         level += 1;
     }
-    chosen.emitter.instance = node.instance[child];
-    chosen.emitter.index = node.index[child];
-    chosen.density = node.density[child] * probability;
-    chosen
+    selection.emitter.instance = node.instance[child];
+    selection.emitter.index = node.index[child];
+    selection.density = node.density[child] * probability;
+    selection
 }
 
-pub fn light_tree_pdf(scene: &Packed, hit: Hit, wanted: bool, p: Vec3, n: Vec3) -> f32 {
-    let mut at = NO_INDEX;
-    if wanted {
-        at = light_leaf(scene, hit);
+pub fn light_tree_pdf(scene: &Packed, hit: Hit, is_enabled: bool, p: Vec3, n: Vec3) -> f32 {
+    let mut child = NO_INDEX;
+    if is_enabled {
+        child = light_leaf(scene, hit);
     }
-    if at == NO_INDEX {
+    if child == NO_INDEX {
         return 0.0;
     }
     let nodes = &scene.lighting.nodes;
-    let mut density = nodes[at as usize / 4].density[at as usize % 4];
-    while at != NO_INDEX {
-        let node = &nodes[at as usize / 4];
-        density *= light_shares(light_importances(node, p, n))[at as usize % 4];
-        at = node.parent.x;
+    let mut density = nodes[child as usize / 4].density[child as usize % 4];
+    while child != NO_INDEX {
+        let node = &nodes[child as usize / 4];
+        density *= light_shares(light_importances(node, p, n))[child as usize % 4];
+        child = node.parent.x;
     }
     density
 }

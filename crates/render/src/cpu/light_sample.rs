@@ -11,9 +11,9 @@ use super::ray::{vector_to_local, vector_to_world};
 use super::warp::{cap_sample, disk_sample, vector_around};
 use crate::records::Primitive;
 
-pub fn solid_angle_pdf(density: f32, to: Vec3, normal: Vec3) -> f32 {
-    let d2 = dot(to, to);
-    density * d2 * d2.sqrt() / dot(normal, to).abs()
+pub fn solid_angle_pdf(density: f32, to_light: Vec3, normal: Vec3) -> f32 {
+    let d2 = dot(to_light, to_light);
+    density * d2 * d2.sqrt() / dot(normal, to_light).abs()
 }
 
 pub fn ellipsoid_area(q: &Primitive) -> f32 {
@@ -72,7 +72,7 @@ pub struct CylinderPoint {
 pub fn cylinder_part(q: &Primitive, o: Vec3, levels: Vec2) -> CylinderPart {
     let inside = (levels.x <= 0.0) & (levels.y <= 0.0);
     let r2 = o.x * o.x + o.y * o.y;
-    let away = Vec2::new(o.x, o.y) / r2.sqrt();
+    let direction = Vec2::new(o.x, o.y) / r2.sqrt();
     let arc = if inside {
         1.0
     } else if levels.x > 0.0 {
@@ -80,12 +80,12 @@ pub fn cylinder_part(q: &Primitive, o: Vec3, levels: Vec2) -> CylinderPart {
     } else {
         0.0
     };
-    let beyond = levels.y > 0.0;
-    let end = inside | (beyond & (o.z > 0.0));
-    let start = inside | (beyond & !(o.z > 0.0));
+    let is_beyond = levels.y > 0.0;
+    let end = inside | (is_beyond & (o.z > 0.0));
+    let start = inside | (is_beyond & !(o.z > 0.0));
     CylinderPart {
         arc,
-        middle: if r2 > 0.0 { away } else { Vec2::X },
+        middle: if r2 > 0.0 { direction } else { Vec2::X },
         side: 4.0 * arc * cylinder_height_ratio(q),
         end: f32::from(u8::from(end)),
         start: f32::from(u8::from(start)),
@@ -101,18 +101,18 @@ pub fn cylinder_sample(q: &Primitive, p: Vec3, u: Vec2) -> CylinderPoint {
     let o = from_anchor - q.middle;
     let part = cylinder_part(q, o, cylinder_levels(q, from_anchor));
     let caps = part.end + part.start;
-    let at = u.x * (part.side + caps);
-    let (local, gradient) = if (at < part.side) | (caps == 0.0) {
-        let angle = (2.0 * min(at / part.side, 1.0) - 1.0) * part.arc;
+    let area = u.x * (part.side + caps);
+    let (local, gradient) = if (area < part.side) | (caps == 0.0) {
+        let angle = (2.0 * min(area / part.side, 1.0) - 1.0) * part.arc;
         let (sn, cs) = (sine(angle), sine(angle + 0.5));
         let m = part.middle;
         let (x, y) = (m.x * cs - m.y * sn, m.y * cs + m.x * sn);
         (Vec3::new(x, y, 2.0 * u.y - 1.0), Vec3::new(x, y, 0.0))
     } else {
-        let rest = at - part.side;
-        let at_end = rest < part.end;
-        let disk = disk_sample(Vec2::new(min(rest - if at_end { 0.0 } else { part.end }, 1.0), u.y));
-        let up = if at_end { 1.0 } else { -1.0 };
+        let cap_area = area - part.side;
+        let on_end = cap_area < part.end;
+        let disk = disk_sample(Vec2::new(min(cap_area - if on_end { 0.0 } else { part.end }, 1.0), u.y));
+        let up = if on_end { 1.0 } else { -1.0 };
         (Vec3::new(disk.x, disk.y, up), Vec3::new(0.0, 0.0, up))
     };
     CylinderPoint {
@@ -127,11 +127,11 @@ pub fn cylinder_share(q: &Primitive, p: Vec3) -> f32 {
     (4.0 * cylinder_height_ratio(q) + 2.0) / (part.side + part.end + part.start)
 }
 
-pub fn power_heuristic(own: f32, other: f32) -> f32 {
-    let ratio = other / own;
-    if own > 0.0 { 1.0 / (1.0 + ratio * ratio) } else { 0.0 }
+pub fn power_heuristic(pdf: f32, other_pdf: f32) -> f32 {
+    let ratio = other_pdf / pdf;
+    if pdf > 0.0 { 1.0 / (1.0 + ratio * ratio) } else { 0.0 }
 }
 
-pub fn whole_below(bits: u32, count: u32) -> u32 {
+pub fn uniform_below(bits: u32, count: u32) -> u32 {
     ((u64::from(bits) * u64::from(count)) >> 32) as u32
 }

@@ -17,25 +17,26 @@ pub fn light_importances(node: &LightNode, p: Vec3, n: Vec3) -> Vec4 {
     let z = node.z - p.z;
     let d2 = x * x + y * y + z * z;
     let d = d2.sqrt();
-    let along = -(node.axis_x * x + node.axis_y * y + node.axis_z * z);
+    let signed_axial = -(node.axis_x * x + node.axis_y * y + node.axis_z * z);
     let is_two_sided = BVec4A::from(node.sides.to_array().map(|sides| sides == 2));
-    let ahead = Vec4::select(is_two_sided, along.abs(), along);
+    let axial = Vec4::select(is_two_sided, signed_axial.abs(), signed_axial);
     let sine = max4(1.0 - node.cosine * node.cosine, Vec4::ZERO).sqrt();
-    let turned = ahead * node.cosine + max4(d2 - along * along, Vec4::ZERO).sqrt() * sine;
-    let leaving = Vec4::select(ahead.cmpge(node.cosine * d), d, turned);
-    let facing = if dot(n, n) == 0.0 {
+    let rotated = axial * node.cosine + max4(d2 - signed_axial * signed_axial, Vec4::ZERO).sqrt() * sine;
+    let emitter_height = Vec4::select(axial.cmpge(node.cosine * d), d, rotated);
+    let surface_height = if dot(n, n) == 0.0 {
         d
     } else {
         x * n.x + y * n.y + z * n.z
     };
-    let least = 0.03 * node.radius;
-    let leaves_by = max4(mean_above(leaving, node.radius), least);
-    let faces_by = max4(mean_above(facing, node.radius), least);
+    let min_height = 0.03 * node.radius;
+    let mean_emitter_height = max4(mean_above(emitter_height, node.radius), min_height);
+    let mean_surface_height = max4(mean_above(surface_height, node.radius), min_height);
     let inverse = 1.0 / max4((d2 + 0.1 * node.radius * node.radius).sqrt(), Vec4::splat(1e-15));
-    let value = node.intensity * (leaves_by * inverse) * (faces_by * inverse) * (inverse * inverse);
-    let leaves = (leaving + 1.5707964 * node.radius).cmpgt((node.edge - 1e-3) * d);
-    let arrives = leaves & (facing + node.radius).cmpgt(-1e-3 * d) & node.intensity.cmpgt(Vec4::ZERO);
-    Vec4::select(arrives, max4(value, Vec4::splat(1e-36)), Vec4::ZERO)
+    let value =
+        node.intensity * (mean_emitter_height * inverse) * (mean_surface_height * inverse) * (inverse * inverse);
+    let may_emit = (emitter_height + 1.5707964 * node.radius).cmpgt((node.edge - 1e-3) * d);
+    let may_arrive = may_emit & (surface_height + node.radius).cmpgt(-1e-3 * d) & node.intensity.cmpgt(Vec4::ZERO);
+    Vec4::select(may_arrive, max4(value, Vec4::splat(1e-36)), Vec4::ZERO)
 }
 
 #[inline(always)]
@@ -44,9 +45,13 @@ pub fn light_shares(importances: Vec4) -> Vec4 {
     if sum == 0.0 {
         return Vec4::X;
     }
-    let wanted = importances.cmpgt(Vec4::ZERO);
-    let least = Vec4::select(wanted, max4(importances, Vec4::splat(sum * 0.00024414063)), Vec4::ZERO);
-    least / ((least.x + least.y) + (least.z + least.w))
+    let is_positive = importances.cmpgt(Vec4::ZERO);
+    let clamped = Vec4::select(
+        is_positive,
+        max4(importances, Vec4::splat(sum * 0.00024414063)),
+        Vec4::ZERO,
+    );
+    clamped / ((clamped.x + clamped.y) + (clamped.z + clamped.w))
 }
 
 #[inline(always)]

@@ -33,10 +33,24 @@ pub fn occluded_by_primitives(scene: &Packed, surface: &Surface, light: &Light, 
     bits
 }
 
-pub fn is_occluded_by_primitives(scene: &Packed, surface: &Surface, to: Vec3, t_max: f32, target_prim: u32) -> bool {
+pub fn is_occluded_by_primitives(
+    scene: &Packed,
+    surface: &Surface,
+    to_light: Vec3,
+    t_max: f32,
+    target_prim: u32,
+) -> bool {
     for (kind, range) in scene.shadow_casters() {
         with_primitive_kind!(kind, |kind| for i in range {
-            if is_occluded_by_primitive(kind, &scene.primitives[i], i as u32, surface, to, t_max, target_prim) {
+            if is_occluded_by_primitive(
+                kind,
+                &scene.primitives[i],
+                i as u32,
+                surface,
+                to_light,
+                t_max,
+                target_prim,
+            ) {
                 return true;
             }
         });
@@ -50,13 +64,13 @@ pub fn is_occluded_by_primitive(
     q: &Primitive,
     i: u32,
     surface: &Surface,
-    to: Vec3,
+    to_light: Vec3,
     t_max: f32,
     target_prim: u32,
 ) -> bool {
     let is_inside = i == standalone_prim(surface.exclude_back);
     (i != standalone_prim(surface.exclude_front)) & (i != target_prim)
-        && occludes_segment(kind, q, surface.ray_origin, is_inside, to, t_max)
+        && occludes_segment(kind, q, surface.ray_origin, is_inside, to_light, t_max)
 }
 
 #[inline(always)] // compiled for each kind

@@ -18,9 +18,9 @@ pub struct LobeSample {
 }
 
 pub fn plain_alpha(material: &Material) -> Vec2 {
-    let across = material.roughness * material.roughness;
-    let along = across + (1.0 - across) * (material.anisotropy * material.anisotropy);
-    Vec2::new(along, across)
+    let alpha_v = material.roughness * material.roughness;
+    let alpha_u = alpha_v + (1.0 - alpha_v) * (material.anisotropy * material.anisotropy);
+    Vec2::new(alpha_u, alpha_v)
 }
 
 pub fn is_polished(material: &Material) -> bool {
@@ -34,17 +34,22 @@ pub fn facet_alpha(material: &Material) -> Vec2 {
 
 pub fn lobe_frame(surface: &Surface, rotation: f32) -> Tangents {
     let n = surface.shading_normal;
-    let along = surface.du - n * dot(n, surface.du);
-    let length2 = dot(along, along);
-    let usable = (length2 > 1e-12 * dot(surface.du, surface.du)) & (length2 < 1e30);
-    let other = frame_around(n);
-    let first = if usable {
-        along * (1.0 / max(length2, 1e-30).sqrt())
+    let tangent = surface.du - n * dot(n, surface.du);
+    let length2 = dot(tangent, tangent);
+    let is_usable = (length2 > 1e-12 * dot(surface.du, surface.du)) & (length2 < 1e30);
+    let fallback = frame_around(n);
+    let first = if is_usable {
+        tangent * (1.0 / max(length2, 1e-30).sqrt())
     } else {
-        other.u
+        fallback.u
     };
-    let across = cross(n, first);
-    let second = across * if dot(across, surface.dv) >= 0.0 { 1.0 } else { -1.0 };
+    let perpendicular = cross(n, first);
+    let second = perpendicular
+        * if dot(perpendicular, surface.dv) >= 0.0 {
+            1.0
+        } else {
+            -1.0
+        };
     let u = normalize(first * sine(rotation + 0.5) + second * sine(rotation));
     Tangents { u, v: cross(n, u) }
 }

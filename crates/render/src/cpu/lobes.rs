@@ -6,29 +6,29 @@ use glam::Vec3;
 
 use super::math::{dot, power};
 use super::surface::Surface;
-use super::traversal::{Directions, MOST};
+use super::traversal::{Directions, MAX_SEGMENTS};
 use crate::records::Material;
 
 /// Sets bit i if direction i lights the surface ([`is_lit`](super::phong::is_lit)).
-pub fn lit_bits(level: Level, surface: &Surface, to: &Directions) -> u32 {
+pub fn lit_bits(level: Level, surface: &Surface, directions: &Directions) -> u32 {
     dispatch!(level, simd => {
         let mut bits = 0;
-        for i in (0..to.count).step_by(width(simd)) {
-            bits |= (lit(simd, surface, &components(simd, to, i)).to_bitmask() as u32) << i;
+        for i in (0..directions.count).step_by(width(simd)) {
+            bits |= (lit(simd, surface, &components(simd, directions, i)).to_bitmask() as u32) << i;
         }
         bits
     })
 }
 
-/// Returns [`phong_lobes`](super::phong::phong_lobes) in all directions: diffuse values, then specular ones.
+/// Returns [`phong_lobes`](super::phong::phong_lobes) in all directions: diffuse lobes, then specular lobes.
 pub fn lobes_of_all(
     level: Level,
     surface: &Surface,
     material: &Material,
-    to: &Directions,
+    directions: &Directions,
     exponent_bits: u32,
-) -> [[f32; MOST]; 2] {
-    dispatch!(level, simd => lobes(simd, surface, material, to, exponent_bits))
+) -> [[f32; MAX_SEGMENTS]; 2] {
+    dispatch!(level, simd => lobes(simd, surface, material, directions, exponent_bits))
 }
 
 #[inline(always)]
@@ -36,22 +36,22 @@ fn lobes<S: Simd>(
     simd: S,
     surface: &Surface,
     material: &Material,
-    to: &Directions,
+    directions: &Directions,
     exponent_bits: u32,
-) -> [[f32; MOST]; 2] {
-    let mut all = [[0.0; MOST]; 2];
+) -> [[f32; MAX_SEGMENTS]; 2] {
+    let mut values = [[0.0; MAX_SEGMENTS]; 2];
     let zero = S::f32s::splat(simd, 0.0);
     let n_v = dot(surface.shading_normal, surface.wo);
-    for i in (0..to.count).step_by(width(simd)) {
-        let to = components(simd, to, i);
-        let is_lit = lit(simd, surface, &to);
+    for i in (0..directions.count).step_by(width(simd)) {
+        let direction = components(simd, directions, i);
+        let is_lit = lit(simd, surface, &direction);
         if is_lit.to_bitmask() == 0 {
             continue;
         }
-        let [x, y, z] = to;
+        let [x, y, z] = direction;
         let inverse_length = S::f32s::splat(simd, 1.0) / (x * x + y * y + z * z).sqrt();
-        let n_l = dot_vector::<S>(surface.shading_normal, &to);
-        let r_v: S::f32s = (n_l * 2.0 * n_v - dot_vector::<S>(surface.wo, &to)) * inverse_length;
+        let n_l = dot_vector::<S>(surface.shading_normal, &direction);
+        let r_v: S::f32s = (n_l * 2.0 * n_v - dot_vector::<S>(surface.wo, &direction)) * inverse_length;
         let r_v = r_v.simd_gt(zero).select(r_v, zero);
         let mut powers = S::f32s::splat(simd, 1.0);
         let mut square = r_v;
@@ -62,24 +62,25 @@ fn lobes<S: Simd>(
             square *= square;
         }
         if exponent_bits == 0 {
-            let mut each = [0.0; MOST];
-            r_v.store_slice(&mut each[..width(simd)]);
-            each = each.map(|x| power(x, material.shininess));
-            powers = S::f32s::from_slice(simd, &each[..width(simd)]);
+            let mut lanes = [0.0; MAX_SEGMENTS];
+            r_v.store_slice(&mut lanes[..width(simd)]);
+            lanes = lanes.map(|x| power(x, material.shininess));
+            powers = S::f32s::from_slice(simd, &lanes[..width(simd)]);
         }
-        let places = i..i + width(simd);
+        let range = i..i + width(simd);
         is_lit
             .select(n_l * inverse_length, zero)
-            .store_slice(&mut all[0][places.clone()]);
-        is_lit.select(powers, zero).store_slice(&mut all[1][places]);
+            .store_slice(&mut values[0][range.clone()]);
+        is_lit.select(powers, zero).store_slice(&mut values[1][range]);
     }
-    all
+    values
 }
 
 #[inline(always)]
-fn lit<S: Simd>(simd: S, surface: &Surface, to: &[S::f32s; 3]) -> S::mask32s {
+fn lit<S: Simd>(simd: S, surface: &Surface, direction: &[S::f32s; 3]) -> S::mask32s {
     let zero = S::f32s::splat(simd, 0.0);
-    dot_vector::<S>(surface.shading_normal, to).simd_gt(zero) & dot_vector::<S>(surface.smooth_normal, to).simd_gt(zero)
+    dot_vector::<S>(surface.shading_normal, direction).simd_gt(zero)
+        & dot_vector::<S>(surface.smooth_normal, direction).simd_gt(zero)
 }
 
 #[inline(always)]
@@ -89,9 +90,9 @@ fn dot_vector<S: Simd>(a: Vec3, [x, y, z]: &[S::f32s; 3]) -> S::f32s {
 
 /// Returns a SIMD vector of directions, starting at index i.
 #[inline(always)]
-fn components<S: Simd>(simd: S, to: &Directions, i: usize) -> [S::f32s; 3] {
-    let [x, y, z] = &to.along;
-    [x, y, z].map(|all| S::f32s::from_slice(simd, &all[i..i + width(simd)]))
+fn components<S: Simd>(simd: S, directions: &Directions, i: usize) -> [S::f32s; 3] {
+    let [x, y, z] = &directions.components;
+    [x, y, z].map(|lanes| S::f32s::from_slice(simd, &lanes[i..i + width(simd)]))
 }
 
 #[inline(always)]
@@ -132,7 +133,7 @@ mod tests {
 
     #[test]
     fn simd_lobes_are_bit_identical_to_the_scalar_functions() {
-        let to = LightSegments {
+        let segments = LightSegments {
             towards: Vec3::new(0.3, -0.4, 0.5),
             u: Vec3::new(0.7, 0.1, 0.2),
             v: Vec3::new(-0.2, 0.9, 0.4),
@@ -166,18 +167,18 @@ mod tests {
             };
             let exponent_bits = if i % 2 == 0 { 4 } else { 0 };
             for level in levels() {
-                let directions = Samples::of(block).segments(level, to);
-                let all = lobes_of_all(level, &surface, &material, &directions, exponent_bits);
+                let directions = Samples::of(block).segments(level, segments);
+                let lobes = lobes_of_all(level, &surface, &material, &directions, exponent_bits);
                 let bits = lit_bits(level, &surface, &directions);
                 assert_eq!(directions.count, count as usize);
                 for k in 0..count {
-                    let d = segment(to, block_sample(block, k));
+                    let d = segment(segments, block_sample(block, k));
                     assert_eq!(directions.get(k as usize), d, "{level:?} {block:?} {k}");
-                    let one = phong_lobes(&surface, &material, d, exponent_bits);
-                    let found = all.map(|lobe| lobe[k as usize].to_bits());
+                    let expected = phong_lobes(&surface, &material, d, exponent_bits);
+                    let found = lobes.map(|lobe| lobe[k as usize].to_bits());
                     assert_eq!(
                         found,
-                        [one.diffuse, one.specular].map(f32::to_bits),
+                        [expected.diffuse, expected.specular].map(f32::to_bits),
                         "{level:?} {block:?} {k}"
                     );
                     assert_eq!(bits >> k & 1 == 1, is_lit(&surface, d));

@@ -36,9 +36,9 @@ pub fn positive_zero(x: f32) -> f32 {
 
 pub fn floor(x: f32) -> f32 {
     let small = x.abs() < 8_388_608.0;
-    let whole = if small { x } else { 0.0 } as i32 as f32;
+    let integer = if small { x } else { 0.0 } as i32 as f32;
     if small {
-        if whole > x { whole - 1.0 } else { whole }
+        if integer > x { integer - 1.0 } else { integer }
     } else {
         x
     }
@@ -70,12 +70,12 @@ pub fn log2(x: f32) -> f32 {
 
 pub fn exp2(x: f32) -> f32 {
     let p = min(max(x, -126.5), 128.0);
-    let whole = (p + if p < 0.0 { -0.5 } else { 0.5 }) as i32;
-    let f = (p - whole as f32) * std::f32::consts::LN_2;
+    let integer = (p + if p < 0.0 { -0.5 } else { 0.5 }) as i32;
+    let f = (p - integer as f32) * std::f32::consts::LN_2;
     let high = 0.008_333_334 + f * (0.001_388_888_9 + f * 0.000_198_412_7);
     let series = 1.0 + f * (1.0 + f * (0.5 + f * (0.166_666_67 + f * (0.041_666_668 + f * high))));
     if x > -126.5 {
-        series * f32::from_bits(((whole + 127) << 23) as u32)
+        series * f32::from_bits(((integer + 127) << 23) as u32)
     } else {
         0.0
     }
@@ -100,12 +100,12 @@ pub fn atan2(y: f32, x: f32) -> f32 {
 }
 
 pub fn sine(x: f32) -> f32 {
-    let whole = floor(x + 0.5);
-    let r = x - whole;
+    let integer = floor(x + 0.5);
+    let r = x - integer;
     let r2 = r * r;
     let tail = 0.599_264_5 - r2 * (0.082_145_89 - r2 * 0.007_370_431);
     let series = r * (PI - r2 * (5.167_712_7 - r2 * (2.550_164 - r2 * tail)));
-    if whole - 2.0 * floor(0.5 * whole) > 0.0 {
+    if integer - 2.0 * floor(0.5 * integer) > 0.0 {
         -series
     } else {
         series

@@ -148,15 +148,15 @@ pub fn standalone_hit_primitive(q: &Primitive) -> HitPrimitive {
 }
 
 pub fn face_primitive(i: &Instance, v0: Vec3, edge_1: Vec3, edge_2: Vec3, material: u32) -> Primitive {
-    let least = f32::MIN_POSITIVE;
-    let across = cross(
-        edge_1 / max(largest(edge_1), least),
-        edge_2 / max(largest(edge_2), least),
+    let min_positive = f32::MIN_POSITIVE;
+    let scaled_normal = cross(
+        edge_1 / max(largest(edge_1), min_positive),
+        edge_2 / max(largest(edge_2), min_positive),
     );
-    let is_whole = dot(across, across) > 1e-30;
-    let normal = if is_whole { normalize(across) } else { Vec3::Z } * i.side;
+    let is_valid = dot(scaled_normal, scaled_normal) > 1e-30;
+    let normal = if is_valid { normalize(scaled_normal) } else { Vec3::Z } * i.side;
     let area = dot(cross(edge_1, edge_2), normal);
-    let determinant = if area.abs() > least { area } else { least };
+    let determinant = if area.abs() > min_positive { area } else { min_positive };
     let anchor = i.anchor + vector_from_mesh(i, v0);
     Primitive {
         anchor,
@@ -184,7 +184,7 @@ pub fn face_surface(face: &HitPrimitive, prim_id: UVec2, b: Vec2, d: Vec3, epsil
     );
     let size = max(max(largest(position), largest(position - face.anchor)), 0.25 * edge)
         * max(1.0, 0.125 * face.condition_number);
-    let start = position + (normal - d) * (epsilon * size);
+    let ray_origin = position + (normal - d) * (epsilon * size);
     let tangents = face_frame(face, b);
     let smooth_normal = face_normal(face, b) * side;
     Surface {
@@ -193,7 +193,7 @@ pub fn face_surface(face: &HitPrimitive, prim_id: UVec2, b: Vec2, d: Vec3, epsil
         smooth_normal,
         shading_normal: smooth_normal,
         wo: -d,
-        ray_origin: start,
+        ray_origin,
         terminator_offset: face_terminator_offset(face, b, side),
         side,
         exclude_front: prim_id,
@@ -244,10 +244,10 @@ pub fn lift(n: Vec3, from_vertex: Vec3, up: Vec3) -> Vec3 {
     }
 }
 
-pub fn face_direction_allowed(face: &HitPrimitive, surface: &Surface, to: Vec3) -> bool {
-    let fall = -dot(surface.normal, to);
+pub fn face_direction_allowed(face: &HitPrimitive, surface: &Surface, direction: Vec3) -> bool {
+    let fall = -dot(surface.normal, direction);
     let height = dot(surface.normal, surface.terminator_offset);
-    let crossing = surface.position + surface.terminator_offset + to * (height / max(fall, 1e-30));
+    let crossing = surface.position + surface.terminator_offset + direction * (height / max(fall, 1e-30));
     let b = point_to_local(&face.primitive, crossing);
     (fall <= 0.0) | (b.x < 0.0) | (b.y < 0.0) | (b.x + b.y > 1.0)
 }
@@ -256,13 +256,17 @@ pub fn face_tangents(face: &HitPrimitive) -> Tangents {
     let a = face.uv_1 - face.uv_0;
     let b = face.uv_2 - face.uv_0;
     let area = a.x * b.y - a.y * b.x;
-    let whole = area.abs() > 1e-30;
-    let scale = 1.0 / if whole { area } else { 1.0 };
+    let is_valid = area.abs() > 1e-30;
+    let scale = 1.0 / if is_valid { area } else { 1.0 };
     let u = (face.edge_1 * b.y - face.edge_2 * a.y) * scale;
     let v = (face.edge_2 * a.x - face.edge_1 * b.x) * scale;
     Tangents {
-        u: if whole { u } else { face.edge_1 },
-        v: if whole { v } else { cross(face.primitive.z, face.edge_1) },
+        u: if is_valid { u } else { face.edge_1 },
+        v: if is_valid {
+            v
+        } else {
+            cross(face.primitive.z, face.edge_1)
+        },
     }
 }
 
@@ -270,8 +274,8 @@ pub fn face_frame(face: &HitPrimitive, b: Vec2) -> Tangents {
     let a = 1.0 - b.x - b.y;
     let u = face.tangents_0.u * a + face.tangents_1.u * b.x + face.tangents_2.u * b.y;
     let v = face.tangents_0.v * a + face.tangents_1.v * b.x + face.tangents_2.v * b.y;
-    let between = (largest(u) > 1e-12) & (largest(v) > 1e-12);
-    if between {
+    let has_tangents = (largest(u) > 1e-12) & (largest(v) > 1e-12);
+    if has_tangents {
         return Tangents { u, v };
     }
     face_tangents(face)
@@ -289,8 +293,8 @@ pub fn face_normal_derivative(face: &HitPrimitive, b: Vec2, d: Vec3) -> Vec3 {
     let length2 = dot(n, n);
     let scale = 1.0 / max(length2, 1e-12).sqrt();
     let unit = n * scale;
-    let along = (dn - unit * dot(unit, dn)) * scale;
-    let outward = along * if dot(unit, face.primitive.z) < 0.0 { -1.0 } else { 1.0 };
+    let tangential = (dn - unit * dot(unit, dn)) * scale;
+    let outward = tangential * if dot(unit, face.primitive.z) < 0.0 { -1.0 } else { 1.0 };
     if length2 > 1e-12 { outward } else { Vec3::ZERO }
 }
 

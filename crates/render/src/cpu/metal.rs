@@ -11,10 +11,10 @@ pub fn conductor_fresnel(eta: f32, k: f32, cosine: f32) -> f32 {
     let c2 = cosine * cosine;
     let s2 = 1.0 - c2;
     let real = eta * eta - k * k - s2;
-    let whole = (real * real + 4.0 * (eta * eta) * (k * k)).sqrt();
-    let a = 2.0 * cosine * max(0.5 * (whole + real), 0.0).sqrt();
-    let s = (whole + c2 - a) / (whole + c2 + a);
-    let p = s * ((c2 * whole + s2 * s2 - a * s2) / (c2 * whole + s2 * s2 + a * s2));
+    let magnitude = (real * real + 4.0 * (eta * eta) * (k * k)).sqrt();
+    let a = 2.0 * cosine * max(0.5 * (magnitude + real), 0.0).sqrt();
+    let s = (magnitude + c2 - a) / (magnitude + c2 + a);
+    let p = s * ((c2 * magnitude + s2 * s2 - a * s2) / (c2 * magnitude + s2 * s2 + a * s2));
     max(0.5 * (s + p), 0.0)
 }
 
@@ -78,11 +78,14 @@ mod tests {
     struct Complex(f64, f64);
 
     impl Complex {
-        fn times(self, other: Complex) -> Complex {
-            Complex(self.0 * other.0 - self.1 * other.1, self.0 * other.1 + self.1 * other.0)
+        fn times(self, factor: Complex) -> Complex {
+            Complex(
+                self.0 * factor.0 - self.1 * factor.1,
+                self.0 * factor.1 + self.1 * factor.0,
+            )
         }
-        fn plus(self, other: Complex, sign: f64) -> Complex {
-            Complex(self.0 + sign * other.0, self.1 + sign * other.1)
+        fn add_scaled(self, other: Complex, factor: f64) -> Complex {
+            Complex(self.0 + factor * other.0, self.1 + factor * other.1)
         }
         fn square(self) -> f64 {
             self.0 * self.0 + self.1 * self.1
@@ -95,15 +98,15 @@ mod tests {
         }
     }
 
-    fn by_amplitudes(eta: f64, k: f64, c: f64) -> f64 {
+    fn reflectance_by_amplitudes(eta: f64, k: f64, c: f64) -> f64 {
         let n = Complex(eta, k);
         let n2 = n.times(n);
         // The index times the refracted cosine: sqrt(n^2 - sin^2).
-        let nt = n2.plus(Complex(1.0 - c * c, 0.0), -1.0).root();
+        let nt = n2.add_scaled(Complex(1.0 - c * c, 0.0), -1.0).root();
         let s = Complex(c, 0.0);
-        let s_ratio = s.plus(nt, -1.0).square() / s.plus(nt, 1.0).square();
+        let s_ratio = s.add_scaled(nt, -1.0).square() / s.add_scaled(nt, 1.0).square();
         let p = n2.times(Complex(c, 0.0));
-        let p_ratio = p.plus(nt, -1.0).square() / p.plus(nt, 1.0).square();
+        let p_ratio = p.add_scaled(nt, -1.0).square() / p.add_scaled(nt, 1.0).square();
         (s_ratio + p_ratio) / 2.0
     }
 
@@ -120,7 +123,7 @@ mod tests {
         ] {
             for c in [1.0, 0.9, 0.5, 0.2, 0.03, 1e-4, 0.0] {
                 let found = f64::from(conductor_fresnel(eta as f32, k as f32, c as f32));
-                let expected = by_amplitudes(eta, k, c);
+                let expected = reflectance_by_amplitudes(eta, k, c);
                 assert!(
                     (found - expected).abs() < 2e-5,
                     "{eta} + {k} i, {c}: {found} {expected}"

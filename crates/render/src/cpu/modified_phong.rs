@@ -18,9 +18,9 @@ pub struct PhongFactors {
 }
 
 pub fn phong_factors(material: &Material) -> PhongFactors {
-    let most = largest(material.diffuse + material.specular);
-    let shrunk = |factor: Vec3| if most > 1.0 { factor / most } else { factor };
-    let (diffuse, specular) = (shrunk(material.diffuse), shrunk(material.specular));
+    let max_sum = largest(material.diffuse + material.specular);
+    let scaled = |factor: Vec3| if max_sum > 1.0 { factor / max_sum } else { factor };
+    let (diffuse, specular) = (scaled(material.diffuse), scaled(material.specular));
     let d = diffuse.x + diffuse.y + diffuse.z;
     let s = specular.x + specular.y + specular.z;
     PhongFactors {
@@ -54,8 +54,8 @@ pub fn modified_phong_sample(material: &Material, normal: Vec3, wo: Vec3, u: Vec
     let p = disk_sample(u);
     let r2 = p.x * p.x + p.y * p.y;
     let cosine = power(max(1.0 - r2, 0.0), 1.0 / (material.shininess + 1.0));
-    let across = max(1.0 - cosine * cosine, 0.0).sqrt();
-    let around = p * (across / max(r2, 1e-20).sqrt());
+    let sine = max(1.0 - cosine * cosine, 0.0).sqrt();
+    let offset = p * (sine / max(r2, 1e-20).sqrt());
     let mirrored = normalize(normal * (2.0 * dot(normal, wo)) - wo);
-    normalize(vector_around(mirrored, around.extend(cosine)))
+    normalize(vector_around(mirrored, offset.extend(cosine)))
 }

@@ -12,7 +12,7 @@ pub fn mapped_normal(surface: Surface, t: &Texture, n: Vec3) -> Vec3 {
     let along_v = (surface.dv * t.u.x - surface.du * t.u.y) * sign;
     let outward = surface.shading_normal * surface.side;
     let tangent = normalize(along_u - outward * dot(outward, along_u));
-    let across = cross(outward, tangent);
-    let bitangent = across * if dot(across, along_v) > 0.0 { 1.0 } else { -1.0 };
+    let perpendicular = cross(outward, tangent);
+    let bitangent = perpendicular * if dot(perpendicular, along_v) > 0.0 { 1.0 } else { -1.0 };
     normalize(tangent * n.x + bitangent * n.y + outward * max(n.z, 0.001)) * surface.side
 }

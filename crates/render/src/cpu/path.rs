@@ -31,8 +31,8 @@ pub fn is_specular(material: &Material) -> bool {
     (material.kind == MIRROR) | (material.kind == GLASS)
 }
 
-pub fn mirrored_path(path: Path, surface: Surface, at: HitDifferential, material: &Material) -> SpecularSplit {
-    let primary = reflected_path(path, surface, at, path.throughput * material.tint);
+pub fn mirrored_path(path: Path, surface: Surface, hit_diff: HitDifferential, material: &Material) -> SpecularSplit {
+    let primary = reflected_path(path, surface, hit_diff, path.throughput * material.tint);
     SpecularSplit {
         primary,
         secondary: primary,
@@ -58,7 +58,7 @@ pub fn is_usable(surface: Surface, normal: Vec3) -> bool {
 pub fn glass_path(
     path: Path,
     surface: Surface,
-    at: HitDifferential,
+    hit_diff: HitDifferential,
     material: &Material,
     random: f32,
 ) -> SpecularSplit {
@@ -71,11 +71,11 @@ pub fn glass_path(
     let cosine_t = refracted_cosine(cosine_i, eta);
     let reflectance = fresnel(cosine_i, cosine_t, eta);
     let splits = (path.depth < MAX_SPLIT_DEPTH) & (reflectance > 0.0) & (reflectance < 1.0);
-    let share = if splits { reflectance } else { 1.0 };
-    let mut reflection = reflected_path(path, surface, at, path.throughput * share);
-    let rest = if splits { 1.0 - reflectance } else { 1.0 };
-    let throughput = path.throughput * material.tint * rest;
-    let refraction = refracted_path(path, surface, at, throughput, eta, cosine_i, cosine_t);
+    let reflected_share = if splits { reflectance } else { 1.0 };
+    let mut reflection = reflected_path(path, surface, hit_diff, path.throughput * reflected_share);
+    let refracted_share = if splits { 1.0 - reflectance } else { 1.0 };
+    let throughput = path.throughput * material.tint * refracted_share;
+    let refraction = refracted_path(path, surface, hit_diff, throughput, eta, cosine_i, cosine_t);
     if splits {
         reflection.branch |= 1 << path.depth;
         return SpecularSplit {
@@ -98,13 +98,13 @@ pub fn glass_path(
     }
 }
 
-pub fn reflected_path(path: Path, surface: Surface, at: HitDifferential, throughput: Vec3) -> Path {
+pub fn reflected_path(path: Path, surface: Surface, hit_diff: HitDifferential, throughput: Vec3) -> Path {
     let d = path.ray.direction;
     let ray = Ray {
         origin: surface.ray_origin,
         direction: reflected_direction(d, surface.shading_normal),
     };
-    let differential = reflected_differential(at, d, surface.shading_normal);
+    let differential = reflected_differential(hit_diff, d, surface.shading_normal);
     Path {
         ray,
         differential,
@@ -119,19 +119,19 @@ pub fn reflected_path(path: Path, surface: Surface, at: HitDifferential, through
 pub fn refracted_path(
     path: Path,
     surface: Surface,
-    at: HitDifferential,
+    hit_diff: HitDifferential,
     throughput: Vec3,
     eta: f32,
     cosine_i: f32,
     cosine_t: f32,
 ) -> Path {
     let d = path.ray.direction;
-    let below = surface.position - (surface.ray_origin - surface.position);
+    let origin = surface.position - (surface.ray_origin - surface.position);
     let ray = Ray {
-        origin: below,
+        origin,
         direction: refracted_direction(d, surface.shading_normal, eta, cosine_i, cosine_t),
     };
-    let differential = refracted_differential(at, d, surface.shading_normal, eta, cosine_t);
+    let differential = refracted_differential(hit_diff, d, surface.shading_normal, eta, cosine_t);
     Path {
         ray,
         differential,
@@ -143,15 +143,18 @@ pub fn refracted_path(
     }
 }
 
-pub fn pass_through_path(path: Path, surface: Surface, at: HitDifferential) -> Path {
-    let below = surface.position - (surface.ray_origin - surface.position);
+pub fn pass_through_path(path: Path, surface: Surface, hit_diff: HitDifferential) -> Path {
+    let origin = surface.position - (surface.ray_origin - surface.position);
     let ray = Ray {
-        origin: below,
+        origin,
         direction: path.ray.direction,
     };
     Path {
         ray,
-        differential: Differential { x: at.x, y: at.y },
+        differential: Differential {
+            x: hit_diff.x,
+            y: hit_diff.y,
+        },
         throughput: path.throughput,
         depth: path.depth,
         branch: path.branch,
@@ -185,12 +188,12 @@ mod tests {
             du: zero,
             dv: zero,
         };
-        let leaning = normalize(Vec3::new(1.0, 0.0, 1.0));
-        // A normal tilted by 45 degrees, seen from above, reflects along the triangle or below. Seen from the side
-        // towards which it tilts, this normal is usable.
-        assert_eq!(usable_normal(surface(-0.1), leaning), smooth_normal);
-        assert_eq!(usable_normal(surface(0.5), leaning), leaning);
+        let tilted = normalize(Vec3::new(1.0, 0.0, 1.0));
+        // Seen from above, a normal tilted by 45 degrees reflects along the triangle or below. Seen from the side
+        // towards which the normal tilts, it is usable.
+        assert_eq!(usable_normal(surface(-0.1), tilted), smooth_normal);
+        assert_eq!(usable_normal(surface(0.5), tilted), tilted);
         // At a grazing angle the smooth normal would also reflect below the plane.
-        assert_eq!(usable_normal(surface(-8.0), leaning), Vec3::Z);
+        assert_eq!(usable_normal(surface(-8.0), tilted), Vec3::Z);
     }
 }

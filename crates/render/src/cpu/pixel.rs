@@ -21,8 +21,8 @@ pub fn pixel_radiance(scene: &Packed, pixel: UVec2, sample: u32) -> (Vec4, Layer
     match scene.integrator {
         Integrator::Phong => {
             let start = camera_sample(scene, pixel, sample);
-            let found = phong::radiance(scene, start.ray, start.differential, pixel, sample);
-            ((found * start.weight).extend(start.weight), Layers::default())
+            let radiance = phong::radiance(scene, start.ray, start.differential, pixel, sample);
+            ((radiance * start.weight).extend(start.weight), Layers::default())
         }
         Integrator::Path => {
             let mut state = path::begin_path(scene, pixel, sample);
@@ -46,8 +46,8 @@ pub fn camera_sample(scene: &Packed, pixel: UVec2, sample: u32) -> CameraSample 
     let (round, index) = (sample / s.pixel_samples, sample % s.pixel_samples);
     let key = sample_key(pixel, scene.camera.seed, 0);
     let u = sample_square(s.pixel_pattern, s.pixel_side, index, round, key);
-    let at = filtered(scene, u);
-    let raster = pixel.as_vec2() + at.truncate();
+    let position = filtered(scene, u);
+    let raster = pixel.as_vec2() + position.truncate();
     let mut ray = view_ray(scene, raster);
     if s.lens != 0 {
         ray = lens_ray(&scene.camera, raster, lens_point(scene, pixel, sample));
@@ -55,7 +55,7 @@ pub fn camera_sample(scene: &Packed, pixel: UVec2, sample: u32) -> CameraSample 
     CameraSample {
         ray,
         differential: differential_at(scene, raster),
-        weight: at.z,
+        weight: position.z,
     }
 }
 
@@ -95,8 +95,8 @@ pub fn filtered(scene: &Packed, u: Vec2) -> Vec3 {
         return u.extend(1.0);
     }
     let (i, j) = (filter_bin(u.x, bins), filter_bin(u.y, bins));
-    let (of_x, of_y) = (table[i as usize], table[j as usize]);
-    let x = filter_offset(u.x, i, bins, of_x.x, of_x.y);
-    let y = filter_offset(u.y, j, bins, of_y.x, of_y.y);
-    Vec3::new(0.5 + x, 0.5 + y, of_x.z * of_y.z)
+    let (bin_x, bin_y) = (table[i as usize], table[j as usize]);
+    let x = filter_offset(u.x, i, bins, bin_x.x, bin_x.y);
+    let y = filter_offset(u.y, j, bins, bin_y.x, bin_y.y);
+    Vec3::new(0.5 + x, 0.5 + y, bin_x.z * bin_y.z)
 }

@@ -58,7 +58,7 @@ pub fn principled_mixture(
     };
     let mut layer_throughput = 1.0;
     m.coat_normal = coat_normal;
-    let over = outside | !volume;
+    let has_layers = outside | !volume;
     let mut coat_share = 0.0;
     if lobes & LOBE_COAT != 0 {
         let cosine = dot(wo, coat_normal);
@@ -66,7 +66,11 @@ pub fn principled_mixture(
             material.clearcoat_roughness * material.clearcoat_roughness,
             SMALLEST_ALPHA,
         );
-        m.coat = if over & (cosine > 0.0) { material.clearcoat } else { 0.0 };
+        m.coat = if has_layers & (cosine > 0.0) {
+            material.clearcoat
+        } else {
+            0.0
+        };
         let reflected = ggx_albedo(m.coat_alpha, max(cosine, 0.0));
         coat_share = min(m.coat * (COAT_F0 * reflected.x + reflected.y), 1.0);
         layer_throughput = 1.0 - coat_share;
@@ -76,10 +80,10 @@ pub fn principled_mixture(
         let roughness = max(material.sheen_roughness, MIN_SHEEN_ROUGHNESS);
         m.sheen_alpha = roughness * roughness;
         let albedo = sheen_albedo(roughness, wo.z);
-        m.sheen = material.sheen * (if over { layer_throughput } else { 0.0 } / max(albedo, 1.0));
+        m.sheen = material.sheen * (if has_layers { layer_throughput } else { 0.0 } / max(albedo, 1.0));
         let bounded = min(albedo, 1.0);
         sheen_share = luminance(m.sheen) * albedo;
-        layer_throughput *= if over {
+        layer_throughput *= if has_layers {
             max(1.0 - largest(material.sheen) * bounded, 0.0)
         } else {
             1.0
@@ -91,24 +95,24 @@ pub fn principled_mixture(
     let ratio = (material.ior - 1.0) / (material.ior + 1.0);
     let mut reflected = Vec3::ZERO;
     let mut inner = Vec3::ZERO;
-    let mut share = Vec2::ZERO;
+    let mut albedo_factors = Vec2::ZERO;
     let mut compensation = 0.0;
     if lobes & (LOBE_SPECULAR | LOBE_TRANSMISSION) != 0 {
-        share = ggx_albedo(m.alpha.y, wo.z);
+        albedo_factors = ggx_albedo(m.alpha.y, wo.z);
         let mut lower_bound = 1.005;
         if lobes & LOBE_ANISOTROPY != 0 && material.aniso_table != 0 {
-            share = energy.xy();
+            albedo_factors = energy.xy();
             lower_bound = 1.0;
         }
-        compensation = max(1.0 / max(share.x + share.y, 1e-3) - lower_bound, 0.0);
+        compensation = max(1.0 / max(albedo_factors.x + albedo_factors.y, 1e-3) - lower_bound, 0.0);
         let inner_f0 = bounded_color(material.specular * (ratio * ratio)) * material.specular_weight;
         let inner_f90 = material.specular_weight * min(50.0 * (ratio * ratio), 1.0);
         let inner_gain = Vec3::ONE + inner_f0 * compensation;
         let metal_gain = (Vec3::ONE + base * compensation) * (material.metallic * layer_throughput);
         m.f0 = inner_f0 * inner_gain * (diffuse_weight * layer_throughput) + base * metal_gain;
         m.f90 = inner_gain * (inner_f90 * (diffuse_weight * layer_throughput)) + metal_gain;
-        reflected = m.f0 * share.x + m.f90 * share.y;
-        inner = (inner_f0 * share.x + Vec3::splat(inner_f90 * share.y)) * inner_gain;
+        reflected = m.f0 * albedo_factors.x + m.f90 * albedo_factors.y;
+        inner = (inner_f0 * albedo_factors.x + Vec3::splat(inner_f90 * albedo_factors.y)) * inner_gain;
     }
     m.diffuse = base * (diffuse_weight * layer_throughput * max(1.0 - largest(inner), 0.0));
     let mut glass_weight = 0.0;
@@ -132,7 +136,7 @@ pub fn principled_mixture(
         m.glass = glass * gain;
         m.transmission_tint = base * m.glass;
         let mirrored = min(
-            luminance(m.glass_f0 * share.x + Vec3::splat(m.glass_f90 * share.y)),
+            luminance(m.glass_f0 * albedo_factors.x + Vec3::splat(m.glass_f90 * albedo_factors.y)),
             1.0,
         );
         glass_weight = glass * (luminance(base) * (1.0 - mirrored) + mirrored);
@@ -170,12 +174,16 @@ pub fn schlick(f0: Vec3, f90: Vec3, cosine: f32) -> Vec3 {
 
 pub fn glass_fresnel(m: &PrincipledLobes, cosine: f32) -> Vec3 {
     let c = min(max(cosine, 1e-6), 1.0);
-    let behind = refracted_cosine(c, m.ratio);
-    let once = fresnel(c, behind, m.ratio);
-    let exact = if m.thin { 2.0 * once / (1.0 + once) } else { once };
+    let cosine_t = refracted_cosine(c, m.ratio);
+    let one_side = fresnel(c, cosine_t, m.ratio);
+    let exact = if m.thin {
+        2.0 * one_side / (1.0 + one_side)
+    } else {
+        one_side
+    };
     let x = (exact - m.f0_ior) / max(1.0 - m.f0_ior, 1e-6);
     let f = m.glass_f0 + (Vec3::splat(m.glass_f90) - m.glass_f0) * x;
-    if behind == 0.0 {
+    if cosine_t == 0.0 {
         Vec3::ONE
     } else {
         bounded_color(Vec3::new(max(f.x, 0.0), max(f.y, 0.0), max(f.z, 0.0)))
@@ -250,8 +258,8 @@ pub fn glass_eval(m: &PrincipledLobes, wo: Vec3, wi: Vec3) -> Vec3 {
     }
     let half = refracting_half(wo, wi, m.eta);
     let reflected = glass_fresnel(m, dot(wo, half));
-    let seen = ggx_pdf(m.alpha, wo, half) * ggx_g1(m.alpha, wi);
-    let density = seen * refracting_density(wo, wi, half, m.eta) * (m.eta * m.eta);
+    let visible = ggx_pdf(m.alpha, wo, half) * ggx_g1(m.alpha, wi);
+    let density = visible * refracting_density(wo, wi, half, m.eta) * (m.eta * m.eta);
     m.transmission_tint * (Vec3::ONE - reflected) * density
 }
 
@@ -334,9 +342,9 @@ pub fn principled_sample(m: &PrincipledLobes, wo: Vec3, u: Vec2, random: f32, lo
     let mut is_delta = false;
     let mut weight = Vec3::ZERO;
     let mut eta = 1.0;
-    let mut rest = random - m.lobe_probs.x;
+    let mut remaining = random - m.lobe_probs.x;
     if lobes & LOBE_SPECULAR != 0 {
-        if (rest >= 0.0) & (rest < m.lobe_probs.y) {
+        if (remaining >= 0.0) & (remaining < m.lobe_probs.y) {
             is_delta = is_flat(m.alpha);
             let half = if is_delta { Vec3::Z } else { ggx_sample(m.alpha, wo, u) };
             wi = half * (2.0 * dot(wo, half)) - wo;
@@ -345,37 +353,41 @@ pub fn principled_sample(m: &PrincipledLobes, wo: Vec3, u: Vec2, random: f32, lo
                 return no_sample();
             }
         }
-        rest -= m.lobe_probs.y;
+        remaining -= m.lobe_probs.y;
     }
     if lobes & LOBE_TRANSMISSION != 0 {
-        if (rest >= 0.0) & (rest < m.lobe_probs.z) {
+        if (remaining >= 0.0) & (remaining < m.lobe_probs.z) {
             is_delta = transmits_straight(m);
             let half = if is_delta { Vec3::Z } else { ggx_sample(m.alpha, wo, u) };
             let cosine = max(dot(wo, half), 1e-6);
             let reflected = glass_fresnel(m, cosine);
             let chance = glass_probability(m, cosine);
-            let mirrors = rest < m.lobe_probs.z * chance;
+            let reflects = remaining < m.lobe_probs.z * chance;
             let mirrored = half * (2.0 * cosine) - wo;
-            let behind = refracted_cosine(cosine, m.eta);
-            let bent = refracted_direction(-wo, half, m.eta, cosine, behind);
-            let through = if m.thin {
+            let cosine_t = refracted_cosine(cosine, m.eta);
+            let refracted = refracted_direction(-wo, half, m.eta, cosine, cosine_t);
+            let transmitted = if m.thin {
                 Vec3::new(mirrored.x, mirrored.y, -mirrored.z)
             } else {
-                bent
+                refracted
             };
-            wi = normalize(if mirrors { mirrored } else { through });
-            eta = if mirrors { 1.0 } else { m.eta };
-            let passing = m.transmission_tint * (Vec3::ONE - reflected) * (m.eta * m.eta);
-            let share = max(m.lobe_probs.z * if mirrors { chance } else { 1.0 - chance }, 1e-30);
-            weight = if mirrors { reflected * m.glass } else { passing } * (1.0 / share);
-            if wi.z * if mirrors { 1.0 } else { -1.0 } <= 0.0 {
+            wi = normalize(if reflects { mirrored } else { transmitted });
+            eta = if reflects { 1.0 } else { m.eta };
+            let transmitted_weight = m.transmission_tint * (Vec3::ONE - reflected) * (m.eta * m.eta);
+            let probability = max(m.lobe_probs.z * if reflects { chance } else { 1.0 - chance }, 1e-30);
+            weight = if reflects {
+                reflected * m.glass
+            } else {
+                transmitted_weight
+            } * (1.0 / probability);
+            if wi.z * if reflects { 1.0 } else { -1.0 } <= 0.0 {
                 return no_sample();
             }
         }
-        rest -= m.lobe_probs.z;
+        remaining -= m.lobe_probs.z;
     }
     if lobes & LOBE_COAT != 0 {
-        if (rest >= 0.0) & (rest < m.lobe_probs.w) {
+        if (remaining >= 0.0) & (remaining < m.lobe_probs.w) {
             let alpha = Vec2::splat(m.coat_alpha);
             is_delta = is_flat(alpha);
             let o = to_frame_around(m.coat_normal, wo);
@@ -384,9 +396,9 @@ pub fn principled_sample(m: &PrincipledLobes, wo: Vec3, u: Vec2, random: f32, lo
             let reflected = schlick(Vec3::splat(COAT_F0), Vec3::ONE, o.z) * (m.coat / m.lobe_probs.w);
             weight = if wi.z > 0.0 { reflected } else { Vec3::ZERO };
         }
-        rest -= m.lobe_probs.w;
+        remaining -= m.lobe_probs.w;
     }
-    if (lobes & LOBE_SHEEN != 0) && rest >= 0.0 {
+    if (lobes & LOBE_SHEEN != 0) && remaining >= 0.0 {
         let height = 1.0 - p.x * p.x - p.y * p.y;
         wi = (p * max(1.0 + height, 0.0).sqrt()).extend(max(height, 0.0));
         is_delta = false;

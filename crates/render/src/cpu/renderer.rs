@@ -1,6 +1,6 @@
 //! CPU backend: evaluates the kernels' twins on a thread pool.
 
-use std::ops::Range;
+use std::ops::{Deref, Range};
 
 use glam::{UVec2, Vec4};
 use rayon::prelude::*;
@@ -15,21 +15,36 @@ use crate::records::{FirstHit, Packed};
 use wgray_image::Region;
 
 /// A scene's CPU backend. Dispatches run in [`Backend::poll`] or [`Backend::wait`], on the current rayon pool.
-pub struct Cpu<'a> {
-    scene: &'a Packed,
+pub struct Cpu<P> {
+    scene: P,
     rules: Rules,
     film: Option<(Film, FilmState)>,
     pending: Option<(Region, Range<u32>)>,
 }
 
-impl<'a> Cpu<'a> {
-    pub fn new(scene: &'a Packed) -> Cpu<'a> {
+impl<P: Deref<Target = Packed>> Cpu<P> {
+    /// Renders a scene, given by a reference or an `Arc`.
+    pub fn new(scene: P) -> Cpu<P> {
         Cpu {
+            rules: Rules::of(&scene),
             scene,
-            rules: Rules::of(scene),
             film: None,
             pending: None,
         }
+    }
+
+    pub fn scene(&self) -> &P {
+        &self.scene
+    }
+
+    pub fn into_scene(self) -> P {
+        self.scene
+    }
+
+    /// Edits the scene and discards the film.
+    pub fn edit_scene(&mut self, edit: impl FnOnce(&mut P)) {
+        edit(&mut self.scene);
+        (self.rules, self.film, self.pending) = (Rules::of(&self.scene), None, None);
     }
 
     pub fn into_film(self) -> Option<Film> {
@@ -45,27 +60,27 @@ impl<'a> Cpu<'a> {
 }
 
 /// Maximum number of pixels of a row per task.
-const RUN: usize = 32;
+const MAX_RUN: usize = 32;
 
-impl Backend for Cpu<'_> {
+impl<P: Deref<Target = Packed>> Backend for Cpu<P> {
     fn begin(&mut self, region: Region) -> Result<(), RenderError> {
         self.idle()?;
-        let started = self.rules.begin(region)?;
-        self.film = Some((self.rules.empty_film(region), started));
+        let state = self.rules.begin(region)?;
+        self.film = Some((self.rules.empty_film(region), state));
         Ok(())
     }
 
     fn resume(&mut self, film: Film) -> Result<(), RenderError> {
         self.idle()?;
-        let started = self.rules.resume(&film)?;
-        self.film = Some((film, started));
+        let state = self.rules.resume(&film)?;
+        self.film = Some((film, state));
         Ok(())
     }
 
     fn submit(&mut self, tile: Region, samples: Range<u32>) -> Result<(), RenderError> {
         self.idle()?;
-        let (_, started) = self.film.as_mut().ok_or(RenderError::NoFilm)?;
-        if self.rules.call(started, tile, &samples)? {
+        let (_, state) = self.film.as_mut().ok_or(RenderError::NoFilm)?;
+        if self.rules.call(state, tile, &samples)? {
             self.pending = Some((tile, samples));
         }
         Ok(())
@@ -75,7 +90,7 @@ impl Backend for Cpu<'_> {
         if let (Some((tile, mut samples)), Some((film, _))) = (self.pending.take(), &mut self.film) {
             while !samples.is_empty() {
                 let end = self.rules.end_of_part(&samples);
-                add_samples(self.scene, film, tile, samples.start..end);
+                add_samples(&self.scene, film, tile, samples.start..end);
                 samples.start = end;
             }
         }
@@ -95,9 +110,10 @@ impl Backend for Cpu<'_> {
     fn first_hits(&mut self, region: Region) -> Result<Vec<FirstHit>, RenderError> {
         self.idle()?;
         self.rules.in_picture(region)?;
+        let scene: &Packed = &self.scene;
         let rows = (region.y0..region.y1).into_par_iter();
         let pixels = rows.flat_map_iter(|y| (region.x0..region.x1).map(move |x| UVec2::new(x, y)));
-        Ok(pixels.map(|pixel| pixel_first_hit(self.scene, pixel)).collect())
+        Ok(pixels.map(|pixel| pixel_first_hit(scene, pixel)).collect())
     }
 
     fn samples_of_all(&self) -> u32 {
@@ -123,8 +139,8 @@ fn add_samples(scene: &Packed, film: &mut Film, tile: Region, samples: Range<u32
         layers,
     } = film;
     let region = *region;
-    let first_looks = scene.sampling.adaptive && samples.start < scene.specialization.pilot_samples;
-    let (pilot_to_read, pilot_to_write) = match first_looks {
+    let is_pilot = scene.sampling.adaptive && samples.start < scene.specialization.pilot_samples;
+    let (pilot_to_read, pilot_to_write) = match is_pilot {
         true => (&[][..], &mut pilot_sums[..]),
         false => (&pilot_sums[..], &mut [][..]),
     };
@@ -159,11 +175,11 @@ fn add_samples(scene: &Packed, film: &mut Film, tile: Region, samples: Range<u32
                     run.sums[x] += value;
                     run.add_layers(x, layers);
                 }
-            } else if first_looks {
+            } else if is_pilot {
                 add_pilot_samples(scene, pixel, samples.clone(), &mut run, x);
             } else {
                 let pilot_sums = neighbor_pilot_sum(pilot_to_read, region, pixel);
-                further_samples(scene, pixel, samples.clone(), &mut run, x, pilot_sums);
+                add_further_samples(scene, pixel, samples.clone(), &mut run, x, pilot_sums);
             }
         }
     });
@@ -179,18 +195,18 @@ struct Run<'a> {
 }
 
 impl Run<'_> {
-    fn add_layers(&mut self, x: usize, found: Layers) {
+    fn add_layers(&mut self, x: usize, sample: Layers) {
         let Layers {
             emission,
             direct,
             indirect,
             albedo,
             normal,
-        } = found;
-        let found = [emission, direct, indirect, albedo, normal];
-        for (layer, found) in self.layers.iter_mut().zip(found) {
+        } = sample;
+        let values = [emission, direct, indirect, albedo, normal];
+        for (layer, value) in self.layers.iter_mut().zip(values) {
             if let Some(sum) = layer.get_mut(x) {
-                *sum += found;
+                *sum += value;
             }
         }
     }
@@ -203,8 +219,8 @@ fn runs(region: Region, records: &mut [Vec4], tile: Region) -> Vec<(UVec2, &mut 
     let rows = rows.skip((tile.y0 - region.y0) as usize).take(tile.height() as usize);
     let columns = (tile.x0 - region.x0) as usize..(tile.x1 - region.x0) as usize;
     rows.flat_map(|(y, row)| {
-        let runs = row[columns.clone()].chunks_mut(RUN).enumerate();
-        runs.map(move |(i, run)| (UVec2::new(tile.x0 + (i * RUN) as u32, region.y0 + y as u32), run))
+        let runs = row[columns.clone()].chunks_mut(MAX_RUN).enumerate();
+        runs.map(move |(i, run)| (UVec2::new(tile.x0 + (i * MAX_RUN) as u32, region.y0 + y as u32), run))
     })
     .collect()
 }
@@ -221,8 +237,8 @@ fn add_pilot_samples(scene: &Packed, pixel: UVec2, samples: Range<u32>, run: &mu
     run.pilot_sums[x] = pilot_finish(run.pilot_sums[x], run.sums[x], run.moments[x]);
 }
 
-/// Adds the samples after the pilot samples. The neighbors' pilot statistics determine how many.
-fn further_samples(scene: &Packed, pixel: UVec2, samples: Range<u32>, run: &mut Run, x: usize, pilot_sums: Vec4) {
+/// Adds the samples after the pilot samples. The neighbors' pilot statistics determine the number of samples.
+fn add_further_samples(scene: &Packed, pixel: UVec2, samples: Range<u32>, run: &mut Run, x: usize, pilot_sums: Vec4) {
     let s = &scene.specialization;
     let end = samples_wanted(
         pilot_sums,

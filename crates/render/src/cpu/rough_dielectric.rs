@@ -31,11 +31,11 @@ pub fn rough_dielectric_eval(material: &Material, wo: Vec3, wi: Vec3) -> Vec3 {
     let i = dot(wi, m);
     let reflected = fresnel(max(o, 1e-6), refracted_cosine(max(o, 1e-6), eta), eta);
     let mirrored = Vec3::splat(reflected * facet_eval(alpha, wo, wi));
-    let passes = (o > 0.0) & (i < 0.0) & (wi.z < 0.0);
+    let transmits = (o > 0.0) & (i < 0.0) & (wi.z < 0.0);
     let d = o + material.ior * i;
-    let seen = 2.0 / max(wo.z + ggx_length(alpha, wo), 1e-30) * ggx_g1(alpha, wi);
-    let bent = (1.0 - reflected) * ggx_d(alpha, m) * seen * o * -i / max(d * d, 1e-30);
-    let refracted = if passes { material.tint * bent } else { Vec3::ZERO };
+    let visible = 2.0 / max(wo.z + ggx_length(alpha, wo), 1e-30) * ggx_g1(alpha, wi);
+    let btdf = (1.0 - reflected) * ggx_d(alpha, m) * visible * o * -i / max(d * d, 1e-30);
+    let refracted = if transmits { material.tint * btdf } else { Vec3::ZERO };
     let value = if above { mirrored } else { refracted } * dielectric_gain(material);
     if wo.z > 0.0 { value } else { Vec3::ZERO }
 }
@@ -53,14 +53,15 @@ pub fn rough_dielectric_pdf(material: &Material, wo: Vec3, wi: Vec3) -> f32 {
     let i = dot(wi, m);
     let reflected = fresnel(max(o, 1e-6), refracted_cosine(max(o, 1e-6), eta), eta);
     let mirrored = reflected * facet_pdf(alpha, wo, wi);
-    let passes = (o > 0.0) & (i < 0.0) & (wi.z < 0.0);
+    let transmits = (o > 0.0) & (i < 0.0) & (wi.z < 0.0);
     let d = o + material.ior * i;
-    let bent = (1.0 - reflected) * ggx_pdf(alpha, wo, m) * (material.ior * material.ior) * -i / max(d * d, 1e-30);
+    let transmitted =
+        (1.0 - reflected) * ggx_pdf(alpha, wo, m) * (material.ior * material.ior) * -i / max(d * d, 1e-30);
     if wo.z > 0.0 {
         if above {
             mirrored
-        } else if passes {
-            bent
+        } else if transmits {
+            transmitted
         } else {
             0.0
         }
@@ -76,30 +77,30 @@ pub fn rough_dielectric_sample(material: &Material, wo: Vec3, u: Vec2, random: f
     let o = max(dot(wo, m), 1e-6);
     let t = refracted_cosine(o, eta);
     let reflected = fresnel(o, t, eta);
-    let mirrors = random < reflected;
+    let reflects = random < reflected;
     let gain = dielectric_gain(material);
-    let above = m * (2.0 * o) - wo;
-    let below = m * (eta * o - t) - wo * eta;
-    let wi = normalize(if mirrors { above } else { below });
+    let reflected_wi = m * (2.0 * o) - wo;
+    let refracted_wi = m * (eta * o - t) - wo * eta;
+    let wi = normalize(if reflects { reflected_wi } else { refracted_wi });
     let d = o - material.ior * t;
-    let seen = ggx_pdf(alpha, wo, m);
-    let mirrored = seen * reflected * 0.25 / o;
-    let bent = seen * (1.0 - reflected) * (material.ior * material.ior) * t / max(d * d, 1e-30);
-    let passed = material.tint * (ggx_g1(alpha, wi) * (eta * eta));
-    let weight = if mirrors {
+    let normal_pdf = ggx_pdf(alpha, wo, m);
+    let mirrored = normal_pdf * reflected * 0.25 / o;
+    let transmitted = normal_pdf * (1.0 - reflected) * (material.ior * material.ior) * t / max(d * d, 1e-30);
+    let transmitted_weight = material.tint * (ggx_g1(alpha, wi) * (eta * eta));
+    let weight = if reflects {
         Vec3::splat(facet_weight(alpha, wo, wi))
     } else {
-        passed
+        transmitted_weight
     } * gain;
-    let lit = (wo.z > 0.0) & (wi.z * if mirrors { 1.0 } else { -1.0 } > 0.0);
+    let lit = (wo.z > 0.0) & (wi.z * if reflects { 1.0 } else { -1.0 } > 0.0);
     LobeSample {
         wi,
         weight: if lit { weight } else { Vec3::ZERO },
         pdf: if lit {
-            if mirrors { mirrored } else { bent }
+            if reflects { mirrored } else { transmitted }
         } else {
             0.0
         },
-        eta: if mirrors { 1.0 } else { eta },
+        eta: if reflects { 1.0 } else { eta },
     }
 }

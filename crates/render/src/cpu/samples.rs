@@ -6,7 +6,7 @@ use fearless_simd::{Level, dispatch};
 
 use super::light::LightSegments;
 use super::shadow::{SampleBlock, block_sample};
-use super::traversal::{Directions, MOST};
+use super::traversal::{Directions, MAX_SEGMENTS};
 use crate::records::GRID;
 
 /// Instruction set of this processor.
@@ -15,8 +15,8 @@ pub static LEVEL: LazyLock<Level> = LazyLock::new(Level::new);
 /// Samples on the unit square. Unused lanes repeat the first sample.
 pub struct Samples {
     count: usize,
-    x: [f32; MOST],
-    y: [f32; MOST],
+    x: [f32; MAX_SEGMENTS],
+    y: [f32; MAX_SEGMENTS],
 }
 
 impl Samples {
@@ -25,8 +25,8 @@ impl Samples {
         let first = block_sample(block, 0);
         let mut samples = Samples {
             count,
-            x: [first.x; MOST],
-            y: [first.y; MOST],
+            x: [first.x; MAX_SEGMENTS],
+            y: [first.y; MAX_SEGMENTS],
         };
         if block.pattern == GRID {
             // Avoids a division per sample.
@@ -43,22 +43,22 @@ impl Samples {
             return samples;
         }
         for i in 1..count {
-            let at = block_sample(block, i as u32);
-            (samples.x[i], samples.y[i]) = (at.x, at.y);
+            let sample = block_sample(block, i as u32);
+            (samples.x[i], samples.y[i]) = (sample.x, sample.y);
         }
         samples
     }
 
     /// Returns the vectors to the samples.
-    pub fn segments(&self, level: Level, to: LightSegments) -> Directions {
+    pub fn segments(&self, level: Level, segments: LightSegments) -> Directions {
         dispatch!(level, _simd => {
-            let mut along = [[0.0; MOST]; 3];
-            for (k, along) in along.iter_mut().enumerate() {
-                for ((d, x), y) in along.iter_mut().zip(&self.x).zip(&self.y) {
-                    *d = to.towards[k] + to.u[k] * (2.0 * x - 1.0) + to.v[k] * (2.0 * y - 1.0);
+            let mut components = [[0.0; MAX_SEGMENTS]; 3];
+            for (k, components) in components.iter_mut().enumerate() {
+                for ((d, x), y) in components.iter_mut().zip(&self.x).zip(&self.y) {
+                    *d = segments.towards[k] + segments.u[k] * (2.0 * x - 1.0) + segments.v[k] * (2.0 * y - 1.0);
                 }
             }
-            Directions { count: self.count, along }
+            Directions { count: self.count, components }
         })
     }
 }

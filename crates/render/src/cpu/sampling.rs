@@ -41,8 +41,12 @@ pub fn rotated_grid_sample(side: u32, index: u32) -> Vec2 {
 }
 
 pub fn wrap(x: f32) -> f32 {
-    let above = if x < 0.0 { x + 1.0 } else { x };
-    if above >= 1.0 { above - 1.0 } else { above }
+    let nonnegative = if x < 0.0 { x + 1.0 } else { x };
+    if nonnegative >= 1.0 {
+        nonnegative - 1.0
+    } else {
+        nonnegative
+    }
 }
 
 pub fn jittered_sample(side: u32, index: u32, group: u32, key: UVec2) -> Vec2 {

@@ -103,23 +103,23 @@ pub fn reflection(
     result
 }
 
-pub fn bounded(found: Material) -> Material {
-    let mut material = found;
-    let bounded = |color: Vec3| color.map(|x| if x > 1.0 { 1.0 } else { x });
-    if (found.kind == DIFFUSE) | (found.kind == PRINCIPLED) {
-        material.diffuse = bounded(found.diffuse);
+pub fn bounded(original: Material) -> Material {
+    let mut material = original;
+    let clamped = |color: Vec3| color.map(|x| if x > 1.0 { 1.0 } else { x });
+    if (original.kind == DIFFUSE) | (original.kind == PRINCIPLED) {
+        material.diffuse = clamped(original.diffuse);
     }
-    material.tint = bounded(found.tint);
-    material.roughness = min(found.roughness, 1.0);
-    if found.kind == PRINCIPLED {
-        material.sheen = bounded(found.sheen);
-        material.sheen_roughness = min(found.sheen_roughness, 1.0);
-        material.anisotropy = min(found.anisotropy, 1.0);
-        material.metallic = min(found.metallic, 1.0);
-        material.transmission = min(found.transmission, 1.0);
-        material.clearcoat = min(found.clearcoat, 1.0);
-        material.clearcoat_roughness = min(found.clearcoat_roughness, 1.0);
-        material.specular_weight = min(found.specular_weight, 1.0);
+    material.tint = clamped(original.tint);
+    material.roughness = min(original.roughness, 1.0);
+    if original.kind == PRINCIPLED {
+        material.sheen = clamped(original.sheen);
+        material.sheen_roughness = min(original.sheen_roughness, 1.0);
+        material.anisotropy = min(original.anisotropy, 1.0);
+        material.metallic = min(original.metallic, 1.0);
+        material.transmission = min(original.transmission, 1.0);
+        material.clearcoat = min(original.clearcoat, 1.0);
+        material.clearcoat_roughness = min(original.clearcoat_roughness, 1.0);
+        material.specular_weight = min(original.specular_weight, 1.0);
     }
     material
 }
@@ -128,8 +128,8 @@ pub fn bounded(found: Material) -> Material {
 pub fn shaded_normal(surface: Surface, material: &Material, normal: Vec3) -> Vec3 {
     if is_delta(material) {
         let usable = usable_normal(surface, normal);
-        let bends = (material.kind == GLASS) | (material.kind == ROUGH_GLASS);
-        if bends && !refracts_inwards(&surface, material, usable) {
+        let refracts = (material.kind == GLASS) | (material.kind == ROUGH_GLASS);
+        if refracts && !refracts_inwards(&surface, material, usable) {
             return surface.normal;
         }
         return usable;
@@ -177,15 +177,15 @@ pub fn facet_frame(scene: &Packed, surface: Surface, material: &Material) -> Tan
     frame_around(surface.shading_normal)
 }
 
-pub fn facets_of(scene: &Packed, surface: &Surface, found: Material) -> Material {
-    let mut material = found;
+pub fn facets_of(scene: &Packed, surface: &Surface, original: Material) -> Material {
+    let mut material = original;
     let frame = Tangents {
         u: surface.du,
         v: surface.dv,
     };
     let wo = vector_to_lobe(frame, surface.shading_normal, surface.wo);
     if material.kind == ROUGH_GLASS {
-        material.ior = 1.0 / eta_of(surface, &found);
+        material.ior = 1.0 / eta_of(surface, &original);
     }
     if material.energy != NO_INDEX {
         material.loss = if material.kind == ROUGH_GLASS {
@@ -266,8 +266,8 @@ pub fn direction_allowed(
 
 #[inline(always)]
 pub fn is_transmissive(material: &Material) -> bool {
-    let passes = (TRANSMISSIVE_KINDS >> material.kind) & 1 != 0;
-    passes | ((material.kind == PRINCIPLED) & (material.transmission > 0.0))
+    let transmits = (TRANSMISSIVE_KINDS >> material.kind) & 1 != 0;
+    transmits | ((material.kind == PRINCIPLED) & (material.transmission > 0.0))
 }
 
 #[inline(always)]

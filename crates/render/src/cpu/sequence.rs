@@ -46,11 +46,11 @@ pub fn halton_sample(index: u32, key: UVec2) -> Vec2 {
 }
 
 pub fn radical_inverse_3(i: u32) -> u32 {
-    let mut rest = i;
+    let mut remaining = i;
     let mut reversed = 0;
     for _ in 0..15 {
-        reversed = reversed * 3 + rest % 3;
-        rest /= 3;
+        reversed = reversed * 3 + remaining % 3;
+        remaining /= 3;
     }
     reversed
 }

@@ -25,10 +25,10 @@ pub fn occlusion_mask(kind: u32, q: &Primitive, p: Vec3, from_inside: bool, ligh
     let from_anchor = vector_to_local(q, p - q.anchor);
     let o = from_anchor - q.middle;
     let levels = solid_levels(kind, q, from_anchor, from_inside);
-    let to = Samples::of(block).segments(*LEVEL, segments_to_local(q, segments_to_light(light, p)));
+    let directions = Samples::of(block).segments(*LEVEL, segments_to_local(q, segments_to_light(light, p)));
     let mut bits = 0;
-    for i in 0..to.count {
-        bits |= if occludes(kind, o, to.get(i), levels, light.t_max) {
+    for i in 0..directions.count {
+        bits |= if occludes(kind, o, directions.get(i), levels, light.t_max) {
             1 << i
         } else {
             0
@@ -38,10 +38,16 @@ pub fn occlusion_mask(kind: u32, q: &Primitive, p: Vec3, from_inside: bool, ligh
 }
 
 #[inline(always)] // compiled for each kind
-pub fn occludes_segment(kind: u32, q: &Primitive, p: Vec3, from_inside: bool, to: Vec3, t_max: f32) -> bool {
+pub fn occludes_segment(kind: u32, q: &Primitive, p: Vec3, from_inside: bool, to_light: Vec3, t_max: f32) -> bool {
     let from_anchor = vector_to_local(q, p - q.anchor);
     let levels = solid_levels(kind, q, from_anchor, from_inside);
-    occludes(kind, from_anchor - q.middle, vector_to_local(q, to), levels, t_max)
+    occludes(
+        kind,
+        from_anchor - q.middle,
+        vector_to_local(q, to_light),
+        levels,
+        t_max,
+    )
 }
 
 pub fn block_sample(block: SampleBlock, i: u32) -> Vec2 {
@@ -51,18 +57,18 @@ pub fn block_sample(block: SampleBlock, i: u32) -> Vec2 {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ShadowFrustum {
     pub apex: Vec3,
-    pub to: LightSegments,
+    pub segments: LightSegments,
     pub length2: f32,
     pub inverse_depth: f32,
 }
 
 pub fn light_frustum(light: &Light, p: Vec3) -> ShadowFrustum {
-    let to = segments_to_light(light, p);
-    let length2 = dot(to.towards, to.towards);
-    let depth = length2 - dot(to.towards, to.u).abs() - dot(to.towards, to.v).abs();
+    let segments = segments_to_light(light, p);
+    let length2 = dot(segments.towards, segments.towards);
+    let depth = length2 - dot(segments.towards, segments.u).abs() - dot(segments.towards, segments.v).abs();
     ShadowFrustum {
         apex: p,
-        to,
+        segments,
         length2,
         inverse_depth: if depth > 0.0 { 1.0 / depth } else { -1.0 },
     }
@@ -70,10 +76,10 @@ pub fn light_frustum(light: &Light, p: Vec3) -> ShadowFrustum {
 
 pub fn may_block(sphere: &Sphere, frustum: &ShadowFrustum) -> bool {
     let w = sphere.center - frustum.apex;
-    let along = dot(w, frustum.to.towards);
-    let m = w - frustum.to.towards * (along / frustum.length2);
+    let along = dot(w, frustum.segments.towards);
+    let m = w - frustum.segments.towards * (along / frustum.length2);
     let m2 = dot(m, m);
-    let slope = (dot(m, frustum.to.u).abs() + dot(m, frustum.to.v).abs()) * frustum.inverse_depth;
+    let slope = (dot(m, frustum.segments.u).abs() + dot(m, frustum.segments.v).abs()) * frustum.inverse_depth;
     let height = m2 - slope * along;
     let radius2 = sphere.radius * sphere.radius;
     (slope < 0.0) | (height <= 0.0) | (height * height <= radius2 * (m2 + slope * slope * frustum.length2))

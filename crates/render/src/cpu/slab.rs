@@ -26,8 +26,8 @@ pub fn slabs(origin: Vec3, direction: Vec3, pad: f32) -> Slabs {
 }
 
 pub fn inverse_of(x: f32) -> f32 {
-    let least = if x < 0.0 { -7.888609e-31 } else { 7.888609e-31 };
-    1.0 / if x.abs() >= 7.888609e-31 { x } else { least }
+    let smallest = if x < 0.0 { -7.888609e-31 } else { 7.888609e-31 };
+    1.0 / if x.abs() >= 7.888609e-31 { x } else { smallest }
 }
 
 pub fn box_interval(low: Vec3, high: Vec3, s: Slabs) -> Vec2 {
@@ -52,32 +52,44 @@ pub struct RayInterval {
     pub far_high: Vec3,
 }
 
-pub fn ray_interval(origin: Vec3, least: Vec3, most: Vec3, pad: f32) -> RayInterval {
-    let up = least.cmpge(Vec3::ZERO);
-    let down = most.cmplt(Vec3::ZERO);
-    let of_least = Vec3::new(inverse_of(least.x), inverse_of(least.y), inverse_of(least.z));
-    let of_most = Vec3::new(inverse_of(most.x), inverse_of(most.y), inverse_of(most.z));
+pub fn ray_interval(origin: Vec3, min_direction: Vec3, max_direction: Vec3, pad: f32) -> RayInterval {
+    let is_positive = min_direction.cmpge(Vec3::ZERO);
+    let is_negative = max_direction.cmplt(Vec3::ZERO);
+    let inverse_min = Vec3::new(
+        inverse_of(min_direction.x),
+        inverse_of(min_direction.y),
+        inverse_of(min_direction.z),
+    );
+    let inverse_max = Vec3::new(
+        inverse_of(max_direction.x),
+        inverse_of(max_direction.y),
+        inverse_of(max_direction.z),
+    );
     let zero = Vec3::ZERO;
     RayInterval {
         low_origin: origin + pad,
         high_origin: origin - pad,
-        near_low: Vec3::select(down, zero, of_most),
-        near_high: Vec3::select(up, zero, of_least),
-        far_low: Vec3::select(down, of_most, zero),
-        far_high: Vec3::select(up, of_least, zero),
+        near_low: Vec3::select(is_negative, zero, inverse_max),
+        near_high: Vec3::select(is_positive, zero, inverse_min),
+        far_low: Vec3::select(is_negative, inverse_max, zero),
+        far_high: Vec3::select(is_positive, inverse_min, zero),
     }
 }
 
-pub fn ray_interval_box(low: Vec3, high: Vec3, f: RayInterval) -> Vec2 {
-    let a = low - f.low_origin;
-    let b = high - f.high_origin;
-    let by_low = a * f.near_low;
-    let by_high = b * f.near_high;
+pub fn ray_interval_box(low: Vec3, high: Vec3, rays: RayInterval) -> Vec2 {
+    let a = low - rays.low_origin;
+    let b = high - rays.high_origin;
+    let t_low = a * rays.near_low;
+    let t_high = b * rays.near_high;
     let near = max(
-        max(max(by_low.x, by_high.x), max(by_low.y, by_high.y)),
-        max(by_low.z, by_high.z),
+        max(max(t_low.x, t_high.x), max(t_low.y, t_high.y)),
+        max(t_low.z, t_high.z),
     );
-    let none = f.far_low.cmpeq(Vec3::ZERO) & f.far_high.cmpeq(Vec3::ZERO);
-    let far = Vec3::select(none, Vec3::splat(INFINITE_T), a * f.far_low + b * f.far_high);
+    let is_unbounded = rays.far_low.cmpeq(Vec3::ZERO) & rays.far_high.cmpeq(Vec3::ZERO);
+    let far = Vec3::select(
+        is_unbounded,
+        Vec3::splat(INFINITE_T),
+        a * rays.far_low + b * rays.far_high,
+    );
     Vec2::new(near, min(min(far.x, far.y), far.z))
 }

@@ -4,11 +4,11 @@ use glam::Vec2;
 
 use super::math::min;
 
-pub fn levels_on_surface(levels: Vec2, on: f32) -> Vec2 {
+pub fn levels_on_surface(levels: Vec2, surface_level: f32) -> Vec2 {
     if levels.x >= levels.y {
-        Vec2::new(on, min(levels.y, on))
+        Vec2::new(surface_level, min(levels.y, surface_level))
     } else {
-        Vec2::new(min(levels.x, on), on)
+        Vec2::new(min(levels.x, surface_level), surface_level)
     }
 }
 

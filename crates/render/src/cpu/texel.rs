@@ -23,8 +23,8 @@ pub fn wrapped_index(i: i32, size: u32, wrap: u32) -> u32 {
         return if i < 0 { 0 } else { i.min(n - 1) as u32 };
     }
     let period = if wrap == MIRRORED { 2 * n } else { n };
-    let whole = floor((i as f32 + 0.5) / period as f32) as i32;
-    let j = i - whole * period;
+    let periods = floor((i as f32 + 0.5) / period as f32) as i32;
+    let j = i - periods * period;
     if j >= n { (period - 1 - j) as u32 } else { j as u32 }
 }
 

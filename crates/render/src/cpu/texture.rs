@@ -26,7 +26,7 @@ use crate::records::{
 
 pub fn texture_color(scene: &Packed, t: &Texture, surface: Footprint) -> Vec3 {
     let f = texture_footprint(t, surface);
-    let x = if t.kind <= LINES {
+    let factor = if t.kind <= LINES {
         Vec3::splat(procedural_share(t.kind, t.parameter, f))
     } else if t.kind == NEAREST {
         nearest_color(scene, t, f.uv)
@@ -35,7 +35,7 @@ pub fn texture_color(scene: &Packed, t: &Texture, surface: Footprint) -> Vec3 {
     } else {
         linear_color(scene, t, f)
     };
-    t.first + (t.second - t.first) * x
+    t.first + (t.second - t.first) * factor
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -56,8 +56,8 @@ pub fn level_of(scene: &Packed, t: &Texture, i: u32) -> Level {
 pub fn load_texel(scene: &Packed, t: &Texture, level: Level, x: i32, y: i32) -> Vec3 {
     let i = wrapped_index(y, level.height, wrap_v(t)) * level.width + wrapped_index(x, level.width, wrap_u(t));
     if t.format == FLOAT {
-        let at = (level.start + 3 * i) as usize;
-        return Vec3::from_slice(bytemuck::cast_slice(&scene.textures.texels[at..at + 3]));
+        let texel = (level.start + 3 * i) as usize;
+        return Vec3::from_slice(bytemuck::cast_slice(&scene.textures.texels[texel..texel + 3]));
     }
     unpacked_color(scene.textures.texels[(level.start + i) as usize], t.format)
 }
@@ -90,14 +90,14 @@ pub fn linear_color(scene: &Packed, t: &Texture, f: Footprint) -> Vec3 {
         0.0
     };
     let finer = floor(lod);
-    let between = lod - finer;
+    let blend = lod - finer;
     let mut color = Vec3::ZERO;
-    for i in 0..if between > 0.0 { 2 } else { 1 } {
+    for i in 0..if blend > 0.0 { 2 } else { 1 } {
         let sampled = bilinear_color(scene, t, level_of(scene, t, finer as u32 + i), f.uv);
         color = if i == 0 {
             sampled
         } else {
-            color + (sampled - color) * between
+            color + (sampled - color) * blend
         };
     }
     color
@@ -121,17 +121,17 @@ pub fn ewa_color(scene: &Packed, t: &Texture, f: Footprint) -> Vec3 {
     let minor = footprint_ellipse(f.dx * size, f.dy * size, t.parameter).minor;
     let lod = level_of_length(t, 0.45 * minor);
     let finer = floor(lod);
-    let between = max(4.0 * (lod - finer) - 3.0, 0.0);
+    let blend = max(4.0 * (lod - finer) - 3.0, 0.0);
     let coarsest = lod >= (t.levels - 1) as f32;
     let dx = if coarsest { Vec2::ZERO } else { f.dx };
     let dy = if coarsest { Vec2::ZERO } else { f.dy };
     let mut color = Vec3::ZERO;
-    for i in 0..if between > 0.0 { 2 } else { 1 } {
+    for i in 0..if blend > 0.0 { 2 } else { 1 } {
         let sampled = ewa_level_color(scene, t, level_of(scene, t, finer as u32 + i), f.uv, dx, dy);
         color = if i == 0 {
             sampled
         } else {
-            color + (sampled - color) * between
+            color + (sampled - color) * blend
         };
     }
     color
@@ -146,28 +146,28 @@ pub fn ewa_level_color(scene: &Packed, t: &Texture, level: Level, uv: Vec2, dx: 
     );
     let ellipse = footprint_ellipse(dx * edges, dy * edges, t.parameter);
     let m = ellipse.m;
-    let least = 1.0 - ellipse.minor * ellipse.minor;
-    let xx = m.x + max((4.0 * (q.x * q.x) - 1.0) / 3.0, least);
-    let yy = m.z + max((4.0 * (q.y * q.y) - 1.0) / 3.0, least);
+    let min_increase = 1.0 - ellipse.minor * ellipse.minor;
+    let xx = m.x + max((4.0 * (q.x * q.x) - 1.0) / 3.0, min_increase);
+    let yy = m.z + max((4.0 * (q.y * q.y) - 1.0) / 3.0, min_increase);
     let slope = m.y / yy;
-    let across = xx - m.y * slope;
+    let half_width2 = xx - m.y * slope;
     let x = near_coordinate(uv.x, wrap_u(t)) * size.x - 0.5;
     let y = near_coordinate(uv.y, wrap_v(t)) * size.y - 0.5;
-    let t_max = yy.sqrt();
-    let first_row = -(floor(t_max - y) as i32);
-    let last_row = floor(y + t_max) as i32;
+    let half_height = yy.sqrt();
+    let first_row = -(floor(half_height - y) as i32);
+    let last_row = floor(y + half_height) as i32;
     let mut base = Vec3::ZERO;
     let mut sum = Vec3::ZERO;
     let mut total = 0.0;
     for row in first_row..=last_row {
         let h = row as f32 - y;
-        let along = h * h / yy;
+        let row_r2 = h * h / yy;
         let middle = x + h * slope;
-        let half = (across * max(1.0 - along, 0.0)).sqrt();
+        let half = (half_width2 * max(1.0 - row_r2, 0.0)).sqrt();
         let last = floor(middle + half) as i32;
         for column in -(floor(half - middle) as i32)..=last {
             let w = column as f32 - middle;
-            let weight = max(gaussian_weight(along + w * w / across), 0.0);
+            let weight = max(gaussian_weight(row_r2 + w * w / half_width2), 0.0);
             let color = load_texel(scene, t, level, column, row);
             base = if total == 0.0 { color } else { base };
             sum += (color - base) * weight;
@@ -194,7 +194,7 @@ pub fn with_principled(before: Material, color: Vec3, lookup: &Lookup) -> Materi
     if lookup.purposes & FOR_DIRECTION != 0 {
         m.rotation += direction_turn(color);
     }
-    for (number, purpose, slot) in [
+    for (parameter, purpose, slot) in [
         (&mut m.metallic, FOR_METALLIC, METALLIC_CHANNEL),
         (&mut m.anisotropy, FOR_ANISOTROPY, ANISOTROPY_CHANNEL),
         (&mut m.specular_weight, FOR_WEIGHT, WEIGHT_CHANNEL),
@@ -205,7 +205,7 @@ pub fn with_principled(before: Material, color: Vec3, lookup: &Lookup) -> Materi
         (&mut m.opacity, FOR_OPACITY, OPACITY_CHANNEL),
     ] {
         if lookup.purposes & purpose != 0 {
-            *number = channel_of(color, lookup, slot);
+            *parameter = channel_of(color, lookup, slot);
         }
     }
     m
@@ -224,7 +224,7 @@ pub fn evaluate_material(
     hit: Hit,
     material: &Material,
     surface: Surface,
-    at: HitDifferential,
+    hit_diff: HitDifferential,
     lookups: u32,
 ) -> EvaluatedMaterial {
     let mut shading = EvaluatedMaterial {
@@ -235,13 +235,13 @@ pub fn evaluate_material(
     if lookups == 0 {
         return shading;
     }
-    let footprint = footprint_of(prim, hit, surface, at);
+    let footprint = footprint_of(prim, hit, surface, hit_diff);
     for i in 0..lookups {
         if i < material.lookups.y {
             let lookup = &scene.textures.lookups[(material.lookups.x + i) as usize];
             let t = &scene.textures.records[lookup.texture as usize];
-            let slot = footprint_in_set(scene, footprint, prim, hit, at, lookup.uv_set);
-            let color = texture_color(scene, t, slot);
+            let set_footprint = footprint_in_set(scene, footprint, prim, hit, hit_diff, lookup.uv_set);
+            let color = texture_color(scene, t, set_footprint);
             let purposes = lookup.purposes;
             if purposes & FOR_AMBIENT != 0 {
                 shading.material.ambient = color;

@@ -12,8 +12,8 @@ use crate::records::Material;
 pub fn thin_reflectance(ior: f32, cosine: f32) -> f32 {
     let c = min(max(cosine, 1e-6), 1.0);
     let eta = 1.0 / ior;
-    let once = fresnel(c, refracted_cosine(c, eta), eta);
-    2.0 * once / (1.0 + once)
+    let one_side = fresnel(c, refracted_cosine(c, eta), eta);
+    2.0 * one_side / (1.0 + one_side)
 }
 
 pub fn to_upper_side(wi: Vec3) -> Vec3 {
@@ -48,15 +48,15 @@ pub fn thin_sample(material: &Material, wo: Vec3, u: Vec2, random: f32) -> LobeS
     let m = ggx_sample(alpha, wo, u);
     let cosine = dot(wo, m);
     let reflected = thin_reflectance(material.ior, cosine);
-    let mirrors = random < reflected;
+    let reflects = random < reflected;
     let up = m * (2.0 * cosine) - wo;
     let lit = (wo.z > 0.0) & (up.z > 0.0) & (cosine > 0.0);
     let weight =
-        if mirrors { Vec3::ONE } else { material.tint } * (facet_weight(alpha, wo, up) * dielectric_gain(material));
-    let share = if mirrors { reflected } else { 1.0 - reflected };
+        if reflects { Vec3::ONE } else { material.tint } * (facet_weight(alpha, wo, up) * dielectric_gain(material));
+    let share = if reflects { reflected } else { 1.0 - reflected };
     let pdf = share * ggx_d(alpha, m) * 0.5 / max(wo.z + ggx_length(alpha, wo), 1e-30);
     LobeSample {
-        wi: Vec3::new(up.x, up.y, if mirrors { up.z } else { -up.z }),
+        wi: Vec3::new(up.x, up.y, if reflects { up.z } else { -up.z }),
         weight: if lit { weight } else { Vec3::ZERO },
         pdf: if lit { pdf } else { 0.0 },
         eta: 1.0,

@@ -80,7 +80,7 @@ pub fn footprint_in_set(
     first: Footprint,
     prim: &HitPrimitive,
     hit: Hit,
-    at: HitDifferential,
+    hit_diff: HitDifferential,
     uv_set: u32,
 ) -> Footprint {
     if uv_set == 0 {
@@ -89,7 +89,7 @@ pub fn footprint_in_set(
     let face = hit_primitive_in_uv_set(scene, prim, hit, uv_set);
     Footprint {
         uv: face_uv(&face, hit.barycentric),
-        dx: face_uv_derivative(&face, at.x.position),
-        dy: face_uv_derivative(&face, at.y.position),
+        dx: face_uv_derivative(&face, hit_diff.x.position),
+        dy: face_uv_derivative(&face, hit_diff.y.position),
     }
 }

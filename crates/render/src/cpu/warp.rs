@@ -52,7 +52,7 @@ pub fn hemisphere_sample(n: Vec3, u: Vec2) -> Vec3 {
     vector_around(n, p.extend(max(1.0 - p.x * p.x - p.y * p.y, 0.0).sqrt()))
 }
 
-pub fn cap_sample(p: Vec2, most: f32) -> Vec3 {
-    let h = (p.x * p.x + p.y * p.y) * most;
-    (p * max(most * (2.0 - h), 0.0).sqrt()).extend(1.0 - h)
+pub fn cap_sample(p: Vec2, cap_height: f32) -> Vec3 {
+    let h = (p.x * p.x + p.y * p.y) * cap_height;
+    (p * max(cap_height * (2.0 - h), 0.0).sqrt()).extend(1.0 - h)
 }

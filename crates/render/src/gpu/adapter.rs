@@ -13,13 +13,13 @@ pub const HOW_TO_GET_VULKAN: &str =
 /// A requested device.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum AdapterChoice {
-    /// A physical GPU, else software Vulkan.
+    /// The best adapter: a GPU, else software Vulkan. Callers may use the CPU instead of software Vulkan.
     Auto,
-    /// Any adapter.
+    /// The same adapter as [`AdapterChoice::Auto`]. Callers do not use the CPU instead.
     Gpu,
-    /// The adapter with this number in [`adapters`], counted from 1, or with this text in its name, driver or type.
-    /// Larger numbers must match a whole word of a name, such as 7900. Of several adapters with the same name, the
-    /// first that can be opened is used.
+    /// The adapter with this number in [`adapters`], counted from 1, or with this text in its name, driver or type. A
+    /// number that is not in the list, such as 7900, must match a whole word of a name. Of several adapters with the
+    /// same name, the first that can be opened is used.
     Named(String),
 }
 
@@ -67,15 +67,15 @@ pub fn adapters() -> Vec<GpuInfo> {
 /// The errors of [`choose`](super::choose).
 pub fn preferred(choice: &AdapterChoice) -> Result<GpuInfo, RenderError> {
     let infos = adapters();
-    let fitting = fitting(&infos, choice).map_err(RenderError::NoDevice)?;
-    let first = fitting.first().and_then(|i| infos.get(*i)).cloned();
+    let matching = matching(&infos, choice).map_err(RenderError::NoDevice)?;
+    let first = matching.first().and_then(|i| infos.get(*i)).cloned();
     first.ok_or_else(|| RenderError::NoDevice(NONE_FOUND.to_owned() + HOW_TO_GET_VULKAN))
 }
 
 pub(super) const NONE_FOUND: &str = "no Vulkan, Metal or DX12 adapter found; ";
 
 /// Returns the matching adapters, best first. The error is a message for the user.
-pub(super) fn fitting(infos: &[GpuInfo], choice: &AdapterChoice) -> Result<Vec<usize>, String> {
+pub(super) fn matching(infos: &[GpuInfo], choice: &AdapterChoice) -> Result<Vec<usize>, String> {
     let AdapterChoice::Named(name) = choice else {
         return Ok((0..infos.len()).collect());
     };
@@ -85,33 +85,33 @@ pub(super) fn fitting(infos: &[GpuInfo], choice: &AdapterChoice) -> Result<Vec<u
     if let Some(number) = name.parse().ok().filter(|number| (1..=infos.len()).contains(number)) {
         return Ok(vec![number - 1]);
     }
-    let all =
-        |fits: &dyn Fn(&GpuInfo) -> bool| -> Vec<usize> { (0..infos.len()).filter(|i| fits(&infos[*i])).collect() };
-    let whole = all(&|info| info.name.to_lowercase() == name.to_lowercase());
-    let found = match whole.is_empty() {
+    let indices_where =
+        |test: &dyn Fn(&GpuInfo) -> bool| -> Vec<usize> { (0..infos.len()).filter(|i| test(&infos[*i])).collect() };
+    let same_name = indices_where(&|info| info.name.to_lowercase() == name.to_lowercase());
+    let found = match same_name.is_empty() {
         // A number outside the list must not match a digit of a version.
-        true if name.bytes().all(|byte| byte.is_ascii_digit()) => all(&|info| has_word(&info.name, name)),
-        true => all(&|info| matches(info, name)),
-        false => whole,
+        true if name.bytes().all(|byte| byte.is_ascii_digit()) => indices_where(&|info| has_word(&info.name, name)),
+        true => indices_where(&|info| matches(info, name)),
+        false => same_name,
     };
-    let listed = |found: &[usize]| {
-        let lines = found
+    let list = |indices: &[usize]| {
+        let lines = indices
             .iter()
             .map(|i| format!("{}: {}, {}", i + 1, infos[*i].name, infos[*i].driver));
         lines.collect::<Vec<_>>().join("; ")
     };
-    let everything: Vec<usize> = (0..infos.len()).collect();
+    let all: Vec<usize> = (0..infos.len()).collect();
     match found.as_slice() {
         [] => {
-            let available = listed(&everything);
+            let available = list(&all);
             Err(format!(
                 "no adapter's name, driver or type contains '{name}'; available: cpu, gpu, auto, {available}"
             ))
         }
         [first, rest @ ..] if rest.iter().any(|i| infos[*i].name != infos[*first].name) => {
-            let matching = listed(&found);
+            let candidates = list(&found);
             Err(format!(
-                "'{name}' matches several adapters; use a longer name, a driver or a number: {matching}"
+                "'{name}' matches several adapters; use a longer name, a driver or a number: {candidates}"
             ))
         }
         _ => Ok(found),
@@ -142,7 +142,7 @@ fn preference(info: &wgpu::AdapterInfo) -> (u8, bool) {
     (kind, !is_lavapipe(&info.name))
 }
 
-/// Mesa's software Vulkan reports the name llvmpipe.
+/// Returns true for Mesa's software Vulkan, lavapipe, which reports the name llvmpipe.
 fn is_lavapipe(name: &str) -> bool {
     name.starts_with("llvmpipe")
 }
@@ -172,16 +172,16 @@ pub(super) fn info(adapter: &wgpu::Adapter) -> GpuInfo {
 /// Returns true for a whole word: `7900` in "Radeon RX 7900 XT", but not `15` in "llvmpipe (LLVM 15.0.6)".
 fn has_word(text: &str, word: &str) -> bool {
     let mut words = text.split(|c: char| !c.is_alphanumeric() && c != '.');
-    words.any(|known| known == word)
+    words.any(|other| other == word)
 }
 
-/// Ignores case.
+/// Returns true if an adapter's name, driver or type contains a name, ignoring case.
 fn matches(info: &GpuInfo, name: &str) -> bool {
     let name = name.to_lowercase();
     let lavapipe = if is_lavapipe(&info.name) { "lavapipe" } else { "" };
     [info.name.as_str(), info.driver.as_str(), info.kind, lavapipe]
         .iter()
-        .any(|known| known.to_lowercase().contains(&name))
+        .any(|text| text.to_lowercase().contains(&name))
 }
 
 #[cfg(test)]
@@ -205,7 +205,7 @@ mod tests {
     #[test]
     fn adapters_are_sorted_gpus_first_then_lavapipe_then_other_software() {
         let (swiftshader, lavapipe) = ("SwiftShader Device (Subzero)", "llvmpipe (LLVM 15.0.6, 256 bits)");
-        let in_order = |adapters: &[(&'static str, DeviceType)]| {
+        let sorted_names = |adapters: &[(&'static str, DeviceType)]| {
             let mut infos: Vec<wgpu::AdapterInfo> = adapters
                 .iter()
                 .map(|(name, kind)| wgpu::AdapterInfo {
@@ -218,15 +218,15 @@ mod tests {
         };
         let cpu = DeviceType::Cpu;
         assert_eq!(
-            in_order(&[(swiftshader, cpu), (lavapipe, cpu)]),
+            sorted_names(&[(swiftshader, cpu), (lavapipe, cpu)]),
             [lavapipe, swiftshader]
         );
         assert_eq!(
-            in_order(&[(lavapipe, cpu), (swiftshader, cpu)]),
+            sorted_names(&[(lavapipe, cpu), (swiftshader, cpu)]),
             [lavapipe, swiftshader]
         );
         assert_eq!(
-            in_order(&[
+            sorted_names(&[
                 (swiftshader, cpu),
                 (lavapipe, cpu),
                 ("Radeon", DeviceType::IntegratedGpu),
@@ -248,7 +248,7 @@ mod tests {
             adapter("Radeon 780M", "amdvlk", "integrated"),
             adapter("llvmpipe (LLVM 15)", "Mesa 22", "software"),
         ];
-        let found = |name: &str| fitting(&infos, &AdapterChoice::Named(name.to_string()));
+        let found = |name: &str| matching(&infos, &AdapterChoice::Named(name.to_string()));
         assert_eq!(
             found("radeon rx 7900"),
             Ok(vec![0]),
@@ -262,9 +262,9 @@ mod tests {
         for (number, i) in [("1", 0), ("4", 3), ("5", 4)] {
             assert_eq!(found(number), Ok(vec![i]));
         }
-        for digit in ["0", "6", "7", "23"] {
-            let none = found(digit).unwrap_err();
-            assert!(none.contains(&format!("contains '{digit}'")), "{none}");
+        for number in ["0", "6", "7", "23"] {
+            let message = found(number).unwrap_err();
+            assert!(message.contains(&format!("contains '{number}'")), "{message}");
         }
         assert_eq!(found("15"), Ok(vec![4]), "a whole word of a name did not match");
         assert!(
@@ -272,20 +272,20 @@ mod tests {
                 .unwrap_err()
                 .starts_with("'7900' matches several adapters")
         );
-        let several = found("discrete").unwrap_err();
+        let message = found("discrete").unwrap_err();
         assert_eq!(
-            several,
+            message,
             "'discrete' matches several adapters; use a longer name, a driver or a number: 1: Radeon RX 7900, radv \
              Mesa 25; 2: Radeon RX 7900 XT, radv Mesa 25"
         );
-        let none = found("geforce").unwrap_err();
+        let message = found("geforce").unwrap_err();
         assert!(
-            none.starts_with(
+            message.starts_with(
                 "no adapter's name, driver or type contains 'geforce'; available: cpu, gpu, auto, 1: Radeon"
             ),
-            "{none}"
+            "{message}"
         );
-        assert_eq!(fitting(&infos, &AdapterChoice::Auto), Ok(vec![0, 1, 2, 3, 4]));
-        assert_eq!(fitting(&[], &AdapterChoice::Named("1".to_string())), Ok(Vec::new()));
+        assert_eq!(matching(&infos, &AdapterChoice::Auto), Ok(vec![0, 1, 2, 3, 4]));
+        assert_eq!(matching(&[], &AdapterChoice::Named("1".to_string())), Ok(Vec::new()));
     }
 }

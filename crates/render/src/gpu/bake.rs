@@ -1,4 +1,4 @@
-//! Baking: small scenes are embedded in their kernel as constants, and the functions of `buffers.wgsl` become
+//! Baking: a small scene is embedded in the kernel as constants, and the functions of `buffers.wgsl` become
 //! straight-line code with a statement per primitive. Software Vulkan loads buffers lane by lane, but constants at no
 //! cost.
 
@@ -24,12 +24,12 @@ pub fn bake_if_small(packed: &Packed) -> Option<String> {
     } else {
         0
     };
-    let of_looks = packed.materials.len() + packed.textures.lookups.len() + packed.textures.records.len();
-    let records = of_looks + lights + packed.lighting.emitters.len();
+    let shading_records = packed.materials.len() + packed.textures.lookups.len() + packed.textures.records.len();
+    let records = shading_records + lights + packed.lighting.emitters.len();
     (packed.primitives.len() <= MAX_LINEAR_PRIMITIVES && records <= MAX_RECORDS).then(|| bake(packed))
 }
 
-/// Returns WGSL for one scene: `buffers.wgsl`, and functions that load records.
+/// Returns WGSL with a scene as constants: the functions of `buffers.wgsl`, and functions that load records.
 pub fn bake(packed: &Packed) -> String {
     let mut out = String::new();
     let records: Vec<String> = packed.primitives.iter().map(Record::constant).collect();
@@ -100,8 +100,8 @@ pub fn bake(packed: &Packed) -> String {
     );
     write_function(
         &mut out,
-        "is_occluded_by_primitives(before: bool, surface: Surface, to: vec3f, t_max: f32, target_prim: u32) -> bool",
-        "var occluded = before;",
+        "is_occluded_by_primitives(already_occluded: bool, surface: Surface, to_light: vec3f, t_max: f32, target_prim: u32) -> bool",
+        "var occluded = already_occluded;",
         "occluded",
         |body| {
             for (kind, range) in packed.shadow_casters() {
@@ -109,7 +109,7 @@ pub fn bake(packed: &Packed) -> String {
                     let record = &records[i];
                     let _ = writeln!(
                         body,
-                        "    occluded |= is_occluded_by_primitive({kind}u, {record}, {i}u, surface, to, t_max, target_prim);"
+                        "    occluded |= is_occluded_by_primitive({kind}u, {record}, {i}u, surface, to_light, t_max, target_prim);"
                     );
                 }
             }
@@ -123,7 +123,7 @@ pub fn bake(packed: &Packed) -> String {
     write_table(&mut out, "load_material", &packed.materials);
     match packed.lighting.nodes.is_empty() {
         true => write_table(&mut out, "load_light", &packed.lighting.lights),
-        false => from_rows::<Light>(&mut out, "load_light", "records", "counts.tables.x"),
+        false => write_loader::<Light>(&mut out, "load_light", "records", "counts.tables.x"),
     }
     write_table(&mut out, "load_texture", &packed.textures.records);
     write_table(&mut out, "load_emitter", &packed.lighting.emitters);
@@ -132,28 +132,28 @@ pub fn bake(packed: &Packed) -> String {
 }
 
 /// Returns WGSL functions that load records from the rows of one buffer, in the order of [`rows`].
-pub fn tables() -> String {
+pub fn record_loaders() -> String {
     let mut out = String::new();
-    from_rows::<Material>(&mut out, "load_material", "records", "0u");
-    from_rows::<Light>(&mut out, "load_light", "records", "counts.tables.x");
-    from_rows::<Texture>(&mut out, "load_texture", "records", "counts.tables.y");
-    from_rows::<Emitter>(&mut out, "load_emitter", "records", "counts.emitters.x");
-    from_rows::<Lookup>(&mut out, "load_lookup", "records", "counts.lookups.x");
+    write_loader::<Material>(&mut out, "load_material", "records", "0u");
+    write_loader::<Light>(&mut out, "load_light", "records", "counts.tables.x");
+    write_loader::<Texture>(&mut out, "load_texture", "records", "counts.tables.y");
+    write_loader::<Emitter>(&mut out, "load_emitter", "records", "counts.emitters.x");
+    write_loader::<Lookup>(&mut out, "load_lookup", "records", "counts.lookups.x");
     out
 }
 
 /// Returns WGSL functions that load records of BVHs and meshes, which are never baked.
-pub fn tree_tables() -> String {
+pub fn bvh_loaders() -> String {
     let mut out = String::new();
-    from_rows::<BvhItem>(&mut out, "load_item", "nodes", "counts.tree.x");
-    from_rows::<Instance>(&mut out, "load_instance", "nodes", "counts.tree.y");
-    from_rows::<LightNode>(&mut out, "load_light_node", "records", "counts.emitters.z");
+    write_loader::<BvhItem>(&mut out, "load_item", "nodes", "counts.tree.x");
+    write_loader::<Instance>(&mut out, "load_instance", "nodes", "counts.tree.y");
+    write_loader::<LightNode>(&mut out, "load_light_node", "records", "counts.emitters.z");
     let _ = writeln!(out, "fn load_node(at: u32) -> Node {{");
-    from_row::<Node>(&mut out, "nodes");
+    write_loader_body::<Node>(&mut out, "nodes");
     out
 }
 
-/// Returns the rows of materials, lights, textures, emitters, lookups, light tree and its leaves' indices.
+/// Returns the rows of materials, lights, textures, emitters, lookups, light-tree nodes and leaf indices.
 pub fn rows(packed: &Packed) -> Vec<UVec4> {
     let bytes = [
         cast_slice(&packed.materials),
@@ -164,7 +164,7 @@ pub fn rows(packed: &Packed) -> Vec<UVec4> {
         cast_slice(&packed.lighting.nodes),
     ];
     let mut rows: Vec<UVec4> = bytemuck::pod_collect_to_vec(&bytes.concat());
-    rows.extend(in_rows(&packed.lighting.leaves));
+    rows.extend(to_rows(&packed.lighting.leaves));
     rows
 }
 
@@ -173,7 +173,7 @@ pub fn node_rows(packed: &Packed) -> Vec<UVec4> {
     let mut out: Vec<UVec4> = cast_slice(&packed.bvh.nodes).to_vec();
     out.extend(cast_slice::<_, UVec4>(&packed.bvh.items));
     out.extend(cast_slice::<_, UVec4>(&packed.bvh.instances));
-    out.extend(in_rows(&packed.bvh.group_words));
+    out.extend(to_rows(&packed.bvh.group_words));
     for mesh in &packed.bvh.meshes {
         out.extend(cast_slice::<_, UVec4>(&mesh.nodes));
     }
@@ -189,7 +189,7 @@ pub fn mesh_rows(packed: &Packed) -> Vec<UVec4> {
         out.extend(cast_slice::<_, UVec4>(&mesh.vertices));
         out.extend(cast_slice::<_, UVec4>(&mesh.attributes));
         out.extend(cast_slice::<_, UVec4>(&mesh.tangents));
-        out.extend(in_rows(&mesh.groups));
+        out.extend(to_rows(&mesh.groups));
         out.extend(cast_slice::<_, UVec4>(&mesh.colors));
         out.extend(cast_slice::<_, UVec4>(&mesh.more_uvs));
     }
@@ -197,26 +197,26 @@ pub fn mesh_rows(packed: &Packed) -> Vec<UVec4> {
 }
 
 pub fn node_rows_count(packed: &Packed) -> usize {
-    let rows_of = |nodes: &[Node]| size_of_val(nodes) / size_of::<UVec4>();
-    let of_meshes: usize = packed.bvh.meshes.iter().map(|mesh| rows_of(&mesh.nodes)).sum();
+    let rows = |nodes: &[Node]| size_of_val(nodes) / size_of::<UVec4>();
+    let mesh_rows: usize = packed.bvh.meshes.iter().map(|mesh| rows(&mesh.nodes)).sum();
     let records = size_of_val(packed.bvh.items.as_slice()) + size_of_val(packed.bvh.instances.as_slice());
-    rows_of(&packed.bvh.nodes) + records / size_of::<UVec4>() + packed.bvh.group_words.len().div_ceil(4) + of_meshes
+    rows(&packed.bvh.nodes) + records / size_of::<UVec4>() + packed.bvh.group_words.len().div_ceil(4) + mesh_rows
 }
 
 pub fn mesh_rows_count(packed: &Packed) -> usize {
     let rows = packed.bvh.meshes.iter().map(|mesh| {
-        let of_vertices = mesh.vertices.len()
+        let vertex_rows = mesh.vertices.len()
             + mesh.attributes.len()
             + 2 * mesh.tangents.len()
             + mesh.colors.len()
             + mesh.more_uvs.len();
-        mesh.triangles.len() + of_vertices + mesh.groups.len().div_ceil(4)
+        mesh.triangles.len() + vertex_rows + mesh.groups.len().div_ceil(4)
     });
     rows.sum()
 }
 
 /// Packs words in rows of four, zero-padded.
-fn in_rows(words: &[u32]) -> impl Iterator<Item = UVec4> {
+fn to_rows(words: &[u32]) -> impl Iterator<Item = UVec4> {
     words.chunks(4).map(|words| {
         let word = |i: usize| words.get(i).copied().unwrap_or(0);
         UVec4::new(word(0), word(1), word(2), word(3))
@@ -224,16 +224,16 @@ fn in_rows(words: &[u32]) -> impl Iterator<Item = UVec4> {
 }
 
 /// Writes a function that loads record `i` of a table in a buffer.
-fn from_rows<R: Record>(out: &mut String, name: &str, buffer: &str, start: &str) {
+fn write_loader<R: Record>(out: &mut String, name: &str, buffer: &str, start: &str) {
     let (record, size) = (R::NAME, size_of::<R>() / size_of::<UVec4>());
     let _ = writeln!(
         out,
         "fn {name}(i: u32) -> {record} {{\n    let at = {start} + i * {size}u;"
     );
-    from_row::<R>(out, buffer);
+    write_loader_body::<R>(out, buffer);
 }
 
-fn from_row<R: Record>(out: &mut String, buffer: &str) {
+fn write_loader_body<R: Record>(out: &mut String, buffer: &str) {
     for row in 0..size_of::<R>() / size_of::<UVec4>() {
         let _ = writeln!(out, "    let r{row} = {buffer}[at + {row}u];");
     }

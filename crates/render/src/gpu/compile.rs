@@ -24,14 +24,14 @@ pub struct ValidKernel {
 
 /// Parses and validates a kernel.
 pub fn check(source: &Source) -> Result<ValidKernel, ShaderError> {
-    check_at(source).map_err(|(error, _)| error)
+    check_with_offset(source).map_err(|(error, _)| error)
 }
 
-/// Errors include the byte offset in the kernel's text, if known.
-pub fn check_at(source: &Source) -> Result<ValidKernel, (ShaderError, Option<usize>)> {
+/// Like [`check`]. Errors include the byte offset in the kernel's text, if known.
+pub fn check_with_offset(source: &Source) -> Result<ValidKernel, (ShaderError, Option<usize>)> {
     let start = |span: Option<Span>| span.and_then(Span::to_range).map(|range| range.start);
-    if let Some((place, rule)) = too_deep(&source.text) {
-        let span = Some(Span::from(place));
+    if let Some((range, rule)) = too_deep(&source.text) {
+        let span = Some(Span::from(range));
         return Err((ShaderError::at(source, span, rule), start(span)));
     }
     let module = naga::front::wgsl::parse_str(&source.text).map_err(|error| {
@@ -39,7 +39,7 @@ pub fn check_at(source: &Source) -> Result<ValidKernel, (ShaderError, Option<usi
         (ShaderError::at(source, span, message), start(span))
     })?;
     let info = validate(&module).map_err(|error| {
-        let span = naga_messages::place(&source.text, &error);
+        let span = naga_messages::location(&source.text, &error);
         let message = naga_messages::message(&module, &source.text, error.as_inner());
         (ShaderError::at(source, span, message), start(span))
     })?;
@@ -59,7 +59,11 @@ impl ValidKernel {
 
     /// Returns true if an entry point writes a variable, even in called functions.
     pub(super) fn writes(&self, entry: &str, variable: Handle<GlobalVariable>) -> bool {
-        let position = self.module.entry_points.iter().position(|known| known.name == entry);
+        let position = self
+            .module
+            .entry_points
+            .iter()
+            .position(|entry_point| entry_point.name == entry);
         let usage = position.map(|i| self.info.get_entry_point(i)[variable]);
         usage.is_some_and(|usage| usage.intersects(GlobalUse::WRITE | GlobalUse::ATOMIC))
     }
@@ -92,12 +96,12 @@ impl ValidKernel {
             .iter()
             .map(|(name, value)| (name.to_string(), f64::from(*value)));
         let entry_point = Some((naga::ShaderStage::Compute, entry));
-        let (specialised, _): (Cow<'_, _>, Cow<'_, _>) =
+        let (specialized, _): (Cow<'_, _>, Cow<'_, _>) =
             process_overrides(module, info, entry_point, &constants.collect())
-                .map_err(|error| ShaderError::other("specialisation", &error))?;
-        let mut module = specialised.into_owned();
+                .map_err(|error| ShaderError::at_stage("specialization", &error))?;
+        let mut module = specialized.into_owned();
         prune(&mut module);
-        let info = validate(&module).map_err(|error| ShaderError::other("specialisation", &error))?;
+        let info = validate(&module).map_err(|error| ShaderError::at_stage("specialization", &error))?;
         // naga need not bound loops, because each loop of the kernels counts to a bound.
         let options = spv::Options {
             lang_version: (1, 3),
@@ -116,15 +120,15 @@ impl ValidKernel {
             entry_point: entry.to_string(),
         };
         let words = spv::write_vec(&module, &info, &options, Some(&pipeline))
-            .map_err(|error| ShaderError::other("SPIR-V", &error))?;
-        Ok(spirv::ask_for(controls, &spirv::forbid_contraction(&words)))
+            .map_err(|error| ShaderError::at_stage("SPIR-V", &error))?;
+        Ok(spirv::request_controls(controls, &spirv::forbid_contraction(&words)))
     }
 
     /// Replaces quotients and square roots by functions of `shaders/rounding.wgsl`.
     fn rounded_in_software(&self) -> Result<ValidKernel, ShaderError> {
         let mut module = self.module.clone();
-        round_in_software(&mut module, &self.info).map_err(|error| ShaderError::other(ROUNDING, &error))?;
-        let info = validate(&module).map_err(|error| ShaderError::other("rounding", &error))?;
+        round_in_software(&mut module, &self.info).map_err(|error| ShaderError::at_stage(ROUNDING, &error))?;
+        let info = validate(&module).map_err(|error| ShaderError::at_stage("rounding", &error))?;
         Ok(ValidKernel { module, info })
     }
 }

@@ -4,7 +4,7 @@
 use std::ops::Range;
 use std::{fs, io, path::Path};
 
-use super::bake::{tables, tree_tables};
+use super::bake::{bvh_loaders, record_loaders};
 use super::dispatch;
 use super::functions::is_same_code;
 use crate::records;
@@ -16,7 +16,7 @@ use wgray_shaders::{
 };
 pub use wgray_shaders::{File, SHARED, built_in};
 
-/// Software division and square roots.
+/// File with division and square roots in software.
 pub const ROUNDING: &str = "rounding.wgsl";
 
 /// A compute shader.
@@ -24,7 +24,7 @@ pub const ROUNDING: &str = "rounding.wgsl";
 pub struct Kernel {
     /// Name of the entry point.
     pub entry_point: &'static str,
-    /// Files besides [`SHARED`], the scene and an integrator. The last one has the entry point and declares its
+    /// Files in addition to [`SHARED`], the scene and an integrator. The last file has the entry point and declares the
     /// outputs.
     pub files: &'static [&'static [File]],
     /// True if the kernel needs an integrator.
@@ -72,8 +72,8 @@ pub struct Shaders {
     files: Vec<(String, String)>,
 }
 
-/// Replaces a byte-order mark, not allowed in WGSL, by as many spaces, to keep offsets.
-fn without_mark(text: String) -> String {
+/// Replaces a byte-order mark, which WGSL does not allow, by spaces of the same length, so that offsets do not change.
+fn without_byte_order_mark(text: String) -> String {
     match text.strip_prefix('\u{feff}') {
         Some(rest) => format!("   {rest}"),
         None => text,
@@ -96,7 +96,7 @@ impl Shaders {
             let path = folder.join(name);
             let text = blocking_path::reject(&path).and_then(|()| fs::read_to_string(&path));
             let text = text.map_err(|error| io::Error::new(error.kind(), format!("{}: {error}", path.display())))?;
-            Ok((name.to_string(), without_mark(text)))
+            Ok((name.to_string(), without_byte_order_mark(text)))
         };
         Ok(Shaders {
             files: built_in().map(|(name, _)| read(name)).collect::<io::Result<_>>()?,
@@ -139,7 +139,8 @@ impl Shaders {
         self.compose_with_texels(kernel, integrator, baked, None)
     }
 
-    /// Like [`Shaders::compose`]. `texels` reads texels from several buffers.
+    /// Like [`Shaders::compose`]. `texels` is a function that reads texels from several buffers; `None` for a single
+    /// buffer.
     pub fn compose_with_texels(
         &self,
         kernel: &Kernel,
@@ -165,10 +166,10 @@ impl Shaders {
             None => {
                 self.append(&mut source, FROM_BUFFERS);
                 source.append("(the loops over kinds of primitives)", &dispatch::linear_loops());
-                source.append("(the tables of records)", &tables());
+                source.append("(the functions that load records)", &record_loaders());
             }
         }
-        source.append("(the tables of trees)", &tree_tables());
+        source.append("(the functions that load BVH records)", &bvh_loaders());
         source.append("(the tests of items of the BVH)", &dispatch::item_tests());
         match texels {
             Some(text) => source.append("(the texels' buffers)", text),
@@ -229,15 +230,15 @@ impl Source {
     }
 
     /// Replaces a range inside one file by text with the same number of lines.
-    pub fn replaced(&self, range: Range<usize>, with: &str) -> Source {
+    pub fn replaced(&self, range: Range<usize>, replacement: &str) -> Source {
         let lines = self.text[range.clone()].matches('\n').count();
-        let with = with.to_string() + &"\n".repeat(lines);
+        let replacement = replacement.to_string() + &"\n".repeat(lines);
         let moved = |start: usize| match start >= range.end {
-            true => start - range.len() + with.len(),
+            true => start - range.len() + replacement.len(),
             false => start,
         };
         Source {
-            text: [&self.text[..range.start], &with, &self.text[range.end..]].concat(),
+            text: [&self.text[..range.start], &replacement, &self.text[range.end..]].concat(),
             parts: self
                 .parts
                 .iter()
@@ -257,9 +258,12 @@ impl Source {
     /// Returns file, line and column of a byte of the text.
     pub fn place(&self, offset: usize) -> Option<String> {
         let (file, text, offset) = self.locate(offset)?;
-        let before = &text[..offset];
-        let start = before.rfind('\n').map_or(0, |at| at + 1);
-        let (line, column) = (before.matches('\n').count() + 1, before[start..].chars().count() + 1);
+        let preceding = &text[..offset];
+        let start = preceding.rfind('\n').map_or(0, |newline| newline + 1);
+        let (line, column) = (
+            preceding.matches('\n').count() + 1,
+            preceding[start..].chars().count() + 1,
+        );
         Some(format!("{file}:{line}:{column}"))
     }
 

@@ -5,7 +5,7 @@ use std::sync::mpsc;
 use bytemuck::{Pod, bytes_of, cast_slice};
 use wgpu::BufferUsages;
 
-use super::adapter::{AdapterChoice, GpuInfo, HOW_TO_GET_VULKAN, NONE_FOUND, enumerate, fitting, info};
+use super::adapter::{AdapterChoice, GpuInfo, HOW_TO_GET_VULKAN, NONE_FOUND, enumerate, info, matching};
 use super::failure::{Failure, error_of_opening};
 use super::pipeline_cache::PipelineCache;
 use crate::error::RenderError;
@@ -15,7 +15,7 @@ use wgray_image::panic_guard::{CatchPanicOnDrop, catch_panic};
 #[derive(Clone)]
 pub struct Device {
     pub(super) pipelines: PipelineCache,
-    // Dropped in this order. wgpu may panic after a device loss.
+    // Rust drops fields in order. After a device loss, wgpu may panic in a drop.
     pub(super) queue: CatchPanicOnDrop<wgpu::Queue>,
     pub(super) device: CatchPanicOnDrop<wgpu::Device>,
     failure: Failure,
@@ -33,17 +33,17 @@ pub fn choose(choice: &AdapterChoice) -> Result<Device, RenderError> {
     choose_among(choice, &|_| true)
 }
 
-/// Like [`choose`], considering only adapters for which `wanted` returns true.
+/// Like [`choose`], but considers only adapters for which `is_eligible` returns true.
 ///
 /// # Errors
 ///
 /// The errors of [`choose`].
-pub fn choose_among(choice: &AdapterChoice, wanted: &dyn Fn(&GpuInfo) -> bool) -> Result<Device, RenderError> {
+pub fn choose_among(choice: &AdapterChoice, is_eligible: &dyn Fn(&GpuInfo) -> bool) -> Result<Device, RenderError> {
     let adapters = enumerate();
     let infos: Vec<GpuInfo> = adapters.iter().map(info).collect();
     let mut failure = None;
-    let fitting = fitting(&infos, choice).map_err(RenderError::NoDevice)?;
-    for i in fitting.into_iter().filter(|i| wanted(&infos[*i])) {
+    let matching = matching(&infos, choice).map_err(RenderError::NoDevice)?;
+    for i in matching.into_iter().filter(|i| is_eligible(&infos[*i])) {
         match open(&adapters[i]) {
             Ok(device) => return Ok(device),
             Err(error) => failure = Some(error),
@@ -109,7 +109,7 @@ impl Device {
         let [validation, internal, memory] = errors;
         // A failed allocation also invalidates later uses of the buffer: report the cause.
         let first = [memory, validation, internal].into_iter().flatten().next();
-        self.failure.judge(&self.info.name, value, first.as_ref())
+        self.failure.check(&self.info.name, value, first.as_ref())
     }
 
     /// Returns an error, or the device loss that caused it.
@@ -126,9 +126,9 @@ impl Device {
         self.poll_for(wgpu::PollType::wait_indefinitely())
     }
 
-    /// wgpu panics here if the device is lost.
-    fn poll_for(&self, what: wgpu::PollType) -> Result<(), RenderError> {
-        match catch_panic(|| self.device.poll(what)) {
+    /// Polls the device, and returns an error if wgpu panics because the device is lost.
+    fn poll_for(&self, poll_type: wgpu::PollType) -> Result<(), RenderError> {
+        match catch_panic(|| self.device.poll(poll_type)) {
             Ok(Ok(_)) => Ok(()),
             Ok(Err(error)) => Err(self.error(error)),
             Err(message) => Err(self.error(message)),
@@ -147,9 +147,9 @@ impl Device {
 
     /// Creates a buffer. An empty list becomes a zeroed record, since bindings cannot be empty.
     pub(super) fn upload<T: Pod>(&self, usage: BufferUsages, records: &[T]) -> wgpu::Buffer {
-        let none = T::zeroed();
+        let zero = T::zeroed();
         let contents = if records.is_empty() {
-            bytes_of(&none)
+            bytes_of(&zero)
         } else {
             cast_slice(records)
         };
@@ -238,9 +238,9 @@ mod tests {
             Err(error) => panic!("{error}"),
         };
         assert!(device.checked(|| ()).is_ok());
-        device.buffer(u64::MAX, BufferUsages::STORAGE); // no device has that much memory
+        device.buffer(u64::MAX, BufferUsages::STORAGE); // more memory than any device has
         let error = device.checked(|| ()).expect_err("the recorded error").to_string();
         assert!(error.starts_with(&device.info.name), "{error}");
-        assert!(device.checked(|| ()).is_ok(), "the error is reported twice");
+        assert!(device.checked(|| ()).is_ok(), "the error was reported twice");
     }
 }

@@ -18,16 +18,16 @@ pub fn linear_loops() -> String {
             ),
             (
                 "occluded_by_primitives(surface: Surface, light: Light, block: SampleBlock) -> u32",
-                "let cone = light_frustum(light, surface.ray_origin);\n    var bits = 0u;",
+                "let frustum = light_frustum(light, surface.ray_origin);\n    var bits = 0u;",
                 "if (SHADOW_CASTERS & (1u << KIND)) != 0u {
-        bits |= occluded_by(KIND, counts.primitives[KIND].xy, surface, cone, light, block);
+        bits |= occluded_by(KIND, counts.primitives[KIND].xy, surface, frustum, light, block);
     }",
                 "bits",
             ),
             (
-                "is_occluded_by_primitives(before: bool, surface: Surface, to: vec3f, t_max: f32, target_prim: u32) -> bool",
-                "var occluded = before;",
-                "if (SHADOW_CASTERS & (1u << KIND)) != 0u { occluded = is_occluded_by(KIND, occluded, surface, to, t_max, target_prim); }",
+                "is_occluded_by_primitives(already_occluded: bool, surface: Surface, to_light: vec3f, t_max: f32, target_prim: u32) -> bool",
+                "var occluded = already_occluded;",
+                "if (SHADOW_CASTERS & (1u << KIND)) != 0u { occluded = is_occluded_by(KIND, occluded, surface, to_light, t_max, target_prim); }",
                 "occluded",
             ),
         ],
@@ -57,10 +57,10 @@ pub fn item_tests() -> String {
                 "bits",
             ),
             (
-                "is_occluded_by_primitive_item(item: BvhItem, surface: Surface, to: vec3f, t_max: f32, target_prim: u32) -> bool",
+                "is_occluded_by_primitive_item(item: BvhItem, surface: Surface, to_light: vec3f, t_max: f32, target_prim: u32) -> bool",
                 "var occluded = false;",
                 "for (var once = has_kind(item, KIND); once; once = false) {
-        occluded = is_occluded_by_primitive(KIND, primitives[item.index], item.index, surface, to, t_max, target_prim);
+        occluded = is_occluded_by_primitive(KIND, primitives[item.index], item.index, surface, to_light, t_max, target_prim);
     }",
                 "occluded",
             ),
@@ -68,8 +68,8 @@ pub fn item_tests() -> String {
     )
 }
 
-/// Writes functions, each given by signature, first statement, statement per kind (named `KIND`) and result. Infinite
-/// planes are not in a BVH.
+/// Writes functions, each described by signature, first statement, statement per kind (named `KIND`) and result.
+/// `with_planes` is false for BVH items, because infinite planes are not in a BVH.
 fn functions(with_planes: bool, functions: &[(&str, &str, &str, &str)]) -> String {
     let mut out = String::new();
     for (signature, start, statement, result) in functions {

@@ -1,5 +1,5 @@
-//! Device failures: errors, out-of-memory and device loss. wgpu reports failures by error scopes, callbacks and panics,
-//! but a device loss only once, by a callback.
+//! Device failures: errors, out-of-memory and device loss. wgpu reports failures by error scopes, callbacks and panics.
+//! It reports a device loss only once, by a callback.
 
 use std::error::Error;
 use std::fmt::Display;
@@ -15,8 +15,8 @@ pub struct Failure(Arc<Mutex<FailureState>>);
 struct FailureState {
     /// The device loss, which is permanent.
     lost: Option<DeviceFault>,
-    /// First error outside of scopes, until it is reported.
-    untold: Option<DeviceFault>,
+    /// First error outside of scopes, until `check` reports the error.
+    unreported: Option<DeviceFault>,
 }
 
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -30,7 +30,7 @@ enum DeviceFault {
 const LOST: &str = "Device is lost";
 const NO_MEMORY: &str = "Out of memory";
 
-/// Messages for a device that cannot be opened: its driver is being reset, or out of memory.
+/// Messages of wgpu for a device that cannot be opened, because the driver is being reset or has no memory.
 const LOST_AT_OPENING: &str = "Parent device is lost";
 const NO_MEMORY_AT_OPENING: &str = "Not enough memory left.";
 
@@ -44,7 +44,7 @@ impl DeviceFault {
 
     fn of_loss(reason: wgpu::DeviceLostReason, message: &str) -> DeviceFault {
         match (reason, message) {
-            (wgpu::DeviceLostReason::Destroyed, _) => DeviceFault::Lost("it was released".to_string()),
+            (wgpu::DeviceLostReason::Destroyed, _) => DeviceFault::Lost("the program released the device".to_string()),
             (_, NO_MEMORY) => DeviceFault::Memory,
             (_, LOST) => DeviceFault::Lost(
                 "the driver ended it, for example after a reset or a dispatch that took too long".to_string(),
@@ -67,36 +67,40 @@ impl Failure {
     /// Records device loss, and errors outside of scopes, for which wgpu would panic.
     pub fn listen(&self, device: &wgpu::Device) {
         let (errors, losses) = (self.clone(), self.clone());
-        device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| errors.keep(DeviceFault::of(&error))));
-        device.set_device_lost_callback(move |reason, message| losses.lose(DeviceFault::of_loss(reason, &message)));
-    }
-
-    fn known<T>(&self, access: impl FnOnce(&mut FailureState) -> T) -> T {
-        access(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner))
-    }
-
-    fn keep(&self, fault: DeviceFault) {
-        self.known(|known| {
-            known.untold.get_or_insert(fault);
+        device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
+            errors.record_error(DeviceFault::of(&error))
+        }));
+        device.set_device_lost_callback(move |reason, message| {
+            losses.record_loss(DeviceFault::of_loss(reason, &message))
         });
     }
 
-    fn lose(&self, fault: DeviceFault) {
-        self.known(|known| {
-            known.lost.get_or_insert(fault);
+    fn with_state<T>(&self, access: impl FnOnce(&mut FailureState) -> T) -> T {
+        access(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+
+    fn record_error(&self, fault: DeviceFault) {
+        self.with_state(|state| {
+            state.unreported.get_or_insert(fault);
+        });
+    }
+
+    fn record_loss(&self, fault: DeviceFault) {
+        self.with_state(|state| {
+            state.lost.get_or_insert(fault);
         });
     }
 
     /// Returns the value of wgpu calls, or an error: a device loss, the first error of the scopes, an error recorded
     /// outside of the scopes, or a panic, in this order.
-    pub fn judge<T>(
+    pub fn check<T>(
         &self,
         device: &str,
         value: Result<T, String>,
-        raised: Option<&wgpu::Error>,
+        scope_error: Option<&wgpu::Error>,
     ) -> Result<T, RenderError> {
-        let (lost, untold) = self.known(|known| (known.lost.clone(), known.untold.take()));
-        let fault = lost.or(raised.map(DeviceFault::of)).or(untold);
+        let (lost, unreported) = self.with_state(|state| (state.lost.clone(), state.unreported.take()));
+        let fault = lost.or(scope_error.map(DeviceFault::of)).or(unreported);
         match (fault, value) {
             (Some(fault), _) => Err(fault.into_error(device)),
             (None, Err(message)) => Err(DeviceFault::Other(message).into_error(device)),
@@ -106,7 +110,7 @@ impl Failure {
 
     /// Returns an error, or the device loss that caused it.
     pub fn error(&self, device: &str, message: &dyn Display) -> RenderError {
-        let lost = self.known(|known| known.lost.clone());
+        let lost = self.with_state(|state| state.lost.clone());
         lost.unwrap_or_else(|| DeviceFault::Other(message.to_string()))
             .into_error(device)
     }
@@ -114,17 +118,17 @@ impl Failure {
 
 /// Returns the error of a device that cannot be opened.
 pub fn error_of_opening(device: &str, error: &dyn Error) -> RenderError {
-    let says = |text: &str| {
+    let mentions = |text: &str| {
         let mut causes = std::iter::successors(Some(error), |error| (*error).source());
         causes.any(|cause| cause.to_string().contains(text))
     };
-    if says(NO_MEMORY_AT_OPENING) {
+    if mentions(NO_MEMORY_AT_OPENING) {
         RenderError::OutOfMemory {
             device: device.to_string(),
-            message: Some("the driver has no memory to open it; use the CPU".to_owned()),
+            message: Some("the driver has no memory to open the device; use the CPU".to_owned()),
         }
-    } else if says(LOST_AT_OPENING) {
-        DeviceFault::Lost("the driver does not open it".to_string()).into_error(device)
+    } else if mentions(LOST_AT_OPENING) {
+        DeviceFault::Lost("the driver does not open the device".to_string()).into_error(device)
     } else {
         DeviceFault::Other(error.to_string()).into_error(device)
     }
@@ -141,18 +145,18 @@ mod tests {
     #[test]
     fn a_loss_is_reported_every_time_and_other_errors_once() {
         let failure = Failure::default();
-        let judge = |value: Result<u8, &str>| error_of(failure.judge("gpu", value.map_err(str::to_string), None));
-        assert_eq!(judge(Ok(7)), "7");
-        assert_eq!(judge(Err("a panic")), "gpu: a panic");
-        failure.keep(DeviceFault::Other("first".to_string()));
-        failure.keep(DeviceFault::Other("second".to_string()));
+        let check = |value: Result<u8, &str>| error_of(failure.check("gpu", value.map_err(str::to_string), None));
+        assert_eq!(check(Ok(7)), "7");
+        assert_eq!(check(Err("a panic")), "gpu: a panic");
+        failure.record_error(DeviceFault::Other("first".to_string()));
+        failure.record_error(DeviceFault::Other("second".to_string()));
         assert_eq!(failure.error("gpu", &"another").to_string(), "gpu: another");
-        assert_eq!(judge(Ok(7)), "gpu: first");
-        assert_eq!(judge(Ok(7)), "7");
-        failure.lose(DeviceFault::of_loss(wgpu::DeviceLostReason::Unknown, "reset"));
-        failure.lose(DeviceFault::of_loss(wgpu::DeviceLostReason::Destroyed, ""));
+        assert_eq!(check(Ok(7)), "gpu: first");
+        assert_eq!(check(Ok(7)), "7");
+        failure.record_loss(DeviceFault::of_loss(wgpu::DeviceLostReason::Unknown, "reset"));
+        failure.record_loss(DeviceFault::of_loss(wgpu::DeviceLostReason::Destroyed, ""));
         for value in [Ok(7), Err("a panic"), Ok(7)] {
-            assert_eq!(judge(value), "gpu: the device was lost: reset");
+            assert_eq!(check(value), "gpu: the device was lost: reset");
         }
         assert_eq!(
             failure.error("gpu", &"another").to_string(),
@@ -162,10 +166,10 @@ mod tests {
 
     #[test]
     fn out_of_memory_is_not_a_device_loss() {
-        let of = |message| DeviceFault::of_loss(wgpu::DeviceLostReason::Unknown, message);
-        assert_eq!(of("Out of memory"), DeviceFault::Memory);
-        assert!(matches!(of("Device is lost"), DeviceFault::Lost(_)));
-        assert_eq!(of("anything"), DeviceFault::Lost("anything".to_string()));
+        let fault_of = |message| DeviceFault::of_loss(wgpu::DeviceLostReason::Unknown, message);
+        assert_eq!(fault_of("Out of memory"), DeviceFault::Memory);
+        assert!(matches!(fault_of("Device is lost"), DeviceFault::Lost(_)));
+        assert_eq!(fault_of("anything"), DeviceFault::Lost("anything".to_string()));
         let error = std::io::Error::other("Not enough memory left.");
         assert!(matches!(
             error_of_opening("gpu", &error),

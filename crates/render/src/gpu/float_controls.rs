@@ -41,25 +41,27 @@ impl FloatControls {
         if version < vk::API_VERSION_1_2 || instance.instance_api_version() < vk::API_VERSION_1_1 {
             return FloatControls::NONE;
         }
-        let mut found = vk::PhysicalDeviceFloatControlsProperties::default();
-        let mut properties = vk::PhysicalDeviceProperties2::default().push_next(&mut found);
+        let mut supported = vk::PhysicalDeviceFloatControlsProperties::default();
+        let mut properties = vk::PhysicalDeviceProperties2::default().push_next(&mut supported);
         // SAFETY: Vulkan 1.1 instances have this function, and Vulkan 1.2 devices support this structure.
         unsafe {
             instance
                 .raw_instance()
                 .get_physical_device_properties2(vulkan.raw_physical_device(), &mut properties);
         }
-        // Lavapipe of Mesa 22.3.6 converts infinities and NaN to finite numbers if asked to preserve them, but
-        // preserves them otherwise.
+        // Lavapipe of Mesa 22.3.6 preserves infinities and NaN without a request, but converts them to finite numbers
+        // if their preservation is requested.
         let lavapipe = vulkan
             .physical_device_capabilities()
             .is_driver(vk::DriverId::MESA_LLVMPIPE);
-        // Without independence, all float widths need the same setting, but kernels only request 32 bits.
-        let alone = |independence| independence != vk::ShaderFloatControlsIndependence::NONE;
+        // Without independence, all float widths need the same setting, but kernels only request it for 32 bits.
+        let is_independent = |independence| independence != vk::ShaderFloatControlsIndependence::NONE;
         FloatControls {
-            rounding: found.shader_rounding_mode_rte_float32 == vk::TRUE && alone(found.rounding_mode_independence),
-            signed_zeros: found.shader_signed_zero_inf_nan_preserve_float32 == vk::TRUE && !lavapipe,
-            denormals: found.shader_denorm_preserve_float32 == vk::TRUE && alone(found.denorm_behavior_independence),
+            rounding: supported.shader_rounding_mode_rte_float32 == vk::TRUE
+                && is_independent(supported.rounding_mode_independence),
+            signed_zeros: supported.shader_signed_zero_inf_nan_preserve_float32 == vk::TRUE && !lavapipe,
+            denormals: supported.shader_denorm_preserve_float32 == vk::TRUE
+                && is_independent(supported.denorm_behavior_independence),
         }
     }
 

@@ -8,9 +8,9 @@ pub struct FunctionText<'a> {
     pub name: &'a str,
     /// Offset of `fn`.
     pub start: usize,
-    /// Return type as written, or empty.
+    /// Return type as in the text, or empty.
     pub result: &'a str,
-    /// Includes both braces.
+    /// The body, including both braces.
     pub body: Range<usize>,
 }
 
@@ -18,8 +18,8 @@ pub struct FunctionText<'a> {
 pub fn functions(text: &str) -> Vec<FunctionText<'_>> {
     let plain = without_comments(text);
     let mut found = Vec::new();
-    let mut at = 0;
-    while let Some(start) = next_word(&plain, at, "fn") {
+    let mut offset = 0;
+    while let Some(start) = next_word(&plain, offset, "fn") {
         let name = text[start + 2..].trim_start();
         let name = &name[..name
             .find(|c: char| !c.is_alphanumeric() && c != '_')
@@ -38,7 +38,7 @@ pub fn functions(text: &str) -> Vec<FunctionText<'_>> {
             result,
             body: open..close + 1,
         });
-        at = close + 1;
+        offset = close + 1;
     }
     found
 }
@@ -65,7 +65,7 @@ pub fn without_comments(text: &str) -> String {
         }
         i += length;
     }
-    String::from_utf8(plain).unwrap_or_default() // whole characters were replaced
+    String::from_utf8(plain).unwrap_or_default() // never invalid: only complete characters were replaced
 }
 
 /// Returns true if only comments and white space differ.
@@ -77,12 +77,12 @@ pub fn is_same_code(a: &str, b: &str) -> bool {
     a == b || (is_simple(a) && is_simple(b) && code(a).split_whitespace().eq(code(b).split_whitespace()))
 }
 
-fn next_word(text: &str, from: usize, word: &str) -> Option<usize> {
-    let part_of_name = |c: char| c.is_alphanumeric() || c == '_';
-    text[from..]
+fn next_word(text: &str, start: usize, word: &str) -> Option<usize> {
+    let is_name_char = |c: char| c.is_alphanumeric() || c == '_';
+    text[start..]
         .match_indices(word)
-        .map(|(i, _)| from + i)
-        .find(|&i| !text[..i].ends_with(part_of_name) && !text[i + word.len()..].starts_with(part_of_name))
+        .map(|(i, _)| start + i)
+        .find(|&i| !text[..i].ends_with(is_name_char) && !text[i + word.len()..].starts_with(is_name_char))
 }
 
 /// Returns the closing brace that matches the opening brace at `open`.
@@ -133,12 +133,12 @@ mod tests {
         let text = "// fn no() {\nfn one(a: f32) -> vec3f { if a > 1.0 { /* } */ } return v; }\n\
             @compute @workgroup_size(8) /* fn */ fn two(){}\nfn ä() -> @builtin(position) vec4f { } fn open() { {";
         let found = functions(text);
-        let seen: Vec<_> = found
+        let parsed: Vec<_> = found
             .iter()
             .map(|f| (f.name, f.result, &text[f.body.clone()]))
             .collect();
         assert_eq!(
-            seen,
+            parsed,
             [
                 ("one", "vec3f", "{ if a > 1.0 { /* } */ } return v; }"),
                 ("two", "", "{}"),

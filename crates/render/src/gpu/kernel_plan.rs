@@ -19,7 +19,7 @@ pub struct KernelPlan {
     pub scene_bytes: u64,
 }
 
-/// Predicts the kernel.
+/// Predicts the kernel that the device of `info` uses for a scene.
 pub fn plan_kernel(packed: &Packed, info: &GpuInfo) -> KernelPlan {
     let kernel = if packed.sampling.adaptive { &ADAPTIVE } else { &RENDER };
     let baked = info.is_software().then(|| bake_if_small(packed)).flatten();

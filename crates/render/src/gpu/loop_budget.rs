@@ -1,67 +1,72 @@
-//! Number of samples per dispatch for which software Vulkan truncates no loops.
+//! Number of samples per dispatch for which software Vulkan truncates no loop.
 
 use crate::records::{MAX_PATH_LEAVES, Packed, SAMPLE_BLOCK};
 
 /// Iterations of all loops after which Mesa 22.3's llvmpipe ends every loop of an invocation. An iteration counts if
 /// any lane needs it.
-const MAX_ROUNDS: f64 = 65_535.0;
+const MAX_ITERATIONS: f64 = 65_535.0;
 /// Estimated number of primitives that may occlude a block of light samples.
 const CANDIDATES: f64 = 4.0;
 
 /// Estimated iterations of a BVH traversal: nodes, leaves, triangles.
-const ROUNDS_OF_TREE: f64 = 150.0;
+const TRAVERSAL_ITERATIONS: f64 = 150.0;
 
 /// Bounces after which Russian roulette has ended nearly all paths: a reflectance of 95 % leaves 0.95^100 = 0.6 %.
 const MAX_ROULETTE_BOUNCES: u32 = 100;
 
 /// Estimated number of surfaces that a ray passes through because of their alpha before a hit.
-const ROUNDS_OF_PASSING: f64 = 4.0;
+const ALPHA_SKIPS: f64 = 4.0;
 
-const ROUNDS_OF_LOOKUP: f64 = 8.0;
+/// Estimated iterations of a texture lookup.
+const LOOKUP_ITERATIONS: f64 = 8.0;
 
 /// Returns the estimated maximum number of samples per dispatch. A wrong estimate only costs time: truncated dispatches
 /// are repeated with fewer samples, and more dispatches take longer.
 pub fn samples_per_dispatch(packed: &Packed, baked: bool) -> u32 {
-    let samples = MAX_ROUNDS / rounds_of_sample(packed, baked);
+    let samples = MAX_ITERATIONS / iterations_of_sample(packed, baked);
     (samples as u32).max(1)
 }
 
 /// Estimates a sample's loop iterations; at least 1.
-fn rounds_of_sample(packed: &Packed, baked: bool) -> f64 {
+fn iterations_of_sample(packed: &Packed, baked: bool) -> f64 {
     let s = &packed.specialization;
-    let all = packed.kinds().map(|(_, range)| range.len()).sum::<usize>() as f64;
-    let casting = || packed.shadow_casters().map(|(_, range)| range.len());
-    let lists = casting()
+    let primitives = packed.kinds().map(|(_, range)| range.len()).sum::<usize>() as f64;
+    let caster_counts = || packed.shadow_casters().map(|(_, range)| range.len());
+    let blocks = caster_counts()
         .map(|count| count.div_ceil(SAMPLE_BLOCK as usize))
         .sum::<usize>() as f64;
-    let casters = casting().sum::<usize>() as f64;
-    // Scenes in buffers are read by loops, baked ones by statements.
-    let (of_hit, of_lists) = if baked { (0.0, lists) } else { (all, lists + casters) };
-    let in_tree = if s.tlas_kinds == 0 { 0.0 } else { ROUNDS_OF_TREE };
-    let of_hit = of_hit + in_tree;
+    let casters = caster_counts().sum::<usize>() as f64;
+    // Primitives in buffers are tested by loops, baked primitives by straight-line code.
+    let (per_hit, per_block) = if baked {
+        (0.0, blocks)
+    } else {
+        (primitives, blocks + casters)
+    };
+    let per_traversal = if s.tlas_kinds == 0 { 0.0 } else { TRAVERSAL_ITERATIONS };
+    let per_hit = per_hit + per_traversal;
     // Camera rays skip camera-invisible surfaces.
-    let of_start = 1.0 + f64::from(s.camera_invisible) * (1.0 + of_hit) * 2.0;
+    let per_start = 1.0 + f64::from(s.camera_invisible) * (1.0 + per_hit) * 2.0;
     if packed.integrator.follows_paths() {
         // Each bounce has a BSDF ray, a shadow ray and texture lookups.
-        let to_light = if baked { in_tree } else { casters + in_tree };
-        let passing = if s.alpha_surfaces == 0 { 1.0 } else { ROUNDS_OF_PASSING };
+        let per_shadow_ray = if baked { per_traversal } else { casters + per_traversal };
+        let alpha_skips = if s.alpha_surfaces == 0 { 1.0 } else { ALPHA_SKIPS };
         let bounces = f64::from(s.bounces.min(s.rr_depth.saturating_add(MAX_ROULETTE_BOUNCES)));
         // Light tree: descent to select an emitter, ascent for the PDF of a hit emitter.
         let levels = 2.0 * f64::from(packed.lighting.nodes.len().max(1).ilog2());
-        let of_bounce = 1.0 + of_hit + to_light + levels + f64::from(s.lookups) * ROUNDS_OF_LOOKUP;
-        return of_start + (bounces + 1.0) * passing * of_bounce;
+        let per_bounce = 1.0 + per_hit + per_shadow_ray + levels + f64::from(s.lookups) * LOOKUP_ITERATIONS;
+        return per_start + (bounces + 1.0) * alpha_skips * per_bounce;
     }
     let block = |samples: u32| {
-        let shadows = CANDIDATES.min(casters) * (1.0 + f64::from(samples)) + in_tree * f64::from(samples);
+        let shadows = CANDIDATES.min(casters) * (1.0 + f64::from(samples)) + per_traversal * f64::from(samples);
         let lobes = f64::from(samples) * (2.0 + f64::from(s.exponent_bits));
-        of_lists + shadows + lobes
+        per_block + shadows + lobes
     };
-    let (blocks, rest) = (s.light_samples / SAMPLE_BLOCK, s.light_samples % SAMPLE_BLOCK);
-    let area_light = f64::from(blocks) * block(SAMPLE_BLOCK) + if rest > 0 { block(rest) } else { 0.0 };
+    let (blocks, remainder) = (s.light_samples / SAMPLE_BLOCK, s.light_samples % SAMPLE_BLOCK);
+    let area_light = f64::from(blocks) * block(SAMPLE_BLOCK) + if remainder > 0 { block(remainder) } else { 0.0 };
     let (area_lights, lights) = (f64::from(packed.counts.lights.x), f64::from(packed.counts.lights.y));
     let shading = area_lights * (1.0 + area_light) + (lights - area_lights) * (1.0 + block(1));
     let paths = if s.bounces == 0 { 1 } else { MAX_PATH_LEAVES };
-    of_start + f64::from(paths) * (shading + (f64::from(s.bounces) + 1.0) * (1.0 + of_hit))
+    per_start + f64::from(paths) * (shading + (f64::from(s.bounces) + 1.0) * (1.0 + per_hit))
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@ use crate::error::RenderError;
 
 /// Memory in use in bytes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Held {
+pub struct MemoryUse {
     /// The scene's buffers.
     pub scene: u64,
     /// The film.
@@ -13,42 +13,42 @@ pub struct Held {
     pub copies: u64,
 }
 
-/// Name of an allocation, and size in bytes.
+/// Name and size in bytes of a failed allocation.
 pub type FailedAllocation = (String, u64);
 
-impl Held {
-    /// Adds the failed allocation, if known, and the memory in use to an out-of-memory error without a message. Returns
-    /// other errors unchanged.
-    pub fn explain(&self, error: RenderError, asked: Option<&FailedAllocation>) -> RenderError {
+impl MemoryUse {
+    /// Adds a message to an out-of-memory error that has none: the failed allocation, if known, and the memory in use.
+    /// Returns other errors unchanged.
+    pub fn explain(&self, error: RenderError, failed: Option<&FailedAllocation>) -> RenderError {
         match error {
             RenderError::OutOfMemory { device, message: None } => RenderError::OutOfMemory {
                 device,
-                message: Some(self.message(asked)),
+                message: Some(self.message(failed)),
             },
             other => other,
         }
     }
 
-    fn message(&self, asked: Option<&FailedAllocation>) -> String {
-        let asked = match asked {
-            Some((what, bytes)) => format!("the driver has no {} MiB for {what}", mebibytes(*bytes)),
+    fn message(&self, failed: Option<&FailedAllocation>) -> String {
+        let cause = match failed {
+            Some((name, bytes)) => format!("the driver has no {} MiB for {name}", mebibytes(*bytes)),
             None => "the driver has no more memory".to_owned(),
         };
         let used = [
             (self.scene, "for the scene"),
             (self.film, "for the film"),
-            (self.copies, "for copies of parts of it"),
+            (self.copies, "for copies of film rows"),
         ];
         let used: Vec<String> = used
             .iter()
             .filter(|(bytes, _)| *bytes > 0)
-            .map(|(bytes, what)| format!("{} {what}", mebibytes(*bytes)))
+            .map(|(bytes, purpose)| format!("{} {purpose}", mebibytes(*bytes)))
             .collect();
-        let beside = match used.is_empty() {
+        let in_use = match used.is_empty() {
             true => String::new(),
             false => format!(" in addition to {}", used.join(", ")),
         };
-        format!("{asked}{beside}; render a crop or a smaller image, or use the CPU")
+        format!("{cause}{in_use}; render a crop or a smaller image, or use the CPU")
     }
 }
 
@@ -70,26 +70,26 @@ mod tests {
 
     #[test]
     fn out_of_memory_errors_are_explained_once() {
-        let held = Held {
+        let memory = MemoryUse {
             scene: 3 << 19,
             film: 64 << 20,
             copies: 0,
         };
-        let asked = ("a copy of it".to_string(), 64 << 20);
-        let error_with_use = held.explain(error(), Some(&asked));
-        let rest = "render a crop or a smaller image, or use the CPU";
+        let failed = ("a copy of it".to_string(), 64 << 20);
+        let error_with_use = memory.explain(error(), Some(&failed));
+        let advice = "render a crop or a smaller image, or use the CPU";
         let line = format!(
             "gpu: out of memory: the driver has no 64.0 MiB for a copy of it in addition to 1.5 for the scene, 64.0 for the \
-             film; {rest}"
+             film; {advice}"
         );
         assert_eq!(error_with_use.to_string(), line);
-        assert_eq!(held.explain(error_with_use, None).to_string(), line);
-        let unknown = Held::default().explain(error(), None).to_string();
+        assert_eq!(memory.explain(error_with_use, None).to_string(), line);
+        let unknown = MemoryUse::default().explain(error(), None).to_string();
         assert_eq!(
             unknown,
-            format!("gpu: out of memory: the driver has no more memory; {rest}")
+            format!("gpu: out of memory: the driver has no more memory; {advice}")
         );
         let other = RenderError::Cancelled;
-        assert!(matches!(held.explain(other, Some(&asked)), RenderError::Cancelled));
+        assert!(matches!(memory.explain(other, Some(&failed)), RenderError::Cancelled));
     }
 }

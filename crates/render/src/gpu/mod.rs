@@ -37,5 +37,5 @@ pub use kernel_plan::{KernelPlan, plan_kernel};
 pub use renderer::{Dispatch, Gpu, Options};
 pub use rounding::Rounding;
 pub use validate::{Forms, check_kernels};
-// For kernels other than the renderer's.
+// Exported for kernels other than the renderer's.
 pub use {naga, wgpu};

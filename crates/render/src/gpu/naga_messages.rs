@@ -45,26 +45,26 @@ pub fn message(module: &Module, text: &str, error: &ValidationError) -> String {
 /// Returns a parse error's location and message.
 pub fn parse_message(error: &ParseError, source: &Source) -> (Option<Span>, String) {
     let labels: Vec<(Span, &str)> = error.labels().collect();
-    // Prefers the location of the wrong value to the location that explains the error.
+    // The location of the wrong value is preferred to the location that explains the error.
     let has_type = |(_, label): &&(Span, &str)| label.starts_with("this expression has type");
-    let chosen = labels.iter().find(has_type).or(labels.first());
+    let best = labels.iter().find(has_type).or(labels.first());
     let mut message = without_debug(error.message());
-    let label = chosen.map(|(_, label)| *label).unwrap_or_default();
+    let label = best.map(|(_, label)| *label).unwrap_or_default();
     if !label.is_empty() && label != "see msg" && !message.contains(label) {
         message += &format!(" ({label})");
     }
-    // The other definition of a name may be in any file.
-    let other = labels
+    // The previous definition of a name may be in any file.
+    let definition = labels
         .iter()
         .find(|(_, label)| label.starts_with("previous definition"));
-    if let Some(place) = other.and_then(|(span, _)| source.place(span.to_range()?.start)) {
-        message += &format!("; the other definition is at {place}");
+    if let Some(location) = definition.and_then(|(span, _)| source.place(span.to_range()?.start)) {
+        message += &format!("; the other definition is at {location}");
     }
-    (chosen.map(|(span, _)| *span), message)
+    (best.map(|(span, _)| *span), message)
 }
 
 /// Returns a validation error's location.
-pub fn place(text: &str, error: &WithSpan<ValidationError>) -> Option<Span> {
+pub fn location(text: &str, error: &WithSpan<ValidationError>) -> Option<Span> {
     let span = error.spans().map(|(span, _)| *span).last();
     span.or_else(|| match error.as_inner() {
         ValidationError::EntryPoint { name, .. } => {
@@ -98,7 +98,7 @@ pub fn chain(error: &dyn Error) -> String {
     message
 }
 
-/// Names of a module, and of the function with an error.
+/// Replaces naga's indices by names of a module, and of the function with an error.
 struct Names<'a> {
     module: &'a Module,
     text: &'a str,
@@ -124,7 +124,7 @@ impl Names<'_> {
             }
             out.push_str(before);
             if rest.starts_with(" '") {
-                out.pop(); // the name follows
+                out.pop(); // the message contains the name
                 continue;
             }
             let is_type = self.function.is_none()
@@ -132,7 +132,7 @@ impl Names<'_> {
                 || before.ends_with("zero value of ")
                 || (before.ends_with("type ") && !before.ends_with("Base type "));
             let name = match before {
-                _ if before.ends_with("Argument ") => Some(format!("[{i}]")), // its position
+                _ if before.ends_with("Argument ") => Some(format!("[{i}]")), // the position of the argument
                 _ if before.ends_with("Call to ") => self.called(i),
                 _ if before.ends_with("Global variable ") || before.ends_with("Bindings for ") => self.global(i),
                 _ if before.ends_with("xpression ") && self.function.is_none() => self.constant(i),

@@ -13,16 +13,16 @@ const ALTERNATIVES: usize = 400;
 pub fn too_deep(text: &str) -> Option<(Range<usize>, String)> {
     let plain = without_comments(text);
     let bytes = plain.as_bytes();
-    let violation = |at: usize, what: &str, most: usize| {
+    let violation = |offset: usize, construct: &str, max: usize| {
         Some((
-            at..at + 1,
-            format!("{what} must be nested at most {most} levels deep here"),
+            offset..offset + 1,
+            format!("{construct} must be nested at most {max} levels deep here"),
         ))
     };
     let mut depth = 0;
     let mut brackets: Vec<usize> = Vec::new();
     let mut alternatives = vec![0];
-    for (at, byte) in bytes.iter().enumerate() {
+    for (offset, byte) in bytes.iter().enumerate() {
         match byte {
             b'(' | b'[' => {
                 depth += 1;
@@ -31,7 +31,7 @@ pub fn too_deep(text: &str) -> Option<(Range<usize>, String)> {
             b')' | b']' => depth = brackets.pop().unwrap_or(0),
             b',' => depth = brackets.last().copied().unwrap_or(0),
             b'+' | b'-' | b'*' | b'/' | b'%' | b'&' | b'|' | b'^' | b'~' | b'!' | b'<' | b'>' | b'=' => depth += 1,
-            b'.' if bytes.get(at + 1).is_some_and(u8::is_ascii_alphabetic) => depth += 1,
+            b'.' if bytes.get(offset + 1).is_some_and(u8::is_ascii_alphabetic) => depth += 1,
             b';' => (depth, brackets) = (0, Vec::new()),
             b'{' => {
                 (depth, brackets) = (0, Vec::new());
@@ -42,21 +42,21 @@ pub fn too_deep(text: &str) -> Option<(Range<usize>, String)> {
                 if alternatives.len() > 1 {
                     alternatives.pop();
                 }
-                let rest = plain[at + 1..].trim_start();
-                let goes_on = rest
+                let rest = plain[offset + 1..].trim_start();
+                let is_else_if = rest
                     .strip_prefix("else")
                     .is_some_and(|rest| rest.trim_start().starts_with("if"));
                 if let Some(count) = alternatives.last_mut() {
-                    *count = if goes_on { *count + 1 } else { 0 };
+                    *count = if is_else_if { *count + 1 } else { 0 };
                 }
                 if alternatives.iter().sum::<usize>() > ALTERNATIVES {
-                    return violation(at, "`else if`", ALTERNATIVES);
+                    return violation(offset, "`else if`", ALTERNATIVES);
                 }
             }
             _ => {}
         }
         if depth > OPERATORS {
-            return violation(at, "operators", OPERATORS);
+            return violation(offset, "operators", OPERATORS);
         }
     }
     None
@@ -84,17 +84,17 @@ mod tests {
 
     #[test]
     fn deeply_nested_code_is_rejected() {
-        let of = |part: &str, count: usize| format!("fn f() {{ let y = x{}; }}", part.repeat(count));
+        let code = |part: &str, count: usize| format!("fn f() {{ let y = x{}; }}", part.repeat(count));
         for part in ["+x", ".x", "[0]", "<x", "+(x", "-f(x)", "+1.5"] {
-            assert_eq!(too_deep(&of(part, 300)), None, "{part}");
-            let (place, message) = too_deep(&of(part, 1001)).expect(part);
-            assert!(place.start > 500 && message.starts_with("operators must be nested at most 1000 levels deep"));
+            assert_eq!(too_deep(&code(part, 300)), None, "{part}");
+            let (range, message) = too_deep(&code(part, 1001)).expect(part);
+            assert!(range.start > 500 && message.starts_with("operators must be nested at most 1000 levels deep"));
         }
-        let of = |count: usize| format!("if a {{}} {} else {{}}", "else if b { x(); }\n ".repeat(count));
-        assert_eq!(too_deep(&of(400)), None);
-        assert!(too_deep(&of(401)).is_some());
+        let chain = |count: usize| format!("if a {{}} {} else {{}}", "else if b { x(); }\n ".repeat(count));
+        assert_eq!(too_deep(&chain(400)), None);
+        assert!(too_deep(&chain(401)).is_some());
         // The lengths of nested chains add up.
-        let inner = of(300);
+        let inner = chain(300);
         assert!(too_deep(&format!("{}if c {{ {inner} }}", "if a {} else if b { ".repeat(101))).is_some());
     }
 }

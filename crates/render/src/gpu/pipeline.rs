@@ -19,17 +19,17 @@ const UNIFORM: BufferBindingType = BufferBindingType::Uniform;
 const READ: BufferBindingType = BufferBindingType::Storage { read_only: true };
 const WRITE: BufferBindingType = BufferBindingType::Storage { read_only: false };
 
-/// Bind groups of `shaders/bindings.wgsl`: per dispatch, per scene, and shapes of the scene.
+/// Bind groups of `shaders/bindings.wgsl`: for the dispatch, for the scene, and for the shapes of the scene.
 pub const GROUPS: [&[BufferBindingType]; 3] = [
     &[UNIFORM, WRITE, WRITE],
     &[UNIFORM, UNIFORM, UNIFORM, UNIFORM, READ, READ],
     &[READ, READ, READ, READ],
 ];
 
-/// Bind group per dispatch. Its last binding has the slider values, if any.
+/// Bind group of the dispatch. The last binding has the slider values, if any.
 pub const DISPATCH_GROUP: usize = 0;
-/// Bind group of the scene. Its last bindings have the texels.
-pub const SCENE: usize = 1;
+/// Bind group of the scene. The last bindings have the texels.
+pub const SCENE_GROUP: usize = 1;
 
 /// Number of storage buffers, not counting further texel buffers.
 pub const STORAGE_BUFFERS: usize = {
@@ -53,13 +53,13 @@ const _: () = assert!(STORAGE_BUFFERS <= 8);
 /// Returns every kernel's bind group layouts, with `more_texels` further texel buffers and slider values, if any.
 pub fn bind_group_layouts(device: &Device, more_texels: usize, sliders: bool) -> Vec<wgpu::BindGroupLayout> {
     let layout = |(group, types): (usize, &&[BufferBindingType])| {
-        let more = match group {
+        let added = match group {
             DISPATCH_GROUP => std::iter::repeat_n(UNIFORM, usize::from(sliders)),
-            SCENE => std::iter::repeat_n(READ, more_texels),
+            SCENE_GROUP => std::iter::repeat_n(READ, more_texels),
             _ => std::iter::repeat_n(READ, 0),
         };
         let entries: Vec<wgpu::BindGroupLayoutEntry> = (0..)
-            .zip(types.iter().copied().chain(more))
+            .zip(types.iter().copied().chain(added))
             .map(|(binding, ty)| wgpu::BindGroupLayoutEntry {
                 binding,
                 visibility: wgpu::ShaderStages::COMPUTE,
@@ -80,7 +80,7 @@ pub fn bind_group_layouts(device: &Device, more_texels: usize, sliders: bool) ->
     GROUPS.iter().enumerate().map(layout).collect()
 }
 
-/// Creates a bind group of buffers, which are given in binding order.
+/// Creates a bind group of buffers, which are in binding order.
 pub fn bind_group(device: &Device, layout: &wgpu::BindGroupLayout, buffers: &[&wgpu::Buffer]) -> wgpu::BindGroup {
     let entries: Vec<wgpu::BindGroupEntry> = (0..)
         .zip(buffers)
@@ -96,8 +96,9 @@ pub fn bind_group(device: &Device, layout: &wgpu::BindGroupLayout, buffers: &[&w
     })
 }
 
-/// Compiles a kernel: with `exact` to SPIR-V that is executed as written, else from WGSL by wgpu. naga validates both
-/// first, for the same error messages. Pipelines in the device's cache are returned immediately.
+/// Compiles a kernel: with `exact` to SPIR-V that is executed as written, else from WGSL by wgpu. naga validates the
+/// source first in both cases, so that error messages are the same. Pipelines in the device's cache are returned
+/// immediately.
 pub fn pipeline(
     device: &Device,
     layouts: &[wgpu::BindGroupLayout],

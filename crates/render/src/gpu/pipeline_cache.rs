@@ -15,7 +15,7 @@ const CAPACITY: usize = 32;
 pub struct Key([u8; 32]);
 
 impl Key {
-    /// Returns a kernel's key. The text determines the bindings.
+    /// Returns a kernel's key. Bindings are not hashed, because the text determines them.
     pub fn new(kernel: &Kernel, source: &Source, constants: &Specialization, exact: Option<Rounding>) -> Key {
         let mut hasher = blake3::Hasher::new();
         hasher.update(format!("{} {exact:?} {constants:?}\n", kernel.entry_point).as_bytes());
@@ -24,14 +24,14 @@ impl Key {
     }
 }
 
-/// From least to most recently used, shared by clones.
+/// Pipelines, from least to most recently used. Clones share the cache.
 #[derive(Clone, Default)]
 pub struct PipelineCache(Arc<Mutex<VecDeque<(Key, wgpu::ComputePipeline)>>>);
 
 impl PipelineCache {
     pub fn get(&self, key: Key) -> Option<wgpu::ComputePipeline> {
         let mut pipelines = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        let position = pipelines.iter().position(|(known, _)| *known == key)?;
+        let position = pipelines.iter().position(|(cached, _)| *cached == key)?;
         let entry = pipelines.remove(position)?;
         let pipeline = entry.1.clone();
         pipelines.push_back(entry);
@@ -40,7 +40,7 @@ impl PipelineCache {
 
     pub fn add(&self, key: Key, pipeline: &wgpu::ComputePipeline) {
         let mut pipelines = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        pipelines.retain(|(known, _)| *known != key);
+        pipelines.retain(|(cached, _)| *cached != key);
         if pipelines.len() == CAPACITY {
             pipelines.pop_front();
         }
@@ -66,15 +66,15 @@ mod tests {
 
     #[test]
     fn keys_differ_by_text_constants_and_rounding() {
-        let known = key("a", 1, None);
-        assert_eq!(known, key("a", 1, None));
+        let original = key("a", 1, None);
+        assert_eq!(original, key("a", 1, None));
         for other in [
             key("b", 1, None),
             key("a", 2, None),
             key("a", 1, Some(Rounding::Device)),
             key("a", 1, Some(Rounding::Software)),
         ] {
-            assert_ne!(known, other);
+            assert_ne!(original, other);
         }
     }
 
@@ -106,7 +106,7 @@ mod tests {
         assert_eq!(cache.get(keys[0]).as_ref(), Some(&pipeline));
         cache.add(keys[CAPACITY], &pipeline);
         let cached: Vec<bool> = keys.iter().map(|key| cache.get(*key).is_some()).collect();
-        let wanted: Vec<bool> = (0..=CAPACITY).map(|i| i != 1).collect();
-        assert_eq!(cached, wanted);
+        let expected: Vec<bool> = (0..=CAPACITY).map(|i| i != 1).collect();
+        assert_eq!(cached, expected);
     }
 }

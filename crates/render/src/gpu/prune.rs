@@ -3,7 +3,7 @@
 use naga::compact::{KeepUnused, compact};
 use naga::{Arena, Block, Expression, Literal, Module, Statement};
 
-/// Replaces branches on constants by the block that is executed, then removes unused items.
+/// Replaces each branch on a constant by the block that is executed, then removes unused items.
 pub fn prune(module: &mut Module) {
     let functions = module.functions.iter_mut().map(|(_, function)| function);
     let entry_points = module
@@ -13,13 +13,13 @@ pub fn prune(module: &mut Module) {
     for function in functions.chain(entry_points) {
         let body = std::mem::take(&mut function.body);
         function.named_expressions.clear(); // named expressions count as used, even in removed blocks
-        function.body = taken(body, &function.expressions).0;
+        function.body = without_dead_branches(body, &function.expressions).0;
     }
     compact(module, KeepUnused::No);
 }
 
 /// Returns a block without dead branches, and true if the block ends with a jump.
-fn taken(block: Block, expressions: &Arena<Expression>) -> (Block, bool) {
+fn without_dead_branches(block: Block, expressions: &Arena<Expression>) -> (Block, bool) {
     let mut out = Block::new();
     for (statement, span) in block.span_into_iter() {
         match statement {
@@ -29,16 +29,19 @@ fn taken(block: Block, expressions: &Arena<Expression>) -> (Block, bool) {
                 reject,
             } => match expressions[condition] {
                 Expression::Literal(Literal::Bool(value)) => {
-                    let (inner, leaves) = taken(if value { accept } else { reject }, expressions);
+                    let (inner, jumps) = without_dead_branches(if value { accept } else { reject }, expressions);
                     inner
                         .span_into_iter()
                         .for_each(|(statement, span)| out.push(statement, span));
-                    if leaves {
+                    if jumps {
                         return (out, true);
                     }
                 }
                 _ => {
-                    let (accept, reject) = (taken(accept, expressions).0, taken(reject, expressions).0);
+                    let (accept, reject) = (
+                        without_dead_branches(accept, expressions).0,
+                        without_dead_branches(reject, expressions).0,
+                    );
                     out.push(
                         Statement::If {
                             condition,
@@ -50,9 +53,9 @@ fn taken(block: Block, expressions: &Arena<Expression>) -> (Block, bool) {
                 }
             },
             Statement::Block(inner) => {
-                let (inner, leaves) = taken(inner, expressions);
+                let (inner, jumps) = without_dead_branches(inner, expressions);
                 out.push(Statement::Block(inner), span);
-                if leaves {
+                if jumps {
                     return (out, true);
                 }
             }
@@ -61,7 +64,10 @@ fn taken(block: Block, expressions: &Arena<Expression>) -> (Block, bool) {
                 continuing,
                 break_if,
             } => {
-                let (body, continuing) = (taken(body, expressions).0, taken(continuing, expressions).0);
+                let (body, continuing) = (
+                    without_dead_branches(body, expressions).0,
+                    without_dead_branches(continuing, expressions).0,
+                );
                 out.push(
                     Statement::Loop {
                         body,

@@ -12,13 +12,13 @@ use super::bake::bake_if_small;
 use super::compose::{ADAPTIVE, FIRST_HITS, Kernel, RENDER, Shaders};
 use super::device::{Device, Mapping};
 use super::loop_budget::samples_per_dispatch;
-use super::memory::{FailedAllocation, Held};
+use super::memory::{FailedAllocation, MemoryUse};
 use super::pipeline::{WORKGROUP, bind_group, bind_group_layouts, pipeline};
 use super::rounding::Rounding;
 use super::scene::SceneBuffers;
 use super::sliders::{Slider, with_buffer};
 use super::texels::TexelParts;
-use super::timer::{TIMES, Timer};
+use super::timer::{TIMESTAMP_BYTES, Timer};
 use crate::backend::{Backend, FilmState, Rules};
 use crate::error::RenderError;
 use crate::film::{Film, FilmLayout};
@@ -54,11 +54,11 @@ pub struct Gpu {
     /// Compiled on first use.
     first_hits: Option<wgpu::ComputePipeline>,
     scene: SceneBuffers,
-    work: wgpu::Buffer,
+    params: wgpu::Buffer,
     /// The kernel's completion record, and a mappable copy of the record.
     completion: [wgpu::Buffer; 2],
-    /// Film rows before the last dispatch, for `undo`.
-    before: Option<wgpu::Buffer>,
+    /// Film rows as they were before the last dispatch, for `undo`.
+    saved_rows: Option<wgpu::Buffer>,
     film: Option<(Target, FilmState)>,
     pending: Option<Pending>,
     rules: Rules,
@@ -82,10 +82,10 @@ pub struct Dispatch {
     pub samples: u64,
 }
 
-/// Submitted work; one dispatch is running.
+/// A submitted tile and its samples; one dispatch is running.
 struct Pending {
     tile: Region,
-    /// Samples not known to be in the film.
+    /// Samples that are not yet complete in the film.
     samples: Range<u32>,
     /// End of the samples of the running dispatch.
     end: u32,
@@ -114,8 +114,9 @@ struct Target {
 
 /// Film rows that contain a tile: a range of bytes of each list.
 struct Rows {
-    lists: u64,
-    list: u64,
+    list_count: u64,
+    list_bytes: u64,
+    /// Start and size of the range in bytes.
     start: u64,
     size: u64,
 }
@@ -123,26 +124,26 @@ struct Rows {
 impl Rows {
     fn of(film: &Target, tile: Region) -> Rows {
         let row = u64::from(film.region.width()) * size_of::<Vec4>() as u64;
-        let list = u64::from(film.region.height()) * row;
+        let list_bytes = u64::from(film.region.height()) * row;
         Rows {
-            lists: film.buffer.size() / list,
-            list,
+            list_count: film.buffer.size() / list_bytes,
+            list_bytes,
             start: u64::from(tile.y0 - film.region.y0) * row,
             size: u64::from(tile.height()) * row,
         }
     }
 
     fn bytes(&self) -> u64 {
-        self.lists * self.size
+        self.list_count * self.size
     }
 
     /// Returns each piece's offset in the film, and in a copy of all pieces.
     fn pieces(&self) -> impl Iterator<Item = (u64, u64)> {
-        (0..self.lists).map(|i| (i * self.list + self.start, i * self.size))
+        (0..self.list_count).map(|i| (i * self.list_bytes + self.start, i * self.size))
     }
 }
 
-const FIRST_HITS_RECORD: usize = size_of::<FirstHit>();
+const FIRST_HIT_BYTES: usize = size_of::<FirstHit>();
 
 /// Range of the loop that detects truncation. A truncated loop runs once.
 const LOOP_PROBE: UVec2 = UVec2::new(0, 4);
@@ -175,14 +176,15 @@ impl Gpu {
         };
         let render = kernels.compile(device, kernel_of(packed.sampling.adaptive))?;
         let scene = SceneBuffers::upload(device, packed, texels, &kernels.layouts)?;
-        let work = device.buffer(
+        let params = device.buffer(
             size_of::<DispatchParams>() as u64,
             BufferUsages::UNIFORM | BufferUsages::COPY_DST,
         );
-        let values = kernels.sliders.len().div_ceil(4) as u64 * size_of::<[u32; 4]>() as u64;
-        let slider_values = (values > 0).then(|| device.buffer(values, BufferUsages::UNIFORM | BufferUsages::COPY_DST));
-        let written = BufferUsages::STORAGE | BufferUsages::COPY_SRC | BufferUsages::COPY_DST;
-        let completion = [device.buffer(RECEIPT, written), completion_staging(device)];
+        let value_bytes = kernels.sliders.len().div_ceil(4) as u64 * size_of::<[u32; 4]>() as u64;
+        let slider_values =
+            (value_bytes > 0).then(|| device.buffer(value_bytes, BufferUsages::UNIFORM | BufferUsages::COPY_DST));
+        let usage = BufferUsages::STORAGE | BufferUsages::COPY_SRC | BufferUsages::COPY_DST;
+        let completion = [device.buffer(COMPLETION_BYTES, usage), completion_staging(device)];
         let mut gpu = Gpu {
             samples_per_dispatch: samples_per_dispatch(packed, kernels.baked.is_some()),
             device: device.clone(),
@@ -190,9 +192,9 @@ impl Gpu {
             render,
             first_hits: None,
             scene,
-            work,
+            params,
             completion,
-            before: None,
+            saved_rows: None,
             film: None,
             pending: None,
             rules: Rules::of(packed),
@@ -200,14 +202,14 @@ impl Gpu {
             timer: None,
             dispatches: Vec::new(),
         };
-        let nothing = Region {
+        let single_pixel = Region {
             x0: 0,
             y0: 0,
             x1: 1,
             y1: 1,
         };
-        gpu.begin(nothing)?;
-        gpu.dispatch_part(nothing, 0..0)?;
+        gpu.begin(single_pixel)?;
+        gpu.dispatch_part(single_pixel, 0..0)?;
         gpu.wait()?;
         gpu.film = None;
         Ok(gpu)
@@ -222,9 +224,9 @@ impl Gpu {
     ///
     /// # Errors
     ///
-    /// [`RenderError::Pending`] while work is pending.
+    /// [`RenderError::Pending`] while a dispatch is pending.
     pub fn set_sliders(&mut self, values: &[u32]) -> Result<(), RenderError> {
-        self.idle()?;
+        self.check_idle()?;
         self.film = None;
         match &self.slider_values {
             Some(buffer) => self
@@ -255,9 +257,9 @@ impl Gpu {
     ///
     /// # Errors
     ///
-    /// [`RenderError::Pending`] while work is pending.
+    /// [`RenderError::Pending`] while a dispatch is pending.
     pub fn update(&mut self, packed: &Packed) -> Result<bool, RenderError> {
-        self.idle()?;
+        self.check_idle()?;
         let texels = TexelParts::of(&self.device.info, packed)?;
         let same_kernel = self.kernels.baked.is_none()
             && (self.kernels.constants, self.rules.film_layout()) == (packed.specialization, packed.film_layout())
@@ -275,9 +277,9 @@ impl Gpu {
     ///
     /// # Errors
     ///
-    /// [`RenderError::Pending`] while work is pending.
+    /// [`RenderError::Pending`] while a dispatch is pending.
     pub fn set_camera(&mut self, camera: &Camera) -> Result<(), RenderError> {
-        self.idle()?;
+        self.check_idle()?;
         self.film = None;
         self.rules.set_size(camera.width, camera.height);
         self.device.checked(|| self.scene.set_camera(&self.device, camera))
@@ -288,30 +290,31 @@ impl Gpu {
         let target = self.device.checked(|| {
             let usage = BufferUsages::STORAGE | BufferUsages::COPY_SRC | BufferUsages::COPY_DST;
             let buffer = self.device.buffer(size, usage);
-            let buffers = [&self.work, &buffer, &self.completion[0]]
+            let buffers = [&self.params, &buffer, &self.completion[0]]
                 .into_iter()
                 .chain(&self.slider_values);
             let group = bind_group(&self.device, &self.kernels.layouts[0], &buffers.collect::<Vec<_>>());
             Target { region, buffer, group }
         });
-        let what = format!("a film of {} x {} pixels", region.width(), region.height());
-        self.explained(target, Some((what, size)))
+        let name = format!("a film of {} x {} pixels", region.width(), region.height());
+        self.explain(target, Some((name, size)))
     }
 
     fn kernel(&self) -> &'static Kernel {
         kernel_of(self.rules.film_layout().adaptive)
     }
 
-    fn held(&self) -> Held {
-        Held {
+    fn memory_use(&self) -> MemoryUse {
+        MemoryUse {
             scene: self.scene.bytes,
             film: self.film.as_ref().map_or(0, |(film, _)| film.buffer.size()),
-            copies: self.before.as_ref().map_or(0, |before| before.size()),
+            copies: self.saved_rows.as_ref().map_or(0, |buffer| buffer.size()),
         }
     }
 
-    fn explained<T>(&self, result: Result<T, RenderError>, asked: Option<FailedAllocation>) -> Result<T, RenderError> {
-        result.map_err(|error| self.held().explain(error, asked.as_ref()))
+    /// Describes an out-of-memory error, and the failed allocation if known.
+    fn explain<T>(&self, result: Result<T, RenderError>, failed: Option<FailedAllocation>) -> Result<T, RenderError> {
+        result.map_err(|error| self.memory_use().explain(error, failed.as_ref()))
     }
 
     /// Dispatches a kernel over a tile after `copies`, and starts mapping its completion record.
@@ -323,7 +326,7 @@ impl Gpu {
         samples: Range<u32>,
         copies: impl FnOnce(&mut wgpu::CommandEncoder),
     ) -> Result<Mapping, RenderError> {
-        let work = DispatchParams {
+        let params = DispatchParams {
             origin: UVec2::new(tile.x0, tile.y0),
             size: UVec2::new(tile.width(), tile.height()),
             film_origin: UVec2::new(target.region.x0, target.region.y0),
@@ -335,7 +338,7 @@ impl Gpu {
         let [written, read] = &self.completion;
         let [columns, rows] = groups(tile);
         self.device.checked(|| {
-            queue.write_buffer(&self.work, 0, bytes_of(&work));
+            queue.write_buffer(&self.params, 0, bytes_of(&params));
             let mut encoder = device.create_command_encoder(&Default::default());
             copies(&mut encoder);
             encoder.clear_buffer(written, 0, None);
@@ -350,31 +353,32 @@ impl Gpu {
             }
             pass.dispatch_workgroups(columns, rows, 1);
             drop(pass);
-            encoder.copy_buffer_to_buffer(written, 0, read, 0, RECEIPT);
+            encoder.copy_buffer_to_buffer(written, 0, read, 0, COMPLETION_BYTES);
             if let Some(timer) = &self.timer {
-                timer.resolve(&mut encoder, read, RECEIPT);
+                timer.resolve(&mut encoder, read, COMPLETION_BYTES);
             }
             queue.submit([encoder.finish()]);
             self.device.map(read)
         })
     }
 
-    /// Returns true if the driver truncated no loop of a finished dispatch. Records its duration if timing is enabled.
-    fn ran_whole(
+    /// Returns true if the driver truncated no loop of a finished dispatch. Records the duration of the dispatch if
+    /// timing is enabled.
+    fn ran_completely(
         &mut self,
         kernel: &'static str,
         tile: Region,
         samples: u32,
         start: Instant,
     ) -> Result<bool, RenderError> {
-        let waited = start.elapsed();
+        let elapsed = start.elapsed();
         let completion: Vec<u32> = self.device.mapped(&self.completion[1])?;
-        let (completion, ticks) = completion.split_at((RECEIPT / 4) as usize);
+        let (completion, ticks) = completion.split_at((COMPLETION_BYTES / 4) as usize);
         if let Some(timer) = &self.timer {
-            let measured = timer.took(ticks);
+            let measured = timer.duration(ticks);
             self.dispatches.push(Dispatch {
                 kernel,
-                took: measured.unwrap_or(waited),
+                took: measured.unwrap_or(elapsed),
                 by_device: measured.is_some(),
                 samples: tile.pixels() * u64::from(samples),
             });
@@ -383,7 +387,7 @@ impl Gpu {
         Ok(completion == [columns * rows, 0])
     }
 
-    fn idle(&self) -> Result<(), RenderError> {
+    fn check_idle(&self) -> Result<(), RenderError> {
         match self.pending {
             Some(_) => Err(RenderError::Pending),
             None => Ok(()),
@@ -395,25 +399,25 @@ impl Gpu {
     fn dispatch_part(&mut self, tile: Region, samples: Range<u32>) -> Result<(), RenderError> {
         let (film, _) = self.film.as_ref().ok_or(RenderError::NoFilm)?;
         let rows = Rows::of(film, tile);
-        let before = match self.before.take().filter(|before| before.size() >= rows.bytes()) {
-            Some(before) => before,
+        let saved_rows = match self.saved_rows.take().filter(|buffer| buffer.size() >= rows.bytes()) {
+            Some(buffer) => buffer,
             None => {
                 let usage = BufferUsages::COPY_SRC | BufferUsages::COPY_DST;
-                let before = self.device.checked(|| self.device.buffer(rows.bytes(), usage));
-                let what = format!("a copy of {} rows of the film", tile.height());
-                self.explained(before, Some((what, rows.bytes())))?
+                let buffer = self.device.checked(|| self.device.buffer(rows.bytes(), usage));
+                let name = format!("a copy of {} rows of the film", tile.height());
+                self.explain(buffer, Some((name, rows.bytes())))?
             }
         };
-        let most = self.rules.end_of_part(&samples) - samples.start;
-        let end = samples.start + self.samples_per_dispatch.min(most);
+        let max_samples = self.rules.end_of_part(&samples) - samples.start;
+        let end = samples.start + self.samples_per_dispatch.min(max_samples);
         let save = |encoder: &mut wgpu::CommandEncoder| {
-            for (start, copy) in rows.pieces() {
-                encoder.copy_buffer_to_buffer(&film.buffer, start, &before, copy, rows.size);
+            for (film_offset, copy_offset) in rows.pieces() {
+                encoder.copy_buffer_to_buffer(&film.buffer, film_offset, &saved_rows, copy_offset, rows.size);
             }
         };
         let start = Instant::now();
         let completion = self.dispatch(&self.render, film, tile, samples.start..end, save)?;
-        self.before = Some(before);
+        self.saved_rows = Some(saved_rows);
         self.pending = Some(Pending {
             tile,
             samples,
@@ -434,7 +438,7 @@ impl Gpu {
             ..
         } = pending;
         let kernel = self.kernel().entry_point;
-        let rest = match self.ran_whole(kernel, tile, end - samples.start, start)? {
+        let remaining = match self.ran_completely(kernel, tile, end - samples.start, start)? {
             true => end..samples.end,
             false => {
                 self.undo(tile)?;
@@ -446,21 +450,22 @@ impl Gpu {
                 samples
             }
         };
-        match rest.is_empty() {
+        match remaining.is_empty() {
             true => Ok(()),
-            false => self.dispatch_part(tile, rest),
+            false => self.dispatch_part(tile, remaining),
         }
     }
 
+    /// Restores the film rows of a tile.
     fn undo(&self, tile: Region) -> Result<(), RenderError> {
-        let (Some((film, _)), Some(before)) = (&self.film, &self.before) else {
+        let (Some((film, _)), Some(saved_rows)) = (&self.film, &self.saved_rows) else {
             return Ok(());
         };
         let rows = Rows::of(film, tile);
         self.device.checked(|| {
             let mut encoder = self.device.device.create_command_encoder(&Default::default());
-            for (start, copy) in rows.pieces() {
-                encoder.copy_buffer_to_buffer(before, copy, &film.buffer, start, rows.size);
+            for (film_offset, copy_offset) in rows.pieces() {
+                encoder.copy_buffer_to_buffer(saved_rows, copy_offset, &film.buffer, film_offset, rows.size);
             }
             self.device.queue.submit([encoder.finish()]);
         })
@@ -480,10 +485,9 @@ impl Gpu {
         }
     }
 
-    /// Discards the film after an error. Also discards the completion buffer, since copies to the buffer would fail
-    /// while it is mapped.
-    fn or_lost<T>(&mut self, result: Result<T, RenderError>) -> Result<T, RenderError> {
-        let result = self.explained(result, None);
+    /// Discards the film after an error. Also replaces the completion buffer, because copies to a mapped buffer fail.
+    fn discard_film_on_error<T>(&mut self, result: Result<T, RenderError>) -> Result<T, RenderError> {
+        let result = self.explain(result, None);
         if result.is_err() {
             self.pending = None;
             self.film = None;
@@ -497,12 +501,12 @@ impl Gpu {
             Some(pipeline) => pipeline,
             None => self.kernels.compile(&self.device, &FIRST_HITS)?,
         };
-        let target = self.target(FIRST_HITS_RECORD, region)?;
+        let target = self.target(FIRST_HIT_BYTES, region)?;
         let start = Instant::now();
         let completion = self.dispatch(&pipeline, &target, region, 0..0, |_| ())?;
         self.first_hits = Some(pipeline);
         self.device.wait_for(&completion)?;
-        match self.ran_whole(FIRST_HITS.entry_point, region, 1, start)? {
+        match self.ran_completely(FIRST_HITS.entry_point, region, 1, start)? {
             true => self.device.download(&target.buffer),
             false => Err(self.truncation_error()),
         }
@@ -520,11 +524,14 @@ fn kernel_of(adaptive: bool) -> &'static Kernel {
     if adaptive { &ADAPTIVE } else { &RENDER }
 }
 
-const RECEIPT: u64 = size_of::<[u32; 2]>() as u64;
+const COMPLETION_BYTES: u64 = size_of::<[u32; 2]>() as u64;
 
 /// Creates the mappable buffer for a completion record and timestamps.
 fn completion_staging(device: &Device) -> wgpu::Buffer {
-    device.buffer(RECEIPT + TIMES, BufferUsages::COPY_DST | BufferUsages::MAP_READ)
+    device.buffer(
+        COMPLETION_BYTES + TIMESTAMP_BYTES,
+        BufferUsages::COPY_DST | BufferUsages::MAP_READ,
+    )
 }
 
 /// Converts a kernel's records, the non-empty lists in order, to a film.
@@ -543,47 +550,47 @@ fn groups(tile: Region) -> [u32; 2] {
 
 impl Backend for Gpu {
     fn begin(&mut self, region: Region) -> Result<(), RenderError> {
-        self.idle()?;
-        let started = self.rules.begin(region)?;
+        self.check_idle()?;
+        let film_state = self.rules.begin(region)?;
         self.film = None; // freed first, since both may not fit into memory
         let film = self.target(self.rules.film_layout().bytes(), region)?;
-        self.film = Some((film, started));
+        self.film = Some((film, film_state));
         Ok(())
     }
 
     fn resume(&mut self, film: Film) -> Result<(), RenderError> {
-        self.idle()?;
-        let started = self.rules.resume(&film)?;
+        self.check_idle()?;
+        let film_state = self.rules.resume(&film)?;
         self.begin(film.region)?;
         let result = match &self.film {
             Some((target, _)) => self.device.checked(|| {
-                let mut at = 0;
+                let mut offset = 0;
                 for list in film.lists() {
-                    self.device.queue.write_buffer(&target.buffer, at, cast_slice(list));
-                    at += size_of_val(list.as_slice()) as u64;
+                    self.device.queue.write_buffer(&target.buffer, offset, cast_slice(list));
+                    offset += size_of_val(list.as_slice()) as u64;
                 }
             }),
             None => Err(RenderError::NoFilm),
         };
-        self.or_lost(result)?;
-        self.film = self.film.take().map(|(target, _)| (target, started));
+        self.discard_film_on_error(result)?;
+        self.film = self.film.take().map(|(target, _)| (target, film_state));
         Ok(())
     }
 
     fn submit(&mut self, tile: Region, samples: Range<u32>) -> Result<(), RenderError> {
-        self.idle()?;
-        let (_, started) = self.film.as_mut().ok_or(RenderError::NoFilm)?;
-        if !self.rules.call(started, tile, &samples)? {
+        self.check_idle()?;
+        let (_, film_state) = self.film.as_mut().ok_or(RenderError::NoFilm)?;
+        if !self.rules.call(film_state, tile, &samples)? {
             return Ok(());
         }
         let result = self.dispatch_part(tile, samples);
-        self.or_lost(result)
+        self.discard_film_on_error(result)
     }
 
     fn poll(&mut self) -> Result<bool, RenderError> {
         if self.pending.is_some() {
             let result = self.device.poll().and_then(|()| self.step());
-            self.or_lost(result)?;
+            self.discard_film_on_error(result)?;
         }
         Ok(self.pending.is_none())
     }
@@ -591,32 +598,32 @@ impl Backend for Gpu {
     fn wait(&mut self) -> Result<(), RenderError> {
         while self.pending.is_some() {
             let result = self.device.wait().and_then(|()| self.step());
-            self.or_lost(result)?;
+            self.discard_film_on_error(result)?;
         }
         Ok(())
     }
 
     fn film(&mut self) -> Result<Film, RenderError> {
-        self.idle()?;
+        self.check_idle()?;
         let (film, _) = self.film.as_ref().ok_or(RenderError::NoFilm)?;
         let region = film.region;
         if region.is_empty() {
             return Ok(self.rules.empty_film(region));
         }
         let result = self.device.download(&film.buffer);
-        let result = self.explained(result, Some(("a copy of the film".to_string(), film.buffer.size())));
-        let records: Vec<Vec4> = self.or_lost(result)?;
+        let result = self.explain(result, Some(("a copy of the film".to_string(), film.buffer.size())));
+        let records: Vec<Vec4> = self.discard_film_on_error(result)?;
         Ok(film_of(region, self.rules.film_layout(), &records))
     }
 
     fn first_hits(&mut self, region: Region) -> Result<Vec<FirstHit>, RenderError> {
-        self.idle()?;
+        self.check_idle()?;
         self.rules.in_picture(region)?;
         if region.is_empty() {
             return Ok(Vec::new());
         }
         let result = self.find_first_hits(region);
-        self.or_lost(result)
+        self.discard_film_on_error(result)
     }
 
     fn samples_of_all(&self) -> u32 {
@@ -631,15 +638,15 @@ impl Backend for Gpu {
         let info = &self.device.info;
         let bytes = info.largest_binding.min(info.largest_buffer);
         let film_layout = self.rules.film_layout();
-        let most = bytes / film_layout.bytes().max(FIRST_HITS_RECORD) as u64;
+        let max_pixels = bytes / film_layout.bytes().max(FIRST_HIT_BYTES) as u64;
         if !film_layout.adaptive {
-            return most;
+            return max_pixels;
         }
         let picture = self.rules.picture();
-        let beside = 2 * (u64::from(picture.width()) + u64::from(picture.height())) + 4;
-        match picture.pixels() <= most {
-            true => most,
-            false => most.saturating_sub(beside), // a region comes with the pixels around it
+        let neighbors = 2 * (u64::from(picture.width()) + u64::from(picture.height())) + 4;
+        match picture.pixels() <= max_pixels {
+            true => max_pixels,
+            false => max_pixels.saturating_sub(neighbors), // the film of a region includes neighbors of the region
         }
     }
 }

@@ -1,5 +1,5 @@
-//! Correctly rounded quotients and square roots on devices that round them differently: in naga modules, function calls
-//! replace the operations.
+//! Correctly rounded quotients and square roots for devices that round them differently: function calls replace the
+//! operations in naga modules.
 
 use std::collections::HashMap;
 
@@ -18,6 +18,7 @@ pub enum Rounding {
     Software,
 }
 
+/// The call that replaces an expression: function and arguments.
 type Calls = HashMap<Handle<Expression>, (Handle<Function>, Vec<Handle<Expression>>)>;
 
 const QUOTIENTS: [&str; 4] = ["quotient", "quotient2", "quotient3", "quotient4"];
@@ -25,16 +26,19 @@ const SQUARE_ROOTS: [&str; 4] = ["square_root", "square_root2", "square_root3", 
 
 /// A function that `shaders/rounding.wgsl` lacks.
 #[derive(Debug, thiserror::Error)]
-#[error("there is no function '{0}'")]
+#[error("the function '{0}' is missing")]
 pub struct MissingFunction(&'static str);
 
 /// Replaces all float quotients and square roots by calls of `shaders/rounding.wgsl`.
 pub fn round_in_software(module: &mut Module, info: &ModuleInfo) -> Result<(), MissingFunction> {
-    // These use the device's operations.
-    let own = [named(module, QUOTIENTS[0])?, named(module, SQUARE_ROOTS[0])?];
+    // These two functions use the device's operations.
+    let excluded = [
+        function_named(module, QUOTIENTS[0])?,
+        function_named(module, SQUARE_ROOTS[0])?,
+    ];
     let mut in_functions = Vec::new();
     for (handle, function) in module.functions.iter() {
-        if !own.contains(&handle) {
+        if !excluded.contains(&handle) {
             in_functions.push((handle, calls_of(module, function, &info[handle])?));
         }
     }
@@ -44,16 +48,16 @@ pub fn round_in_software(module: &mut Module, info: &ModuleInfo) -> Result<(), M
     }
     for (handle, calls) in in_functions {
         let function = &mut module.functions[handle];
-        call(&mut function.body, &mut function.expressions, &calls);
+        insert_calls(&mut function.body, &mut function.expressions, &calls);
     }
     for (entry_point, calls) in module.entry_points.iter_mut().zip(in_entry_points) {
         let function = &mut entry_point.function;
-        call(&mut function.body, &mut function.expressions, &calls);
+        insert_calls(&mut function.body, &mut function.expressions, &calls);
     }
     Ok(())
 }
 
-fn named(module: &Module, name: &'static str) -> Result<Handle<Function>, MissingFunction> {
+fn function_named(module: &Module, name: &'static str) -> Result<Handle<Function>, MissingFunction> {
     let found = module.functions.iter().find(|(_, f)| f.name.as_deref() == Some(name));
     found.map(|(handle, _)| handle).ok_or(MissingFunction(name))
 }
@@ -79,13 +83,13 @@ fn calls_of(module: &Module, function: &Function, info: &FunctionInfo) -> Result
             TypeInner::Vector { size, scalar } if scalar.kind == ScalarKind::Float => *size as usize,
             _ => continue, // integers
         };
-        calls.insert(handle, (named(module, names[components - 1])?, arguments));
+        calls.insert(handle, (function_named(module, names[components - 1])?, arguments));
     }
     Ok(calls)
 }
 
-/// Splits evaluation at each replaced expression, and inserts the call that replaces it.
-fn call(block: &mut Block, expressions: &mut Arena<Expression>, calls: &Calls) {
+/// Splits the evaluation range at each replaced expression, and inserts the call that replaces the expression.
+fn insert_calls(block: &mut Block, expressions: &mut Arena<Expression>, calls: &Calls) {
     for (statement, span) in std::mem::take(block).span_into_iter() {
         let Statement::Emit(range) = statement else {
             block.push(with_calls(statement, expressions, calls), span);
@@ -120,7 +124,7 @@ fn call(block: &mut Block, expressions: &mut Arena<Expression>, calls: &Calls) {
 
 fn with_calls(mut statement: Statement, expressions: &mut Arena<Expression>, calls: &Calls) -> Statement {
     match &mut statement {
-        Statement::Block(block) => call(block, expressions, calls),
+        Statement::Block(block) => insert_calls(block, expressions, calls),
         Statement::If {
             accept: first,
             reject: second,
@@ -131,12 +135,12 @@ fn with_calls(mut statement: Statement, expressions: &mut Arena<Expression>, cal
             continuing: second,
             ..
         } => {
-            call(first, expressions, calls);
-            call(second, expressions, calls);
+            insert_calls(first, expressions, calls);
+            insert_calls(second, expressions, calls);
         }
         Statement::Switch { cases, .. } => cases
             .iter_mut()
-            .for_each(|case| call(&mut case.body, expressions, calls)),
+            .for_each(|case| insert_calls(&mut case.body, expressions, calls)),
         _ => {}
     }
     statement

@@ -6,7 +6,7 @@ use crate::error::ShaderError;
 use crate::excerpt;
 
 impl ShaderError {
-    pub(crate) fn other(stage: &str, error: &dyn std::error::Error) -> ShaderError {
+    pub(crate) fn at_stage(stage: &str, error: &dyn std::error::Error) -> ShaderError {
         ShaderError {
             place: stage.to_string(),
             message: chain(error),
@@ -23,9 +23,9 @@ impl ShaderError {
                 excerpt: None,
             };
         };
-        let before = &text[..offset];
-        let line = before.matches('\n').count() + 1;
-        let start = before.rfind('\n').map_or(0, |at| at + 1);
+        let preceding = &text[..offset];
+        let line = preceding.matches('\n').count() + 1;
+        let start = preceding.rfind('\n').map_or(0, |newline| newline + 1);
         let column = text[start..offset].chars().count() + 1;
         let line_text = text[start..].lines().next().unwrap_or("");
         let marked = range.and_then(|range| text.get(offset..offset + range.len()));

@@ -1,5 +1,5 @@
-//! Overrides in shaders as sliders of the development mode: kernels read them from a uniform buffer, without
-//! recompilation.
+//! Overrides in shaders as sliders of the development mode: kernels read the values from a uniform buffer, so that a
+//! change needs no compilation.
 
 use std::ops::Range;
 
@@ -33,7 +33,7 @@ pub struct Slider {
     pub min: f64,
     /// Maximum value of a number.
     pub max: f64,
-    /// Value in the file.
+    /// Default value in the file.
     pub default: Value,
 }
 
@@ -103,7 +103,7 @@ impl Slider {
     }
 }
 
-/// Returns the sliders of the kernel that renders: overrides with a default value that compilation does not need.
+/// Returns the sliders of the rendering kernel: overrides with a default value, except those that compilation needs.
 pub fn sliders(shaders: &Shaders, integrator: Integrator, adaptive: bool) -> Vec<Slider> {
     if !shaders.files().any(|(_, text)| text.contains("override")) {
         return Vec::new();
@@ -130,7 +130,7 @@ pub fn with_buffer(source: Source, kernel: &Kernel, sliders: &[Slider]) -> Resul
     for (Slider { file, name, kind, .. }, range) in declared(&checked, &source) {
         let Some(i) = sliders
             .iter()
-            .position(|known| (&known.file, &known.name) == (&file, &name))
+            .position(|slider| (&slider.file, &slider.name) == (&file, &name))
         else {
             continue;
         };
@@ -160,10 +160,10 @@ pub fn with_buffer(source: Source, kernel: &Kernel, sliders: &[Slider]) -> Resul
 /// Returns a kernel's sliders, and the locations of the declarations.
 fn declared(checked: &ValidKernel, source: &Source) -> impl Iterator<Item = (Slider, Range<usize>)> {
     let module = checked.module();
-    module.overrides.iter().filter_map(move |(handle, declared)| {
+    module.overrides.iter().filter_map(move |(handle, declaration)| {
         let Override {
             name, id: None, init, ..
-        } = declared
+        } = declaration
         else {
             return None;
         };
@@ -180,8 +180,8 @@ fn declared(checked: &ValidKernel, source: &Source) -> impl Iterator<Item = (Sli
         };
         let range = module.overrides.get_span(handle).to_range()?;
         let (file, text, start) = source.locate(range.start)?;
-        let rest = text.get(start + range.len()..)?.lines().next().unwrap_or_default();
-        let [min, max] = range_of(kind, default, rest);
+        let line_end = text.get(start + range.len()..)?.lines().next().unwrap_or_default();
+        let [min, max] = range_of(kind, default, line_end);
         let slider = Slider {
             file: file.to_string(),
             name: name.clone()?,
@@ -195,7 +195,7 @@ fn declared(checked: &ValidKernel, source: &Source) -> impl Iterator<Item = (Sli
     })
 }
 
-/// Returns true for overrides in the size of an array or workgroup, or in another declaration.
+/// Returns true if the size of an array or workgroup, or another declaration, depends on an override.
 fn is_needed_to_compile(module: &Module, handle: Handle<Override>) -> bool {
     let in_expressions = module
         .global_expressions
@@ -205,26 +205,30 @@ fn is_needed_to_compile(module: &Module, handle: Handle<Override>) -> bool {
     in_expressions || module.types.iter().any(|(_, ty)| is_size(&ty.inner))
 }
 
-/// Returns the range in a comment after a declaration, `// LOW..HIGH`, else a range around the value.
-fn range_of(kind: Kind, default: Value, rest: &str) -> [f64; 2] {
+/// Returns the range in a comment after a declaration, `// LOW..HIGH`; without a comment, a range around the value.
+fn range_of(kind: Kind, default: Value, line_end: &str) -> [f64; 2] {
     let Value::Number(value) = default else {
         return kind.limits();
     };
-    let comment = rest.trim_start().strip_prefix("//").unwrap_or_default().trim_start();
-    let written = comment.strip_prefix("slider").unwrap_or(comment).split_once("..");
-    let parsed = written.and_then(|(low, high)| {
+    let comment = line_end
+        .trim_start()
+        .strip_prefix("//")
+        .unwrap_or_default()
+        .trim_start();
+    let bounds = comment.strip_prefix("slider").unwrap_or(comment).split_once("..");
+    let parsed = bounds.and_then(|(low, high)| {
         let high = high.split_whitespace().next()?;
         Some([low.trim().parse::<f64>().ok()?, high.parse().ok()?])
     });
-    let around = || {
+    let default_range = || {
         [
             0.0f64.min(2.0 * value),
             (2.0 * value).max(if kind == Kind::F32 { 1.0 } else { 8.0 }),
         ]
     };
-    let [low, high] = parsed.filter(|[low, high]| low < high).unwrap_or_else(around);
-    let [least, most] = kind.limits();
-    [low.min(value).max(least), high.max(value).min(most)]
+    let [low, high] = parsed.filter(|[low, high]| low < high).unwrap_or_else(default_range);
+    let [min, max] = kind.limits();
+    [low.min(value).max(min), high.max(value).min(max)]
 }
 
 #[cfg(test)]
@@ -233,19 +237,19 @@ mod tests {
 
     const PHONG: Integrator = Integrator::Phong;
 
-    fn shaders(more: &str) -> Shaders {
+    fn shaders(appended: &str) -> Shaders {
         let text = Shaders::built_in().text("phong.wgsl").to_string();
-        Shaders::built_in().with("phong.wgsl", text + more)
+        Shaders::built_in().with("phong.wgsl", text + appended)
     }
 
-    fn found(more: &str) -> Vec<Slider> {
-        sliders(&shaders(more), PHONG, false)
+    fn sliders_of(appended: &str) -> Vec<Slider> {
+        sliders(&shaders(appended), PHONG, false)
     }
 
     #[test]
     fn overrides_with_values_are_sliders() {
         let lines = Shaders::built_in().text("phong.wgsl").lines().count();
-        let found = found(
+        let found = sliders_of(
             "override gain: f32 = 0.1; // 0..4\n  override passes: i32 = -3; // slider -8..8 steps\n\
              override many = 20u;\noverride on: bool = true; // whether\noverride wide: f32 = 2.0 * 1.5; // 0..1\n",
         );
@@ -284,7 +288,7 @@ mod tests {
     #[test]
     fn overrides_that_compilation_needs_are_not_sliders() {
         let free = "override free: f32 = 0.5; // 0..1\nfn half_of(x: f32) -> f32 { return x * free; }\n";
-        assert_eq!(found(free).len(), 1);
+        assert_eq!(sliders_of(free).len(), 1);
         for bound in [
             "override size: u32 = 3u;\nvar<workgroup> many: array<f32, size>;\n",
             "override size: u32 = 3u;\nvar<workgroup> many: array<f32, size * 2u>;\n",
@@ -293,28 +297,28 @@ mod tests {
             "@id(7) override numbered: f32 = 0.5;\n",
             "const constant: f32 = 0.5; // slider 0..1\n",
         ] {
-            let names: Vec<String> = found(&(free.to_string() + bound))
+            let names: Vec<String> = sliders_of(&(free.to_string() + bound))
                 .into_iter()
                 .map(|slider| slider.name)
                 .collect();
             assert_eq!(names, ["free"], "{bound}");
         }
-        assert_eq!(found("override broken: f32 = missing;\n"), []);
+        assert_eq!(sliders_of("override broken: f32 = missing;\n"), []);
     }
 
     #[test]
     fn kernels_read_the_values_and_keep_their_lines() {
-        let own = shaders(
+        let edited = shaders(
             "override a: f32 = 0.5; override b: bool = true;\nfn used() -> f32 { return select(0.0, a, b); }\n",
         );
-        let all = sliders(&own, PHONG, false);
-        let before = own.compose(&RENDER, PHONG, None);
+        let all = sliders(&edited, PHONG, false);
+        let before = edited.compose(&RENDER, PHONG, None);
         let after = with_buffer(before.clone(), &RENDER, &all).unwrap();
         check(&after).unwrap_or_else(|error| panic!("{error}"));
-        let line = |source: &Source, what: &str| source.text.lines().position(|line| line.contains(what));
-        for what in ["fn used()", "fn render(", "fn advance("] {
-            assert!(line(&before, what).is_some());
-            assert_eq!(line(&after, what), line(&before, what), "{what}");
+        let line = |source: &Source, code: &str| source.text.lines().position(|line| line.contains(code));
+        for code in ["fn used()", "fn render(", "fn advance("] {
+            assert!(line(&before, code).is_some());
+            assert_eq!(line(&after, code), line(&before, code), "{code}");
         }
         assert!(
             after

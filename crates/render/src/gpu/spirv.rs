@@ -38,8 +38,9 @@ pub fn instructions(module: &[u32]) -> impl Iterator<Item = (u16, &[u32])> {
     })
 }
 
-fn end_of(module: &[u32], kind: impl Fn(u16) -> bool) -> usize {
-    let first = instructions(module).take_while(|(opcode, _)| kind(*opcode));
+/// Returns the offset after the first instructions, as long as `is_included` returns true for their opcodes.
+fn end_of(module: &[u32], is_included: impl Fn(u16) -> bool) -> usize {
+    let first = instructions(module).take_while(|(opcode, _)| is_included(*opcode));
     HEADER + first.map(|(_, words)| words.len()).sum::<usize>()
 }
 
@@ -60,24 +61,24 @@ pub fn forbid_contraction(module: &[u32]) -> Vec<u32> {
 
 /// Requests 32-bit float controls in all entry points: capabilities and execution modes (SPIR-V 1.6, sections 3.31 and
 /// 3.6), and the extension.
-pub fn ask_for(controls: FloatControls, module: &[u32]) -> Vec<u32> {
-    let wanted: Vec<(u32, u32)> = [
+pub fn request_controls(controls: FloatControls, module: &[u32]) -> Vec<u32> {
+    let requested: Vec<(u32, u32)> = [
         (controls.denormals, (4464, 4459)),
         (controls.signed_zeros, (4466, 4461)),
         (controls.rounding, (4467, 4462)),
     ]
     .into_iter()
-    .filter_map(|(wanted, numbers)| wanted.then_some(numbers))
+    .filter_map(|(is_requested, numbers)| is_requested.then_some(numbers))
     .collect();
-    if wanted.is_empty() {
+    if requested.is_empty() {
         return module.to_vec();
     }
-    let capabilities = wanted
+    let capabilities = requested
         .iter()
         .flat_map(|(capability, _)| [instruction(OP_CAPABILITY, 2), *capability]);
     let entry_points = instructions(module).filter(|(opcode, _)| *opcode == OP_ENTRY_POINT);
     let modes = entry_points.flat_map(|(_, words)| {
-        let modes = wanted.iter().map(|(_, mode)| *mode);
+        let modes = requested.iter().map(|(_, mode)| *mode);
         modes.flat_map(|mode| [instruction(OP_EXECUTION_MODE, 4), words[2], mode, WIDTH])
     });
     let sections = [
@@ -124,8 +125,8 @@ mod tests {
 
     const KERNEL: &str = "
         @group(0) @binding(0) var<storage, read_write> out: array<f32>;
-        @compute @workgroup_size(4) fn half(@builtin(global_invocation_id) at: vec3u) {
-            out[at.x] = sqrt(out[at.x]) / 2.0;
+        @compute @workgroup_size(4) fn half(@builtin(global_invocation_id) id: vec3u) {
+            out[id.x] = sqrt(out[id.x]) / 2.0;
         }";
 
     fn module(controls: FloatControls) -> Vec<u32> {
@@ -158,28 +159,28 @@ mod tests {
 
     /// Returns the float-control capabilities, the execution modes with operands, and true if the extension is
     /// declared.
-    fn asked(module: &[u32]) -> (Vec<u32>, Vec<Vec<u32>>, bool) {
-        let of = |wanted: u16| instructions(module).filter(move |(opcode, _)| *opcode == wanted);
+    fn requested_controls(module: &[u32]) -> (Vec<u32>, Vec<Vec<u32>>, bool) {
+        let with_opcode = |expected: u16| instructions(module).filter(move |(opcode, _)| *opcode == expected);
         let controls = 4459..=4468;
-        let entry = of(15).next().expect("an entry point").1[2];
-        let capabilities = of(17)
+        let entry = with_opcode(15).next().expect("an entry point").1[2];
+        let capabilities = with_opcode(17)
             .map(|(_, words)| words[1])
             .filter(|number| controls.contains(number));
-        let modes = of(16).filter(|(_, words)| words[1] == entry && controls.contains(&words[2]));
-        let named = of(10).any(|(_, words)| {
+        let modes = with_opcode(16).filter(|(_, words)| words[1] == entry && controls.contains(&words[2]));
+        let has_extension = with_opcode(10).any(|(_, words)| {
             let bytes: Vec<u8> = words[1..].iter().flat_map(|word| word.to_le_bytes()).collect();
             bytes == *b"SPV_KHR_float_controls\0\0"
         });
         let modes = modes.map(|(_, words)| words[2..].to_vec());
-        (capabilities.collect(), modes.collect(), named)
+        (capabilities.collect(), modes.collect(), has_extension)
     }
 
     #[test]
     fn float_controls_are_in_their_sections() {
-        let one = |capability: u32, mode: u32| (vec![capability], vec![vec![mode, 32]], true);
-        let (denormals, signed_zeros, rounding) = (one(4464, 4459), one(4466, 4461), one(4467, 4462));
+        let single = |capability: u32, mode: u32| (vec![capability], vec![vec![mode, 32]], true);
+        let (denormals, signed_zeros, rounding) = (single(4464, 4459), single(4466, 4461), single(4467, 4462));
         let none = FloatControls::NONE;
-        for (controls, wanted) in [
+        for (controls, expected) in [
             (none, (vec![], vec![], false)),
             (
                 FloatControls {
@@ -206,13 +207,13 @@ mod tests {
             ),
         ] {
             let module = module(controls);
-            assert_eq!(asked(&module), wanted, "{controls:?}");
+            assert_eq!(requested_controls(&module), expected, "{controls:?}");
             assert!(in_order(&module), "{controls:?}");
         }
         let (plain, all) = (module(none), module(FloatControls::ALL));
         let other_instructions = |module: &[u32]| -> Vec<Vec<u32>> {
-            let of_controls = |words: &[u32]| words[1..].iter().any(|word| (4459..=4468).contains(word));
-            let others = instructions(module).filter(|(opcode, words)| *opcode != 10 && !of_controls(words));
+            let is_control = |words: &[u32]| words[1..].iter().any(|word| (4459..=4468).contains(word));
+            let others = instructions(module).filter(|(opcode, words)| *opcode != 10 && !is_control(words));
             others.map(|(_, words)| words.to_vec()).collect()
         };
         assert_eq!(
@@ -229,9 +230,9 @@ mod tests {
         let mut wrong = module.clone();
         let capabilities = end_of(&module, |opcode| opcode == OP_CAPABILITY);
         let first: Vec<u32> = wrong.drain(HEADER..HEADER + 2).collect();
-        let behind = capabilities + extension(FLOAT_CONTROLS).len() - 2;
-        wrong.splice(behind..behind, first);
-        assert_eq!(asked(&wrong).2, asked(&module).2);
+        let position = capabilities + extension(FLOAT_CONTROLS).len() - 2;
+        wrong.splice(position..position, first);
+        assert_eq!(requested_controls(&wrong).2, requested_controls(&module).2);
         assert!(!in_order(&wrong), "a capability after an extension was not detected");
     }
 }

@@ -1,4 +1,4 @@
-//! Buffer limits of a device: scenes that exceed the limits are rejected, and texels are split across buffers.
+//! Buffer limits of a device: texels are split across several buffers, and scenes that exceed the limits are rejected.
 
 use std::fmt::Write as _;
 
@@ -6,7 +6,7 @@ use glam::UVec4;
 
 use super::adapter::GpuInfo;
 use super::bake::{mesh_rows_count, node_rows_count};
-use super::pipeline::{GROUPS, SCENE, STORAGE_BUFFERS};
+use super::pipeline::{GROUPS, SCENE_GROUP, STORAGE_BUFFERS};
 use crate::error::RenderError;
 use crate::records::Packed;
 
@@ -44,14 +44,14 @@ impl TexelParts {
         }
         let shift = (largest / 4).max(1).ilog2().min(31);
         let count = packed.textures.texels.len().div_ceil(1 << shift).max(1);
-        let most = 1 + (info.storage_buffers as usize).saturating_sub(STORAGE_BUFFERS);
-        if count > most {
+        let max_count = 1 + (info.storage_buffers as usize).saturating_sub(STORAGE_BUFFERS);
+        if count > max_count {
             let (size, part) = (
                 mebibytes(4 * packed.textures.texels.len() as u64),
                 mebibytes(4 << shift),
             );
             return Err(too_large(format!(
-                "the scene's images need {size} MiB; the limit is {most} x {part} MiB"
+                "the scene's images need {size} MiB; the limit is {max_count} x {part} MiB"
             )));
         }
         Ok(TexelParts { count, shift })
@@ -62,7 +62,7 @@ impl TexelParts {
         let size = 1 << self.shift;
         (0..self.count)
             .map(move |i| texels.get(i * size..).unwrap_or_default())
-            .map(move |rest| &rest[..rest.len().min(size)])
+            .map(move |tail| &tail[..tail.len().min(size)])
     }
 
     /// Returns WGSL with the function of `shaders/texels.wgsl` for several buffers, and the bindings of all buffers
@@ -73,19 +73,19 @@ impl TexelParts {
         }
         let mut out = String::new();
         for i in 1..self.count {
-            let binding = GROUPS[SCENE].len() + i - 1;
+            let binding = GROUPS[SCENE_GROUP].len() + i - 1;
             let _ = writeln!(
                 out,
-                "@group({SCENE}) @binding({binding}) var<storage, read> texels_{i}: array<u32>;"
+                "@group({SCENE_GROUP}) @binding({binding}) var<storage, read> texels_{i}: array<u32>;"
             );
         }
         let (shift, mask) = (self.shift, (1u32 << self.shift) - 1);
         let _ = writeln!(out, "fn texel_word(i: u32) -> u32 {{");
-        let _ = writeln!(out, "    let part = i >> {shift}u;\n    let at = i & {mask}u;");
+        let _ = writeln!(out, "    let part = i >> {shift}u;\n    let offset = i & {mask}u;");
         for i in 1..self.count {
-            let _ = writeln!(out, "    if part == {i}u {{ return texels_{i}[at]; }}");
+            let _ = writeln!(out, "    if part == {i}u {{ return texels_{i}[offset]; }}");
         }
-        let _ = writeln!(out, "    return texels[at];\n}}");
+        let _ = writeln!(out, "    return texels[offset];\n}}");
         Some(out)
     }
 }

@@ -7,7 +7,7 @@ use wgpu::BufferUsages;
 use super::device::Device;
 
 /// Bytes of a dispatch's timestamps: start and end.
-pub const TIMES: u64 = 2 * size_of::<u64>() as u64;
+pub const TIMESTAMP_BYTES: u64 = 2 * size_of::<u64>() as u64;
 
 pub struct Timer {
     clock: Option<Clock>,
@@ -31,7 +31,7 @@ impl Timer {
                     ty: wgpu::QueryType::Timestamp,
                     count: 2,
                 }),
-                ticks: device.buffer(TIMES, BufferUsages::QUERY_RESOLVE | BufferUsages::COPY_SRC),
+                ticks: device.buffer(TIMESTAMP_BYTES, BufferUsages::QUERY_RESOLVE | BufferUsages::COPY_SRC),
                 period: f64::from(device.queue.get_timestamp_period()),
             }),
         }
@@ -47,20 +47,20 @@ impl Timer {
     }
 
     /// Copies the timestamps of a pass to a buffer.
-    pub fn resolve(&self, encoder: &mut wgpu::CommandEncoder, to: &wgpu::Buffer, offset: u64) {
+    pub fn resolve(&self, encoder: &mut wgpu::CommandEncoder, destination: &wgpu::Buffer, offset: u64) {
         if let Some(Clock { queries, ticks, .. }) = &self.clock {
             encoder.resolve_query_set(queries, 0..2, ticks, 0);
-            encoder.copy_buffer_to_buffer(ticks, 0, to, offset, TIMES);
+            encoder.copy_buffer_to_buffer(ticks, 0, destination, offset, TIMESTAMP_BYTES);
         }
     }
 
     /// Returns the duration between two timestamps, which take two words each.
-    pub fn took(&self, words: &[u32]) -> Option<Duration> {
+    pub fn duration(&self, words: &[u32]) -> Option<Duration> {
         let clock = self.clock.as_ref()?;
         let [a, b, c, d] = *words else { return None };
         let ticks = |low: u32, high: u32| u64::from(low) | u64::from(high) << 32;
-        let between = ticks(c, d).checked_sub(ticks(a, b)).filter(|ticks| *ticks > 0)?;
-        let nanoseconds = between as f64 * clock.period;
+        let elapsed = ticks(c, d).checked_sub(ticks(a, b)).filter(|ticks| *ticks > 0)?;
+        let nanoseconds = elapsed as f64 * clock.period;
         (nanoseconds < 3.6e12).then(|| Duration::from_nanos(nanoseconds as u64)) // longer durations are invalid
     }
 }

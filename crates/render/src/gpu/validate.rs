@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::bake::bake_if_small;
-use super::compile::{ValidKernel, check_at};
+use super::compile::{ValidKernel, check_with_offset};
 use super::compose::{KERNELS, Kernel, Shaders, Source};
 use super::float_controls::FloatControls;
 use super::functions::functions;
@@ -13,7 +13,7 @@ use crate::error::{ShaderError, ShaderErrors};
 use crate::records::Packed;
 
 /// Maximum number of errors reported per kernel.
-const MOST: usize = 16;
+const MAX_ERRORS: usize = 16;
 
 /// Representation of the scene in the checked kernels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -40,7 +40,7 @@ pub fn check_kernels(packed: &Packed, shaders: &Shaders, forms: Forms) -> Result
         .collect();
     let found: Vec<Vec<ShaderError>> = all
         .into_par_iter()
-        .map(|(kernel, scene)| mistakes(kernel, shaders.compose(kernel, packed.integrator, scene), packed))
+        .map(|(kernel, scene)| errors_of_kernel(kernel, shaders.compose(kernel, packed.integrator, scene), packed))
         .collect();
     let mut errors: Vec<ShaderError> = Vec::new();
     for error in found.into_iter().flatten() {
@@ -48,7 +48,8 @@ pub fn check_kernels(packed: &Packed, shaders: &Shaders, forms: Forms) -> Result
             errors.push(error);
         }
     }
-    // An error in a declaration also causes errors in code generated from it; these are omitted.
+    // An error in a declaration also causes errors in code that is generated from the declaration. The errors in
+    // generated code are omitted.
     if errors.iter().any(|error| is_in_file(error, shaders)) {
         errors.retain(|error| is_in_file(error, shaders));
     }
@@ -64,11 +65,11 @@ fn is_in_file(error: &ShaderError, shaders: &Shaders) -> bool {
     shaders.files().any(|(name, _)| Some(name) == file)
 }
 
-fn mistakes(kernel: &Kernel, source: Source, packed: &Packed) -> Vec<ShaderError> {
-    let (mut errors, rest) = mistakes_of_functions(source);
-    let Some((source, checked)) = rest else { return errors };
-    match interface::mistakes(kernel, packed.integrator, &source, &checked, errors.is_empty()) {
-        Ok(more) => errors.extend(more),
+fn errors_of_kernel(kernel: &Kernel, source: Source, packed: &Packed) -> Vec<ShaderError> {
+    let (mut errors, valid) = errors_of_functions(source);
+    let Some((source, checked)) = valid else { return errors };
+    match interface::errors(kernel, packed.integrator, &source, &checked, errors.is_empty()) {
+        Ok(interface_errors) => errors.extend(interface_errors),
         Err(error) => errors.push(error),
     }
     if errors.is_empty() {
@@ -78,17 +79,17 @@ fn mistakes(kernel: &Kernel, source: Source, packed: &Packed) -> Vec<ShaderError
     errors
 }
 
-/// Finds the errors in all functions, although naga stops at the first one: a function with an error gets an empty
-/// body, which its callers accept. The rest is valid, unless an error is outside all bodies.
-fn mistakes_of_functions(mut source: Source) -> (Vec<ShaderError>, Option<(Source, ValidKernel)>) {
+/// Finds the errors in all functions, although naga stops at the first error: a function with an error gets an empty
+/// body, which callers of the function accept. Also returns the valid remainder, unless an error is outside all bodies.
+fn errors_of_functions(mut source: Source) -> (Vec<ShaderError>, Option<(Source, ValidKernel)>) {
     let mut errors: Vec<ShaderError> = Vec::new();
     loop {
-        let (mut error, at) = match check_at(&source) {
+        let (mut error, offset) = match check_with_offset(&source) {
             Ok(checked) => return (errors, Some((source, checked))),
             Err(error) => error,
         };
         let texts = functions(&source.text);
-        let emptied = |i: usize| {
+        let with_empty_body = |i: usize| {
             let function = &texts[i];
             let body = match function.result {
                 "" => "{}".to_string(),
@@ -96,27 +97,33 @@ fn mistakes_of_functions(mut source: Source) -> (Vec<ShaderError>, Option<(Sourc
             };
             source.replaced(function.body.clone(), &body)
         };
-        let culprit = match at {
-            Some(at) => texts.iter().position(|text| (text.start..text.body.end).contains(&at)),
+        let culprit = match offset {
+            Some(offset) => texts
+                .iter()
+                .position(|text| (text.start..text.body.end).contains(&offset)),
             // naga reports no location: the error disappears with the body of its function.
-            None => {
-                (0..texts.len()).find(|i| check_at(&emptied(*i)).err().map(|(error, _)| error).as_ref() != Some(&error))
-            }
+            None => (0..texts.len()).find(|i| {
+                check_with_offset(&with_empty_body(*i))
+                    .err()
+                    .map(|(error, _)| error)
+                    .as_ref()
+                    != Some(&error)
+            }),
         };
-        if let (None, Some(i)) = (at, culprit) {
+        if let (None, Some(i)) = (offset, culprit) {
             let function = &texts[i];
             let message = format!("in `{}`: {}", function.name, error.message);
             let head = function.start..function.start + "fn ".len() + function.name.len();
             error = ShaderError::at(&source, Some(naga::Span::from(head)), message);
         }
-        let again = errors.iter().any(|known| known.place == error.place);
-        if !again {
+        let is_repeated = errors.iter().any(|earlier| earlier.place == error.place);
+        if !is_repeated {
             errors.push(error);
         }
-        let Some(i) = culprit.filter(|_| !again && errors.len() < MOST) else {
+        let Some(i) = culprit.filter(|_| !is_repeated && errors.len() < MAX_ERRORS) else {
             return (errors, None);
         };
-        source = emptied(i);
+        source = with_empty_body(i);
     }
 }
 
@@ -152,13 +159,14 @@ mod tests {
     }
 
     #[track_caller]
-    fn reports(edits: &[(&str, &str, &str)], wanted: &[&str]) {
+    fn reports(edits: &[(&str, &str, &str)], expected: &[&str]) {
         let messages = messages_of(edits);
-        assert_eq!(messages.len(), wanted.len(), "{messages:#?}");
-        for wanted in wanted {
-            let (place, parts) = wanted.split_once(' ').unwrap();
-            let fits = |line: &&String| line.starts_with(place) && parts.split(" .. ").all(|part| line.contains(part));
-            assert!(messages.iter().any(|line| fits(&line)), "{wanted}: {messages:#?}");
+        assert_eq!(messages.len(), expected.len(), "{messages:#?}");
+        for expected in expected {
+            let (location, parts) = expected.split_once(' ').unwrap();
+            let matches =
+                |line: &&String| line.starts_with(location) && parts.split(" .. ").all(|part| line.contains(part));
+            assert!(messages.iter().any(|line| matches(&line)), "{expected}: {messages:#?}");
         }
     }
 
@@ -279,7 +287,7 @@ mod tests {
                     "struct Receipts { groups_done: atomic<u32>, more: f32, truncated: atomic<u32> }",
                 ),
             ],
-            &["bindings.wgsl: `completion` is not laid out .. `completion.more` is `f32`"],
+            &["bindings.wgsl: `completion` does not have the layout .. `completion.more` is `f32`"],
         );
         reports(
             &[
@@ -300,7 +308,7 @@ mod tests {
         assert!(
             messages
                 .iter()
-                .any(|line| line.starts_with("bindings.wgsl:") && line.contains("laid out")),
+                .any(|line| line.starts_with("bindings.wgsl:") && line.contains("does not have the layout")),
             "{messages:#?}"
         );
         assert!(messages.iter().all(|line| !line.starts_with('(')), "{messages:#?}");
@@ -334,7 +342,7 @@ mod tests {
         reports(
             &[(
                 FIRST_HITS,
-                "hits[place.y * params.film_size.x + place.x] =",
+                "hits[film_pixel.y * params.film_size.x + film_pixel.x] =",
                 "let hit =",
             )],
             &["kernels/first_hits.wgsl: `first_hits` never writes `hits`"],
@@ -343,14 +351,14 @@ mod tests {
 
     #[test]
     fn messages_use_the_names_of_the_source() {
-        let with = |body: &str| {
+        let messages_with = |body: &str| {
             messages_of(&[(
                 "phong.wgsl",
                 "",
                 &format!("fn wrong(a: f32, b: vec3f, n: u32) {{\n    {body}\n}}"),
             )])
         };
-        for (body, wanted) in [
+        for (body, expected) in [
             ("if n { }", "condition `n` (`u32`) is not a boolean"),
             (
                 "let x = b + vec2f();",
@@ -385,11 +393,11 @@ mod tests {
             ("let x = b == camera;", "`camera` (`Camera`)"),
             ("let x = camera == camera;", "Incompatible operands"),
         ] {
-            let messages = with(body);
+            let messages = messages_with(body);
             // Only two of the three kernels have `film`; the third reports another error.
             let line = messages
                 .iter()
-                .find(|line| line.contains(wanted))
+                .find(|line| line.contains(expected))
                 .unwrap_or_else(|| panic!("{body}: {messages:?}"));
             let message = line.split_once(' ').unwrap().1;
             assert!(line.starts_with("phong.wgsl:"), "{line}");

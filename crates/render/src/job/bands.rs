@@ -19,19 +19,19 @@ use wgray_image::memory::fallible;
 pub enum Flow {
     /// Continue with the next dispatch.
     Continue,
-    /// Stop a render of all bands together once every pixel has a sample; otherwise continue.
+    /// Stop a render of all bands together as soon as every pixel has a sample; continue other renders.
     TimeIsUp,
-    /// Cancel the work.
+    /// Cancel the render.
     Cancel,
 }
 
 impl From<bool> for Flow {
-    fn from(is_extensible: bool) -> Flow {
-        if is_extensible { Flow::Continue } else { Flow::Cancel }
+    fn from(is_continued: bool) -> Flow {
+        if is_continued { Flow::Continue } else { Flow::Cancel }
     }
 }
 
-/// Callback after each dispatch, with the region of the band and the done fraction of all work, 0 to 1.
+/// Callback after each dispatch. It receives the region of the band and the finished fraction of all samples, 0 to 1.
 pub type Watch<'a> = dyn FnMut(&mut dyn Backend, Region, f64) -> Result<Flow, RenderError> + 'a;
 
 /// Renders the bands of a region, from top to bottom. The measured speed determines the size of dispatches. Pieces from
@@ -40,18 +40,19 @@ pub struct Bands<'a> {
     store: &'a mut dyn CheckpointStore,
     bands: VecDeque<Band>,
     samples: u32,
-    /// Completion of bands rendered together; `None` if they are rendered one after the other.
-    whole: Option<bool>,
-    /// Samples at the end of the current pass, if the bands are rendered in passes ([`Bands::in_passes`]).
-    pass: Option<u32>,
+    /// True if the bands rendered together are complete; `None` if bands are rendered one after the other.
+    together_complete: Option<bool>,
+    /// Samples per pixel at the end of the current pass, if the bands are rendered in passes ([`Bands::in_passes`]).
+    pass_end: Option<u32>,
     steps: Steps,
-    /// Samples over all pixels, in finished bands and in total.
-    done: f64,
-    total: f64,
+    /// Samples over all pixels of the finished bands.
+    finished_samples: f64,
+    /// Samples over all pixels of the region.
+    total_samples: f64,
     /// Time and duration of the last checkpoint.
-    kept: (Instant, Duration),
+    last_checkpoint: (Instant, Duration),
     /// Samples over all pixels that were rendered, not loaded.
-    rendered: f64,
+    rendered_samples: f64,
 }
 
 /// A rendered band.
@@ -98,30 +99,30 @@ impl FinishedBand {
 struct Band {
     region: Region,
     state: State,
-    /// The piece after the last whole pass, if the current pass has changed it.
-    passed: Option<FilmPiece>,
+    /// The piece after the last complete pass, if the current pass has changed the piece.
+    last_pass: Option<FilmPiece>,
 }
 
 enum State {
     New,
     Stored(StoredPiece),
-    Here(FilmPiece),
+    InMemory(FilmPiece),
 }
 
 #[derive(PartialEq, Eq)]
-enum End {
+enum Outcome {
     Done,
     TimeIsUp,
 }
 
-/// Target duration between copies of a film.
-const PASS: Duration = Duration::from_secs(1);
+/// Target duration of a pass, at the end of which the films are copied.
+const PASS_DURATION: Duration = Duration::from_secs(1);
 
 /// Minimum rows of a shortened band, without and with adaptive sampling, which adds two rows of neighbors.
 const MIN_ROWS: [u32; 2] = [16, 64];
 
 impl<'a> Bands<'a> {
-    /// Splits a region into bands, and takes over a store's pieces, which must lie in it.
+    /// Splits a region into bands. Pieces of the store, which must lie in the region, become bands.
     pub fn new(
         region: Region,
         samples: u32,
@@ -130,48 +131,48 @@ impl<'a> Bands<'a> {
         largest_film: u64,
         store: &'a mut dyn CheckpointStore,
     ) -> Bands<'a> {
-        let mut all = VecDeque::new();
+        let mut queue = VecDeque::new();
         let mut y = region.y0;
-        let add_new = |all: &mut VecDeque<Band>, y0: u32, y1: u32| {
+        let add_new = |queue: &mut VecDeque<Band>, y0: u32, y1: u32| {
             let rows = Region { y0, y1, ..region };
-            let new = bands(rows, split, largest_film).map(|region| Band::new(region, State::New));
-            all.extend(new);
+            let new_bands = bands(rows, split, largest_film).map(|region| Band::new(region, State::New));
+            queue.extend(new_bands);
         };
         for piece in store.pieces() {
             if piece.film.pixels() > largest_film && !piece.reached.pass.is_empty() {
                 continue; // from another backend, which supports larger films
             }
-            add_new(&mut all, y, piece.region.y0);
+            add_new(&mut queue, y, piece.region.y0);
             y = piece.region.y1;
-            all.push_back(Band::new(piece.region, State::Stored(piece)));
+            queue.push_back(Band::new(piece.region, State::Stored(piece)));
         }
-        add_new(&mut all, y, region.y1);
+        add_new(&mut queue, y, region.y1);
         Bands {
             store,
-            bands: all,
+            bands: queue,
             samples,
-            whole: None,
-            pass: None,
+            together_complete: None,
+            pass_end: None,
             steps: Steps::new(split, DISPATCH_DURATION, order),
-            done: 0.0,
-            total: region.pixels() as f64 * f64::from(samples),
-            kept: (Instant::now(), Duration::ZERO),
-            rendered: 0.0,
+            finished_samples: 0.0,
+            total_samples: region.pixels() as f64 * f64::from(samples),
+            last_checkpoint: (Instant::now(), Duration::ZERO),
+            rendered_samples: 0.0,
         }
     }
 
-    /// Renders all bands together, with all films in memory: every pixel gets a few samples before any gets more.
+    /// Renders all bands together, with all films in memory: every pixel gets a few samples before any pixel gets more.
     ///
     /// # Errors
     ///
     /// [`RenderError::Memory`] if the films do not fit.
     pub fn as_a_whole(mut self, film_layout: FilmLayout) -> Result<Bands<'a>, RenderError> {
         check_memory(self.pixels().saturating_mul(film_layout.bytes() as u64))?;
-        self.whole = Some(false);
+        self.together_complete = Some(false);
         Ok(self)
     }
 
-    /// Like [`Bands::as_a_whole`], for [`Bands::next_pass`]: also keeps the films of the last whole pass.
+    /// Like [`Bands::as_a_whole`], for [`Bands::next_pass`]: also keeps the films of the last complete pass.
     ///
     /// # Errors
     ///
@@ -179,7 +180,7 @@ impl<'a> Bands<'a> {
     pub fn in_passes(self, film_layout: FilmLayout) -> Result<Bands<'a>, RenderError> {
         check_memory(self.pixels().saturating_mul(2 * film_layout.bytes() as u64))?;
         let mut bands = self.as_a_whole(film_layout)?;
-        bands.pass = Some(0);
+        bands.pass_end = Some(0);
         Ok(bands)
     }
 
@@ -188,7 +189,8 @@ impl<'a> Bands<'a> {
     }
 
     /// Renders and returns the next band; `None` after the last band. After an error, the next call resumes the band
-    /// from its last checkpoint, possibly on another backend. Calls `made` whenever progress is stored.
+    /// from its last checkpoint, possibly on another backend. Calls `on_progress` after each copy of a film from the
+    /// backend.
     ///
     /// # Errors
     ///
@@ -197,27 +199,27 @@ impl<'a> Bands<'a> {
         &mut self,
         backend: &mut dyn Backend,
         watch: &mut Watch,
-        made: &mut dyn FnMut(),
+        on_progress: &mut dyn FnMut(),
     ) -> Result<Option<FinishedBand>, RenderError> {
-        if self.whole == Some(false) {
-            self.grow(backend, watch, made)?;
-            self.whole = Some(true);
+        if self.together_complete == Some(false) {
+            self.render_together(backend, watch, on_progress)?;
+            self.together_complete = Some(true);
         }
         if self.bands.is_empty() {
             return Ok(None);
         }
-        if self.whole.is_none() {
+        if self.together_complete.is_none() {
             self.make_first_small(backend);
-            self.work(0, self.samples, backend, watch, made)?;
+            self.render_band(0, self.samples, backend, watch, on_progress)?;
         }
         let Some(band) = self.bands.pop_front() else {
             return Ok(None);
         };
-        self.done += band.region.pixels() as f64 * f64::from(self.samples);
+        self.finished_samples += band.region.pixels() as f64 * f64::from(self.samples);
         match band.state {
-            State::Here(piece) => Ok(Some(FinishedBand::of(piece))),
-            State::Stored(kept) => Ok(Some(FinishedBand::of(self.store.load(kept.number)?))),
-            State::New => Err(RenderError::NoFilm), // not possible: `work` has created a piece
+            State::InMemory(piece) => Ok(Some(FinishedBand::of(piece))),
+            State::Stored(stored) => Ok(Some(FinishedBand::of(self.store.load(stored.number)?))),
+            State::New => Err(RenderError::NoFilm), // not possible: `render_band` has created a piece
         }
     }
 
@@ -232,30 +234,30 @@ impl<'a> Bands<'a> {
         &mut self,
         backend: &mut dyn Backend,
         watch: &mut Watch,
-        made: &mut dyn FnMut(),
+        on_progress: &mut dyn FnMut(),
     ) -> Result<Option<u32>, RenderError> {
-        let have = self.passed_samples();
-        if self.pass.is_none() || self.whole != Some(false) || have >= self.samples {
+        let samples = self.passed_samples();
+        if self.pass_end.is_none() || self.together_complete != Some(false) || samples >= self.samples {
             return Ok(None);
         }
-        let until = match self.pass {
-            Some(until) if until > have => until, // a pass that failed
-            _ => self.end_of_pass(have),
+        let end = match self.pass_end {
+            Some(end) if end > samples => end, // continues a pass that failed
+            _ => self.end_of_pass(samples),
         };
-        self.pass = Some(until);
-        if self.work_on_all(until, backend, watch, made)? == End::TimeIsUp {
-            self.whole = Some(true);
+        self.pass_end = Some(end);
+        if self.render_all(end, backend, watch, on_progress)? == Outcome::TimeIsUp {
+            self.together_complete = Some(true);
             return Ok(None);
         }
         for band in &mut self.bands {
-            band.passed = None;
+            band.last_pass = None;
         }
         Ok(Some(self.passed_samples()))
     }
 
-    /// Returns the samples of every pixel after the last whole pass.
+    /// Returns the number of samples of every pixel after the last complete pass.
     pub fn passed_samples(&self) -> u32 {
-        let samples = |band: &Band| match &band.passed {
+        let samples = |band: &Band| match &band.last_pass {
             Some(piece) => piece.reached.pass.start,
             None => band.samples(self.samples),
         };
@@ -272,9 +274,9 @@ impl<'a> Bands<'a> {
         output: &mut dyn FnMut(FinishedBand) -> Result<(), RenderError>,
     ) -> Result<(), RenderError> {
         for band in &self.bands {
-            let piece = match (&band.passed, &band.state) {
-                (Some(piece), _) | (None, State::Here(piece)) => piece.clone(),
-                (None, State::Stored(kept)) => self.store.load(kept.number)?,
+            let piece = match (&band.last_pass, &band.state) {
+                (Some(piece), _) | (None, State::InMemory(piece)) => piece.clone(),
+                (None, State::Stored(stored)) => self.store.load(stored.number)?,
                 (None, State::New) => return Err(RenderError::NoFilm),
             };
             output(FinishedBand::of(piece))?;
@@ -282,63 +284,63 @@ impl<'a> Bands<'a> {
         Ok(())
     }
 
-    /// Returns the samples at the end of the pass after `have`, long enough to amortize copies. Every power of two ends
-    /// a pass.
-    fn end_of_pass(&self, have: u32) -> u32 {
+    /// Returns the samples per pixel at the end of a pass that starts with `samples`. A pass is long enough to amortize
+    /// the copies of films, and every power of two ends a pass.
+    fn end_of_pass(&self, samples: u32) -> u32 {
         let count = match self.bands.len() {
-            1 => (self.steps.speed().unwrap_or(0.0) * PASS.as_secs_f64() / self.pixels() as f64) as u32,
-            _ => have / 4,
+            1 => (self.steps.speed().unwrap_or(0.0) * PASS_DURATION.as_secs_f64() / self.pixels() as f64) as u32,
+            _ => samples / 4,
         };
-        let power = (have + 1).next_power_of_two();
-        have.saturating_add(count.max(1)).min(power).min(self.samples)
+        let power = (samples + 1).next_power_of_two();
+        samples.saturating_add(count.max(1)).min(power).min(self.samples)
     }
 
     /// Returns the rendered (not loaded) fraction of the samples in finished bands: 0 to 1.
     pub fn fraction_rendered(&self) -> f64 {
-        if self.done > 0.0 {
-            (self.rendered / self.done).min(1.0)
+        if self.finished_samples > 0.0 {
+            (self.rendered_samples / self.finished_samples).min(1.0)
         } else {
             0.0
         }
     }
 
-    fn grow(
+    fn render_together(
         &mut self,
         backend: &mut dyn Backend,
         watch: &mut Watch,
-        made: &mut dyn FnMut(),
+        on_progress: &mut dyn FnMut(),
     ) -> Result<(), RenderError> {
-        let mut until = match self.bands.len() {
+        let mut target = match self.bands.len() {
             1 => self.samples,
             _ => 1,
         };
         loop {
-            if self.work_on_all(until, backend, watch, made)? == End::TimeIsUp || until >= self.samples {
+            if self.render_all(target, backend, watch, on_progress)? == Outcome::TimeIsUp || target >= self.samples {
                 return Ok(());
             }
-            // A round copies all films: with many samples a round adds a quarter.
-            until = (until + (until / 4).max(1)).min(self.samples);
+            // Each round copies all films. Later rounds therefore add a quarter of the samples.
+            target = (target + (target / 4).max(1)).min(self.samples);
         }
     }
 
-    /// Renders until all pixels have `until` samples, or the time is up.
-    fn work_on_all(
+    /// Renders until all pixels have `target` samples, or the time is up.
+    fn render_all(
         &mut self,
-        until: u32,
+        target: u32,
         backend: &mut dyn Backend,
         watch: &mut Watch,
-        made: &mut dyn FnMut(),
-    ) -> Result<End, RenderError> {
+        on_progress: &mut dyn FnMut(),
+    ) -> Result<Outcome, RenderError> {
         for i in 0..self.bands.len() {
-            let is_here = matches!(self.bands[i].state, State::Here(_));
-            if is_here && self.bands[i].samples(self.samples) >= until {
+            let is_in_memory = matches!(self.bands[i].state, State::InMemory(_));
+            if is_in_memory && self.bands[i].samples(self.samples) >= target {
                 continue;
             }
-            if self.work(i, until, backend, watch, made)? == End::TimeIsUp {
-                return Ok(End::TimeIsUp);
+            if self.render_band(i, target, backend, watch, on_progress)? == Outcome::TimeIsUp {
+                return Ok(Outcome::TimeIsUp);
             }
         }
-        Ok(End::Done)
+        Ok(Outcome::Done)
     }
 
     /// Shortens the first band to about one checkpoint interval.
@@ -354,56 +356,56 @@ impl<'a> Bands<'a> {
         if !self.store.small_pieces() {
             return;
         }
-        let least = MIN_ROWS[usize::from(backend.samples_of_all() < self.samples)];
-        let of_a_row = f64::from(region.width()) * f64::from(self.samples);
-        let of_a_piece = self.steps.speed().unwrap_or(0.0) * self.store.interval().as_secs_f64();
-        let rows = ((of_a_piece / of_a_row) as u32).max(least);
+        let min_rows = MIN_ROWS[usize::from(backend.samples_of_all() < self.samples)];
+        let samples_per_row = f64::from(region.width()) * f64::from(self.samples);
+        let samples_per_piece = self.steps.speed().unwrap_or(0.0) * self.store.interval().as_secs_f64();
+        let rows = ((samples_per_piece / samples_per_row) as u32).max(min_rows);
         if rows < region.height() {
-            let (first, rest) = (
+            let (first_row, remainder) = (
                 region.y0,
                 Region {
                     y0: region.y0 + rows,
                     ..*region
                 },
             );
-            region.y1 = first + rows;
-            self.bands.insert(1, Band::new(rest, State::New));
+            region.y1 = first_row + rows;
+            self.bands.insert(1, Band::new(remainder, State::New));
         }
     }
 
-    fn work(
+    fn render_band(
         &mut self,
         i: usize,
-        until: u32,
+        target: u32,
         backend: &mut dyn Backend,
         watch: &mut Watch,
-        made: &mut dyn FnMut(),
-    ) -> Result<End, RenderError> {
-        let result = self.try_to_work(i, until, backend, watch, made);
+        on_progress: &mut dyn FnMut(),
+    ) -> Result<Outcome, RenderError> {
+        let result = self.try_render_band(i, target, backend, watch, on_progress);
         if result.is_err() {
             self.steps.failed();
         }
         result
     }
 
-    fn try_to_work(
+    fn try_render_band(
         &mut self,
         i: usize,
-        until: u32,
+        target: u32,
         backend: &mut dyn Backend,
         watch: &mut Watch,
-        made: &mut dyn FnMut(),
-    ) -> Result<End, RenderError> {
-        if let State::Stored(kept) = &self.bands[i].state {
-            let piece = self.store.load(kept.number)?;
-            self.bands[i].state = State::Here(piece);
+        on_progress: &mut dyn FnMut(),
+    ) -> Result<Outcome, RenderError> {
+        if let State::Stored(stored) = &self.bands[i].state {
+            let piece = self.store.load(stored.number)?;
+            self.bands[i].state = State::InMemory(piece);
         }
         let region = self.bands[i].region;
-        if self.bands[i].samples(self.samples) >= until {
-            return Ok(End::Done);
+        if self.bands[i].samples(self.samples) >= target {
+            return Ok(Outcome::Done);
         }
         match &self.bands[i].state {
-            State::Here(piece) => {
+            State::InMemory(piece) => {
                 self.steps.resume(backend, region, self.samples, &piece.reached);
                 backend.resume(piece.film.clone())?;
             }
@@ -412,40 +414,43 @@ impl<'a> Bands<'a> {
                 backend.begin(self.steps.film())?;
             }
         }
-        self.steps.stop_at(until);
-        let others_have_one = (0..self.bands.len()).all(|k| k == i || self.bands[k].samples(self.samples) > 0);
-        let mut done = self.done + self.bands.iter().map(|band| band.work(self.samples)).sum::<f64>();
-        while let Some(work) = self.steps.step(backend)? {
-            done += work;
-            self.rendered += work;
-            let end = match watch(backend, region, done / self.total)? {
+        self.steps.stop_at(target);
+        let others_have_samples = (0..self.bands.len()).all(|k| k == i || self.bands[k].samples(self.samples) > 0);
+        let complete_passes = self.bands.iter().map(|band| band.sample_total(self.samples));
+        let mut finished_samples = self.finished_samples + complete_passes.sum::<f64>();
+        while let Some(samples) = self.steps.step(backend)? {
+            finished_samples += samples;
+            self.rendered_samples += samples;
+            let end = match watch(backend, region, finished_samples / self.total_samples)? {
                 Flow::Cancel => Some(Err(RenderError::Cancelled)),
-                Flow::TimeIsUp if self.whole.is_some() && others_have_one && self.steps.samples() > 0 => {
-                    Some(Ok(End::TimeIsUp))
+                Flow::TimeIsUp
+                    if self.together_complete.is_some() && others_have_samples && self.steps.samples() > 0 =>
+                {
+                    Some(Ok(Outcome::TimeIsUp))
                 }
                 Flow::Continue | Flow::TimeIsUp => None,
             };
-            if end.is_some() || self.is_time_to_keep() {
-                self.take(i, backend, end.is_some())?;
-                made();
+            if end.is_some() || self.is_checkpoint_due() {
+                self.copy_band(i, backend, end.is_some())?;
+                on_progress();
             }
             if let Some(end) = end {
                 return end;
             }
         }
-        self.take(i, backend, false)?;
-        made();
-        Ok(End::Done)
+        self.copy_band(i, backend, false)?;
+        on_progress();
+        Ok(Outcome::Done)
     }
 
-    fn is_time_to_keep(&self) -> bool {
-        // Checkpoints take at most a tenth of the time.
-        let (last, took) = self.kept;
-        last.elapsed() >= self.store.interval().max(9 * took)
+    fn is_checkpoint_due(&self) -> bool {
+        // Limits checkpoints to a tenth of the time.
+        let (time, duration) = self.last_checkpoint;
+        time.elapsed() >= self.store.interval().max(9 * duration)
     }
 
     /// Copies a band from the backend, and stores it if it is complete or a checkpoint is due.
-    fn take(&mut self, i: usize, backend: &mut dyn Backend, at_the_end: bool) -> Result<(), RenderError> {
+    fn copy_band(&mut self, i: usize, backend: &mut dyn Backend, is_stopped: bool) -> Result<(), RenderError> {
         let start = Instant::now();
         let region = self.bands[i].region;
         let reached = self.steps.reached().clone();
@@ -456,32 +461,32 @@ impl<'a> Bands<'a> {
             reached,
             film: if is_finished { film.part(region) } else { film },
         };
-        let is_time = at_the_end || self.is_time_to_keep();
-        if is_finished || is_time {
+        let is_due = is_stopped || self.is_checkpoint_due();
+        if is_finished || is_due {
             self.store.keep(&piece);
         }
         let band = &mut self.bands[i];
-        let before = std::mem::replace(&mut band.state, State::Here(piece));
-        if let (State::Here(before), Some(_)) = (before, self.pass) {
-            band.passed.get_or_insert(before);
+        let previous = std::mem::replace(&mut band.state, State::InMemory(piece));
+        if let (State::InMemory(previous), Some(_)) = (previous, self.pass_end) {
+            band.last_pass.get_or_insert(previous);
         }
-        if is_time {
-            if self.whole.is_some() {
+        if is_due {
+            if self.together_complete.is_some() {
                 self.keep_others(i);
             }
             self.store.sync();
-            self.kept = (Instant::now(), start.elapsed());
+            self.last_checkpoint = (Instant::now(), start.elapsed());
         }
         Ok(())
     }
 
-    /// Stores the other changed bands in memory.
+    /// Stores the bands in memory that have changed, except band `i`.
     fn keep_others(&mut self, i: usize) {
-        let kept = self.store.pieces();
+        let stored = self.store.pieces();
         for (k, band) in self.bands.iter().enumerate() {
-            let State::Here(piece) = &band.state else { continue };
-            let is_kept = |kept: &StoredPiece| kept.region == piece.region && kept.reached == piece.reached;
-            if k != i && !kept.iter().any(is_kept) {
+            let State::InMemory(piece) = &band.state else { continue };
+            let is_same = |stored: &StoredPiece| stored.region == piece.region && stored.reached == piece.reached;
+            if k != i && !stored.iter().any(is_same) {
                 self.store.keep(piece);
             }
         }
@@ -493,25 +498,25 @@ impl Band {
         Band {
             region,
             state,
-            passed: None,
+            last_pass: None,
         }
     }
 
     fn reached(&self) -> Option<&SampleProgress> {
         match &self.state {
             State::New => None,
-            State::Stored(kept) => Some(&kept.reached),
-            State::Here(piece) => Some(&piece.reached),
+            State::Stored(stored) => Some(&stored.reached),
+            State::InMemory(piece) => Some(&piece.reached),
         }
     }
 
-    fn samples(&self, all: u32) -> u32 {
-        self.reached().map_or(0, |reached| reached.pass.start.min(all))
+    fn samples(&self, max: u32) -> u32 {
+        self.reached().map_or(0, |reached| reached.pass.start.min(max))
     }
 
-    /// Samples over all pixels, not counting an incomplete pass.
-    fn work(&self, all: u32) -> f64 {
-        self.region.pixels() as f64 * f64::from(self.samples(all))
+    /// Returns the number of samples over all pixels, not counting an incomplete pass.
+    fn sample_total(&self, max: u32) -> f64 {
+        self.region.pixels() as f64 * f64::from(self.samples(max))
     }
 }
 

@@ -17,7 +17,7 @@ use crate::error::RenderError;
 use crate::film::FilmLayout;
 use wgray_image::Output;
 
-/// Why a checkpoint cannot be used.
+/// Reasons why a checkpoint cannot be used.
 #[derive(Debug, Error)]
 pub enum CheckpointError {
     /// The file exists, and resuming was not requested.
@@ -31,7 +31,7 @@ pub enum CheckpointError {
         /// The difference.
         what: String,
     },
-    /// Not a checkpoint that this program can read.
+    /// The file is not a checkpoint that this program can read.
     #[error("{}: cannot resume from this file: {what}; choose another name or delete it", path.display())]
     Unreadable {
         /// The file.
@@ -62,7 +62,7 @@ pub struct CheckpointOptions<'a> {
     pub interval: Duration,
     /// Called while another process writes the file; returns true to keep waiting.
     pub wait: Box<dyn FnMut() -> bool + 'a>,
-    /// Receives problems that do not end the work.
+    /// Receives messages about problems that do not stop the render.
     pub report: Box<dyn FnMut(&str) + 'a>,
 }
 
@@ -82,14 +82,14 @@ pub struct Checkpoint<'a> {
     end: u64,
     interval: Duration,
     report: Box<dyn FnMut(&str) + 'a>,
-    /// Length below which rewriting is not tried again after a failure.
-    untidy: u64,
+    /// Minimum length of the file at which rewriting is tried again after a failure.
+    retry_length: u64,
     /// Reported problems: a failed write, a lost file.
     reported: [bool; 2],
 }
 
-/// Replaced pieces are kept until they take more bytes than this and than the pieces in use.
-const WASTE: u64 = 64 << 20;
+/// The file is rewritten once replaced pieces take this many bytes more than the pieces in use.
+const MAX_REPLACED_BYTES: u64 = 64 << 20;
 /// Interval between attempts to lock a file in use.
 const RETRY_INTERVAL: Duration = Duration::from_millis(50);
 /// Attempts before waiting is reported.
@@ -102,7 +102,7 @@ impl<'a> Checkpoint<'a> {
     ///
     /// [`CheckpointError`].
     pub fn open(
-        opening: CheckpointOptions<'a>,
+        options: CheckpointOptions<'a>,
         identity: Identity,
         film_layout: FilmLayout,
     ) -> Result<Checkpoint<'a>, CheckpointError> {
@@ -112,34 +112,34 @@ impl<'a> Checkpoint<'a> {
             interval,
             mut wait,
             mut report,
-        } = opening;
+        } = options;
         let name = match name.is_dir() {
             true => name.join(identity.file_name()),
             false => name,
         };
-        let failed = |error| CheckpointError::Io {
+        let io_error = |error| CheckpointError::Io {
             path: name.clone(),
             error,
         };
         // Links are followed and stay in place.
-        let found = Output::find(&name).map_err(failed)?;
-        let no_file = || CheckpointError::Unreadable {
+        let output = Output::find(&name).map_err(io_error)?;
+        let not_a_file = || CheckpointError::Unreadable {
             path: name.clone(),
             what: "it is not a regular file".to_owned(),
         };
-        let path = found.path().ok_or_else(no_file)?;
+        let path = output.path().ok_or_else(not_a_file)?;
         let header = Header {
             format: FORMAT,
             identity,
             part: None,
         };
-        let mut rounds = 0;
+        let mut retries = 0;
         loop {
             match fs::metadata(path) {
                 Ok(_) if !resume => return Err(CheckpointError::Exists(name)),
                 Ok(_) => {}
                 Err(error) if error.kind() == io::ErrorKind::NotFound => {
-                    match start(path, &header) {
+                    match create(path, &header) {
                         Ok((file, key, end)) => {
                             return Ok(Checkpoint {
                                 name,
@@ -153,27 +153,27 @@ impl<'a> Checkpoint<'a> {
                                 end,
                                 interval,
                                 report,
-                                untidy: 0,
+                                retry_length: 0,
                                 reported: [false; 2],
                             });
                         }
-                        // Another process was faster.
+                        // Another process has created the file in the meantime.
                         Err(error) if error.kind() == io::ErrorKind::AlreadyExists => continue,
-                        Err(error) => return Err(failed(error)),
+                        Err(error) => return Err(io_error(error)),
                     }
                 }
-                Err(error) => return Err(failed(error)),
+                Err(error) => return Err(io_error(error)),
             }
             let file = match File::options().read(true).write(true).open(path) {
                 Ok(file) => file,
                 Err(error) if error.kind() == io::ErrorKind::NotFound => continue,
-                Err(error) => return Err(failed(error)),
+                Err(error) => return Err(io_error(error)),
             };
             match file.try_lock() {
                 Err(TryLockError::WouldBlock) => {
-                    // A killed process ends within a second: waiting for it is not reported.
-                    rounds += 1;
-                    if rounds == QUIET_RETRIES {
+                    // A killed process ends within a second, so a short wait is not reported.
+                    retries += 1;
+                    if retries == QUIET_RETRIES {
                         report(&format!(
                             "{}: in use by another process; waiting until it ends",
                             name.display()
@@ -189,7 +189,7 @@ impl<'a> Checkpoint<'a> {
                 Err(TryLockError::Error(_)) | Ok(()) => {}
             }
             // The process with the lock may have replaced the file.
-            if !is_at(&file, path) {
+            if !is_file_at(&file, path) {
                 continue;
             }
             return Checkpoint::continue_from(name, path, file, header, film_layout, interval, report);
@@ -214,29 +214,31 @@ impl<'a> Checkpoint<'a> {
             path: name.clone(),
             what: error.to_string(),
         };
-        let failed = |error| CheckpointError::Io {
+        let io_error = |error| CheckpointError::Io {
             path: name.clone(),
             error,
         };
-        // Left by a process killed while it rewrote the file.
+        // Removes files of processes that were killed while they rewrote the checkpoint.
         wgray_image::remove_stale_beside(path);
-        let (found, key, start) = pieces_file::read_header(&mut file).map_err(unreadable)?;
-        let what = match found.part {
+        let (existing, key, header_end) = pieces_file::read_header(&mut file).map_err(unreadable)?;
+        let difference = match existing.part {
             Some(_) => Some("is a part of an image, which wgray merge reads, and not a checkpoint".to_owned()),
-            None => (header.identity.difference(&found.identity)).map(|what| format!("belongs to another job: {what}")),
+            None => {
+                (header.identity.difference(&existing.identity)).map(|what| format!("belongs to another job: {what}"))
+            }
         };
-        if let Some(what) = what {
+        if let Some(what) = difference {
             return Err(CheckpointError::Foreign { path: name, what });
         }
-        let contents = pieces_file::scan(&file, &header.identity, &key, start).map_err(failed)?;
+        let contents = pieces_file::scan(&file, &header.identity, &key, header_end).map_err(io_error)?;
         if contents.damaged > 0 {
             report(&format!(
-                "{}: dropped {} bytes after byte {}, which are damaged or incomplete",
+                "{}: the file is damaged or incomplete after byte {}; bytes dropped: {}",
                 name.display(),
-                contents.damaged,
-                contents.end
+                contents.end,
+                contents.damaged
             ));
-            file.set_len(contents.end).map_err(failed)?;
+            file.set_len(contents.end).map_err(io_error)?;
         }
         let latest = pieces_file::latest(&contents.entries);
         let latest = latest.into_iter().map(|i| (contents.entries[i].region.y0, i)).collect();
@@ -244,7 +246,7 @@ impl<'a> Checkpoint<'a> {
             name,
             path: path.to_owned(),
             file,
-            header: found,
+            header: existing,
             key,
             film_layout,
             entries: contents.entries,
@@ -252,7 +254,7 @@ impl<'a> Checkpoint<'a> {
             end: contents.end,
             interval,
             report,
-            untidy: 0,
+            retry_length: 0,
             reported: [false; 2],
         })
     }
@@ -272,23 +274,23 @@ impl<'a> Checkpoint<'a> {
     }
 
     /// Rewrites the file without replaced pieces if they take more than half of the file.
-    fn tidy(&mut self) {
+    fn remove_replaced_pieces(&mut self) {
         let lengths = self
             .latest
             .values()
             .map(|i| self.entries[*i].end - self.entries[*i].start);
         let needed: u64 = lengths.sum();
-        let bound = (2 * needed + WASTE).max(self.untidy);
-        if self.end > bound && self.rewrite(|temporary, path| temporary.persist(path)).is_err() {
+        let limit = (2 * needed + MAX_REPLACED_BYTES).max(self.retry_length);
+        if self.end > limit && self.rewrite(|temporary, path| temporary.persist(path)).is_err() {
             // The disk may be full, or the file cannot be replaced. Nothing is lost; a later call tries again.
-            self.untidy = 2 * self.end;
+            self.retry_length = 2 * self.end;
         }
     }
 
     /// Writes the pieces in use to a new file, and renames it into place.
     fn rewrite(
         &mut self,
-        name: impl Fn(NamedTempFile, &Path) -> Result<File, tempfile::PersistError>,
+        persist: impl Fn(NamedTempFile, &Path) -> Result<File, tempfile::PersistError>,
     ) -> io::Result<()> {
         let (mut temporary, key, mut end) = temporary(&self.path, &self.header)?;
         let mut entries = Vec::new();
@@ -308,15 +310,15 @@ impl<'a> Checkpoint<'a> {
             .as_file()
             .set_permissions(self.file.metadata()?.permissions())?;
         temporary.as_file().sync_data()?;
-        self.file = name(temporary, &self.path)?;
+        self.file = persist(temporary, &self.path)?;
         self.latest = (0..).zip(&entries).map(|(i, entry)| (entry.region.y0, i)).collect();
         (self.entries, self.key, self.end) = (entries, key, end);
         Ok(())
     }
 
-    /// Restores a deleted file. If a different file has taken its place, keeps and reports that file.
-    fn still_there(&mut self) -> io::Result<()> {
-        if is_at(&self.file, &self.path) && self.file.metadata()?.len() >= self.end {
+    /// Writes the file again if it was deleted. Keeps and reports a different file at the same path.
+    fn restore_if_deleted(&mut self) -> io::Result<()> {
+        if is_file_at(&self.file, &self.path) && self.file.metadata()?.len() >= self.end {
             return Ok(());
         }
         let is_gone = fs::symlink_metadata(&self.path).is_err_and(|error| error.kind() == io::ErrorKind::NotFound);
@@ -327,25 +329,25 @@ impl<'a> Checkpoint<'a> {
         {
             return Ok(());
         }
-        self.tell_once(
+        self.report_once(
             1,
             "was changed or replaced by another program; this render can no longer be resumed from it",
         );
         Ok(())
     }
 
-    fn tell_once(&mut self, which: usize, what: &str) {
-        if !std::mem::replace(&mut self.reported[which], true) {
-            (self.report)(&format!("{}: {what}", self.name.display()));
+    fn report_once(&mut self, problem: usize, message: &str) {
+        if !std::mem::replace(&mut self.reported[problem], true) {
+            (self.report)(&format!("{}: {message}", self.name.display()));
         }
     }
 
-    /// Reports the first piece that could not be written; later ones are tried.
-    fn noted(&mut self, result: io::Result<()>) {
+    /// Reports the first piece that could not be written. The caller continues with later pieces.
+    fn report_failure(&mut self, result: io::Result<()>) {
         if let Err(error) = result {
             // Readers drop an incomplete piece, but it takes space.
             let _ = self.file.set_len(self.end);
-            self.tell_once(
+            self.report_once(
                 0,
                 &format!("a piece could not be written; rendering continues: {error}"),
             );
@@ -355,7 +357,7 @@ impl<'a> Checkpoint<'a> {
 
 impl CheckpointStore for Checkpoint<'_> {
     fn pieces(&self) -> Vec<StoredPiece> {
-        let kept = |i: &usize| {
+        let stored_piece = |i: &usize| {
             let entry = &self.entries[*i];
             StoredPiece {
                 number: *i,
@@ -364,28 +366,28 @@ impl CheckpointStore for Checkpoint<'_> {
                 reached: entry.reached.clone(),
             }
         };
-        self.latest.values().map(kept).collect()
+        self.latest.values().map(stored_piece).collect()
     }
 
     fn load(&mut self, number: usize) -> Result<FilmPiece, RenderError> {
         let entry = self.entries.get(number).ok_or(RenderError::NoFilm)?;
         let read = pieces_file::read_piece(&self.file, &self.key, entry, self.film_layout);
-        let named = |error: io::Error| {
+        let with_path = |error: io::Error| {
             let message = format!("{}: cannot be read: {error}", self.name.display());
             RenderError::Input(io::Error::new(error.kind(), message))
         };
-        Ok(read.map_err(named)?.0)
+        Ok(read.map_err(with_path)?.0)
     }
 
     fn keep(&mut self, piece: &FilmPiece) {
         let result = self.append(piece);
-        self.noted(result);
+        self.report_failure(result);
     }
 
     fn sync(&mut self) {
-        let result = self.file.sync_data().and_then(|()| self.still_there());
-        self.tidy();
-        self.noted(result);
+        let result = self.file.sync_data().and_then(|()| self.restore_if_deleted());
+        self.remove_replaced_pieces();
+        self.report_failure(result);
     }
 
     fn interval(&self) -> Duration {
@@ -397,8 +399,8 @@ impl CheckpointStore for Checkpoint<'_> {
     }
 }
 
-/// Creates the file, locked and with its whole header from the start.
-fn start(path: &Path, header: &Header) -> io::Result<(File, Key, u64)> {
+/// Creates the file. When the file appears, it is locked and has a complete header.
+fn create(path: &Path, header: &Header) -> io::Result<(File, Key, u64)> {
     let (temporary, key, end) = temporary(path, header)?;
     temporary.as_file().sync_data()?;
     let file = temporary.persist_noclobber(path).map_err(|error| error.error)?;
@@ -411,7 +413,8 @@ fn temporary(path: &Path, header: &Header) -> io::Result<(NamedTempFile, Key, u6
     Ok((temporary, key, end))
 }
 
-fn is_at(file: &File, path: &Path) -> bool {
+/// Returns true if a path leads to an open file.
+fn is_file_at(file: &File, path: &Path) -> bool {
     #[cfg(unix)]
     {
         use std::os::unix::fs::MetadataExt;

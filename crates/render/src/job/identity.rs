@@ -65,12 +65,12 @@ impl Identity {
         } = self;
         let mut hasher = blake3::Hasher::new();
         for text in [version, shaders, scene] {
-            list(&mut hasher, text.as_bytes());
+            hash_list(&mut hasher, text.as_bytes());
         }
-        list(&mut hasher, bytes_of(picture));
-        list(&mut hasher, bytes_of(region));
-        list(&mut hasher, bytes_of(pixel_samples));
-        list(&mut hasher, &[*adaptive, *layers, *exact_rounding].map(u8::from));
+        hash_list(&mut hasher, bytes_of(picture));
+        hash_list(&mut hasher, bytes_of(region));
+        hash_list(&mut hasher, bytes_of(pixel_samples));
+        hash_list(&mut hasher, &[*adaptive, *layers, *exact_rounding].map(u8::from));
         format!("{}.checkpoint", &hasher.finalize().to_hex()[..16])
     }
 
@@ -80,7 +80,7 @@ impl Identity {
         Region { x0, y0, x1, y1 }
     }
 
-    /// Rejects sizes and regions that this program never writes: files are untrusted.
+    /// Rejects sizes and regions that this program never writes, because files are untrusted.
     pub fn check(&self) -> Result<(), String> {
         let [width, height] = self.picture;
         let sides = 1..=MAX_COUNT;
@@ -104,11 +104,11 @@ impl Identity {
         }
     }
 
-    /// Describes the first difference from another job: "its size is A, not B".
+    /// Describes the first difference of another job from this job: "its size is A, not B".
     pub fn difference(&self, other: &Identity) -> Option<String> {
         let size = |[width, height]: [u32; 2]| format!("{width} x {height}");
         let short = |hash: &str| hash.get(..16).unwrap_or(hash).to_owned();
-        let either = |other: bool, set: &str, unset: &str| match other {
+        let either = |is_set: bool, set: &str, unset: &str| match is_set {
             true => format!("{set}, not {unset}"),
             false => format!("{unset}, not {set}"),
         };
@@ -132,7 +132,7 @@ impl Identity {
             )
         } else if self.exact_rounding != other.exact_rounding {
             let text = either(other.exact_rounding, "with", "without");
-            format!("its rounding is {text} --exact-rounding")
+            format!("it was rendered {text} --exact-rounding")
         } else if self.shaders != other.shaders {
             format!(
                 "its shaders differ: their hash is {}, not {}",
@@ -171,7 +171,7 @@ pub fn hash_of_scene(scene: &Packed) -> String {
         integrator.name().as_bytes(),
     ];
     for bytes in records.into_iter().chain(scene.lists()) {
-        list(&mut hasher, bytes);
+        hash_list(&mut hasher, bytes);
     }
     for coordinate in origin.to_array() {
         hasher.update(&coordinate.to_le_bytes());
@@ -187,7 +187,7 @@ pub fn hash_of_scene(scene: &Packed) -> String {
         ..*specialization
     };
     for (name, value) in specialization.constants() {
-        list(&mut hasher, name.as_bytes());
+        hash_list(&mut hasher, name.as_bytes());
         hasher.update(&value.to_le_bytes());
     }
     hasher.finalize().to_hex().to_string()
@@ -195,16 +195,16 @@ pub fn hash_of_scene(scene: &Packed) -> String {
 
 fn hash_mesh(hasher: &mut blake3::Hasher, mesh: &PackedMesh) {
     for bytes in mesh.lists() {
-        list(hasher, bytes);
+        hash_list(hasher, bytes);
     }
     hasher.update(bytes_of(&[mesh.low, mesh.high]));
 }
 
-/// Minimum length of a list hashed by all threads.
+/// Minimum number of bytes of a list that all threads hash together.
 const PARALLEL_BYTES: usize = 1 << 20;
 
-/// Hashes the length of a list before its bytes, so that different lists of lists never hash the same bytes.
-fn list(hasher: &mut blake3::Hasher, bytes: &[u8]) {
+/// Hashes the length of a list, then its bytes, so that different sequences of lists never give the same hashed bytes.
+fn hash_list(hasher: &mut blake3::Hasher, bytes: &[u8]) {
     hasher.update(&(bytes.len() as u64).to_le_bytes());
     match bytes.len() >= PARALLEL_BYTES {
         true => hasher.update_rayon(bytes),
@@ -217,8 +217,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn headers_of_jobs_that_cannot_be_are_refused() {
-        let good = Identity {
+    fn identities_with_invalid_sizes_or_regions_are_rejected() {
+        let valid = Identity {
             version: String::new(),
             shaders: String::new(),
             scene: String::new(),
@@ -229,7 +229,7 @@ mod tests {
             layers: false,
             exact_rounding: false,
         };
-        good.check().unwrap();
+        valid.check().unwrap();
         for (picture, region, pixel_samples) in [
             ([0, 3], [0, 0, 0, 3], 1),
             ([65_537, 3], [0, 0, 1, 1], 1),
@@ -241,13 +241,13 @@ mod tests {
             ([4, 3], [0, 0, 4, 3], 0),
             ([4, 3], [0, 0, 4, 3], 65_537),
         ] {
-            let bad = Identity {
+            let invalid = Identity {
                 picture,
                 region,
                 pixel_samples,
-                ..good.clone()
+                ..valid.clone()
             };
-            assert!(bad.check().unwrap_err().contains("must "), "{bad:?}");
+            assert!(invalid.check().unwrap_err().contains("must "), "{invalid:?}");
         }
     }
 }

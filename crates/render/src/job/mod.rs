@@ -1,5 +1,6 @@
-//! Scheduling of work on any backend: bands that fit memory, dispatches of bounded duration, progress, cancellation,
-//! checkpoints and parts. Sums continue from the film's own values, so that every partition gives the same bits.
+//! Scheduling of renders on any backend: bands that fit into memory, dispatches of bounded duration, progress,
+//! cancellation, checkpoints and parts. Each dispatch adds samples to the film, so that every partition of a render
+//! gives the same bits.
 
 mod bands;
 pub mod checkpoint;
@@ -24,17 +25,17 @@ pub use part::{PartError, PartHeader, Parts, Tile, read_part, write_part};
 pub use piece::{CheckpointStore, FilmPiece, INTERVAL, NoCheckpoint, StoredPiece};
 pub use steps::{Order, SampleProgress, Steps};
 
-/// Target duration of a dispatch: hides its overhead, and suits watchdogs and cancellation.
+/// Target duration of a dispatch: long enough to hide the overhead, short enough for watchdogs and cancellation.
 const DISPATCH_DURATION: Duration = Duration::from_millis(60);
 
-/// Partition of the work.
+/// Division of a render into bands and dispatches.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct WorkSplit {
     /// Maximum film size in pixels.
     pub band_pixels: u64,
-    /// Samples per dispatch; `None` adapts to speed.
+    /// Samples per dispatch; `None` adapts the number to the measured speed.
     pub samples_per_dispatch: Option<u32>,
-    /// Rows per dispatch; `None` adapts to speed.
+    /// Rows per dispatch; `None` adapts the number to the measured speed.
     pub rows_per_dispatch: Option<u32>,
 }
 
@@ -53,10 +54,10 @@ impl WorkSplit {
     /// Returns [`WorkSplit::default`], with smaller bands for layers, so that a film takes no more memory than with
     /// adaptive sampling.
     pub fn of(film_layout: FilmLayout) -> WorkSplit {
-        const LISTS: u64 = 3;
+        const ADAPTIVE_LISTS: u64 = 3;
         let split = WorkSplit::default();
         WorkSplit {
-            band_pixels: split.band_pixels * LISTS / LISTS.max(film_layout.lists() as u64),
+            band_pixels: split.band_pixels * ADAPTIVE_LISTS / ADAPTIVE_LISTS.max(film_layout.lists() as u64),
             ..split
         }
     }
@@ -77,9 +78,9 @@ pub fn bands(region: Region, split: &WorkSplit, largest_film: u64) -> impl Itera
 /// Returns the first hits through a region's pixel centers, in row-major order, top row first. Dispatches have a
 /// bounded size.
 pub fn first_hits(backend: &mut dyn Backend, region: Region) -> Result<Vec<FirstHit>, RenderError> {
-    const CALL_PIXELS: u64 = 1 << 18;
+    const DISPATCH_PIXELS: u64 = 1 << 18;
     let split = WorkSplit {
-        band_pixels: CALL_PIXELS,
+        band_pixels: DISPATCH_PIXELS,
         ..WorkSplit::default()
     };
     let mut hits = Vec::new();
@@ -90,7 +91,7 @@ pub fn first_hits(backend: &mut dyn Backend, region: Region) -> Result<Vec<First
 }
 
 /// Renders an image band by band, from top to bottom, and passes each band to `output`. `progress` receives the
-/// finished fraction of the work, 0 to 1, and returns true to continue.
+/// finished fraction of the samples, 0 to 1, and returns true to continue.
 pub fn render(
     backend: &mut dyn Backend,
     region: Region,
@@ -108,7 +109,7 @@ pub fn render(
         backend.largest_film(),
         &mut no_checkpoint,
     );
-    let mut watch = |_: &mut dyn Backend, _: Region, share: f64| Ok(progress(share).into());
+    let mut watch = |_: &mut dyn Backend, _: Region, fraction: f64| Ok(progress(fraction).into());
     while let Some(band) = bands.render_next(backend, &mut watch, &mut || {})? {
         output(band.film)?;
     }
@@ -121,10 +122,10 @@ mod tests {
 
     use super::*;
 
-    /// Records its dispatches.
-    struct Notes(Vec<(Region, Range<u32>)>);
+    /// A backend that records its dispatches.
+    struct Recorder(Vec<(Region, Range<u32>)>);
 
-    impl Backend for Notes {
+    impl Backend for Recorder {
         fn begin(&mut self, _: Region) -> Result<(), RenderError> {
             Ok(())
         }
@@ -170,14 +171,14 @@ mod tests {
     #[test]
     fn both_orders_give_every_pixel_each_sample_once() {
         for (order, first) in [(Order::Rows, 0..16), (Order::Pixels, 0..4)] {
-            let (mut notes, region) = (Notes(Vec::new()), Region::whole(64, 64));
+            let (mut recorder, region) = (Recorder(Vec::new()), Region::whole(64, 64));
             let mut steps = Steps::new(&WorkSplit::default(), DISPATCH_DURATION, order);
-            steps.start(&notes, region, 16);
-            while steps.step(&mut notes).unwrap().is_some() {}
-            assert_eq!(notes.0[0].1, first, "{order:?}");
+            steps.start(&recorder, region, 16);
+            while steps.step(&mut recorder).unwrap().is_some() {}
+            assert_eq!(recorder.0[0].1, first, "{order:?}");
             // Every pixel gets each sample once, in ascending order.
             let mut samples = [0; 64];
-            for (tile, range) in notes.0 {
+            for (tile, range) in recorder.0 {
                 assert_eq!((tile.x0, tile.x1), (0, 64));
                 for done in &mut samples[tile.y0 as usize..tile.y1 as usize] {
                     assert_eq!(*done, range.start);
@@ -188,14 +189,14 @@ mod tests {
         }
     }
 
-    /// Like `Notes`, with adaptive sampling and four pilot samples.
+    /// Like `Recorder`, with adaptive sampling and four pilot samples.
     #[derive(Default)]
-    struct Looks {
+    struct AdaptiveRecorder {
         film: Option<Region>,
-        calls: Vec<(Region, Range<u32>)>,
+        dispatches: Vec<(Region, Range<u32>)>,
     }
 
-    impl Backend for Looks {
+    impl Backend for AdaptiveRecorder {
         fn begin(&mut self, region: Region) -> Result<(), RenderError> {
             self.film = Some(region);
             Ok(())
@@ -214,7 +215,7 @@ mod tests {
         }
 
         fn submit(&mut self, tile: Region, samples: Range<u32>) -> Result<(), RenderError> {
-            self.calls.push((tile, samples));
+            self.dispatches.push((tile, samples));
             Ok(())
         }
 
@@ -240,7 +241,7 @@ mod tests {
     }
 
     #[test]
-    fn pilot_samples_of_a_region_and_its_neighbors_come_first() {
+    fn pilot_samples_of_a_region_and_its_neighbors_precede_further_samples() {
         let (region, film) = (
             Region {
                 x0: 5,
@@ -260,9 +261,9 @@ mod tests {
                 samples_per_dispatch,
                 ..WorkSplit::default()
             };
-            let (mut backend, mut done, mut outputs) = (Looks::default(), 0.0, Vec::new());
-            let mut progress = |share| {
-                done = share;
+            let (mut backend, mut finished, mut outputs) = (AdaptiveRecorder::default(), 0.0, Vec::new());
+            let mut progress = |fraction| {
+                finished = fraction;
                 true
             };
             let mut output = |film: Film| {
@@ -273,22 +274,24 @@ mod tests {
             assert_eq!((backend.film, outputs.len()), (Some(film), 1));
             assert_eq!(outputs[0], (region, region.pixels() as usize, region.pixels() as usize));
             let further = backend
-                .calls
+                .dispatches
                 .iter()
                 .position(|(_, samples)| samples.start >= 4)
                 .unwrap();
-            let work = |calls: &[(Region, Range<u32>)], part: Region, samples: Range<u32>| {
-                for (tile, range) in calls {
+            let check = |dispatches: &[(Region, Range<u32>)], part: Region, samples: Range<u32>| {
+                for (tile, range) in dispatches {
                     assert_eq!((tile.x0, tile.x1), (part.x0, part.x1));
                     assert!(range.start >= samples.start && range.end <= samples.end);
                     assert_eq!(*tile, tile.within(part));
                 }
-                let pixels = calls.iter().map(|(tile, range)| tile.pixels() * range.len() as u64);
+                let pixels = dispatches
+                    .iter()
+                    .map(|(tile, range)| tile.pixels() * range.len() as u64);
                 assert_eq!(pixels.sum::<u64>(), part.pixels() * samples.len() as u64);
             };
-            work(&backend.calls[..further], film, 0..4);
-            work(&backend.calls[further..], region, 4..16);
-            assert!((done - 1.0).abs() < 1e-12, "{done}");
+            check(&backend.dispatches[..further], film, 0..4);
+            check(&backend.dispatches[further..], region, 4..16);
+            assert!((finished - 1.0).abs() < 1e-12, "{finished}");
         }
     }
 }

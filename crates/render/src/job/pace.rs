@@ -6,55 +6,55 @@ use std::time::Duration;
 #[derive(Clone, Debug)]
 pub(super) struct Pace {
     /// Target duration of a dispatch.
-    call: Duration,
+    dispatch_duration: Duration,
     speed: Option<f64>,
     /// Speed if no pixel skips samples.
-    speed_of_all: f64,
-    /// Maximum work, after a larger dispatch has failed.
-    most: f64,
+    full_speed: f64,
+    /// Maximum work of a dispatch, after a larger dispatch has failed.
+    max_work: f64,
 }
 
 impl Pace {
-    /// Small enough for the slowest device and scene.
-    const FIRST_CALL: f64 = 16384.0;
-    /// Maximum speedup from skipped samples with adaptive sampling. It is limited because in the next tile, maybe no
-    /// pixel skips samples.
-    const MAX_OUTLIER_RATIO: f64 = 8.0;
-    /// Minimum work: one workgroup.
-    const LEAST: f64 = 64.0;
+    /// Work of the first dispatch: small enough for the slowest device and scene.
+    const FIRST_DISPATCH: f64 = 16384.0;
+    /// Maximum speedup from samples that adaptive sampling skips. The speedup is limited because the pixels of the next
+    /// tile may skip no samples.
+    const MAX_SPEEDUP: f64 = 8.0;
+    /// Minimum work of a dispatch: one workgroup.
+    const MIN_WORK: f64 = 64.0;
 
-    pub fn new(call: Duration) -> Pace {
+    pub fn new(dispatch_duration: Duration) -> Pace {
         Pace {
-            call,
+            dispatch_duration,
             speed: None,
-            speed_of_all: 0.0,
-            most: f64::INFINITY,
+            full_speed: 0.0,
+            max_work: f64::INFINITY,
         }
     }
 
-    /// Records a finished dispatch. `of_all` is true if no pixel skipped samples.
-    pub fn took(&mut self, work: f64, time: Duration, of_all: bool) {
+    /// Records a finished dispatch. `is_full` is true if no pixel skipped samples.
+    pub fn record(&mut self, work: f64, time: Duration, is_full: bool) {
         let speed = work / time.as_secs_f64().max(1e-6);
-        let speed = self.speed.map_or(speed, |known| speed.min(2.0 * known));
-        if of_all {
-            self.speed_of_all = speed;
+        let speed = self.speed.map_or(speed, |previous| speed.min(2.0 * previous));
+        if is_full {
+            self.full_speed = speed;
         }
-        self.speed = Some(speed.min(Self::MAX_OUTLIER_RATIO * self.speed_of_all));
+        self.speed = Some(speed.min(Self::MAX_SPEEDUP * self.full_speed));
     }
 
-    /// Halves the maximum: a failed dispatch may have taken too long.
+    /// Limits further dispatches to half the work of a failed dispatch, which may have taken too long.
     pub fn failed(&mut self, work: f64) {
-        self.most = self.most.min(work / 2.0);
+        self.max_work = self.max_work.min(work / 2.0);
     }
 
-    /// Discards the speed of other work or of another device.
+    /// Discards the measured speed, when the work or the device changes.
     pub fn forget(&mut self) {
         self.speed = None;
     }
 
-    /// Prepares for a film, in which no pixel skips samples at first.
+    /// Prepares for a new film, in which no pixel skips samples at first.
     pub fn start_film(&mut self) {
-        self.speed = self.speed.map(|speed| speed.min(self.speed_of_all));
+        self.speed = self.speed.map(|speed| speed.min(self.full_speed));
     }
 
     pub fn speed(&self) -> Option<f64> {
@@ -63,9 +63,9 @@ impl Pace {
 
     /// Returns the work of the next dispatch.
     pub fn work(&self) -> f64 {
-        let work = self
-            .speed
-            .map_or(Self::FIRST_CALL, |speed| speed * self.call.as_secs_f64());
-        work.min(self.most).max(Self::LEAST)
+        let work = self.speed.map_or(Self::FIRST_DISPATCH, |speed| {
+            speed * self.dispatch_duration.as_secs_f64()
+        });
+        work.min(self.max_work).max(Self::MIN_WORK)
     }
 }

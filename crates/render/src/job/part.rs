@@ -41,12 +41,12 @@ pub struct PartHeader {
 }
 
 impl PartHeader {
-    /// Returns the reason why another part does not belong to the same image; `None` if it does.
-    fn difference(&self, other: &PartHeader, view_is_given: bool) -> Option<&'static str> {
+    /// Returns the reason why another part does not belong to the same image; `None` if the part belongs to it.
+    fn difference(&self, other: &PartHeader, ignores_view: bool) -> Option<&'static str> {
         let view = |header: &PartHeader| (header.view_transform.clone(), header.exposure);
         if (&self.aovs, self.alpha) != (&other.aovs, other.alpha) {
             Some("has different layers")
-        } else if !view_is_given && view(self) != view(other) {
+        } else if !ignores_view && view(self) != view(other) {
             Some("has a different view transform or exposure")
         } else if self.middle_depth != other.middle_depth || self.metadata != other.metadata {
             Some("was rendered with different settings")
@@ -67,16 +67,16 @@ impl PartHeader {
                 return Err(format!("its piece of the pixels {region} is not finished"));
             }
         }
-        let known = |name: &String| Aov::ALL.into_iter().find(|aov| aov.name() == name);
-        for aov in self.aovs.iter().filter_map(known) {
-            let is_there = match aov.source(Integrator::Phong) {
+        let aov_named = |name: &String| Aov::ALL.into_iter().find(|aov| aov.name() == name);
+        for aov in self.aovs.iter().filter_map(aov_named) {
+            let has_values = match aov.source(Integrator::Phong) {
                 AovSource::Adaptive => identity.adaptive,
                 AovSource::Samples => identity.layers,
                 AovSource::FirstHit => {
                     entries.iter().all(|entry| entry.has_hits) || aov == Aov::ShadingNormal && identity.layers
                 }
             };
-            if !is_there {
+            if !has_values {
                 return Err(format!("has no values for its layer {}", aov.name()));
             }
         }
@@ -113,8 +113,8 @@ pub struct Tile {
 }
 
 impl Tile {
-    /// Returns the part's rows of a region. The sizes of parts differ by at most one row. `None` if there are fewer
-    /// rows than parts.
+    /// Returns the part's rows of a region; `None` if the number is invalid, or if the region has fewer rows than the
+    /// image has parts. The heights of parts differ by at most one row.
     pub fn rows(self, region: Region) -> Option<Region> {
         let Tile { number, of } = self;
         let height = u64::from(region.height());
@@ -134,7 +134,7 @@ impl std::fmt::Display for Tile {
     }
 }
 
-/// Writes a part: the finished bands that `render` passes on.
+/// Writes a part: the finished bands that `render` passes to the sink.
 ///
 /// # Errors
 ///
@@ -202,58 +202,64 @@ pub struct Parts {
     pub identity: Identity,
     /// The header; all its fields except the tile are equal in all parts.
     pub header: PartHeader,
-    /// Paths and hash keys. Files are opened per read, as the number of open files is limited.
+    /// Paths and hash keys. Each read opens its file again, because the number of open files is limited.
     files: Vec<(PathBuf, Key)>,
     /// Each piece's file and entry, by first row.
     pieces: BTreeMap<u32, (usize, Entry)>,
 }
 
 impl Parts {
-    /// Opens all parts of an image, given in any order. Checks that the parts are complete, belong to one job, and
-    /// cover every row exactly once. The view settings of the parts must agree unless `view_is_given`.
+    /// Opens all parts of an image, listed in any order. Checks that the parts are complete, belong to one job, and
+    /// cover every row exactly once. With `ignores_view`, the view settings of the parts may differ.
     ///
     /// # Errors
     ///
     /// [`PartError`].
-    pub fn open(paths: &[PathBuf], view_is_given: bool) -> Result<Parts, PartError> {
+    pub fn open(paths: &[PathBuf], ignores_view: bool) -> Result<Parts, PartError> {
         let mut parts: Option<Parts> = None;
         let mut tiles = Vec::new();
         for path in paths {
-            let bad = |what: String| PartError::Bad {
+            let error = |what: String| PartError::Bad {
                 path: path.clone(),
                 what,
             };
             let (key, header, part, entries) = open(path)?;
             tiles.push(part.tile);
-            let all = parts.get_or_insert_with(|| Parts {
+            let merged = parts.get_or_insert_with(|| Parts {
                 identity: header.identity.clone(),
                 header: part.clone(),
                 files: Vec::new(),
                 pieces: BTreeMap::new(),
             });
-            let first = || all.files.first().map_or(path, |(first, _)| first).display();
-            if let Some(what) = all.identity.difference(&header.identity) {
-                return Err(bad(format!("belongs to a different image than {}: {what}", first())));
+            let first_path = || merged.files.first().map_or(path, |(path, _)| path).display();
+            if let Some(what) = merged.identity.difference(&header.identity) {
+                return Err(error(format!(
+                    "belongs to a different image than {}: {what}",
+                    first_path()
+                )));
             }
-            if let Some(what) = all.header.difference(&part, view_is_given) {
-                return Err(bad(format!("{what} than {}", first())));
+            if let Some(what) = merged.header.difference(&part, ignores_view) {
+                return Err(error(format!("{what} than {}", first_path())));
             }
             for entry in entries {
                 let Region { y0, y1, .. } = entry.region;
-                let above = all.pieces.range(..y1).next_back();
-                if let Some((_, (number, other))) = above.filter(|(_, (_, other))| other.region.y1 > y0) {
-                    let (from, to) = (y0.max(other.region.y0), y1.min(other.region.y1) - 1);
-                    let other = all.files.get(*number).map_or(path, |(other, _)| other).display();
-                    return Err(bad(format!("overlaps {other} in rows {from} to {to}")));
+                let last_above = merged.pieces.range(..y1).next_back();
+                if let Some((_, (number, overlapping))) = last_above.filter(|(_, (_, piece))| piece.region.y1 > y0) {
+                    let first_row = y0.max(overlapping.region.y0);
+                    let last_row = y1.min(overlapping.region.y1) - 1;
+                    let other_file = merged.files.get(*number).map_or(path, |(path, _)| path).display();
+                    return Err(error(format!(
+                        "overlaps {other_file} in rows {first_row} to {last_row}"
+                    )));
                 }
-                all.pieces.insert(y0, (all.files.len(), entry));
+                merged.pieces.insert(y0, (merged.files.len(), entry));
             }
-            all.files.push((path.clone(), key));
+            merged.files.push((path.clone(), key));
         }
-        let parts = parts.ok_or_else(|| PartError::Gap("no parts were given".to_owned()))?;
+        let parts = parts.ok_or_else(|| PartError::Gap("no parts to merge".to_owned()))?;
         match parts.gap() {
             None => Ok(parts),
-            Some((from, to)) => Err(PartError::Gap(missing(from, to, &tiles))),
+            Some((first_row, last_row)) => Err(PartError::Gap(missing(first_row, last_row, &tiles))),
         }
     }
 
@@ -274,14 +280,14 @@ impl Parts {
         let Identity {
             picture, pixel_samples, ..
         } = self.identity;
-        let known = |name: &String| Aov::ALL.into_iter().find(|aov| aov.name() == name);
+        let aov_named = |name: &String| Aov::ALL.into_iter().find(|aov| aov.name() == name);
         let transform = ViewTransform::ALL
             .into_iter()
             .find(|view| view.name() == self.header.view_transform);
         Layout {
             picture: picture.into(),
             region: self.identity.region(),
-            aovs: self.header.aovs.iter().filter_map(known).collect(),
+            aovs: self.header.aovs.iter().filter_map(aov_named).collect(),
             alpha: self.header.alpha,
             middle_depth: f32::from_bits(self.header.middle_depth),
             max_samples: pixel_samples,
@@ -325,65 +331,65 @@ impl Parts {
     }
 }
 
-/// Describes missing rows, and the missing parts if all parts agree on the number of parts.
-fn missing(from: u32, to: u32, tiles: &[Tile]) -> String {
-    let rows = match from == to {
-        true => format!("row {from} is missing"),
-        false => format!("rows {from} to {to} are missing"),
+/// Describes missing rows, and lists the missing parts if all parts name the same number of parts.
+fn missing(first_row: u32, last_row: u32, tiles: &[Tile]) -> String {
+    let rows = match first_row == last_row {
+        true => format!("row {first_row} is missing"),
+        false => format!("rows {first_row} to {last_row} are missing"),
     };
-    let Some(of) = tiles
+    let Some(count) = tiles
         .first()
         .map(|tile| tile.of)
-        .filter(|of| tiles.iter().all(|tile| tile.of == *of))
+        .filter(|count| tiles.iter().all(|tile| tile.of == *count))
     else {
         return rows;
     };
-    const MOST: usize = 20;
+    const MAX_NAMES: usize = 20;
     let present: BTreeSet<u32> = tiles.iter().map(|tile| tile.number).collect();
-    let absent = (1..=of).filter(|number| !present.contains(number));
+    let absent = (1..=count).filter(|number| !present.contains(number));
     let mut names: Vec<String> = absent
-        .take(MOST + 1)
-        .map(|number| Tile { number, of }.to_string())
+        .take(MAX_NAMES + 1)
+        .map(|number| Tile { number, of: count }.to_string())
         .collect();
-    let dots = if names.len() > MOST { " ..." } else { "" };
-    names.truncate(MOST);
+    let dots = if names.len() > MAX_NAMES { " ..." } else { "" };
+    names.truncate(MAX_NAMES);
     let listed = names.join(", ");
     format!("{rows}: add part {listed}{dots}")
 }
 
 fn open(path: &Path) -> Result<(Key, Header, PartHeader, Vec<Entry>), PartError> {
-    let bad = |what: String| PartError::Bad {
+    let error = |what: String| PartError::Bad {
         path: path.to_owned(),
         what,
     };
-    let io = |error: io::Error| bad(error.to_string());
-    blocking_path::reject(path).map_err(io)?;
-    let mut file = File::open(path).map_err(io)?;
-    let data = file.metadata().map_err(io)?;
+    let io_error = |cause: io::Error| error(cause.to_string());
+    blocking_path::reject(path).map_err(io_error)?;
+    let mut file = File::open(path).map_err(io_error)?;
+    let data = file.metadata().map_err(io_error)?;
     if !data.is_file() {
         let what = if data.is_dir() {
             "it is a directory"
         } else {
-            "it is not a regular file, and parts are read twice"
+            "it is not a regular file; parts must be regular files, because they are read twice"
         };
-        return Err(bad(what.to_owned()));
+        return Err(error(what.to_owned()));
     }
-    let (header, key, start) = pieces_file::read_header(&mut file).map_err(io)?;
+    let (header, key, start) = pieces_file::read_header(&mut file).map_err(io_error)?;
     let Some(part) = header.part.clone() else {
         let what = "is a checkpoint, not a part; wgray merge reads the files that wgray render --tile writes";
-        return Err(bad(what.to_owned()));
+        return Err(error(what.to_owned()));
     };
-    let contents = pieces_file::scan(&file, &header.identity, &key, start).map_err(io)?;
-    part.check(&header.identity, &contents.entries).map_err(bad)?;
+    let contents = pieces_file::scan(&file, &header.identity, &key, start).map_err(io_error)?;
+    part.check(&header.identity, &contents.entries).map_err(error)?;
     let rows = part.tile.rows(header.identity.region());
     let height: u64 = contents
         .entries
         .iter()
         .map(|entry| u64::from(entry.region.height()))
         .sum();
-    let is_whole = rows.is_some_and(|rows| u64::from(rows.height()) == height);
-    if contents.damaged > 0 || !is_whole {
-        return Err(bad(format!(
+    let is_complete = rows.is_some_and(|rows| u64::from(rows.height()) == height);
+    if contents.damaged > 0 || !is_complete {
+        return Err(error(format!(
             "is damaged or truncated at byte {}; render part {} again",
             contents.end, part.tile
         )));
@@ -450,16 +456,16 @@ mod tests {
         header.part.as_mut().unwrap()
     }
 
-    /// Files with correct hashes that the program never writes. Fuzzing found that the first case panicked.
+    /// Files with correct hashes that the program never writes. A fuzzer found a panic for layers without values.
     #[test]
-    fn what_no_program_writes_is_refused() {
+    fn parts_that_the_program_never_writes_are_rejected() {
         assert_eq!(error_of(|_, _| ()), "");
         for aov in ["normal", "shading_normal", "albedo", "variance", "sample_count"] {
-            let without = error_of(|header, _| part(header).aovs = vec![aov.to_owned()]);
-            assert_eq!(without, format!("has no values for its layer {aov}"));
+            let message = error_of(|header, _| part(header).aovs = vec![aov.to_owned()]);
+            assert_eq!(message, format!("has no values for its layer {aov}"));
         }
         assert_eq!(error_of(|header, _| part(header).aovs = vec!["other".to_owned()]), "");
-        for (depth, exposure, wanted) in [
+        for (depth, exposure, expected) in [
             (f32::NAN, 0.0, "its depth, NaN, must be"),
             (0.0, 0.0, "its depth, 0, must be"),
             (1.0, f64::INFINITY, "its exposure "),
@@ -468,7 +474,7 @@ mod tests {
                 part(header).middle_depth = depth.to_bits();
                 part(header).exposure = exposure.to_bits();
             });
-            assert!(message.starts_with(wanted), "{message}");
+            assert!(message.starts_with(expected), "{message}");
         }
         let unfinished = error_of(|_, piece| piece.reached.pass = 8..16);
         assert_eq!(unfinished, "its piece of the pixels 0,0,4,3 is not finished");

@@ -7,31 +7,31 @@ use crate::error::RenderError;
 use crate::film::Film;
 use wgray_image::Region;
 
-/// Rows of an image with their samples so far. Any backend can continue the piece and gives the same bits.
+/// Rows of an image with the samples rendered so far. Any backend can continue a piece, and gives the same bits.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FilmPiece {
     /// Whole rows of the job's region.
     pub region: Region,
-    /// Samples of the film's pixels.
+    /// Samples that the film's pixels have so far.
     pub reached: SampleProgress,
     /// Film of the region; if unfinished, with the neighbors that determine its sample counts.
     pub film: Film,
 }
 
-/// A piece in a store.
+/// Description of a piece in a store.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct StoredPiece {
     /// Key for [`CheckpointStore::load`].
     pub number: usize,
     /// Rows of the piece.
     pub region: Region,
-    /// Region of its film.
+    /// Region of the piece's film.
     pub film: Region,
-    /// Samples of the film's pixels.
+    /// Samples that the film's pixels have so far.
     pub reached: SampleProgress,
 }
 
-/// Storage of pieces while others are rendered.
+/// Storage of rendered pieces.
 pub trait CheckpointStore {
     /// Returns the pieces, which share no rows, from top to bottom.
     fn pieces(&self) -> Vec<StoredPiece>;
@@ -40,10 +40,10 @@ pub trait CheckpointStore {
     ///
     /// # Errors
     ///
-    /// Unreadable pieces.
+    /// The piece cannot be read.
     fn load(&mut self, number: usize) -> Result<FilmPiece, RenderError>;
 
-    /// Stores a piece, replacing earlier pieces of the same rows. Reports a failure without stopping the work.
+    /// Stores a piece, replacing earlier pieces of the same rows. Reports a failure without stopping the render.
     fn keep(&mut self, piece: &FilmPiece);
 
     /// Flushes all stored pieces to the disk.
@@ -56,7 +56,7 @@ pub trait CheckpointStore {
     fn small_pieces(&self) -> bool;
 }
 
-/// Stores nothing: the work survives a lost device, but not the end of the process.
+/// A store that keeps nothing. A render survives the loss of a device, but not the end of the process.
 #[derive(Debug)]
 pub struct NoCheckpoint;
 

@@ -46,7 +46,7 @@ pub struct Header {
 pub struct Entry {
     pub region: Region,
     pub film: Region,
-    /// Samples of the film's pixels.
+    /// Samples that the film's pixels have so far.
     pub reached: SampleProgress,
     /// True if first hits follow the film.
     pub has_hits: bool,
@@ -122,17 +122,17 @@ impl<W: Write> HashingStream<W> {
     }
 
     /// Writes the hash of all bytes so far, including hashes.
-    fn put_hash(&mut self) -> io::Result<()> {
+    fn write_hash(&mut self) -> io::Result<()> {
         let hash = self.hash();
         self.write_and_hash(&hash)
     }
 
-    fn put_words(&mut self, words: &[u32]) -> io::Result<()> {
+    fn write_words(&mut self, words: &[u32]) -> io::Result<()> {
         const CHUNK: usize = 4096;
         for chunk in words.chunks(CHUNK) {
             let mut copy = [0; CHUNK];
-            for (to, word) in copy.iter_mut().zip(chunk) {
-                *to = word.to_le();
+            for (copied, word) in copy.iter_mut().zip(chunk) {
+                *copied = word.to_le();
             }
             self.write_and_hash(cast_slice(&copy[..chunk.len()]))?;
         }
@@ -141,79 +141,79 @@ impl<W: Write> HashingStream<W> {
 }
 
 impl<R: Read> HashingStream<R> {
-    fn get(&mut self, bytes: &mut [u8]) -> io::Result<()> {
+    fn read_and_hash(&mut self, bytes: &mut [u8]) -> io::Result<()> {
         self.inner.read_exact(bytes)?;
         self.hasher.update(bytes);
         self.bytes += bytes.len() as u64;
         Ok(())
     }
 
-    fn get_words(&mut self, words: &mut [u32]) -> io::Result<()> {
-        self.get(cast_slice_mut(words))?;
+    fn read_words(&mut self, words: &mut [u32]) -> io::Result<()> {
+        self.read_and_hash(cast_slice_mut(words))?;
         for word in words {
             *word = u32::from_le(*word);
         }
         Ok(())
     }
 
-    /// Reads a hash. Returns true if it is correct.
-    fn is_whole(&mut self) -> io::Result<bool> {
+    /// Reads a hash. Returns true if it matches the bytes so far.
+    fn hash_matches(&mut self) -> io::Result<bool> {
         let (hash, mut found) = (self.hash(), [0; HASH]);
-        self.get(&mut found)?;
+        self.read_and_hash(&mut found)?;
         Ok(found == hash)
     }
 }
 
-/// Writes magic and header. Returns the hash and the number of bytes.
+/// Writes the magic and the header. Returns the header's hash and the number of bytes.
 pub fn write_header(out: &mut impl Write, header: &Header) -> io::Result<(Key, u64)> {
     let text = serde_json::to_vec(header)?;
     let mut out = HashingStream::new(out);
     out.inner.write_all(MAGIC)?;
-    out.put_words(&[text.len() as u32])?;
+    out.write_words(&[text.len() as u32])?;
     out.write_and_hash(&text)?;
     let key = out.hash();
-    out.put_hash()?;
+    out.write_hash()?;
     Ok((key, MAGIC.len() as u64 + out.bytes))
 }
 
-/// Inverse of [`write_header`]. Errors distinguish damaged headers from other files.
+/// Reads what [`write_header`] writes. Errors distinguish damaged headers from files of other formats.
 pub fn read_header(input: &mut impl Read) -> io::Result<(Header, Key, u64)> {
-    let bad = |what: &str| io::Error::new(io::ErrorKind::InvalidData, what.to_owned());
-    let none = |_| bad("it is not a part or checkpoint that wgray wrote");
-    let cut = |_| bad("its header is damaged or truncated");
+    let invalid = |message: &str| io::Error::new(io::ErrorKind::InvalidData, message.to_owned());
+    let foreign = |_| invalid("it is not a part or checkpoint that wgray wrote");
+    let damaged = |_| invalid("its header is damaged or truncated");
     let mut magic = [0; MAGIC.len()];
-    input.read_exact(&mut magic).map_err(none)?;
+    input.read_exact(&mut magic).map_err(foreign)?;
     if magic != *MAGIC {
-        return Err(none(io::ErrorKind::InvalidData.into()));
+        return Err(foreign(io::ErrorKind::InvalidData.into()));
     }
     let mut input = HashingStream::new(input);
     let mut length = [0];
-    input.get_words(&mut length).map_err(cut)?;
+    input.read_words(&mut length).map_err(damaged)?;
     if length[0] > MAX_HEADER_BYTES {
-        return Err(cut(io::ErrorKind::InvalidData.into()));
+        return Err(damaged(io::ErrorKind::InvalidData.into()));
     }
     let mut text = vec![0; length[0] as usize];
-    input.get(&mut text).map_err(cut)?;
+    input.read_and_hash(&mut text).map_err(damaged)?;
     let key = input.hash();
-    if !input.is_whole().map_err(cut)? {
-        return Err(cut(io::ErrorKind::InvalidData.into()));
+    if !input.hash_matches().map_err(damaged)? {
+        return Err(damaged(io::ErrorKind::InvalidData.into()));
     }
-    // The message names the program version, even one with other header fields.
+    // If the header has other fields, the message names the version of the program that wrote the file.
     let header: Header = serde_json::from_slice(&text).map_err(|_| {
         let version = serde_json::from_slice(&text).ok().and_then(|value: serde_json::Value| {
             let version = value.get("identity")?.get("version")?.as_str()?;
             Some(version.to_owned())
         });
         let version = version.unwrap_or("an unknown version".to_owned());
-        bad(&format!("it was written by another version of wgray: {version}"))
+        invalid(&format!("it was written by another version of wgray: {version}"))
     })?;
     if header.format != FORMAT {
         let (found, version) = (header.format, header.identity.version);
-        return Err(bad(&format!(
+        return Err(invalid(&format!(
             "it has format {found} (wgray {version}); this program reads format {FORMAT}"
         )));
     }
-    header.identity.check().map_err(|rule| bad(&rule))?;
+    header.identity.check().map_err(|rule| invalid(&rule))?;
     Ok((header, key, MAGIC.len() as u64 + input.bytes))
 }
 
@@ -232,13 +232,13 @@ impl Head {
         let SampleProgress { pass, next } = &self.reached;
         let flags = [self.film_layout.adaptive, self.film_layout.layers, self.has_hits];
         let flags = (0..).zip(flags).map(|(i, flag)| u32::from(flag) << i).sum();
-        let words = [x0, y0, x1, y1, film.x0, film.y0, film.x1, film.y1];
-        let more = [pass.start, pass.end, next[0], next[1], flags, 0];
+        let regions = [x0, y0, x1, y1, film.x0, film.y0, film.x1, film.y1];
+        let progress = [pass.start, pass.end, next[0], next[1], flags, 0];
         std::array::from_fn(|i| {
-            if i < words.len() {
-                words[i]
+            if i < regions.len() {
+                regions[i]
             } else {
-                more[i - words.len()]
+                progress[i - regions.len()]
             }
         })
     }
@@ -260,12 +260,12 @@ impl Head {
             },
             has_hits: flags & 4 != 0,
         };
-        let (whole, [width, height]) = (identity.region(), identity.picture);
+        let (job_region, [width, height]) = (identity.region(), identity.picture);
         let picture = Region::whole(width, height);
         let rows = head.region;
-        let lies_in = |part: Region, of: Region| !part.is_empty() && part.within(of) == part;
-        let is_good = lies_in(rows, whole)
-            && (rows.x0, rows.x1) == (whole.x0, whole.x1)
+        let lies_in = |inner: Region, outer: Region| !inner.is_empty() && inner.within(outer) == inner;
+        let is_valid = lies_in(rows, job_region)
+            && (rows.x0, rows.x1) == (job_region.x0, job_region.x1)
             && lies_in(rows, head.film)
             && lies_in(head.film, rows.with_neighbors())
             && lies_in(head.film, picture)
@@ -278,10 +278,10 @@ impl Head {
                     adaptive: identity.adaptive,
                     layers: identity.layers,
                 };
-        is_good.then_some(head)
+        is_valid.then_some(head)
     }
 
-    fn data(&self) -> u64 {
+    fn data_bytes(&self) -> u64 {
         let hits = if self.has_hits { self.region.pixels() } else { 0 };
         self.film.pixels() * self.film_layout.bytes() as u64 + hits * size_of::<FirstHit>() as u64
     }
@@ -298,26 +298,26 @@ pub fn write_piece(out: &mut impl Write, key: &Key, piece: &FilmPiece, hits: &[F
         has_hits: !hits.is_empty(),
     };
     let mut out = HashingStream::keyed(out, key);
-    out.put_words(&head.words())?;
-    out.put_hash()?;
+    out.write_words(&head.words())?;
+    out.write_hash()?;
     for list in lists {
-        out.put_words(cast_slice(list))?;
+        out.write_words(cast_slice(list))?;
     }
-    out.put_words(cast_slice(hits))?;
-    out.put_hash()?;
+    out.write_words(cast_slice(hits))?;
+    out.write_hash()?;
     Ok(out.bytes)
 }
 
-/// Scans the pieces up to the first incomplete or damaged one. `header` is the end of the header.
-pub fn scan(file: &File, identity: &Identity, key: &Key, header: u64) -> io::Result<Contents> {
+/// Scans the pieces up to the first incomplete or damaged piece. `header_end` is the offset after the header.
+pub fn scan(file: &File, identity: &Identity, key: &Key, header_end: u64) -> io::Result<Contents> {
     let length = file.metadata()?.len();
     let mut input = BufReader::with_capacity(1 << 20, file);
     let mut contents = Contents {
         entries: Vec::new(),
-        end: header,
+        end: header_end,
         damaged: 0,
     };
-    input.seek(SeekFrom::Start(header))?;
+    input.seek(SeekFrom::Start(header_end))?;
     loop {
         match next_entry(&mut input, identity, key, contents.end, length) {
             Ok(Some(entry)) => {
@@ -342,25 +342,25 @@ fn next_entry(
 ) -> io::Result<Option<Entry>> {
     let mut input = HashingStream::keyed(input, key);
     let mut words = [0; WORDS];
-    input.get_words(&mut words)?;
-    if !input.is_whole()? {
+    input.read_words(&mut words)?;
+    if !input.hash_matches()? {
         return Ok(None);
     }
     let Some(head) = Head::of(&words, identity) else {
         return Ok(None);
     };
-    let end = start + HEAD + head.data() + HASH as u64;
+    let end = start + HEAD + head.data_bytes() + HASH as u64;
     if end > length {
         return Ok(None);
     }
-    let mut left = head.data();
+    let mut remaining = head.data_bytes();
     let mut buffer = vec![0; 1 << 18];
-    while left > 0 {
-        let count = left.min(buffer.len() as u64) as usize;
-        input.get(&mut buffer[..count])?;
-        left -= count as u64;
+    while remaining > 0 {
+        let count = remaining.min(buffer.len() as u64) as usize;
+        input.read_and_hash(&mut buffer[..count])?;
+        remaining -= count as u64;
     }
-    Ok(input.is_whole()?.then_some(Entry {
+    Ok(input.hash_matches()?.then_some(Entry {
         region: head.region,
         film: head.film,
         reached: head.reached,
@@ -381,10 +381,10 @@ pub fn read_piece(
     input.seek(SeekFrom::Start(entry.start))?;
     let mut input = HashingStream::keyed(input, key);
     let mut head = [0; HEAD as usize];
-    input.get(&mut head)?;
+    input.read_and_hash(&mut head)?;
     let mut film = Film::of(entry.film, film_layout);
     for list in film.lists_mut() {
-        input.get_words(cast_slice_mut::<Vec4, u32>(list))?;
+        input.read_words(cast_slice_mut::<Vec4, u32>(list))?;
     }
     let count = if entry.has_hits {
         entry.region.pixels() as usize
@@ -392,8 +392,8 @@ pub fn read_piece(
         0
     };
     let mut hits = vec![<FirstHit as bytemuck::Zeroable>::zeroed(); count];
-    input.get_words(cast_slice_mut(&mut hits))?;
-    if !input.is_whole()? {
+    input.read_words(cast_slice_mut(&mut hits))?;
+    if !input.hash_matches()? {
         return Err(io::Error::new(
             io::ErrorKind::InvalidData,
             "a piece has changed since the file was opened",
@@ -416,16 +416,16 @@ pub fn latest(entries: &[Entry]) -> Vec<usize> {
     rows.into_values().collect()
 }
 
-/// Adds a piece to a map from first rows to numbers, replacing pieces that share rows with it.
+/// Adds a piece to a map from first rows to piece numbers. Removes the pieces that share rows with the new piece.
 pub fn replace(rows: &mut std::collections::BTreeMap<u32, usize>, entries: &[Entry], number: usize, region: Region) {
     // Pieces are disjoint: only the last piece that starts above can overlap.
-    let above = rows
+    let last_above = rows
         .range(..region.y0)
         .next_back()
         .filter(|(_, i)| entries[**i].region.y1 > region.y0);
-    let first = above.map_or(region.y0, |(y, _)| *y);
-    let gone: Vec<u32> = rows.range(first..region.y1).map(|(y, _)| *y).collect();
-    for y in gone {
+    let first = last_above.map_or(region.y0, |(y, _)| *y);
+    let replaced: Vec<u32> = rows.range(first..region.y1).map(|(y, _)| *y).collect();
+    for y in replaced {
         rows.remove(&y);
     }
     rows.insert(region.y0, number);

@@ -14,16 +14,16 @@ use wgray_image::Region;
 /// Order of a film's samples, which does not change the result.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Order {
-    /// Fills a dispatch with samples of a few rows. Kernels that add more samples at once are faster.
+    /// Many samples of a few rows at a time: kernels are faster if they add many samples per pixel.
     Rows,
     /// A few samples of all pixels at a time, for progressive display.
     Pixels,
 }
 
 /// Minimum rows of a dispatch with [`Order::Rows`]: two rows of workgroups on a GPU.
-const ROWS: u32 = 16;
+const MIN_DISPATCH_ROWS: u32 = 16;
 
-/// Samples of the pixels of a film.
+/// Samples that the pixels of a film have so far.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SampleProgress {
     /// Samples in progress; all earlier samples are complete. Empty when all samples are complete.
@@ -42,10 +42,10 @@ pub struct Steps {
     /// The region, and neighbors that need pilot samples.
     film: Region,
     samples: u32,
-    of_all: u32,
-    until: u32,
+    samples_of_all: u32,
+    target: u32,
     reached: SampleProgress,
-    call: Option<Dispatch>,
+    dispatch: Option<Dispatch>,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -62,33 +62,33 @@ impl Dispatch {
 }
 
 impl Steps {
-    /// Creates an empty sequence of dispatches that take about the duration `call`.
-    pub fn new(split: &WorkSplit, call: Duration, order: Order) -> Steps {
+    /// Creates an empty sequence of dispatches with a target duration.
+    pub fn new(split: &WorkSplit, dispatch_duration: Duration, order: Order) -> Steps {
         Steps {
             split: *split,
             order,
-            pace: Pace::new(call),
+            pace: Pace::new(dispatch_duration),
             region: Region::whole(0, 0),
             film: Region::whole(0, 0),
             samples: 0,
-            of_all: 0,
-            until: 0,
+            samples_of_all: 0,
+            target: 0,
             reached: SampleProgress {
                 pass: 0..0,
                 next: [0; 2],
             },
-            call: None,
+            dispatch: None,
         }
     }
 
-    /// Starts a film of a region; [`Steps::film`] returns the film's own region. Keeps the measured speed.
+    /// Starts a film of a region; [`Steps::film`] returns the region of the film. Keeps the measured speed.
     pub fn start(&mut self, backend: &dyn Backend, region: Region, samples: u32) {
         self.region = region;
         self.samples = samples;
-        self.until = samples;
-        self.of_all = backend.samples_of_all().min(samples);
+        self.target = samples;
+        self.samples_of_all = backend.samples_of_all().min(samples);
         self.film = film_of(backend, region, samples);
-        self.call = None;
+        self.dispatch = None;
         self.pace.start_film();
         self.begin_pass(0);
     }
@@ -102,7 +102,7 @@ impl Steps {
 
     /// Stops when all pixels have this number of samples, and the pass in progress is complete.
     pub fn stop_at(&mut self, samples: u32) {
-        self.until = samples.min(self.samples);
+        self.target = samples.min(self.samples);
         let SampleProgress { pass, next } = &self.reached;
         if *next == [self.region_of_pass().x0, self.region_of_pass().y0] {
             self.begin_pass(pass.start);
@@ -114,7 +114,7 @@ impl Steps {
         self.film
     }
 
-    /// Returns the samples of the film's pixels, between dispatches.
+    /// Returns how many samples the film's pixels have, between dispatches.
     pub fn reached(&self) -> &SampleProgress {
         &self.reached
     }
@@ -124,21 +124,21 @@ impl Steps {
         self.pace.forget();
     }
 
-    /// Drops a failed dispatch and makes the next ones smaller.
+    /// Drops a failed dispatch and makes the next dispatches smaller.
     pub fn failed(&mut self) {
         self.pace.forget();
-        if let Some(call) = self.call.take() {
-            self.pace.failed(call.work());
+        if let Some(dispatch) = self.dispatch.take() {
+            self.pace.failed(dispatch.work());
         }
     }
 
-    /// Makes the next dispatch, and returns its samples over all pixels; `None` if complete.
+    /// Runs the next dispatch, and returns its number of samples over all pixels; `None` if the film is complete.
     pub fn step(&mut self, backend: &mut dyn Backend) -> Result<Option<f64>, RenderError> {
         if !self.submit(backend)? {
             return Ok(None);
         }
         backend.wait()?;
-        Ok(self.end_call())
+        Ok(self.end_dispatch())
     }
 
     /// Submits the next dispatch, for [`Steps::poll`]. Returns false if the film is complete.
@@ -147,13 +147,13 @@ impl Steps {
             return Ok(false);
         }
         let pass = self.reached.pass.clone();
-        let call = Dispatch {
+        let dispatch = Dispatch {
             tile: self.next_tile(),
             samples: pass.len() as u32,
             start: Instant::now(),
         };
-        self.call = Some(call);
-        backend.submit(call.tile, pass)?;
+        self.dispatch = Some(dispatch);
+        backend.submit(dispatch.tile, pass)?;
         Ok(true)
     }
 
@@ -180,16 +180,16 @@ impl Steps {
         }
     }
 
-    /// Returns the samples over all pixels of the submitted dispatch, once it has ended.
+    /// Returns the number of samples over all pixels of the submitted dispatch; `None` until the dispatch has ended.
     pub fn poll(&mut self, backend: &mut dyn Backend) -> Result<Option<f64>, RenderError> {
-        Ok(if backend.poll()? { self.end_call() } else { None })
+        Ok(if backend.poll()? { self.end_dispatch() } else { None })
     }
 
-    fn end_call(&mut self) -> Option<f64> {
-        let call = self.call.take()?;
-        let Dispatch { tile, samples, start } = call;
-        let of_all = self.reached.pass.end <= self.of_all;
-        self.pace.took(call.work(), start.elapsed(), of_all);
+    fn end_dispatch(&mut self) -> Option<f64> {
+        let dispatch = self.dispatch.take()?;
+        let Dispatch { tile, samples, start } = dispatch;
+        let is_full = self.reached.pass.end <= self.samples_of_all;
+        self.pace.record(dispatch.work(), start.elapsed(), is_full);
         let region = self.region_of_pass();
         self.reached.next = match tile.x1 < region.x1 {
             true => [tile.x1, tile.y0],
@@ -206,7 +206,7 @@ impl Steps {
     }
 
     fn region_of_pass(&self) -> Region {
-        if self.reached.pass.start < self.of_all {
+        if self.reached.pass.start < self.samples_of_all {
             self.film
         } else {
             self.region
@@ -236,13 +236,17 @@ impl Steps {
 
     fn begin_pass(&mut self, first: u32) {
         let rows = match self.order {
-            Order::Rows => self.region.height().min(ROWS),
+            Order::Rows => self.region.height().min(MIN_DISPATCH_ROWS),
             Order::Pixels => self.region.height(),
         };
         let pixels = f64::from(self.region.width()) * f64::from(rows);
         let count = (self.split.samples_per_dispatch).unwrap_or_else(|| (self.pace.work() / pixels).max(1.0) as u32);
-        let end = if first < self.of_all { self.of_all } else { self.samples };
-        let end = end.min(self.until).max(first);
+        let end = if first < self.samples_of_all {
+            self.samples_of_all
+        } else {
+            self.samples
+        };
+        let end = end.min(self.target).max(first);
         self.reached.pass = first..first + count.min(end - first);
         let region = self.region_of_pass();
         self.reached.next = [region.x0, region.y0];

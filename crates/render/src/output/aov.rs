@@ -20,7 +20,7 @@ pub enum Aov {
     Depth,
     /// Texture coordinates.
     Uv,
-    /// Index of the shape in the scene file; in a mesh, of the triangle.
+    /// Index of the triangle in a mesh; otherwise index of the shape in the scene file.
     Primitive,
     /// Index of the shape in the scene file: `[[shapes]]`, then `[[instances]]`, then lights.
     Instance,
@@ -59,7 +59,7 @@ pub enum Channel {
     Whole(&'static str, fn(&FirstHit) -> u32),
     /// A component of a layer's mean.
     Mean(&'static str, Layer, usize),
-    /// A component of the shading normal: with layers of the mean, otherwise of the first hit.
+    /// A component of the shading normal: of the mean if the film has layers, otherwise of the first hit.
     ShadingNormal(&'static str, usize),
     /// Number of samples.
     Count(&'static str),
@@ -86,11 +86,11 @@ impl Channel {
         match self {
             Channel::Float(_, value) => value(&band.hits[i]).to_ne_bytes(),
             Channel::Whole(_, value) => value(&band.hits[i]).to_ne_bytes(),
-            Channel::Mean(_, layer, part) => band.film.layer(*layer, i)[*part].to_ne_bytes(),
-            Channel::ShadingNormal(_, part) if band.film.has_layers() => {
-                band.film.layer(Layer::Normal, i)[*part].to_ne_bytes()
+            Channel::Mean(_, layer, component) => band.film.layer(*layer, i)[*component].to_ne_bytes(),
+            Channel::ShadingNormal(_, component) if band.film.has_layers() => {
+                band.film.layer(Layer::Normal, i)[*component].to_ne_bytes()
             }
-            Channel::ShadingNormal(_, part) => band.hits[i].shading_normal[*part].to_ne_bytes(),
+            Channel::ShadingNormal(_, component) => band.hits[i].shading_normal[*component].to_ne_bytes(),
             Channel::Count(_) => band.film.sample_count(i).to_ne_bytes(),
             Channel::Variance(_, channel) => band.film.variance(i)[*channel].to_ne_bytes(),
         }
@@ -234,7 +234,7 @@ impl Aov {
     /// - Depth d: `1 / (1 + (d / middle)^4)`.
     /// - Texture coordinates: fractional parts in red and green.
     /// - Indices: a color per index.
-    /// - Sample counts: `log(count) / log(most)`.
+    /// - Sample counts: `log(count) / log(max)`.
     /// - Variance: standard error to the power 1/2.2.
     pub fn color(self, band: Band, i: usize, layout: &Layout) -> Vec3 {
         let film = band.film;
@@ -247,15 +247,15 @@ impl Aov {
                 Vec3::from(film.layer(Layer::Normal, i)) * 0.5 + 0.5 * film.alpha(i)
             }
             Aov::SampleCount => {
-                let [count, most] = [band.film.sample_count(i), layout.max_samples].map(|n| n.max(1) as f32);
-                Vec3::splat(count.ln() / most.max(2.0).ln())
+                let [count, max] = [band.film.sample_count(i), layout.max_samples].map(|n| n.max(1) as f32);
+                Vec3::splat(count.ln() / max.max(2.0).ln())
             }
             Aov::Variance => Vec3::from(band.film.variance(i)).map(|v| v.sqrt().powf(1.0 / 2.2)),
             _ => self.color_of_hit(&band.hits[i], layout.middle_depth),
         }
     }
 
-    /// Returns [`Aov::color`] for a first hit; other sources look like [`Aov::Instance`].
+    /// Returns [`Aov::color`] of a first hit. Variables of other sources have the color of [`Aov::Instance`].
     pub fn color_of_hit(self, hit: &FirstHit, middle_depth: f32) -> Vec3 {
         if hit.shape == NO_INDEX {
             return Vec3::ZERO;
@@ -266,22 +266,22 @@ impl Aov {
             Aov::ShadingNormal => hit.shading_normal * 0.5 + 0.5,
             Aov::Uv => (hit.uv - hit.uv.floor()).extend(0.0),
             Aov::Barycentric => hit.barycentric.extend(1.0 - hit.barycentric.x - hit.barycentric.y),
-            Aov::Primitive => number_color(hit.primitive),
-            _ => number_color(hit.shape),
+            Aov::Primitive => index_color(hit.primitive),
+            _ => index_color(hit.shape),
         }
     }
 }
 
 /// Returns a color for an index, never black: hues a golden section of the circle apart, so that consecutive indices
 /// differ clearly, in three lightnesses.
-fn number_color(number: u32) -> Vec3 {
+fn index_color(index: u32) -> Vec3 {
     const GOLDEN_SECTION: u32 = 0x9e37_79b9; // of 2^32
-    let hue = number.wrapping_mul(GOLDEN_SECTION) as f32 / u32::MAX as f32 * 6.0;
-    let pure = Vec3::new(
+    let hue = index.wrapping_mul(GOLDEN_SECTION) as f32 / u32::MAX as f32 * 6.0;
+    let saturated = Vec3::new(
         (hue - 3.0).abs() - 1.0,
         2.0 - (hue - 2.0).abs(),
         2.0 - (hue - 4.0).abs(),
     );
-    let lightness = [1.0, 0.6, 0.8][number as usize % 3];
-    (pure.clamp(Vec3::ZERO, Vec3::ONE) * 0.75 + 0.25) * lightness
+    let lightness = [1.0, 0.6, 0.8][index as usize % 3];
+    (saturated.clamp(Vec3::ZERO, Vec3::ONE) * 0.75 + 0.25) * lightness
 }

@@ -19,9 +19,9 @@ use super::{Band, ExrType, Layout, Metadata, Pending, Pixels, SaveOptions, Sink}
 use crate::error::RenderError;
 use crate::film::mean;
 
-/// Writes the radiance as R, G, B, premultiplied by alpha, the alpha as A, and AOVs as further channels of the part.
-/// The display window is the whole image, the data window the region. Returns the number of finite values that became
-/// infinite.
+/// Writes the radiance as R, G and B, premultiplied by alpha, alpha as A, and AOVs as further channels of the same
+/// part. The display window is the whole image, the data window is the region. Returns the number of finite values that
+/// became infinite.
 pub fn write(
     files: &mut [Pending],
     layout: &Layout,
@@ -34,8 +34,8 @@ pub fn write(
     let columns = columns(layout);
     let header = header(layout, options, &columns);
     let mut too_large = 0;
-    // Errors of the render bypass the library, which calls the closure.
-    let mut failed = None;
+    // The closure can only return errors of the library, so an error of the render is stored here.
+    let mut render_error = None;
     let written = write_blocks(file, [header].into_iter().collect(), true, |meta, writer| {
         let mut rows = Rows {
             columns: &columns,
@@ -48,16 +48,16 @@ pub fn write(
             next: 0,
             too_large: 0,
         };
-        let rendered = render(&mut |band| Ok(rows.take(band).map_err(plain)?));
+        let rendered = render(&mut |band| Ok(rows.add_band(band).map_err(to_io_error)?));
         too_large = rows.too_large;
         rendered.map_err(|error| {
-            failed = Some(error);
+            render_error = Some(error);
             Error::Aborted
         })
     });
-    match failed {
+    match render_error {
         Some(error) => Err(error),
-        None => Ok(written.map(|()| too_large).map_err(plain)?),
+        None => Ok(written.map(|()| too_large).map_err(to_io_error)?),
     }
 }
 
@@ -82,14 +82,14 @@ fn columns(layout: &Layout) -> Vec<(&'static str, Column)> {
 }
 
 impl Column {
-    fn is_whole(&self) -> bool {
+    fn is_integer(&self) -> bool {
         matches!(self, Column::Aov(channel) if channel.is_whole())
     }
 }
 
 fn header(layout: &Layout, options: &SaveOptions, columns: &[(&str, Column)]) -> Header {
     let channel = |(name, column): &(&str, Column)| {
-        let sample = match (column.is_whole(), options.exr_type) {
+        let sample = match (column.is_integer(), options.exr_type) {
             (true, _) => SampleType::U32,
             (false, ExrType::Float) => SampleType::F32,
             (false, ExrType::Half) => SampleType::F16,
@@ -135,28 +135,29 @@ struct Rows<'a, W: Write + Seek> {
     block_rows: usize,
     /// Rows of an incomplete block.
     lines: Vec<Vec<u8>>,
+    /// Index of the next block.
     next: usize,
     /// Finite values that became infinite.
     too_large: u64,
 }
 
 impl<W: Write + Seek> Rows<'_, W> {
-    fn take(&mut self, band: Band) -> UnitResult {
+    fn add_band(&mut self, band: Band) -> UnitResult {
         let width = self.layout.region.width() as usize;
         let rows = band.film.region.height() as usize;
         let lines = (0..rows)
             .into_par_iter()
-            .map(|y| line(self.columns, band, y * width..(y + 1) * width, self.half));
+            .map(|y| encode_row(self.columns, band, y * width..(y + 1) * width, self.half));
         for (line, too_large) in lines.collect::<Vec<_>>() {
             self.lines.push(line);
             self.too_large += too_large;
         }
         let height = self.layout.region.height() as usize;
-        let last = self.next * self.block_rows + self.lines.len() == height;
-        let whole = self.lines.len() / self.block_rows * self.block_rows;
+        let is_last = self.next * self.block_rows + self.lines.len() == height;
+        let complete_rows = self.lines.len() / self.block_rows * self.block_rows;
         let ready: Vec<Vec<u8>> = self
             .lines
-            .drain(..if last { self.lines.len() } else { whole })
+            .drain(..if is_last { self.lines.len() } else { complete_rows })
             .collect();
         let (first, headers, block_rows) = (self.next, &self.meta.headers, self.block_rows);
         let chunks = ready.par_chunks(block_rows).enumerate().map(|(i, lines)| {
@@ -181,7 +182,7 @@ impl<W: Write + Seek> Rows<'_, W> {
 }
 
 /// Returns a row's bytes, channel by channel, and the number of finite values that became infinite in 16 bits.
-fn line(columns: &[(&str, Column)], band: Band, pixels: std::ops::Range<usize>, half: bool) -> (Vec<u8>, u64) {
+fn encode_row(columns: &[(&str, Column)], band: Band, pixels: std::ops::Range<usize>, half: bool) -> (Vec<u8>, u64) {
     let mut bytes = Vec::with_capacity(4 * columns.len() * pixels.len());
     let mut too_large = 0;
     for (_, column) in columns {
@@ -191,7 +192,7 @@ fn line(columns: &[(&str, Column)], band: Band, pixels: std::ops::Range<usize>, 
                 Column::Alpha => band.film.alpha(i).to_ne_bytes(),
                 Column::Aov(channel) => channel.bytes(band, i),
             };
-            if half && !column.is_whole() {
+            if half && !column.is_integer() {
                 let value = f32::from_ne_bytes(sample);
                 let rounded = f16::from_f32(value); // to nearest, ties to even
                 too_large += u64::from(value.is_finite() && rounded.is_infinite());
@@ -204,7 +205,7 @@ fn line(columns: &[(&str, Column)], band: Band, pixels: std::ops::Range<usize>, 
     (bytes, too_large)
 }
 
-fn plain(error: Error) -> io::Error {
+fn to_io_error(error: Error) -> io::Error {
     match error {
         Error::Io(error) => error,
         other => io::Error::other(other),
@@ -219,7 +220,8 @@ pub(super) fn read_metadata(file: BufReader<File>) -> Option<Metadata> {
     Some(Metadata::from_lines(software, &comments.unwrap_or_default()))
 }
 
-/// Reads R, G and B of an EXR file's first layer. Colors with alpha are premultiplied, hence over black.
+/// Reads R, G and B of an EXR file's first layer. In files with alpha, colors are premultiplied, as if over a black
+/// background.
 ///
 /// # Errors
 ///
@@ -230,8 +232,8 @@ pub fn read_exr(path: &Path) -> io::Result<Pixels> {
         height: size.y() as u32,
         colors: vec![[0.0; 3]; size.area()],
     };
-    let set = |pixels: &mut Pixels, at: Vec2<usize>, (r, g, b): (f32, f32, f32)| {
-        pixels.colors[at.y() * pixels.width as usize + at.x()] = [r, g, b];
+    let set = |pixels: &mut Pixels, position: Vec2<usize>, (r, g, b): (f32, f32, f32)| {
+        pixels.colors[position.y() * pixels.width as usize + position.x()] = [r, g, b];
     };
     let image = ::exr::prelude::read()
         .no_deep_data()
@@ -244,6 +246,6 @@ pub fn read_exr(path: &Path) -> io::Result<Pixels> {
         .first_valid_layer()
         .all_attributes()
         .from_file(path)
-        .map_err(plain)?;
+        .map_err(to_io_error)?;
     Ok(image.layer_data.channel_data.pixels)
 }

@@ -15,8 +15,8 @@ use crate::error::RenderError;
 use crate::film::mean;
 use wgray_image::memory::fallible;
 
-/// Bytes per pixel that the WebP encoder allocates: a copy of four channels, and the file in a buffer that doubles.
-const WEBP_BESIDE: u64 = 12;
+/// Bytes per pixel that the WebP encoder allocates: a copy of four channels, and the file in a growing buffer.
+const WEBP_ENCODER_BYTES: u64 = 12;
 
 /// Writes the radiance; in a JPEG, it is composited over black.
 pub fn write(
@@ -27,7 +27,7 @@ pub fn write(
     render: &mut dyn FnMut(&mut Sink) -> Result<(), RenderError>,
 ) -> Result<(), RenderError> {
     let [file] = files else {
-        return Err(io::Error::other("JPEG and WebP are one file").into());
+        return Err(io::Error::other("a JPEG or WebP image is a single file").into());
     };
     let (width, height) = (layout.region.width(), layout.region.height());
     format.check_size(width, height).map_err(io::Error::other)?;
@@ -37,13 +37,14 @@ pub fn write(
         false => (3, ExtendedColorType::Rgb8),
     };
     let bytes = layout.region.pixels() * channels;
-    let beside = match format {
-        Format::WebP => layout.region.pixels() * WEBP_BESIDE,
+    let encoder_bytes = match format {
+        Format::WebP => layout.region.pixels() * WEBP_ENCODER_BYTES,
         _ => 0,
     };
-    // Before rendering, as a later failure would abort the process. The memory of the encoder is freed immediately.
-    let mut pixels: Vec<u8> = room(bytes).ok_or(RenderError::Memory(bytes + beside))?;
-    room(beside).ok_or(RenderError::Memory(bytes + beside))?;
+    // Allocated before rendering, because a later failure would abort the process. The memory for the encoder is freed
+    // at once: the encoder allocates it again.
+    let mut pixels: Vec<u8> = allocate(bytes).ok_or(RenderError::Memory(bytes + encoder_bytes))?;
+    allocate(encoder_bytes).ok_or(RenderError::Memory(bytes + encoder_bytes))?;
     render(&mut |band| {
         pixels.par_extend(match alpha {
             true => with_alpha(band, layout),
@@ -70,11 +71,11 @@ pub fn write(
     })
 }
 
-fn room(bytes: u64) -> Option<Vec<u8>> {
-    let mut room = Vec::new();
+fn allocate(bytes: u64) -> Option<Vec<u8>> {
+    let mut memory = Vec::new();
     let bytes = usize::try_from(bytes).ok()?;
-    fallible(|| room.try_reserve_exact(bytes)).ok()?;
-    Some(room)
+    fallible(|| memory.try_reserve_exact(bytes)).ok()?;
+    Some(memory)
 }
 
 fn without_alpha(band: Band, layout: &Layout) -> Vec<u8> {

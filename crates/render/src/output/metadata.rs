@@ -7,8 +7,8 @@ use std::path::Path;
 use super::{Metadata, exr, flat, png};
 use wgray_image::panic_guard::catch_panic;
 
-/// Reads the metadata of an image by this program, in any of its formats, detected from the first bytes; `None` for
-/// other files.
+/// Reads the metadata of an image that this program wrote; `None` for other files. The first bytes determine the
+/// format.
 pub fn read_metadata(path: &Path) -> Option<Metadata> {
     let mut file = BufReader::new(File::open(path).ok()?);
     let start = file.fill_buf().ok()?;

@@ -1,5 +1,5 @@
-//! Image files: PNG, JPEG and WebP with display values, OpenEXR with linear values. PNG and OpenEXR are written row by
-//! row, so that an image need not fit memory. Files have temporary names until complete.
+//! Image files: PNG, JPEG and WebP with display values, OpenEXR with linear values. PNG and OpenEXR files are written
+//! row by row, so that an image need not fit into memory. Files have temporary names until they are complete.
 
 mod aov;
 mod exr;
@@ -38,18 +38,18 @@ pub struct Layout {
     pub middle_depth: f32,
     /// Sample count that a PNG maps to full brightness.
     pub max_samples: u32,
-    /// View transform and exposure, except in an EXR.
+    /// View transform and exposure, which are not applied to OpenEXR files.
     pub view: ViewSettings,
 }
 
-/// Whole rows of a region.
+/// Complete rows of a region.
 #[derive(Clone, Copy, Debug)]
 pub struct Band<'a> {
-    /// The radiance.
+    /// Film of these rows.
     pub film: &'a Film,
-    /// First hits of these pixels; empty if no [`Aov`] of the layout needs them ([`AovSource::FirstHit`]).
+    /// First hits of the pixels; empty if no [`Aov`] of the layout needs them ([`AovSource::FirstHit`]).
     pub hits: &'a [FirstHit],
 }
 
-/// Receives a region's bands, from top to bottom.
+/// Function that receives a region's bands, from top to bottom.
 pub type Sink<'a> = dyn FnMut(Band) -> Result<(), RenderError> + 'a;

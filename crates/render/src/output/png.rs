@@ -13,7 +13,7 @@ use crate::error::RenderError;
 use crate::film::mean;
 use wgray_image::GAMMA;
 
-/// Encodes 8-bit RGB as a PNG in memory, compressing fast.
+/// Encodes 8-bit RGB as a PNG in memory, with fast compression.
 ///
 /// # Errors
 ///
@@ -24,11 +24,11 @@ pub fn in_memory(width: u32, height: u32, rgb: &[u8]) -> io::Result<Vec<u8>> {
     png.set_compression(Compression::Fast);
     png.write_header()
         .and_then(|mut writer| writer.write_image_data(rgb))
-        .map_err(plain)?;
+        .map_err(to_io_error)?;
     Ok(file)
 }
 
-/// Reads Latin-1 text chunks before the pixels.
+/// Reads the Latin-1 text chunks before the pixels.
 pub(super) fn read_metadata(file: BufReader<File>) -> Option<Metadata> {
     let reader = Decoder::new(file).read_info().ok()?;
     let texts = reader.info().uncompressed_latin1_text.iter();
@@ -46,7 +46,7 @@ fn encoder<W: Write>(file: W, (width, height): (u32, u32), color: ColorType, dep
     png
 }
 
-/// Writes radiance to the first file, AOVs to the others.
+/// Writes the radiance to the first file, and each AOV to one of the other files.
 pub fn write(
     files: &mut [Pending],
     layout: &Layout,
@@ -68,24 +68,24 @@ pub fn write(
                 false => png.set_source_gamma(ScaledFloat::new(GAMMA as f32)),
             }
         }
-        write_metadata(&mut png, &options.metadata).map_err(plain)?;
-        writers.push((png.write_header().map_err(plain)?, content));
+        write_metadata(&mut png, &options.metadata).map_err(to_io_error)?;
+        writers.push((png.write_header().map_err(to_io_error)?, content));
     }
     let mut streams = Vec::new();
     for (writer, content) in &mut writers {
-        streams.push((writer.stream_writer().map_err(plain)?, *content));
+        streams.push((writer.stream_writer().map_err(to_io_error)?, *content));
     }
     render(&mut |band| {
         for (stream, content) in &mut streams {
-            stream.write_all(&bytes(band, *content, layout, depth))?;
+            stream.write_all(&encode(band, *content, layout, depth))?;
         }
         Ok(())
     })?;
     for (stream, _) in streams {
-        stream.finish().map_err(plain)?;
+        stream.finish().map_err(to_io_error)?;
     }
     for (writer, _) in writers {
-        writer.finish().map_err(plain)?;
+        writer.finish().map_err(to_io_error)?;
     }
     Ok(())
 }
@@ -101,15 +101,15 @@ fn write_metadata<W: Write>(png: &mut Encoder<'static, W>, metadata: &Metadata) 
     Ok(())
 }
 
-fn bytes(band: Band, content: Option<Aov>, layout: &Layout, depth: BitDepth) -> Vec<u8> {
+fn encode(band: Band, content: Option<Aov>, layout: &Layout, depth: BitDepth) -> Vec<u8> {
     match (content, layout.alpha) {
-        (None, true) => rounded(band, depth, |i| {
+        (None, true) => quantize(band, depth, |i| {
             layout
                 .view
                 .display_straight(mean(band.film.sums[i]), band.film.alpha(i))
         }),
-        (None, false) => rounded(band, depth, |i| layout.view.display(mean(band.film.sums[i]))),
-        (Some(aov), _) => rounded(band, depth, |i| {
+        (None, false) => quantize(band, depth, |i| layout.view.display(mean(band.film.sums[i]))),
+        (Some(aov), _) => quantize(band, depth, |i| {
             let color = aov.color(band, i, layout).to_array();
             match (aov, aov.light()) {
                 (Aov::Albedo, _) => layout.view.display_share(color),
@@ -121,7 +121,7 @@ fn bytes(band: Band, content: Option<Aov>, layout: &Layout, depth: BitDepth) -> 
 }
 
 /// Quantizes pixels from 0 to 1.
-fn rounded<const N: usize>(band: Band, depth: BitDepth, pixel: impl Fn(usize) -> [f64; N] + Sync) -> Vec<u8> {
+fn quantize<const N: usize>(band: Band, depth: BitDepth, pixel: impl Fn(usize) -> [f64; N] + Sync) -> Vec<u8> {
     let pixels = (0..band.film.sums.len()).into_par_iter();
     match depth {
         BitDepth::Eight => pixels.flat_map_iter(|i| pixel(i).map(to_8_bits)).collect(),
@@ -132,7 +132,7 @@ fn rounded<const N: usize>(band: Band, depth: BitDepth, pixel: impl Fn(usize) ->
     }
 }
 
-fn plain(error: EncodingError) -> io::Error {
+fn to_io_error(error: EncodingError) -> io::Error {
     match error {
         EncodingError::IoError(error) => error,
         other => io::Error::other(other),

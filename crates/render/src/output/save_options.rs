@@ -7,15 +7,15 @@ use wgray_scene::ViewSettings;
 /// Encoding of image files. Settings of other formats have no effect.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SaveOptions {
-    /// PNG.
+    /// Bits per channel of PNG files.
     pub bit_depth: BitDepth,
-    /// OpenEXR.
+    /// Type of float channels of OpenEXR files.
     pub exr_type: ExrType,
-    /// OpenEXR.
+    /// Compression of OpenEXR files.
     pub exr_compression: ExrCompression,
-    /// JPEG, 1 to 100.
+    /// Quality of JPEG files, 1 to 100.
     pub quality: u8,
-    /// All formats.
+    /// Metadata of all files.
     pub metadata: Metadata,
 }
 
@@ -35,15 +35,16 @@ impl SaveOptions {
     /// Default JPEG quality. Losses are invisible in images without text or sharp edges.
     pub const QUALITY: u8 = 90;
 
-    /// Returns the options for display values, whose metadata (if any) include the view settings.
-    pub(super) fn of(&self, view: ViewSettings) -> SaveOptions {
-        let mut shown = self.clone();
-        let pairs = &mut shown.metadata.pairs;
+    /// Returns the options for files with display values: adds the view settings to metadata, unless the metadata is
+    /// empty.
+    pub(super) fn with_view(&self, view: ViewSettings) -> SaveOptions {
+        let mut options = self.clone();
+        let pairs = &mut options.metadata.pairs;
         if !pairs.is_empty() {
             pairs.push(("view_transform".to_owned(), view.transform.name().to_owned()));
             pairs.push(("exposure".to_owned(), view.exposure.to_string()));
         }
-        shown
+        options
     }
 }
 
@@ -142,7 +143,7 @@ impl Metadata {
 
     /// Returns the text of a name.
     pub fn get(&self, name: &str) -> Option<&str> {
-        let pair = self.pairs.iter().find(|(known, _)| known == name);
+        let pair = self.pairs.iter().find(|(key, _)| key == name);
         pair.map(|(_, text)| text.as_str())
     }
 
@@ -153,17 +154,17 @@ impl Metadata {
     /// Inverse of [`Metadata::software`] and [`Metadata::lines`].
     pub(super) fn from_lines(software: Option<String>, lines: &str) -> Metadata {
         let software = software.map(|text| (Metadata::SOFTWARE.to_owned(), text));
-        let others = lines.lines().filter_map(|line| line.split_once(": "));
-        let others = others.map(|(name, text)| (name.to_owned(), text.to_owned()));
+        let pairs = lines.lines().filter_map(|line| line.split_once(": "));
+        let pairs = pairs.map(|(name, text)| (name.to_owned(), text.to_owned()));
         Metadata {
-            pairs: software.into_iter().chain(others).collect(),
+            pairs: software.into_iter().chain(pairs).collect(),
         }
     }
 
-    /// Returns all other pairs, one per line: `seed: 0`.
+    /// Returns all pairs except the program's name, one per line, such as `seed: 0`.
     pub(super) fn lines(&self) -> Option<String> {
-        let others = self.pairs.iter().filter(|(name, _)| name != Metadata::SOFTWARE);
-        let lines: Vec<String> = others.map(|(name, text)| format!("{name}: {text}")).collect();
+        let pairs = self.pairs.iter().filter(|(name, _)| name != Metadata::SOFTWARE);
+        let lines: Vec<String> = pairs.map(|(name, text)| format!("{name}: {text}")).collect();
         (!lines.is_empty()).then(|| lines.join("\n"))
     }
 }

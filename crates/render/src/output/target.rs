@@ -35,11 +35,11 @@ impl Format {
     /// Returns the format that a path's extension selects: `.png`, `.exr`, `.jpg`, `.jpeg` or `.webp`.
     pub fn of(path: &Path) -> Option<Format> {
         let extension = path.extension()?.to_str()?.to_ascii_lowercase();
-        let known = |format: &Format| extension == format.name() || (*format == Format::Jpeg && extension == "jpg");
-        Format::ALL.into_iter().find(known)
+        let matches = |format: &Format| extension == format.name() || (*format == Format::Jpeg && extension == "jpg");
+        Format::ALL.into_iter().find(matches)
     }
 
-    /// Returns the location of layers.
+    /// Returns the location of [`Aov`]s.
     pub fn layers(self) -> Layers {
         match self {
             Format::Exr => Layers::Inside,
@@ -64,8 +64,8 @@ impl Format {
     /// The violated rule.
     pub fn check_size(self, width: u32, height: u32) -> Result<(), String> {
         match self.longest_side() {
-            Some(most) if width.max(height) > most => Err(format!(
-                "{width} x {height} pixels are too many for {}; the limit is {most} along a side",
+            Some(max) if width.max(height) > max => Err(format!(
+                "{width} x {height} pixels are too many for {}; the limit is {max} along a side",
                 self.title()
             )),
             _ => Ok(()),
@@ -122,8 +122,8 @@ pub fn files(path: &Path, format: Format, aovs: &[Aov]) -> Vec<PathBuf> {
     files
 }
 
-/// Writes the bands that `render` passes on to all targets. Files are renamed into place when all are complete. On
-/// failure existing files are unchanged.
+/// Writes the bands that `render` produces to all targets. The files are renamed into place when all of them are
+/// complete. After a failure, existing files are unchanged.
 ///
 /// # Errors
 ///
@@ -134,44 +134,44 @@ pub fn save(
     options: &SaveOptions,
     render: &mut dyn FnMut(&mut Sink) -> Result<(), RenderError>,
 ) -> Result<SaveReport, RenderError> {
-    let mut saved = SaveReport::default();
-    write(&mut targets, layout, options, &mut saved, &mut |_| Ok(()), render)?;
+    let mut report = SaveReport::default();
+    write(&mut targets, layout, options, &mut report, &mut |_| Ok(()), render)?;
     let mut files: Vec<Pending> = targets.into_iter().flat_map(|target| target.files).collect();
     files.iter_mut().try_for_each(Pending::complete)?;
     files.into_iter().try_for_each(Pending::finish)?;
-    Ok(saved)
+    Ok(report)
 }
 
-/// Passes every band to `before`, then to the targets. Writers pull bands from a callback, so they are nested.
+/// Passes every band to `first_sink`, then to the targets. A writer calls `render` itself, so the writers are nested.
 fn write(
     targets: &mut [Target],
     layout: &Layout,
     options: &SaveOptions,
-    saved: &mut SaveReport,
-    before: &mut Sink,
+    report: &mut SaveReport,
+    first_sink: &mut Sink,
     render: &mut dyn FnMut(&mut Sink) -> Result<(), RenderError>,
 ) -> Result<(), RenderError> {
-    let shown = options.of(layout.view);
-    let Some((Target { format, files }, others)) = targets.split_first_mut() else {
-        return render(before);
+    let display_options = options.with_view(layout.view);
+    let Some((Target { format, files }, other_targets)) = targets.split_first_mut() else {
+        return render(first_sink);
     };
-    let mut fill = |sink: &mut Sink| {
-        let mut both = |band: Band| {
-            before(band)?;
+    let mut render_nested = |sink: &mut Sink| {
+        let mut both_sinks = |band: Band| {
+            first_sink(band)?;
             sink(band)
         };
-        write(others, layout, options, saved, &mut both, render)
+        write(other_targets, layout, options, report, &mut both_sinks, render)
     };
     match format {
-        Format::Png => png::write(files, layout, &shown, &mut fill),
+        Format::Png => png::write(files, layout, &display_options, &mut render_nested),
         Format::Exr => {
-            let too_large = exr::write(files, layout, options, &mut fill)?;
+            let too_large = exr::write(files, layout, options, &mut render_nested)?;
             let name = files.first().map(|file| file.name().to_owned());
-            saved
+            report
                 .too_large
                 .extend(name.filter(|_| too_large > 0).map(|name| (name, too_large)));
             Ok(())
         }
-        Format::Jpeg | Format::WebP => flat::write(files, *format, layout, &shown, &mut fill),
+        Format::Jpeg | Format::WebP => flat::write(files, *format, layout, &display_options, &mut render_nested),
     }
 }

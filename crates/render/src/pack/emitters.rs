@@ -26,10 +26,10 @@ pub struct PackedEmitters {
     pub instance_leaves: Vec<u32>,
 }
 
-/// Maximum number of emitters selected by power alone; more use a light tree.
+/// Maximum number of emitters that are selected only by power; more emitters use a light tree.
 pub const MAX_LISTED_EMITTERS: usize = 16;
-/// Maximum number of emitters in a light tree, which takes about 100 bytes per emitter. Larger numbers are selected by
-/// power alone.
+/// Maximum number of emitters in a light tree, which takes about 100 bytes per emitter. More emitters are selected only
+/// by power.
 const MAX_TREE_EMITTERS: usize = 500_000;
 
 /// Collects all emitters: primitives, delta lights, triangles of meshes and the environment map. Sets
@@ -40,7 +40,7 @@ pub fn emitters(
     materials: &mut [Material],
     delta_lights: &[Light],
     primitives: &[(Primitive, bool)],
-    trees: &PackedBvh,
+    bvh: &PackedBvh,
     environment_integral: Option<f64>,
 ) -> PackedEmitters {
     // Mean radiance of each material, and its power per area.
@@ -60,15 +60,15 @@ pub fn emitters(
         .collect();
     let mut packed = PackedEmitters::default();
     let mut powers = Vec::new();
-    // Each emitter's material; a unique number for lights without a material.
-    let mut kinds = Vec::new();
+    // Group of each emitter for `defend`: the material index, or a unique number for a light without a material.
+    let mut groups = Vec::new();
     for (i, (primitive, _)) in (0..).zip(primitives) {
         let material = &materials[primitive.material as usize];
         let strength = strengths[primitive.material as usize];
         if strength > 0.0 && primitive.kind != PLANE {
             let light = light_of(primitive, i, material, t_max(scene.render.shadow_epsilon));
             powers.push(strength * area(primitive));
-            kinds.push(primitive.material as usize);
+            groups.push(primitive.material as usize);
             packed.lighting.lights.push(light);
         }
     }
@@ -76,52 +76,52 @@ pub fn emitters(
         powers.push(match light.kind {
             POINT => 4.0 * std::f64::consts::PI * mean(light.color),
             SPOT => spot_power(light) * mean(light.color),
-            _ => std::f64::consts::PI * radius(primitives, trees).powi(2) * mean(light.color),
+            _ => std::f64::consts::PI * radius(primitives, bvh).powi(2) * mean(light.color),
         });
         packed.lighting.lights.push(*light);
     }
     let environment = packed.lighting.lights.len();
-    let of_materials = kinds.len();
-    kinds.extend((of_materials..environment).map(|i| materials.len() + i));
+    let material_count = groups.len();
+    groups.extend((material_count..environment).map(|i| materials.len() + i));
     if let Some(environment_integral) = environment_integral {
-        powers.push(std::f64::consts::PI * radius(primitives, trees).powi(2) * environment_integral);
+        powers.push(std::f64::consts::PI * radius(primitives, bvh).powi(2) * environment_integral);
         packed.lighting.lights.push(environment_light());
-        kinds.push(materials.len() + environment);
+        groups.push(materials.len() + environment);
     }
-    let mut places: Vec<(u32, u32)> = (0..packed.lighting.lights.len() as u32).map(|i| (0, i)).collect();
-    for (number, instance) in (1..).zip(&trees.instances) {
-        let mesh = &trees.meshes[instance.mesh as usize];
+    let mut references: Vec<(u32, u32)> = (0..packed.lighting.lights.len() as u32).map(|i| (0, i)).collect();
+    for (number, instance) in (1..).zip(&bvh.instances) {
+        let mesh = &bvh.meshes[instance.mesh as usize];
         let columns = DMat3::from_cols(instance.u.as_dvec3(), instance.v.as_dvec3(), instance.w.as_dvec3());
         for (slot, triangle) in (0..).zip(&mesh.triangles) {
-            let group = mesh.groups.get(slot as usize).copied().unwrap_or(0);
-            let material = trees.group_words[(instance.materials + group) as usize] & !NO_SHADOW;
+            let mesh_group = mesh.groups.get(slot as usize).copied().unwrap_or(0);
+            let material = bvh.group_words[(instance.materials + mesh_group) as usize] & !NO_SHADOW;
             let strength = strengths[material as usize];
             if strength > 0.0 {
                 let [a, b, c] = [triangle.x, triangle.y, triangle.z]
                     .map(|vertex| columns * mesh.vertices[vertex as usize].truncate().as_dvec3());
                 let area = 0.5 * (b - a).cross(c - a).length();
                 if area > 0.0 {
-                    places.push((number, slot));
+                    references.push((number, slot));
                     powers.push(strength * area);
-                    kinds.push(material as usize);
+                    groups.push(material as usize);
                 }
             }
         }
     }
-    balance(&mut powers, &places, &packed.lighting.lights);
-    let is_far = |place: &(u32, u32)| is_far(&packed.lighting.lights, place);
-    let near = places.iter().filter(|place| !is_far(place)).count();
-    if (MAX_LISTED_EMITTERS + 1..=MAX_TREE_EMITTERS).contains(&near) {
-        let found = EmitterRef {
-            places,
+    balance(&mut powers, &references, &packed.lighting.lights);
+    let is_far = |reference: &(u32, u32)| is_far(&packed.lighting.lights, reference);
+    let near_count = references.iter().filter(|reference| !is_far(reference)).count();
+    if (MAX_LISTED_EMITTERS + 1..=MAX_TREE_EMITTERS).contains(&near_count) {
+        let list = EmitterList {
+            references,
             powers,
             radiances,
             strengths,
         };
-        return with_tree(packed, materials, primitives, trees, &found);
+        return with_tree(packed, materials, primitives, bvh, &list);
     }
-    for (kind, factor) in defend(&mut powers, &kinds, |i| is_far(&places[i])) {
-        if let Some(strength) = strengths.get_mut(kind) {
+    for (group, factor) in defend(&mut powers, &groups, |i| is_far(&references[i])) {
+        if let Some(strength) = strengths.get_mut(group) {
             *strength *= factor;
         }
     }
@@ -141,7 +141,7 @@ pub fn emitters(
         };
     }
     packed.environment = environment_integral.map_or(0.0, |_| powers[environment] / total);
-    packed.lighting.emitters = (table(&powers).into_iter().zip(places))
+    packed.lighting.emitters = (table(&powers).into_iter().zip(references))
         .map(|((threshold, alias_index), (instance, index))| Emitter {
             threshold,
             alias_index,
@@ -152,29 +152,31 @@ pub fn emitters(
     packed
 }
 
-/// Defensive sampling of near emitters: scales the power of each kind so that a quarter of the samples are uniform over
-/// all emitters, and an occluded strong emitter does not starve the others. Returns the factors of the kinds; no
-/// factors for a single kind.
-fn defend(powers: &mut [f64], kinds: &[usize], is_far: impl Fn(usize) -> bool) -> Vec<(usize, f64)> {
+/// Defensive sampling of near emitters: scales the power of each group so that a quarter of the samples are uniform
+/// over all emitters. Otherwise, an occluded strong emitter would take the samples of the others. Returns the factors
+/// of the groups; no factors for a single group.
+fn defend(powers: &mut [f64], groups: &[usize], is_far: impl Fn(usize) -> bool) -> Vec<(usize, f64)> {
     let mut near: BTreeMap<usize, (f64, f64)> = BTreeMap::new();
-    for (i, (power, kind)) in powers.iter().zip(kinds).enumerate() {
+    for (i, (power, group)) in powers.iter().zip(groups).enumerate() {
         if !is_far(i) {
-            let (sum, count) = near.entry(*kind).or_default();
+            let (sum, count) = near.entry(*group).or_default();
             *sum += power;
             *count += 1.0;
         }
     }
-    let (total, all) = near
+    let (total_power, total_count) = near
         .values()
-        .fold((0.0, 0.0), |(total, all), (sum, count)| (total + sum, all + count));
+        .fold((0.0, 0.0), |(total_power, total_count), (sum, count)| {
+            (total_power + sum, total_count + count)
+        });
     if near.len() < 2 {
         return Vec::new();
     }
     let factors: BTreeMap<usize, f64> = (near.iter())
-        .map(|(kind, (sum, count))| (*kind, 0.75 + 0.25 * (count / all) * (total / sum)))
+        .map(|(group, (sum, count))| (*group, 0.75 + 0.25 * (count / total_count) * (total_power / sum)))
         .collect();
     for (i, power) in powers.iter_mut().enumerate() {
-        if let Some(factor) = factors.get(&kinds[i])
+        if let Some(factor) = factors.get(&groups[i])
             && !is_far(i)
         {
             *power *= factor;
@@ -183,18 +185,18 @@ fn defend(powers: &mut [f64], kinds: &[usize], is_far: impl Fn(usize) -> bool) -
     factors.into_iter().collect()
 }
 
-/// Scales the power of distant emitters so that their share s becomes 0.5 s + 0.25: a near emitter in a wide landscape
-/// has a tiny share but dominates its neighborhood.
-fn balance(powers: &mut [f64], places: &[(u32, u32)], lights: &[Light]) {
-    let far: Vec<bool> = places.iter().map(|place| is_far(lights, place)).collect();
-    let sum = |wanted: bool| -> f64 {
-        let chosen = powers.iter().zip(&far).filter(|(_, far)| **far == wanted);
-        chosen.map(|(power, _)| power).sum()
+/// Scales the power of distant emitters so that their fraction s of the power becomes 0.5 s + 0.25: in a wide
+/// landscape, a near emitter has a tiny fraction of the power, but dominates the light in its neighborhood.
+fn balance(powers: &mut [f64], references: &[(u32, u32)], lights: &[Light]) {
+    let far: Vec<bool> = references.iter().map(|reference| is_far(lights, reference)).collect();
+    let sum = |is_far: bool| -> f64 {
+        let selected = powers.iter().zip(&far).filter(|(_, far)| **far == is_far);
+        selected.map(|(power, _)| power).sum()
     };
-    let (of_far, of_near) = (sum(true), sum(false));
-    if of_far > 0.0 && of_near > 0.0 {
-        let share = 0.5 * (of_far / (of_far + of_near)) + 0.25;
-        let factor = of_near * share / (1.0 - share) / of_far;
+    let (far_power, near_power) = (sum(true), sum(false));
+    if far_power > 0.0 && near_power > 0.0 {
+        let fraction = 0.5 * (far_power / (far_power + near_power)) + 0.25;
+        let factor = near_power * fraction / (1.0 - fraction) / far_power;
         for (power, _) in powers.iter_mut().zip(far).filter(|(_, far)| *far) {
             *power *= factor;
         }
@@ -215,57 +217,60 @@ fn is_far(lights: &[Light], &(instance, index): &(u32, u32)) -> bool {
     instance == 0 && matches!(lights[index as usize].kind, DIRECTIONAL | ENVIRONMENT)
 }
 
-struct EmitterRef {
-    /// Instance, and index of the light or triangle.
-    places: Vec<(u32, u32)>,
+/// All emitters, and the strengths of materials.
+struct EmitterList {
+    /// Mesh instance (0 for a light), and index of the light or triangle.
+    references: Vec<(u32, u32)>,
+    /// Power of each emitter.
     powers: Vec<f64>,
+    /// Mean radiance of each material.
     radiances: Vec<f64>,
     /// Power per area of each material.
     strengths: Vec<f64>,
 }
 
-/// Builds the light tree over all near emitters. The alias table selects it or a distant emitter.
+/// Builds the light tree over all near emitters. The alias table selects the light tree or a distant emitter.
 fn with_tree(
     mut packed: PackedEmitters,
     materials: &mut [Material],
     primitives: &[(Primitive, bool)],
-    trees: &PackedBvh,
-    found: &EmitterRef,
+    bvh: &PackedBvh,
+    list: &EmitterList,
 ) -> PackedEmitters {
-    let is_far = |place: &(u32, u32)| is_far(&packed.lighting.lights, place);
+    let is_far = |reference: &(u32, u32)| is_far(&packed.lighting.lights, reference);
     let (mut in_tree, mut far) = (Vec::new(), Vec::new());
-    for (place, power) in found.places.iter().zip(&found.powers) {
-        if is_far(place) { &mut far } else { &mut in_tree }.push((*place, *power));
+    for (reference, power) in list.references.iter().zip(&list.powers) {
+        if is_far(reference) { &mut far } else { &mut in_tree }.push((*reference, *power));
     }
-    let power_of = |some: &[((u32, u32), f64)]| some.iter().map(|(_, power)| power).sum::<f64>();
-    let (of_tree, total) = (power_of(&in_tree), power_of(&in_tree) + power_of(&far));
-    let share = of_tree / total;
-    let lamps: Vec<TreeEmitter> = in_tree
+    let power_of = |emitters: &[((u32, u32), f64)]| emitters.iter().map(|(_, power)| power).sum::<f64>();
+    let (tree_power, total) = (power_of(&in_tree), power_of(&in_tree) + power_of(&far));
+    let tree_probability = tree_power / total;
+    let tree_emitters: Vec<TreeEmitter> = in_tree
         .iter()
-        .map(|(place @ (instance, index), _)| {
-            let lamp = match *instance {
-                0 => tree_emitter(&packed.lighting.lights[*index as usize], primitives, &found.radiances),
+        .map(|((instance, index), _)| {
+            let emitter = match *instance {
+                0 => tree_emitter(&packed.lighting.lights[*index as usize], primitives, &list.radiances),
                 number => {
-                    let (corners, material) = face(trees, number as usize - 1, *index);
-                    tree_emitter_of_triangle(corners, found.radiances[material as usize], true)
+                    let (corners, material) = instance_triangle(bvh, number as usize - 1, *index);
+                    tree_emitter_of_triangle(corners, list.radiances[material as usize], true)
                 }
             };
             TreeEmitter {
-                density: lamp.density * share,
-                instance: place.0,
-                index: place.1,
-                ..lamp
+                density: emitter.density * tree_probability,
+                instance: *instance,
+                index: *index,
+                ..emitter
             }
         })
         .collect();
-    packed.lighting.nodes = light_tree::build(&lamps);
+    packed.lighting.nodes = light_tree::build(&tree_emitters);
     packed.lighting.leaves = vec![NO_INDEX; primitives.len()];
-    packed.instance_leaves = vec![NO_INDEX; trees.instances.len()];
-    for lamp in lamps.iter().filter(|lamp| lamp.instance != 0) {
-        let number = lamp.instance as usize - 1;
+    packed.instance_leaves = vec![NO_INDEX; bvh.instances.len()];
+    for emitter in tree_emitters.iter().filter(|emitter| emitter.instance != 0) {
+        let number = emitter.instance as usize - 1;
         if packed.instance_leaves[number] == NO_INDEX {
             packed.instance_leaves[number] = packed.lighting.leaves.len() as u32;
-            let triangles = trees.meshes[trees.instances[number].mesh as usize].triangles.len();
+            let triangles = bvh.meshes[bvh.instances[number].mesh as usize].triangles.len();
             packed
                 .lighting
                 .leaves
@@ -277,16 +282,16 @@ fn with_tree(
             if node.children[child] != NO_INDEX || node.intensity[child] == 0.0 {
                 continue;
             }
-            let place = match node.instance[child] {
+            let leaf = match node.instance[child] {
                 0 => packed.lighting.lights[node.index[child] as usize].primitive,
                 number => packed.instance_leaves[number as usize - 1] + node.index[child],
             };
-            if place != NO_INDEX {
-                packed.lighting.leaves[place as usize] = i;
+            if leaf != NO_INDEX {
+                packed.lighting.leaves[leaf as usize] = i;
             }
         }
     }
-    for (material, strength) in materials.iter_mut().zip(&found.strengths) {
+    for (material, strength) in materials.iter_mut().zip(&list.strengths) {
         material.density = if *strength > 0.0 { 1.0 } else { 0.0 };
     }
     for ((_, index), power) in &far {
@@ -296,12 +301,14 @@ fn with_tree(
             packed.environment = power / total;
         }
     }
-    let weights: Vec<f64> = [of_tree]
+    let weights: Vec<f64> = [tree_power]
         .into_iter()
         .chain(far.iter().map(|(_, power)| *power))
         .collect();
-    let places = [(0, NO_INDEX)].into_iter().chain(far.iter().map(|(place, _)| *place));
-    packed.lighting.emitters = (table(&weights).into_iter().zip(places))
+    let references = [(0, NO_INDEX)]
+        .into_iter()
+        .chain(far.iter().map(|(reference, _)| *reference));
+    packed.lighting.emitters = (table(&weights).into_iter().zip(references))
         .map(|((threshold, alias_index), (instance, index))| Emitter {
             threshold,
             alias_index,
@@ -312,9 +319,10 @@ fn with_tree(
     packed
 }
 
-fn face(trees: &PackedBvh, number: usize, slot: u32) -> ([DVec3; 3], u32) {
-    let instance = &trees.instances[number];
-    let mesh = &trees.meshes[instance.mesh as usize];
+/// Returns the world-space corners of a triangle of an instance, and the material index.
+fn instance_triangle(bvh: &PackedBvh, number: usize, slot: u32) -> ([DVec3; 3], u32) {
+    let instance = &bvh.instances[number];
+    let mesh = &bvh.meshes[instance.mesh as usize];
     let columns = DMat3::from_cols(instance.u.as_dvec3(), instance.v.as_dvec3(), instance.w.as_dvec3());
     let triangle = mesh.triangles[slot as usize];
     let corners = [triangle.x, triangle.y, triangle.z]
@@ -322,7 +330,7 @@ fn face(trees: &PackedBvh, number: usize, slot: u32) -> ([DVec3; 3], u32) {
     let group = mesh.groups.get(slot as usize).copied().unwrap_or(0);
     (
         corners,
-        trees.group_words[(instance.materials + group) as usize] & !NO_SHADOW,
+        bvh.group_words[(instance.materials + group) as usize] & !NO_SHADOW,
     )
 }
 
@@ -354,8 +362,8 @@ fn tree_emitter(light: &Light, primitives: &[(Primitive, bool)], radiances: &[f6
     match light.kind {
         POINT => return point(Cone::ALL),
         SPOT => {
-            // Conservative: full intensity within `spread`, then below the cosine of the angle beyond.
-            let angle = |below_one: f64| (1.0 - below_one).clamp(-1.0, 1.0).acos();
+            // Conservative: full intensity within `spread`; outside, at most the cosine of the angle beyond `spread`.
+            let angle = |one_minus_cosine: f64| (1.0 - one_minus_cosine).clamp(-1.0, 1.0).acos();
             let cone = f64::from(light.cone);
             let (outer, inner) = (angle(cone), angle(cone - 1.0 / f64::from(light.falloff)));
             let spread = inner.max(outer - std::f64::consts::FRAC_PI_2);
@@ -469,16 +477,13 @@ fn light_of(primitive: &Primitive, number: u32, material: &Material, t_max: f32)
 }
 
 /// Returns half the diagonal of the bounding box of bounded geometry; 1 if the box is empty.
-fn radius(primitives: &[(Primitive, bool)], trees: &PackedBvh) -> f64 {
+fn radius(primitives: &[(Primitive, bool)], bvh: &PackedBvh) -> f64 {
     let spheres = primitives.iter().filter(|(p, _)| p.kind != PLANE).map(|(p, _)| {
         let sphere = bounding_sphere(p);
         let (center, radius) = (sphere.center.as_dvec3(), f64::from(sphere.radius));
         (center - radius, center + radius)
     });
-    let items = trees
-        .items
-        .iter()
-        .map(|item| (item.low.as_dvec3(), item.high.as_dvec3()));
+    let items = bvh.items.iter().map(|item| (item.low.as_dvec3(), item.high.as_dvec3()));
     let empty = (DVec3::INFINITY, DVec3::NEG_INFINITY);
     let (low, high) = (spheres.chain(items)).fold(empty, |(low, high), (a, b)| (low.min(a), high.max(b)));
     if low.x <= high.x {

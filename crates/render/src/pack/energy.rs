@@ -10,15 +10,15 @@ use crate::cpu::math::{dot, max};
 use crate::cpu::sequence::sobol_sample;
 use crate::cpu::specular::{fresnel, refracted_cosine};
 
-/// Sampled normals if the roughness is known, and per row if not. Sobol' points: few microfacets tilt enough for total
-/// internal reflection, and a grid would miss them.
+/// Numbers of sampled normals per table entry, for constant and for textured roughness. The samples are Sobol' points,
+/// because few microfacets tilt enough for total internal reflection, and a grid would miss them.
 const NORMAL_SAMPLES: (u32, u32) = (4096, 1024);
 
 /// Returns the tables of both sides, outside first. Rows: sqrt(alpha), 0 to 1; columns: cosine, 0 to 1. If `alpha` is
-/// known only the adjacent rows are computed, and others are 1.
+/// known, only the adjacent rows are computed, and the entries of other rows are 1.
 pub fn energy_table(ior: f32, alpha: Option<f32>) -> Vec<f32> {
     let last = (ENERGY_SIZE - 1) as f32;
-    let wanted = |row: u32| alpha.is_none_or(|alpha| (row as f32 - alpha.sqrt() * last).abs() < 1.0);
+    let is_needed = |row: u32| alpha.is_none_or(|alpha| (row as f32 - alpha.sqrt() * last).abs() < 1.0);
     let facets = points(if alpha.is_some() {
         NORMAL_SAMPLES.0
     } else {
@@ -31,7 +31,7 @@ pub fn energy_table(ior: f32, alpha: Option<f32>) -> Vec<f32> {
             let alpha = max(root * root, SMALLEST_ALPHA);
             for column in 0..ENERGY_SIZE {
                 let cosine = max(column as f32 / last, 0.002);
-                table.push(if wanted(row) {
+                table.push(if is_needed(row) {
                     glass_albedo(index, alpha, cosine, &facets)
                 } else {
                     1.0
@@ -100,41 +100,43 @@ pub enum TableLobes {
     PrincipledLobes(Option<u32>),
 }
 
-/// Rows by textured roughness and anisotropy.
-const ROWS: (u32, u32) = (10, 6);
+/// Numbers of rows for textured roughness and for textured anisotropy.
+const TEXTURED_ROWS: (u32, u32) = (10, 6);
 
 /// Correction factor of glass tables: at the kink of total internal reflection, linear interpolation is too low.
 const KINK_CORRECTION: f32 = 1.004;
 
-/// Returns the table of anisotropic microfacets for `single_scatter_albedo_aniso`: the numbers of rows by roughness and
-/// by anisotropy, 1 if known; then for each part the rows, each with lines by azimuth of columns by cosine.
-pub fn aniso_table(parts: TableLobes, roughness: Option<f32>, anisotropy: Option<f32>) -> Vec<u32> {
+/// Returns the table of anisotropic microfacets for `single_scatter_albedo_aniso`: first the numbers of rows for
+/// roughness and for anisotropy, 1 for a known value; then the rows of each lobe, as lines by azimuth of columns by
+/// cosine.
+pub fn aniso_table(lobes: TableLobes, roughness: Option<f32>, anisotropy: Option<f32>) -> Vec<u32> {
     let rows = [
-        if roughness.is_none() { ROWS.0 } else { 1 },
-        if anisotropy.is_none() { ROWS.1 } else { 1 },
+        if roughness.is_none() { TEXTURED_ROWS.0 } else { 1 },
+        if anisotropy.is_none() { TEXTURED_ROWS.1 } else { 1 },
     ];
     let facets = points(match (roughness, anisotropy) {
-        (Some(_), Some(_)) if parts == TableLobes::Mirror => 1024,
+        (Some(_), Some(_)) if lobes == TableLobes::Mirror => 1024,
         (Some(_), Some(_)) => 2048,
         (None, None) => 64,
         _ => 128,
     });
-    let at = |known: Option<f32>, row: u32, rows: u32| known.unwrap_or(row as f32 / max(rows as f32 - 1.0, 1.0));
+    let value =
+        |constant: Option<f32>, row: u32, rows: u32| constant.unwrap_or(row as f32 / max(rows as f32 - 1.0, 1.0));
     let mut nodes = Vec::new();
     for r in 0..rows[0] {
         for s in 0..rows[1] {
             let alpha = facet_alpha(&Material {
-                roughness: at(roughness, r, rows[0]),
-                anisotropy: at(anisotropy, s, rows[1]),
+                roughness: value(roughness, r, rows[0]),
+                anisotropy: value(anisotropy, s, rows[1]),
                 ..bytemuck::Zeroable::zeroed()
             });
             for line in 0..ANISO_LINES {
                 for column in 0..ANISO_COLUMNS {
-                    let place = Vec2::new(
+                    let position = Vec2::new(
                         line as f32 / (ANISO_LINES - 1) as f32,
                         column as f32 / (ANISO_COLUMNS - 1) as f32,
                     );
-                    nodes.push((alpha, aniso_direction(alpha, place)));
+                    nodes.push((alpha, aniso_direction(alpha, position)));
                 }
             }
         }
@@ -150,19 +152,19 @@ pub fn aniso_table(parts: TableLobes, roughness: Option<f32>, anisotropy: Option
             );
         }
     };
-    match parts {
+    match lobes {
         TableLobes::Glass(index) => glass(&mut words, index),
         TableLobes::Mirror => words.extend(nodes.iter().map(|(alpha, wo)| {
-            let both = schlick_albedo(*alpha, *wo, &facets);
-            ((both.x + both.y) as f32).to_bits()
+            let albedo = schlick_albedo(*alpha, *wo, &facets);
+            ((albedo.x + albedo.y) as f32).to_bits()
         })),
         TableLobes::PrincipledLobes(index) => {
-            let both: Vec<DVec2> = nodes
+            let albedos: Vec<DVec2> = nodes
                 .iter()
                 .map(|(alpha, wo)| schlick_albedo(*alpha, *wo, &facets))
                 .collect();
-            words.extend(both.iter().map(|both| (both.x as f32).to_bits()));
-            words.extend(both.iter().map(|both| (both.y as f32).to_bits()));
+            words.extend(albedos.iter().map(|albedo| (albedo.x as f32).to_bits()));
+            words.extend(albedos.iter().map(|albedo| (albedo.y as f32).to_bits()));
             if let Some(index) = index {
                 glass(&mut words, index);
             }
@@ -172,16 +174,20 @@ pub fn aniso_table(parts: TableLobes, roughness: Option<f32>, anisotropy: Option
 }
 
 /// Inverts `aniso_table_position`.
-fn aniso_direction(alpha: Vec2, place: Vec2) -> Vec3 {
-    let roughness = alpha.y + (alpha.x - alpha.y) * (place.x * place.x);
-    let between = (roughness * roughness - alpha.y * alpha.y) / max(alpha.x * alpha.x - alpha.y * alpha.y, 1e-12);
-    let along = max(0.0, if between > 1.0 { 1.0 } else { between });
+fn aniso_direction(alpha: Vec2, position: Vec2) -> Vec3 {
+    let roughness = alpha.y + (alpha.x - alpha.y) * (position.x * position.x);
+    let fraction = (roughness * roughness - alpha.y * alpha.y) / max(alpha.x * alpha.x - alpha.y * alpha.y, 1e-12);
+    let squared_cosine = max(0.0, if fraction > 1.0 { 1.0 } else { fraction }); // of the azimuth
     let half_way = 0.5 * roughness.sqrt();
-    // Root of its quadratic equation.
-    let b = 1.0 + 2.0 * half_way - 2.0 * place.y;
-    let root = (b * b + 8.0 * half_way * place.y).sqrt();
+    // The cosine is the positive root of a quadratic equation.
+    let b = 1.0 + 2.0 * half_way - 2.0 * position.y;
+    let root = (b * b + 8.0 * half_way * position.y).sqrt();
     let cosine = max(0.5 * (root - b), 1e-3);
     let cosine = if cosine > 1.0 { 1.0 } else { cosine };
     let sine = max(1.0 - cosine * cosine, 0.0).sqrt();
-    Vec3::new(sine * along.sqrt(), sine * (1.0 - along).sqrt(), cosine)
+    Vec3::new(
+        sine * squared_cosine.sqrt(),
+        sine * (1.0 - squared_cosine).sqrt(),
+        cosine,
+    )
 }

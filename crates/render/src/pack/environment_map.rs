@@ -10,10 +10,11 @@ use super::{BACKGROUND, ENVIRONMENT_BLOCKS, ENVIRONMENT_INVISIBLE, ENVIRONMENT_M
 use wgray_scene::downsample::linear;
 use wgray_scene::{self as scene, EnvironmentImage, Scene};
 
-/// Darker maps count as black, since their PDFs would approach the subnormal numbers.
-const DARKEST: f64 = 1e-25;
-/// Blocks with a smaller share of the power get no light samples; only BSDF samples find them.
-const DARKEST_SHARE: f64 = 1e-12;
+/// Minimum integral of a map over all directions. Darker maps count as black, because their PDFs would approach the
+/// subnormal numbers.
+const MIN_INTEGRAL: f64 = 1e-25;
+/// Minimum fraction of the power of a block with light samples. Darker blocks are reached only by BSDF samples.
+const MIN_BLOCK_FRACTION: f64 = 1e-12;
 /// Parts per side of a block, each with its own mean direction.
 const PARTS: usize = 4;
 /// Approximate angular radius of a bin of normals.
@@ -57,8 +58,8 @@ impl EnvironmentMap {
             | bit(any(|environment| environment.background.is_some()), BACKGROUND)
     }
 
-    /// Returns the map's fields. `share` is the probability of sampling it.
-    pub fn record(&self, share: f64) -> Environment {
+    /// Returns a record with the fields of the map. `probability` is the probability of sampling the map.
+    pub fn record(&self, probability: f64) -> Environment {
         let Some(map) = &self.0 else {
             return bytemuck::Zeroable::zeroed();
         };
@@ -71,8 +72,8 @@ impl EnvironmentMap {
             z,
             height: map.height,
             cells: map.cells as u32,
-            // Relative to the sum of three components at four corners.
-            density: (share / 12.0) as f32,
+            // The kernels multiply by the sum of three components at four corners, not by the mean.
+            density: (probability / 12.0) as f32,
             blocks: map.blocks as u32,
             shifts: map.shifts,
             ..bytemuck::Zeroable::zeroed()
@@ -80,8 +81,8 @@ impl EnvironmentMap {
     }
 }
 
-fn pack_map(around: &EnvironmentImage, texels: &mut Vec<u32>) -> Option<PackedMap> {
-    let image = &*around.image;
+fn pack_map(environment: &EnvironmentImage, texels: &mut Vec<u32>) -> Option<PackedMap> {
+    let image = &*environment.image;
     let (width, height) = (image.width as usize, image.height as usize);
     let start = texels.len();
     let cells = start + 3 * width * (height + 2);
@@ -89,7 +90,7 @@ fn pack_map(around: &EnvironmentImage, texels: &mut Vec<u32>) -> Option<PackedMa
     let grid = Grid::of(width, height);
     texels.reserve_exact(blocks + grid.words() - start);
     let texel = linear(image);
-    let color = |i: usize| texel(i) * around.scale;
+    let color = |i: usize| texel(i) * environment.scale;
     let pole = |row: usize| (0..width).map(|column| color(row * width + column)).sum::<DVec3>() / width as f64;
     let mut add = |color: DVec3| texels.extend(color.as_vec3().to_array().map(f32::to_bits));
     (0..width).for_each(|_| add(pole(0)));
@@ -97,11 +98,15 @@ fn pack_map(around: &EnvironmentImage, texels: &mut Vec<u32>) -> Option<PackedMa
     (0..width).for_each(|_| add(pole(height - 1)));
     let weights = weights(&texels[start..], width, height);
     let sum: f64 = weights.iter().sum();
-    if !(sum >= DARKEST) {
+    if !(sum >= MIN_INTEGRAL) {
         texels.truncate(start);
         return None;
     }
-    let axes = [around.to_world.x_axis, around.to_world.y_axis, around.to_world.z_axis];
+    let axes = [
+        environment.to_world.x_axis,
+        environment.to_world.y_axis,
+        environment.to_world.z_axis,
+    ];
     grid.write_cells(&weights, texels);
     grid.write_distributions(&weights, axes, sum, texels);
     Some(PackedMap {
@@ -111,7 +116,7 @@ fn pack_map(around: &EnvironmentImage, texels: &mut Vec<u32>) -> Option<PackedMa
         texels: start,
         cells,
         blocks,
-        shifts: (grid.along | grid.down << 8) as u32,
+        shifts: (grid.column_shift | grid.row_shift << 8) as u32,
         sum,
     })
 }
@@ -122,9 +127,9 @@ struct Grid {
     width: usize,
     height: usize,
     /// log2 of a block's width in cells.
-    along: usize,
+    column_shift: usize,
     /// log2 of a block's height in cells.
-    down: usize,
+    row_shift: usize,
 }
 
 /// Radiance of a part of a block.
@@ -136,24 +141,24 @@ struct Part {
 }
 
 impl Grid {
-    /// Takes the size in texels.
+    /// Returns the partition for an image size in texels.
     fn of(width: usize, height: usize) -> Grid {
-        let most = ENVIRONMENT_BLOCKS as usize;
-        let shift = |count: usize| (0..).find(|shift| (count - 1) >> shift < most).unwrap_or(0);
+        let max_blocks = ENVIRONMENT_BLOCKS as usize;
+        let shift = |count: usize| (0..).find(|shift| (count - 1) >> shift < max_blocks).unwrap_or(0);
         Grid {
             width,
             height: height + 1,
-            along: shift(width),
-            down: shift(height + 1),
+            column_shift: shift(width),
+            row_shift: shift(height + 1),
         }
     }
 
     fn columns(&self) -> usize {
-        ((self.width - 1) >> self.along) + 1
+        ((self.width - 1) >> self.column_shift) + 1
     }
 
     fn rows(&self) -> usize {
-        ((self.height - 1) >> self.down) + 1
+        ((self.height - 1) >> self.row_shift) + 1
     }
 
     fn words(&self) -> usize {
@@ -163,26 +168,29 @@ impl Grid {
 
     /// Returns the column and row ranges of the blocks, row by row.
     fn blocks(&self) -> impl Iterator<Item = (Range<usize>, Range<usize>)> {
-        let columns = move |i: usize| i << self.along..((i + 1) << self.along).min(self.width);
-        let rows = move |i: usize| i << self.down..((i + 1) << self.down).min(self.height);
+        let columns = move |i: usize| i << self.column_shift..((i + 1) << self.column_shift).min(self.width);
+        let rows = move |i: usize| i << self.row_shift..((i + 1) << self.row_shift).min(self.height);
         (0..self.rows()).flat_map(move |row| (0..self.columns()).map(move |column| (columns(column), rows(row))))
     }
 
     fn write_cells(&self, weights: &[f64], words: &mut Vec<u32>) {
         let table = |(columns, rows): (Range<usize>, Range<usize>)| {
-            let places: Vec<(usize, usize)> = rows
+            let cells: Vec<(usize, usize)> = rows
                 .flat_map(|row| columns.clone().map(move |column| (row, column)))
                 .collect();
-            let rest: Vec<f64> = places
+            let cell_weights: Vec<f64> = cells
                 .iter()
                 .map(|(row, column)| weights[row * self.width + column])
                 .collect();
-            let mean = rest.iter().sum::<f64>() / rest.len() as f64;
+            let mean = cell_weights.iter().sum::<f64>() / cell_weights.len() as f64;
             let scale = if mean > 0.0 { 1.0 / mean } else { 0.0 };
-            let mut words = Vec::with_capacity(2 * rest.len());
-            write_table(rest.into_iter().map(|weight| weight * scale).collect(), &mut words);
+            let mut words = Vec::with_capacity(2 * cell_weights.len());
+            write_table(
+                cell_weights.into_iter().map(|weight| weight * scale).collect(),
+                &mut words,
+            );
             for pair in words.chunks_mut(2) {
-                let (row, column) = places[pair[1] as usize];
+                let (row, column) = cells[pair[1] as usize];
                 pair[1] = (row << 16 | column) as u32;
             }
             words
@@ -200,33 +208,33 @@ impl Grid {
         let side = ENVIRONMENT_BLOCKS as usize;
         let mut powers = vec![0.0; self.rows() * side];
         let mut parts: Vec<(usize, Part)> = Vec::new();
-        let angles = |count: usize, turn: &dyn Fn(usize) -> f64| -> Vec<(f64, f64)> {
-            (0..count).map(|i| turn(i).sin_cos()).collect()
+        let sines_and_cosines = |count: usize, angle: &dyn Fn(usize) -> f64| -> Vec<(f64, f64)> {
+            (0..count).map(|i| angle(i).sin_cos()).collect()
         };
-        let azimuths = angles(self.width, &|i| PI - TAU * (i + 1) as f64 / self.width as f64);
+        let azimuths = sines_and_cosines(self.width, &|i| PI - TAU * (i + 1) as f64 / self.width as f64);
         let image_rows = (self.height - 1) as f64;
-        let polar = angles(self.height, &|row| {
+        let polar = sines_and_cosines(self.height, &|row| {
             let border = |row: f64| row.clamp(0.0, image_rows) / image_rows * PI;
             0.5 * (border(row as f64 - 0.5) + border(row as f64 + 0.5))
         });
         for (i, (columns, rows)) in self.blocks().enumerate() {
             let block = i / self.columns() * side + i % self.columns();
-            let mut inside = [Part::default(); PARTS * PARTS];
+            let mut block_parts = [Part::default(); PARTS * PARTS];
             for row in rows.clone() {
                 for column in columns.clone() {
                     let weight = weights[row * self.width + column];
                     let ((sine, cosine), (y, x)) = (polar[row], azimuths[column]);
-                    let place = |i: usize, range: &Range<usize>| (i - range.start) * PARTS / range.len();
-                    let part = &mut inside[place(row, &rows) * PARTS + place(column, &columns)];
+                    let part_index = |i: usize, range: &Range<usize>| (i - range.start) * PARTS / range.len();
+                    let part = &mut block_parts[part_index(row, &rows) * PARTS + part_index(column, &columns)];
                     part.power += weight;
                     part.vector += weight * DVec3::new(sine * x, sine * y, cosine);
                 }
             }
-            let power: f64 = inside.iter().map(|part| part.power).sum();
-            if power > DARKEST_SHARE * sum {
+            let power: f64 = block_parts.iter().map(|part| part.power).sum();
+            if power > MIN_BLOCK_FRACTION * sum {
                 powers[block] = power;
                 parts.extend(
-                    inside
+                    block_parts
                         .into_iter()
                         .filter(|part| part.power > 0.0)
                         .map(|part| (block, part)),
@@ -250,10 +258,10 @@ impl Grid {
             for (block, mean, power, spread) in &lobes {
                 cosines[*block] += power * mean_cosine(normal.dot(*mean), *spread);
             }
-            // Without light in front of the surface, no sample contributes.
-            let any = cosines.iter().any(|weight| *weight > 0.0);
+            // If no light is in front of the surface, no sample contributes, and any distribution will do.
+            let has_light = cosines.iter().any(|weight| *weight > 0.0);
             let mut words = Vec::new();
-            write_bin(if any { &cosines } else { &powers }, &mut words);
+            write_bin(if has_light { &cosines } else { &powers }, &mut words);
             words
         });
         let bins: Vec<Vec<u32>> = bins.collect();
@@ -262,10 +270,10 @@ impl Grid {
     }
 }
 
-/// Returns the normal at the center. Inverse of `normal_bin`.
+/// Returns the normal at the center of a bin; inverse of `normal_bin`.
 fn bin_normal(bin: u32) -> DVec3 {
-    let at = |i: u32| f64::from(i) / f64::from(NORMAL_BINS - 1) * 2.0 - 1.0;
-    let (x, y) = (at(bin % NORMAL_BINS), at(bin / NORMAL_BINS));
+    let coordinate = |i: u32| f64::from(i) / f64::from(NORMAL_BINS - 1) * 2.0 - 1.0;
+    let (x, y) = (coordinate(bin % NORMAL_BINS), coordinate(bin / NORMAL_BINS));
     let z = 1.0 - x.abs() - y.abs();
     let folded = |a: f64, b: f64| if z < 0.0 { (1.0 - b.abs()).copysign(a) } else { a };
     DVec3::new(folded(x, y), folded(y, x), z).normalize()
@@ -338,30 +346,31 @@ fn solid_angle(row: usize, width: usize, height: usize) -> f64 {
 
 /// Writes the alias table of weights with mean 1: Vose, "A Linear Algorithm for Generating Random Numbers with a Given
 /// Distribution", IEEE TSE 17(9), 1991. Scans replace the lists of small and large weights, which would use as much
-/// memory as the table. The first large weight fills each small one.
-fn write_table(mut rest: Vec<f64>, words: &mut Vec<u32>) {
+/// memory as the table. The first large weight fills each small weight.
+fn write_table(mut weights: Vec<f64>, words: &mut Vec<u32>) {
     let start = words.len();
-    words.extend((0..rest.len() as u32).flat_map(|i| [u32::MAX, i]));
-    let next_large = |rest: &[f64], from: usize| (from..rest.len()).find(|i| rest[*i] >= 1.0);
-    let mut large = next_large(&rest, 0);
-    for i in 0..rest.len() {
+    words.extend((0..weights.len() as u32).flat_map(|i| [u32::MAX, i]));
+    let next_large = |weights: &[f64], start: usize| (start..weights.len()).find(|i| weights[*i] >= 1.0);
+    let mut large = next_large(&weights, 0);
+    for i in 0..weights.len() {
         let mut small = i;
-        // A large weight before `i` that becomes small is filled at once; later ones are reached in turn.
-        while let Some(filling) = large
-            && rest[small] < 1.0
+        // A large weight before `i` that becomes small is filled at once. The loop fills later weights when it reaches
+        // them.
+        while let Some(donor) = large
+            && weights[small] < 1.0
         {
             // Rounded up, so that every positive weight can be selected.
-            words[start + 2 * small] = (rest[small] * 4_294_967_296.0).ceil() as u32;
-            words[start + 2 * small + 1] = filling as u32;
-            rest[filling] -= 1.0 - rest[small];
-            if rest[filling] >= 1.0 {
+            words[start + 2 * small] = (weights[small] * 4_294_967_296.0).ceil() as u32;
+            words[start + 2 * small + 1] = donor as u32;
+            weights[donor] -= 1.0 - weights[small];
+            if weights[donor] >= 1.0 {
                 break;
             }
-            large = next_large(&rest, filling + 1);
-            if filling > i {
+            large = next_large(&weights, donor + 1);
+            if donor > i {
                 break;
             }
-            small = filling;
+            small = donor;
         }
     }
 }
@@ -376,13 +385,13 @@ mod tests {
         let count = words.len() / 2;
         let mut out = vec![0.0; count];
         for (i, pair) in words.chunks(2).enumerate() {
-            let own = if pair[1] as usize == i {
+            let probability = if pair[1] as usize == i {
                 1.0
             } else {
                 f64::from(pair[0]) / 4_294_967_296.0
             };
-            out[i] += own / count as f64;
-            out[pair[1] as usize] += (1.0 - own) / count as f64;
+            out[i] += probability / count as f64;
+            out[pair[1] as usize] += (1.0 - probability) / count as f64;
         }
         out
     }
@@ -447,8 +456,8 @@ mod tests {
         for bin in 0..NORMAL_BINS * NORMAL_BINS {
             // Two points on the edge of the octahedral map represent the same normal.
             let normal = bin_normal(bin);
-            let again = bin_normal(normal_bin(normal.as_vec3()));
-            assert!((normal - again).length() < 1e-6, "{bin}: {normal}, {again}");
+            let center = bin_normal(normal_bin(normal.as_vec3()));
+            assert!((normal - center).length() < 1e-6, "{bin}: {normal}, {center}");
         }
         assert_eq!(normal_bin(Vec3::ZERO), NORMAL_BINS * NORMAL_BINS);
         for axis in [DVec3::X, DVec3::Y, DVec3::Z]
@@ -465,8 +474,8 @@ mod tests {
         for r in [0.05, 0.2, 1.0] {
             for m in [0.0, 0.3 * r, r, 1.7 * r] {
                 let count = 10_000;
-                let at = |i: i32| m - r + 2.0 * r * (f64::from(i) + 0.5) / f64::from(count);
-                let mean = (0..count).map(|i| at(i).max(0.0)).sum::<f64>() / f64::from(count);
+                let cosine = |i: i32| m - r + 2.0 * r * (f64::from(i) + 0.5) / f64::from(count);
+                let mean = (0..count).map(|i| cosine(i).max(0.0)).sum::<f64>() / f64::from(count);
                 assert!((mean_cosine(m, r) - mean).abs() < 1e-6 * r, "{m}, {r}: {mean}");
             }
             assert_eq!(mean_cosine(-r, r), 0.0);
@@ -492,42 +501,42 @@ mod tests {
             assert_eq!(words.len(), grid.words(), "{width} x {height}");
             let mut first = 0;
             for (i, (columns, rows)) in grid.blocks().enumerate() {
-                let places: Vec<usize> = rows
+                let block_cells: Vec<usize> = rows
                     .flat_map(|row| columns.clone().map(move |column| row * width + column))
                     .collect();
-                let power: f64 = places.iter().map(|place| weights[*place]).sum();
+                let power: f64 = block_cells.iter().map(|cell| weights[*cell]).sum();
                 let block = i / grid.columns() * 32 + i % grid.columns();
                 let inverse = f64::from(f32::from_bits(words[block]));
                 assert!((inverse * power - 1.0).abs() < 1e-6, "{width} x {height}, block {i}");
                 // Aliases are stored as row and column.
-                let table: Vec<u32> = cells[2 * first..2 * (first + places.len())]
+                let table: Vec<u32> = cells[2 * first..2 * (first + block_cells.len())]
                     .chunks(2)
                     .flat_map(|pair| {
-                        let place = (pair[1] >> 16) as usize * width + (pair[1] & 0xffff) as usize;
-                        let at = places.iter().position(|other| *other == place);
-                        [pair[0], at.expect("a cell of the block") as u32]
+                        let alias = (pair[1] >> 16) as usize * width + (pair[1] & 0xffff) as usize;
+                        let position = block_cells.iter().position(|cell| *cell == alias);
+                        [pair[0], position.expect("a cell of the block") as u32]
                     })
                     .collect();
-                for (found, place) in probabilities(&table).into_iter().zip(&places) {
+                for (found, cell) in probabilities(&table).into_iter().zip(&block_cells) {
                     assert!(
-                        (found - weights[*place] / power).abs() < 1e-6,
+                        (found - weights[*cell] / power).abs() < 1e-6,
                         "{width} x {height}, block {i}"
                     );
                 }
-                first += places.len();
+                first += block_cells.len();
             }
-            // The distribution of rows for the upward normal, whose irradiance comes from the upper hemisphere of a
-            // white map.
+            // For the upward normal, light comes only from the upper hemisphere, so lower rows have probability 0.
             let stride = (grid.rows() + 1) * 33;
             let up = normal_bin(Vec3::new(0.01, 0.01, 1.0)) as usize;
             let distribution = |bin: usize| widths(&words[grid.rows() * 32 + bin * stride..][..33]);
-            let below: f64 = distribution(up)[grid.rows().div_ceil(2) + 2..].iter().sum();
-            let of_all: f64 = distribution((NORMAL_BINS * NORMAL_BINS) as usize)[grid.rows().div_ceil(2) + 2..]
+            let lower_share: f64 = distribution(up)[grid.rows().div_ceil(2) + 2..].iter().sum();
+            let lower_share_of_all: f64 = distribution((NORMAL_BINS * NORMAL_BINS) as usize)
+                [grid.rows().div_ceil(2) + 2..]
                 .iter()
                 .sum();
             if height >= 32 {
-                assert_eq!(below, 0.0, "{width} x {height}: light from behind");
-                assert!(of_all > 0.2, "the control: {of_all}");
+                assert_eq!(lower_share, 0.0, "{width} x {height}: light from behind");
+                assert!(lower_share_of_all > 0.2, "for all directions: {lower_share_of_all}");
             }
         }
     }
@@ -535,12 +544,12 @@ mod tests {
     #[test]
     fn cells_cover_all_directions() {
         for (width, height) in [(1, 1), (2, 1), (3, 2), (64, 32), (5, 101)] {
-            let all: f64 = (0..=height)
+            let sum: f64 = (0..=height)
                 .map(|row| width as f64 * solid_angle(row, width, height))
                 .sum();
             assert!(
-                (all - 4.0 * std::f64::consts::PI).abs() < 1e-12,
-                "{width} x {height}: {all}"
+                (sum - 4.0 * std::f64::consts::PI).abs() < 1e-12,
+                "{width} x {height}: {sum}"
             );
         }
     }

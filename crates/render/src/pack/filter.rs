@@ -41,8 +41,9 @@ fn mitchell(x: f64) -> f64 {
     six_times / 6.0
 }
 
-/// Returns the [`FILTER_BINS_MAX`] equally likely bins of a filter: inner edge, outer edge, weight, 0. A lobe's bins
-/// have equal integrals. Their weight corrects the rounding to whole bins: close to 1, negative in negative lobes.
+/// Returns the [`FILTER_BINS_MAX`] equally likely bins of a filter: inner edge, outer edge, weight, 0. The bins of a
+/// lobe have equal integrals. Their weight corrects for the rounding to whole bins: it is close to 1, or to -1 in a
+/// negative lobe.
 pub fn table(filter: PixelFilter) -> Vec<Vec4> {
     let lobes = lobes(filter);
     let total: f64 = lobes.iter().map(|lobe| lobe.integral().abs()).sum();
@@ -68,7 +69,7 @@ pub fn table(filter: PixelFilter) -> Vec<Vec4> {
     table
 }
 
-/// An interval of constant sign.
+/// An interval in which the filter has constant sign.
 struct Lobe {
     start: f64,
     step: f64,
@@ -79,12 +80,12 @@ struct Lobe {
 impl Lobe {
     fn new(filter: PixelFilter, start: f64, end: f64) -> Lobe {
         let step = (end - start) / STEPS as f64;
-        let at = |i: f64| height(filter, start + step * i);
+        let value_at = |i: f64| height(filter, start + step * i);
         let mut sum = 0.0;
         let mut sums = vec![sum];
         for i in 0..STEPS {
             let i = i as f64;
-            sum += step / 6.0 * (at(i) + 4.0 * at(i + 0.5) + at(i + 1.0)); // Simpson's rule
+            sum += step / 6.0 * (value_at(i) + 4.0 * value_at(i + 0.5) + value_at(i + 1.0)); // Simpson's rule
             sums.push(sum);
         }
         Lobe { start, step, sums }
@@ -95,12 +96,12 @@ impl Lobe {
     }
 
     /// Inverts the cumulative distribution.
-    fn quantile(&self, share: f64) -> f64 {
-        let wanted = share * self.integral().abs();
-        let above = self.sums.partition_point(|sum| sum.abs() <= wanted);
-        let above = above.clamp(1, STEPS);
-        let (low, high) = (self.sums[above - 1].abs(), self.sums[above].abs());
-        self.start + self.step * ((above - 1) as f64 + (wanted - low) / (high - low))
+    fn quantile(&self, fraction: f64) -> f64 {
+        let target = fraction * self.integral().abs();
+        let upper = self.sums.partition_point(|sum| sum.abs() <= target);
+        let upper = upper.clamp(1, STEPS);
+        let (low, high) = (self.sums[upper - 1].abs(), self.sums[upper].abs());
+        self.start + self.step * ((upper - 1) as f64 + (target - low) / (high - low))
     }
 }
 

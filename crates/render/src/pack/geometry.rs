@@ -13,19 +13,20 @@ use crate::records::{PackedBvh, PackedMesh};
 use wgray_scene::mesh::Mesh;
 use wgray_scene::{Geometry, Scene, Shape};
 
-/// Maximum number of bounded primitives without a BVH: a few are faster as constants in a loop.
+/// Maximum number of bounded primitives without a BVH: a few primitives are faster without one.
 pub const MAX_LINEAR_PRIMITIVES: usize = 64;
 
-/// Builds the BVH over mesh instances and these primitives, each given with its index and whether it casts a shadow.
-/// Also returns [`Counts::item_padding`](super::Counts::item_padding).
-pub fn trees(
+/// Builds the BVH over mesh instances and primitives. Each primitive has an index, and a flag that is true if the
+/// primitive casts a shadow. `casts` returns true if a material casts shadows. Also returns
+/// [`Counts::item_padding`](super::Counts::item_padding).
+pub fn build_bvh(
     scene: &Scene,
     primitives: &[(u32, &Primitive, bool)],
     casts: impl Fn(usize) -> bool,
 ) -> (PackedBvh, Vec4) {
-    let mut trees = PackedBvh::default();
-    let with_normal_maps = with_normal_maps(scene);
-    let mut known: Vec<*const Mesh> = Vec::new();
+    let mut bvh = PackedBvh::default();
+    let meshes_with_tangents = meshes_with_tangents(scene);
+    let mut meshes: Vec<*const Mesh> = Vec::new();
     let mut items = Vec::new();
     for (number, shape) in scene.shapes.iter().enumerate() {
         let Geometry::Mesh {
@@ -36,29 +37,29 @@ pub fn trees(
         else {
             continue;
         };
-        let place = known.iter().position(|other| *other == Arc::as_ptr(mesh));
-        let place = place.unwrap_or_else(|| {
-            known.push(Arc::as_ptr(mesh));
-            let with_tangents = with_normal_maps.contains(&Arc::as_ptr(mesh));
-            trees.meshes.push(PackedMesh::cached(mesh, with_tangents));
-            known.len() - 1
+        let mesh_index = meshes.iter().position(|other| *other == Arc::as_ptr(mesh));
+        let mesh_index = mesh_index.unwrap_or_else(|| {
+            meshes.push(Arc::as_ptr(mesh));
+            let with_tangents = meshes_with_tangents.contains(&Arc::as_ptr(mesh));
+            bvh.meshes.push(PackedMesh::cached(mesh, with_tangents));
+            meshes.len() - 1
         });
         let word = |material: &usize| *material as u32 | if casts(*material) { 0 } else { NO_SHADOW };
         let words: Vec<u32> = materials.iter().map(word).collect();
-        let casting = words.iter().filter(|word| **word & NO_SHADOW == 0).count();
-        let packed = &trees.meshes[place];
-        let kind = INSTANCE | if casting > 0 { CASTS_SHADOW } else { 0 };
-        items.push(item(kind, trees.instances.len() as u32, box_in_world(mesh, to_world)));
-        trees.instances.push(Instance {
-            mesh: place as u32,
-            materials: trees.group_words.len() as u32,
+        let casters = words.iter().filter(|word| **word & NO_SHADOW == 0).count();
+        let packed = &bvh.meshes[mesh_index];
+        let kind = INSTANCE | if casters > 0 { CASTS_SHADOW } else { 0 };
+        items.push(item(kind, bvh.instances.len() as u32, box_in_world(mesh, to_world)));
+        bvh.instances.push(Instance {
+            mesh: mesh_index as u32,
+            materials: bvh.group_words.len() as u32,
             shape: number as u32,
-            shadows: if casting < words.len() { SOME_SHADOWS } else { 0 },
+            shadows: if casters < words.len() { SOME_SHADOWS } else { 0 },
             has_uvs: (!mesh.uvs.is_empty()).into(),
             uv_sets: mesh.more_uvs.len() as u32,
             ..instance(packed, mesh.center, to_world)
         });
-        trees.group_words.extend(words);
+        bvh.group_words.extend(words);
     }
     for (number, primitive, casts) in primitives {
         let kind = primitive.kind | if *casts { CASTS_SHADOW } else { 0 };
@@ -72,21 +73,21 @@ pub fn trees(
         })
         .collect();
     let tree = build(&boxes, 1);
-    trees.items = tree.order.iter().map(|i| items[*i as usize]).collect();
-    trees.nodes = cast_vec(tree.nodes);
-    let condition_number = trees.instances.iter().map(|i| i.condition_number).fold(1.0, f32::max);
+    bvh.items = tree.order.iter().map(|i| items[*i as usize]).collect();
+    bvh.nodes = cast_vec(tree.nodes);
+    let condition_number = bvh.instances.iter().map(|i| i.condition_number).fold(1.0, f32::max);
     let farthest = boxes
         .iter()
         .map(|b| b.low.abs().max(b.high.abs()).max_element())
         .fold(0.0, f32::max);
-    trees.place_rows();
-    (trees, Vec4::new(BOX_PAD * condition_number, farthest, 0.0, 0.0))
+    bvh.set_mesh_rows();
+    (bvh, Vec4::new(BOX_PAD * condition_number, farthest, 0.0, 0.0))
 }
 
 /// Returns the meshes that are packed with vertex tangents: meshes with a normal map in any instance, and meshes that
 /// have both tangents and a material with tangent directions (anisotropy, coat normal map), which would otherwise use
 /// the tangents of the triangles.
-fn with_normal_maps(scene: &Scene) -> HashSet<*const Mesh> {
+fn meshes_with_tangents(scene: &Scene) -> HashSet<*const Mesh> {
     let needs_tangents = |mesh: &Mesh, material: &usize| {
         let material = &scene.materials[*material];
         material.normal_map.is_some() || !mesh.tangents.is_empty() && material.has_direction()
@@ -101,11 +102,11 @@ fn with_normal_maps(scene: &Scene) -> HashSet<*const Mesh> {
 }
 
 impl PackedBvh {
-    /// Sets the buffer rows of meshes in the instances. The nodes of meshes come last in the first buffer.
-    fn place_rows(&mut self) {
+    /// Sets the first buffer rows of the meshes in the instances. The nodes of meshes come last in the first buffer.
+    fn set_mesh_rows(&mut self) {
         let mut node_row = self.mesh_nodes_row();
         let mut row = 0;
-        let places: Vec<[u32; 8]> = self
+        let first_rows: Vec<[u32; 8]> = self
             .meshes
             .iter()
             .map(|mesh| {
@@ -133,7 +134,7 @@ impl PackedBvh {
             })
             .collect();
         for instance in &mut self.instances {
-            let place = places[instance.mesh as usize];
+            let rows = first_rows[instance.mesh as usize];
             [
                 instance.nodes,
                 instance.triangles,
@@ -143,7 +144,7 @@ impl PackedBvh {
                 instance.groups,
                 instance.colors,
                 instance.more_uvs,
-            ] = place;
+            ] = rows;
         }
     }
 

@@ -8,18 +8,18 @@ use super::primitive::parallelogram;
 use super::{DIRECTIONAL, EMITTER, Light, Material, NO_INDEX, POINT, Primitive, RECTANGLE, SPOT};
 use wgray_scene::{self as scene, Scene};
 
-/// `t_max` of shadow rays to directional lights: beyond any scene, with a finite square.
+/// `t_max` of shadow rays to directional lights: beyond any scene, but with a finite square.
 pub(super) const DISTANT: f32 = 1e10;
 
-/// Minimum relative distance from a shadow ray's end to the light sample, as lights may lie on surfaces.
-const BEFORE_LIGHT: f64 = 1e-5;
+/// Minimum relative distance from the end of a shadow ray to the light sample, because lights may lie on surfaces.
+const MIN_LIGHT_DISTANCE: f64 = 1e-5;
 
 /// Minimum range of the cosine of a spot light's falloff.
 const MIN_FALLOFF: f64 = 1e-12;
 
 /// Returns `t_max` of shadow rays, relative to the vector to the light sample.
 pub(super) fn t_max(shadow_epsilon: f64) -> f32 {
-    (1.0 - shadow_epsilon.max(BEFORE_LIGHT)) as f32
+    (1.0 - shadow_epsilon.max(MIN_LIGHT_DISTANCE)) as f32
 }
 
 /// Packs the lights, rectangles first, and counts the rectangles. Each rectangle adds a primitive and a material.
@@ -55,7 +55,7 @@ pub(super) fn pack_lights(
 
 fn pack_light(light: &scene::Light, number: u32, shadow_epsilon: f64) -> Light {
     let t_max = t_max(shadow_epsilon);
-    let unit = Light {
+    let base = Light {
         finite: 1.0,
         t_max,
         primitive: NO_INDEX,
@@ -68,13 +68,13 @@ fn pack_light(light: &scene::Light, number: u32, shadow_epsilon: f64) -> Light {
             u: rectangle.u.as_vec3(),
             v: rectangle.v.as_vec3(),
             color: color.as_vec3(),
-            ..unit
+            ..base
         },
         scene::Light::Point { position, color } => Light {
             center: position.as_vec3(),
             color: color.as_vec3(),
             kind: POINT,
-            ..unit
+            ..base
         },
         scene::Light::Directional { direction, color } => Light {
             center: -direction.as_vec3(),
@@ -82,7 +82,7 @@ fn pack_light(light: &scene::Light, number: u32, shadow_epsilon: f64) -> Light {
             t_max: DISTANT,
             color: color.as_vec3(),
             kind: DIRECTIONAL,
-            ..unit
+            ..base
         },
         scene::Light::Spot {
             position,
@@ -95,26 +95,27 @@ fn pack_light(light: &scene::Light, number: u32, shadow_epsilon: f64) -> Light {
             color: color.as_vec3(),
             normal: direction.as_vec3(),
             kind: SPOT,
-            cone: below_one(*cone) as f32,
-            falloff: (1.0 / (below_one(*cone) - below_one(*inner)).max(MIN_FALLOFF)) as f32,
-            ..unit
+            cone: one_minus_cosine(*cone) as f32,
+            falloff: (1.0 / (one_minus_cosine(*cone) - one_minus_cosine(*inner)).max(MIN_FALLOFF)) as f32,
+            ..base
         },
     }
 }
 
 /// Returns 1 - cos(angle) without cancellation.
-fn below_one(angle: f64) -> f64 {
+fn one_minus_cosine(angle: f64) -> f64 {
     2.0 * (angle / 2.0).sin().powi(2)
 }
 
+/// Sets the primitive of each light that has a rectangle.
 pub(super) fn connect_lights(lights: &mut [Light], order: &[(Primitive, bool)], shapes: usize) {
-    let mut of_number: BTreeMap<u32, u32> = BTreeMap::new();
+    let mut light_indices: BTreeMap<u32, u32> = BTreeMap::new();
     for (i, light) in (0..).zip(&*lights) {
-        of_number.insert(light.number, i);
+        light_indices.insert(light.number, i);
     }
     for (i, (primitive, _)) in (0..).zip(order) {
         let number = primitive.shape.checked_sub(shapes as u32);
-        if let Some(light) = number.and_then(|number| of_number.get(&number)) {
+        if let Some(light) = number.and_then(|number| light_indices.get(&number)) {
             lights[*light as usize].primitive = i;
         }
     }

@@ -22,7 +22,7 @@ pub struct Cone {
     pub spread: f64,
     /// θ_e, 0 to pi / 2.
     pub edge: f64,
-    /// Includes the opposite directions.
+    /// True if the opposite directions belong to the cone too.
     pub two_sided: bool,
 }
 
@@ -55,35 +55,35 @@ impl Cone {
         if two_sided && a.axis.dot(b.axis) < 0.0 {
             b.axis = -b.axis;
         }
-        let around = Cone {
+        let union = Cone {
             edge: a.edge.max(b.edge),
             two_sided,
             ..a
         };
         if a.spread >= PI {
-            return around;
+            return union;
         }
         // The angle is 2 asin(chord / 2), without the cancellation of acos at small angles. The cheaper bound asin(x)
         // <= x + (pi / 2 - 1) x^3 decides most cases.
         let chord = (a.axis - b.axis).length();
         let bound = chord + 0.25 * (FRAC_PI_2 - 1.0) * chord.powi(3);
         if bound + b.spread <= a.spread * (1.0 - 1e-12) {
-            return around;
+            return union;
         }
-        let between = 2.0 * (0.5 * chord).min(1.0).asin();
-        if (between + b.spread).min(PI) <= a.spread {
-            return around;
+        let angle = 2.0 * (0.5 * chord).min(1.0).asin();
+        if (angle + b.spread).min(PI) <= a.spread {
+            return union;
         }
-        let spread = 0.5 * (a.spread + between + b.spread);
+        let spread = 0.5 * (a.spread + angle + b.spread);
         let normal = a.axis.cross(b.axis);
         if spread >= PI || normal.length() < 1e-9 {
-            return Cone { spread: PI, ..around };
+            return Cone { spread: PI, ..union };
         }
-        let turn = DQuat::from_axis_angle(normal.normalize(), spread - a.spread);
+        let rotation = DQuat::from_axis_angle(normal.normalize(), spread - a.spread);
         Cone {
-            axis: (turn * a.axis).normalize(),
+            axis: (rotation * a.axis).normalize(),
             spread,
-            ..around
+            ..union
         }
     }
 
@@ -123,14 +123,14 @@ struct Bounds {
 }
 
 impl Bounds {
-    fn of(lamp: &TreeEmitter) -> Bounds {
+    fn of(emitter: &TreeEmitter) -> Bounds {
         let TreeEmitter {
             low,
             high,
             cone,
             intensity,
             ..
-        } = *lamp;
+        } = *emitter;
         Bounds {
             low,
             high,
@@ -148,13 +148,13 @@ impl Bounds {
         }
     }
 
-    fn of_all(all: impl Iterator<Item = Bounds>) -> Option<Bounds> {
-        all.reduce(|a, b| a.with(&b))
+    fn union(bounds: impl Iterator<Item = Bounds>) -> Option<Bounds> {
+        bounds.reduce(|a, b| a.with(&b))
     }
 
-    /// Returns the numerator of equation 2. `room` enlarges the box, so that boxes without extent have a cost, too.
-    fn cost(&self, room: f64) -> f64 {
-        let size = self.high - self.low + room;
+    /// Returns the numerator of equation 2. `padding` enlarges the box, so that boxes without extent have a cost, too.
+    fn cost(&self, padding: f64) -> f64 {
+        let size = self.high - self.low + padding;
         let area = 2.0 * (size.x * size.y + size.y * size.z + size.z * size.x);
         self.intensity * area * self.cone.measure()
     }
@@ -167,18 +167,18 @@ const WIDTH: usize = 4;
 const PARALLEL: usize = 2048;
 
 /// Builds the tree, root first.
-pub fn build(lamps: &[TreeEmitter]) -> Vec<LightNode> {
-    build_with(lamps, PARALLEL)
+pub fn build(emitters: &[TreeEmitter]) -> Vec<LightNode> {
+    build_with(emitters, PARALLEL)
 }
 
-fn build_with(lamps: &[TreeEmitter], parallel: usize) -> Vec<LightNode> {
-    let mut order: Vec<u32> = (0..lamps.len() as u32).collect();
+fn build_with(emitters: &[TreeEmitter], parallel: usize) -> Vec<LightNode> {
+    let mut order: Vec<u32> = (0..emitters.len() as u32).collect();
     let builder = Builder {
-        lamps,
-        total: lamps.iter().map(|lamp| lamp.intensity).sum(),
+        emitters,
+        total: emitters.iter().map(|emitter| emitter.intensity).sum(),
         parallel,
     };
-    let mut nodes = Vec::with_capacity(lamps.len() / 2 + 1);
+    let mut nodes = Vec::with_capacity(emitters.len() / 2 + 1);
     if let Some(part) = builder.part(&mut order, 0) {
         builder.add_subtree(NO_INDEX, part, &mut nodes);
     }
@@ -186,7 +186,7 @@ fn build_with(lamps: &[TreeEmitter], parallel: usize) -> Vec<LightNode> {
 }
 
 struct Builder<'a> {
-    lamps: &'a [TreeEmitter],
+    emitters: &'a [TreeEmitter],
     total: f64,
     parallel: usize,
 }
@@ -200,23 +200,23 @@ struct Part<'a> {
 
 impl Builder<'_> {
     fn part<'a>(&self, order: &'a mut [u32], level: u32) -> Option<Part<'a>> {
-        let bounds = Bounds::of_all(order.iter().map(|i| Bounds::of(&self.lamps[*i as usize])))?;
+        let bounds = Bounds::union(order.iter().map(|i| Bounds::of(&self.emitters[*i as usize])))?;
         Some(Part { order, bounds, level })
     }
 
     /// Appends a node and its descendants depth first, and returns its index.
-    fn add_subtree(&self, parent: u32, all: Part, nodes: &mut Vec<LightNode>) -> u32 {
-        let number = nodes.len();
-        let is_parallel = all.order.len() >= self.parallel;
-        let (node, parts) = self.node(parent, all);
+    fn add_subtree(&self, parent: u32, part: Part, nodes: &mut Vec<LightNode>) -> u32 {
+        let node_index = nodes.len();
+        let is_parallel = part.order.len() >= self.parallel;
+        let (node, parts) = self.node(parent, part);
         nodes.push(node);
         let inner = parts.into_iter().enumerate().filter(|(_, part)| part.order.len() > 1);
-        let parent_of = |i: usize| (4 * number + i) as u32;
+        let parent_of = |i: usize| (4 * node_index + i) as u32;
         if !is_parallel {
             for (i, part) in inner {
-                nodes[number].children[i] = self.add_subtree(parent_of(i), part, nodes);
+                nodes[node_index].children[i] = self.add_subtree(parent_of(i), part, nodes);
             }
-            return number as u32;
+            return node_index as u32;
         }
         let inner: Vec<(usize, Part)> = inner.collect();
         let subtrees = inner.into_par_iter().map(|(i, part)| {
@@ -227,7 +227,7 @@ impl Builder<'_> {
         for (i, mut subtree) in subtrees.collect::<Vec<_>>() {
             let first = nodes.len() as u32;
             for node in &mut subtree {
-                node.parent.x = node.parent.x.wrapping_add(4 * first); // the root's is set below
+                node.parent.x = node.parent.x.wrapping_add(4 * first); // the parent of the subtree's root is set below
                 for child in 0..WIDTH {
                     if node.children[child] != NO_INDEX {
                         node.children[child] += first;
@@ -235,27 +235,27 @@ impl Builder<'_> {
                 }
             }
             subtree[0].parent.x = parent_of(i);
-            nodes[number].children[i] = first;
+            nodes[node_index].children[i] = first;
             nodes.append(&mut subtree);
         }
-        number as u32
+        node_index as u32
     }
 
     /// Returns a node without child indices, and the emitters of each child.
-    fn node<'a>(&self, parent: u32, all: Part<'a>) -> (LightNode, Vec<Part<'a>>) {
-        let size = (all.bounds.high - all.bounds.low).max_element();
-        let room = if size > 0.0 { 1e-3 * size } else { 1.0 };
-        let mut parts = vec![all];
-        // Split the most expensive part until the node is full.
+    fn node<'a>(&self, parent: u32, part: Part<'a>) -> (LightNode, Vec<Part<'a>>) {
+        let size = (part.bounds.high - part.bounds.low).max_element();
+        let padding = if size > 0.0 { 1e-3 * size } else { 1.0 };
+        let mut parts = vec![part];
+        // The most expensive part is split until the node is full.
         while parts.len() < WIDTH {
             let costs = parts.iter().enumerate().filter(|(_, part)| part.order.len() > 1);
-            let worst = costs.max_by(|(_, a), (_, b)| a.bounds.cost(room).total_cmp(&b.bounds.cost(room)));
-            let Some((i, _)) = worst else {
+            let costliest = costs.max_by(|(_, a), (_, b)| a.bounds.cost(padding).total_cmp(&b.bounds.cost(padding)));
+            let Some((i, _)) = costliest else {
                 break;
             };
             let Part { order, level, .. } = parts.swap_remove(i);
-            let middle = self.split(order, level);
-            let (first, second) = order.split_at_mut(middle);
+            let first_size = self.split(order, level);
+            let (first, second) = order.split_at_mut(first_size);
             parts.extend(
                 [first, second]
                     .into_iter()
@@ -268,22 +268,22 @@ impl Builder<'_> {
             ..bytemuck::Zeroable::zeroed()
         };
         for (i, part) in parts.iter().enumerate() {
-            self.describe(&mut node, i, &part.bounds);
-            if let [lamp] = *part.order {
-                let lamp = &self.lamps[lamp as usize];
-                node.density[i] = lamp.density as f32;
-                node.instance[i] = lamp.instance;
-                node.index[i] = lamp.index;
+            self.set_child(&mut node, i, &part.bounds);
+            if let [emitter] = *part.order {
+                let emitter = &self.emitters[emitter as usize];
+                node.density[i] = emitter.density as f32;
+                node.instance[i] = emitter.instance;
+                node.index[i] = emitter.index;
             }
         }
         (node, parts)
     }
 
-    fn describe(&self, node: &mut LightNode, i: usize, bounds: &Bounds) {
+    fn set_child(&self, node: &mut LightNode, i: usize, bounds: &Bounds) {
         let center = (0.5 * (bounds.low + bounds.high)).as_vec3();
-        // Distance from the rounded center.
-        let far = (bounds.high - center.as_dvec3()).max(center.as_dvec3() - bounds.low);
-        let radius = far.length() * (1.0 + 1e-6);
+        // Relative to the rounded center.
+        let half_extent = (bounds.high - center.as_dvec3()).max(center.as_dvec3() - bounds.low);
+        let radius = half_extent.length() * (1.0 + 1e-6);
         let axis = bounds.cone.axis.as_vec3();
         (node.x[i], node.y[i], node.z[i]) = center.into();
         node.radius[i] = radius as f32;
@@ -291,20 +291,20 @@ impl Builder<'_> {
         node.cosine[i] = bounds.cone.spread.cos() as f32;
         node.edge[i] = bounds.cone.edge.cos() as f32;
         node.sides[i] = if bounds.cone.two_sided { 2 } else { 1 };
-        // Above 0, which marks a child.
+        // Greater than 0, because 0 marks a missing child.
         node.intensity[i] = ((bounds.intensity / self.total) as f32).max(f32::MIN_POSITIVE);
     }
 
     /// Partitions emitters by the surface area orientation heuristic. Returns the size of the first part.
     fn split(&self, order: &mut [u32], level: u32) -> usize {
         let half = order.len() / 2;
-        let middle = |i: &u32| {
-            let lamp = &self.lamps[*i as usize];
-            0.5 * (lamp.low + lamp.high)
+        let center = |i: &u32| {
+            let emitter = &self.emitters[*i as usize];
+            0.5 * (emitter.low + emitter.high)
         };
         let (low, high) = order
             .iter()
-            .map(middle)
+            .map(center)
             .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| {
                 (low.min(p), high.max(p))
             });
@@ -317,7 +317,7 @@ impl Builder<'_> {
             |longest, axis| if size[axis] > size[longest] { axis } else { longest },
         );
         if level >= LIGHT_TREE_MAX_DEPTH {
-            order.select_nth_unstable_by(half, |a, b| middle(a)[longest].total_cmp(&middle(b)[longest]));
+            order.select_nth_unstable_by(half, |a, b| center(a)[longest].total_cmp(&center(b)[longest]));
             return half;
         }
         let mut best: Option<(f64, usize, usize)> = None;
@@ -327,24 +327,24 @@ impl Builder<'_> {
             }
             let mut buckets: [Option<Bounds>; BUCKETS] = [None; BUCKETS];
             for i in &*order {
-                let bounds = Bounds::of(&self.lamps[*i as usize]);
-                let bucket = &mut buckets[bucket(middle(i)[axis], low[axis], size[axis])];
-                *bucket = Some(bucket.map_or(bounds, |before| before.with(&bounds)));
+                let bounds = Bounds::of(&self.emitters[*i as usize]);
+                let bucket = &mut buckets[bucket(center(i)[axis], low[axis], size[axis])];
+                *bucket = Some(bucket.map_or(bounds, |merged| merged.with(&bounds)));
             }
-            let room = 1e-3 * size[longest];
-            let stretched = size[longest] / size[axis]; // K_r
+            let padding = 1e-3 * size[longest];
+            let stretch = size[longest] / size[axis]; // K_r
             let mut first: Option<Bounds> = None;
             for split in 1..BUCKETS {
-                // If the bucket before it is empty, a split equals the previous split.
+                // A split after an empty bucket equals the previous split.
                 let Some(added) = buckets[split - 1] else { continue };
-                let nearer = first.map_or(added, |before| before.with(&added));
-                first = Some(nearer);
-                let Some(farther) = Bounds::of_all(buckets[split..].iter().copied().flatten()) else {
+                let lower = first.map_or(added, |bounds| bounds.with(&added));
+                first = Some(lower);
+                let Some(upper) = Bounds::union(buckets[split..].iter().copied().flatten()) else {
                     break;
                 };
-                let (first, second) = (nearer.cost(room), farther.cost(room));
-                let cost = stretched * (first + second);
-                if best.is_none_or(|(least, _, _)| cost < least) {
+                let (first, second) = (lower.cost(padding), upper.cost(padding));
+                let cost = stretch * (first + second);
+                if best.is_none_or(|(min_cost, _, _)| cost < min_cost) {
                     best = Some((cost, axis, split));
                 }
             }
@@ -354,7 +354,7 @@ impl Builder<'_> {
         };
         let mut first = 0;
         for i in 0..order.len() {
-            if bucket(middle(&order[i])[axis], low[axis], size[axis]) < split {
+            if bucket(center(&order[i])[axis], low[axis], size[axis]) < split {
                 order.swap(first, i);
                 first += 1;
             }
@@ -364,8 +364,8 @@ impl Builder<'_> {
 }
 
 fn bucket(x: f64, low: f64, size: f64) -> usize {
-    let share = (x - low) / size;
-    ((share * BUCKETS as f64) as usize).min(BUCKETS - 1)
+    let fraction = (x - low) / size;
+    ((fraction * BUCKETS as f64) as usize).min(BUCKETS - 1)
 }
 
 #[cfg(test)]

@@ -21,16 +21,16 @@ pub struct Appearances {
     pub lookups: Vec<Lookup>,
     pub textures: Vec<Texture>,
     pub texels: Vec<u32>,
-    /// The pyramid of each image; the key is the address of the image.
-    places: BTreeMap<usize, u32>,
-    /// Levels that each image needs.
+    /// Offset of each image's pyramid; the key is the address of the image.
+    pyramids: BTreeMap<usize, u32>,
+    /// Number of levels that each image needs; the key is the address of the image.
     levels: BTreeMap<usize, u32>,
-    /// Textures; a normal map has one texture per strength.
+    /// Record of each texture; a normal map has one record per strength.
     records: BTreeMap<(usize, Option<u64>), u32>,
     /// Tables of rough glass; the key is the index of refraction and alpha (`None` if textured).
-    energies: BTreeMap<(u32, Option<u32>), u32>,
-    /// Tables of anisotropic microfacets; the key is the parts, the roughness and the anisotropy.
-    aniso_table: BTreeMap<(TableLobes, Option<u32>, Option<u32>), u32>,
+    albedo_tables: BTreeMap<(u32, Option<u32>), u32>,
+    /// Tables of anisotropic microfacets; the key is the lobes, the roughness and the anisotropy.
+    aniso_tables: BTreeMap<(TableLobes, Option<u32>, Option<u32>), u32>,
 }
 
 fn camera_visibility(material: &scene::Material) -> u32 {
@@ -89,10 +89,10 @@ impl Appearances {
         appearances
     }
 
-    /// Returns the maximum number of lookups of a material, and of a mirror or glass. With `path` both are the overall
-    /// maximum, because `path` evaluates all materials in one place.
+    /// Returns the maximum number of lookups of materials that are neither mirror nor glass, and of mirrors and glass.
+    /// With `path`, both are the overall maximum, because `path` evaluates all materials with the same code.
     pub fn lookups(&self, integrator: Integrator) -> (u32, u32) {
-        let most = |specular: bool| {
+        let max = |specular: bool| {
             let materials = self
                 .materials
                 .iter()
@@ -100,7 +100,7 @@ impl Appearances {
             let lookups = materials.map(|material| material.lookups.y);
             lookups.max().unwrap_or(0)
         };
-        let (others, specular) = (most(false), most(true));
+        let (others, specular) = (max(false), max(true));
         match integrator.follows_paths() {
             true => (others.max(specular), others.max(specular)),
             false => (others, specular),
@@ -217,17 +217,17 @@ impl Appearances {
         let textured = has(FOR_ROUGHNESS);
         let mut record = reduce_to_delta(record, textured);
         record.camera_visibility = camera_visibility(material);
-        let passes = record.thin == 0 && (record.transmission > 0.0 || has(FOR_TRANSMISSION));
-        let parts = match record.kind {
+        let transmits = record.thin == 0 && (record.transmission > 0.0 || has(FOR_TRANSMISSION));
+        let lobes = match record.kind {
             METAL | THIN if record.energy != NO_INDEX => Some(TableLobes::Mirror),
             ROUGH_GLASS if record.energy != NO_INDEX => Some(TableLobes::Glass(record.ior.to_bits())),
-            PRINCIPLED => Some(TableLobes::PrincipledLobes(passes.then_some(record.ior.to_bits()))),
+            PRINCIPLED => Some(TableLobes::PrincipledLobes(transmits.then_some(record.ior.to_bits()))),
             _ => None,
         };
-        if let Some(parts) = parts {
+        if let Some(lobes) = lobes {
             if record.anisotropy > 0.0 || has(FOR_ANISOTROPY) {
-                record.aniso_table = 1 + self.aniso_table(&record, parts, textured, has(FOR_ANISOTROPY));
-            } else if record.kind == ROUGH_GLASS || record.kind == PRINCIPLED && passes {
+                record.aniso_table = 1 + self.aniso_table(&record, lobes, textured, has(FOR_ANISOTROPY));
+            } else if record.kind == ROUGH_GLASS || record.kind == PRINCIPLED && transmits {
                 record.energy = self.energy(&record, textured);
             }
         }
@@ -257,22 +257,29 @@ impl Appearances {
         let alpha = if textured { None } else { Some(square.sqrt()) };
         let key = (record.ior.to_bits(), alpha.map(f32::to_bits));
         let texels = &mut self.texels;
-        *self.energies.entry(key).or_insert_with(|| {
+        *self.albedo_tables.entry(key).or_insert_with(|| {
             let start = texels.len() as u32;
             texels.extend(energy_table(record.ior, alpha).iter().map(|x| x.to_bits()));
             start
         })
     }
 
-    /// Like `energy`, for anisotropic microfacets. `rough` and `long`: roughness and anisotropy are textured.
-    fn aniso_table(&mut self, record: &Material, parts: TableLobes, rough: bool, long: bool) -> u32 {
-        let known = |number: f32, textured: bool| (!textured).then_some(number);
-        let (roughness, anisotropy) = (known(record.roughness, rough), known(record.anisotropy, long));
-        let key = (parts, roughness.map(f32::to_bits), anisotropy.map(f32::to_bits));
+    /// Like `energy`, for anisotropic microfacets. The flags are true if roughness or anisotropy are textured.
+    fn aniso_table(
+        &mut self,
+        record: &Material,
+        lobes: TableLobes,
+        textured_roughness: bool,
+        textured_anisotropy: bool,
+    ) -> u32 {
+        let constant = |value: f32, textured: bool| (!textured).then_some(value);
+        let roughness = constant(record.roughness, textured_roughness);
+        let anisotropy = constant(record.anisotropy, textured_anisotropy);
+        let key = (lobes, roughness.map(f32::to_bits), anisotropy.map(f32::to_bits));
         let texels = &mut self.texels;
-        *self.aniso_table.entry(key).or_insert_with(|| {
+        *self.aniso_tables.entry(key).or_insert_with(|| {
             let start = texels.len() as u32;
-            texels.extend(aniso_table(parts, roughness, anisotropy));
+            texels.extend(aniso_table(lobes, roughness, anisotropy));
             start
         })
     }
@@ -289,10 +296,10 @@ impl Appearances {
             v: texture.transform[1].as_vec3(),
             ..bytemuck::Zeroable::zeroed()
         };
-        let between = |first: DVec3, second: DVec3| (first.as_vec3(), second.as_vec3());
+        let endpoints = |first: DVec3, second: DVec3| (first.as_vec3(), second.as_vec3());
         let record = match &texture.kind {
             TextureKind::Constant(color) => {
-                let (first, second) = between(*color, *color);
+                let (first, second) = endpoints(*color, *color);
                 Texture {
                     first,
                     kind: CHECKER,
@@ -301,7 +308,7 @@ impl Appearances {
                 }
             }
             TextureKind::Checker { even, odd } => {
-                let (first, second) = between(*even, *odd);
+                let (first, second) = endpoints(*even, *odd);
                 Texture {
                     first,
                     kind: CHECKER,
@@ -310,7 +317,7 @@ impl Appearances {
                 }
             }
             TextureKind::Lines { cell, line, line_width } => {
-                let (first, second) = between(*cell, *line);
+                let (first, second) = endpoints(*cell, *line);
                 Texture {
                     first,
                     kind: LINES,
@@ -327,12 +334,12 @@ impl Appearances {
                 factor,
             } => {
                 let (first, second) = match strength {
-                    Some(s) => between(DVec3::new(-s, -s, -1.0), DVec3::new(s, s, 1.0)),
-                    None => between(DVec3::ZERO, *factor),
+                    Some(s) => endpoints(DVec3::new(-s, -s, -1.0), DVec3::new(s, s, 1.0)),
+                    None => endpoints(DVec3::ZERO, *factor),
                 };
                 let levels = levels_of(image, *filter);
                 let address = address(image);
-                let most_levels = self.levels.get(&address).map_or(levels, |most| levels.max(*most));
+                let max_levels = self.levels.get(&address).map_or(levels, |max| levels.max(*max));
                 let texels = &mut self.texels;
                 Texture {
                     first,
@@ -350,7 +357,7 @@ impl Appearances {
                         Texels::Floats(_) => FLOAT,
                     },
                     wrap: self::wrap(wrap[0]) + 4 * self::wrap(wrap[1]),
-                    texels: *(self.places.entry(address)).or_insert_with(|| pyramid(image, most_levels, texels)),
+                    texels: *(self.pyramids.entry(address)).or_insert_with(|| pyramid(image, max_levels, texels)),
                     width: image.width,
                     height: image.height,
                     levels,
@@ -382,15 +389,15 @@ fn levels_of(image: &Image, filter: TextureFilter) -> u32 {
     if filter.needs_levels() { image.levels() } else { 1 }
 }
 
-/// A material's lookups: one per texture, with all purposes.
+/// A material's lookups: one lookup per texture, with all purposes.
 #[derive(Default)]
 struct Lookups(Vec<Lookup>);
 
 impl Lookups {
-    /// Scalars have a channel and its position in `Lookup::channels`.
+    /// Adds a purpose to the lookup of a texture. `channel` is a scalar's channel, and its index in `Lookup::channels`.
     fn add(&mut self, texture: u32, uv_set: u32, purpose: u32, channel: Option<(Channel, u32)>) {
-        let known = self.0.iter().position(|lookup| lookup.texture == texture);
-        let place = known.unwrap_or_else(|| {
+        let position = self.0.iter().position(|lookup| lookup.texture == texture);
+        let position = position.unwrap_or_else(|| {
             self.0.push(Lookup {
                 texture,
                 uv_set,
@@ -398,10 +405,10 @@ impl Lookups {
             });
             self.0.len() - 1
         });
-        let lookup = &mut self.0[place];
+        let lookup = &mut self.0[position];
         lookup.purposes |= purpose;
-        if let Some((channel, place)) = channel {
-            lookup.channels |= number_of(channel) << (2 * place);
+        if let Some((channel, index)) = channel {
+            lookup.channels |= channel_number(channel) << (2 * index);
         }
     }
 }
@@ -461,19 +468,19 @@ fn principled(
 fn resolve_scalar(
     value: &Value,
     purpose: u32,
-    place: u32,
+    channel_index: u32,
     resolve: &mut impl FnMut(&Color, u32, Option<(Channel, u32)>) -> Vec3,
 ) -> f32 {
     match *value {
         Value::Plain(number) => number as f32,
         Value::Texture(i, channel) => {
-            let color = resolve(&Color::Texture(i), purpose, Some((channel, place)));
-            color[number_of(channel) as usize]
+            let color = resolve(&Color::Texture(i), purpose, Some((channel, channel_index)));
+            color[channel_number(channel) as usize]
         }
     }
 }
 
-fn number_of(channel: Channel) -> u32 {
+fn channel_number(channel: Channel) -> u32 {
     match channel {
         Channel::R | Channel::A => 0,
         Channel::G => 1,

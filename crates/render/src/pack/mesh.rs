@@ -13,7 +13,8 @@ use wgray_scene::mesh::{Mesh, VertexTangents};
 const MAX_LEAF_SIZE: u32 = 4;
 
 impl PackedMesh {
-    /// Packs a mesh, with tangents for normal maps if it has the attributes. The mesh caches the result.
+    /// Packs a mesh, with tangents for normal maps if the mesh has texture coordinates and normals. The mesh caches the
+    /// result.
     pub(crate) fn cached(mesh: &Arc<Mesh>, with_tangents: bool) -> Arc<PackedMesh> {
         struct WithTangents(Arc<PackedMesh>);
         if with_tangents && !mesh.uvs.is_empty() && !mesh.normals.is_empty() {
@@ -29,7 +30,7 @@ impl PackedMesh {
     fn of(mesh: &Mesh, tangents: Option<VertexTangents>) -> PackedMesh {
         let corners = |triangle: &[u32; 3]| triangle.map(|vertex| mesh.positions[vertex as usize]);
         let boxes: Vec<Aabb> = mesh.triangles.par_iter().map(|t| Aabb::around(&corners(t))).collect();
-        let bounds = boxes.iter().fold(Aabb::EMPTY, |all, b| all.with(b));
+        let bounds = boxes.iter().fold(Aabb::EMPTY, |bounds, b| bounds.with(b));
         let tree = build(&boxes, MAX_LEAF_SIZE);
         let (triangles, copies, tangents) = match &tangents {
             Some(generated) => (
@@ -45,17 +46,19 @@ impl PackedMesh {
         });
         let uv = |i: usize| mesh.uvs.get(i).copied().unwrap_or_default();
         let normal = |i: usize| mesh.normals.get(i).copied().unwrap_or_default();
-        let own = mesh.positions.len();
-        let count = own + copies.len();
-        // The original of a duplicated vertex.
-        let original = |i: usize| if i < own { i } else { copies[i - own] as usize };
+        let original_count = mesh.positions.len();
+        let count = original_count + copies.len();
+        let original = |i: usize| match i < original_count {
+            true => i,
+            false => copies[i - original_count] as usize,
+        };
         let vertices = (0..count).into_par_iter().map(original);
         let vertices = vertices.map(|i| mesh.positions[i].extend(uv(i).x));
-        let with_attributes = match mesh.normals.is_empty() && mesh.uvs.is_empty() {
+        let attribute_count = match mesh.normals.is_empty() && mesh.uvs.is_empty() {
             true => 0,
             false => count,
         };
-        let attributes = (0..with_attributes).into_par_iter().map(original);
+        let attributes = (0..attribute_count).into_par_iter().map(original);
         let attributes = attributes.map(|i| normal(i).extend(uv(i).y));
         let tangents = tangents
             .par_iter()
@@ -64,14 +67,14 @@ impl PackedMesh {
             .into_par_iter()
             .map(original);
         let colors = colors.map(|i| mesh.colors.get(i).copied().unwrap_or(Vec4::ONE));
-        let further = |set: usize, i: usize| {
+        let uv_of_set = |set: usize, i: usize| {
             let uvs = mesh.more_uvs.get(set);
             uvs.and_then(|uvs| uvs.get(i)).copied().unwrap_or_default()
         };
         let pairs = mesh.more_uvs.len().div_ceil(2);
         let more_uvs = (0..count * pairs).into_par_iter().map(|row| {
             let (i, first) = (original(row / pairs), 2 * (row % pairs));
-            let [a, b] = [further(first, i), further(first + 1, i)];
+            let [a, b] = [uv_of_set(first, i), uv_of_set(first + 1, i)];
             Vec4::new(a.x, a.y, b.x, b.y)
         });
         let group = |&number: &u32| mesh.group_of.get(number as usize).copied();

@@ -1,4 +1,4 @@
-//! Packs a validated scene into records, and constants that specialize kernels.
+//! Packs a validated scene into records, and into constants that specialize kernels.
 
 mod camera;
 mod emitters;
@@ -14,6 +14,7 @@ mod order;
 mod origin;
 mod primitive;
 mod pyramid;
+mod shading;
 mod shadow_casters;
 mod specialize;
 
@@ -27,10 +28,13 @@ pub use self::geometry::MAX_LINEAR_PRIMITIVES;
 use self::light::{DISTANT, connect_lights, pack_lights, t_max};
 use self::materials::Appearances;
 use self::order::SortedPrimitives;
+pub use self::origin::origin;
 use self::primitive::pack_shapes;
 #[cfg(test)]
 pub(crate) use self::primitive::primitive;
+pub use self::shading::PackedShading;
 use self::specialize::Parts;
+pub use self::specialize::camera_features;
 use crate::records::*;
 use wgray_scene::{PixelFilter, PixelFilterKind, Scene};
 
@@ -40,59 +44,77 @@ const MIN_EPSILON: f64 = 32.0 / 16_777_216.0;
 
 /// Packs a scene.
 pub fn pack(scene: &Scene) -> Packed {
+    let (shading, texels) = PackedShading::of(scene);
+    pack_with(scene, &shading, texels)
+}
+
+/// Packs a scene, with materials, textures and environment map that are already packed.
+pub fn pack_with(scene: &Scene, shading: &PackedShading, texels: Vec<u32>) -> Packed {
+    let PackedShading {
+        appearances,
+        environment_map,
+    } = shading;
     let origin = origin::origin(&scene.camera);
     let scene = &*origin::translated_to(scene, origin);
-    let mut appearances = Appearances::of(scene);
-    let around = EnvironmentMap::of(scene, &mut appearances.texels);
     let mut materials = appearances.materials.clone();
     let mut primitives = pack_shapes(scene);
     let (mut lights, mut area_lights) = pack_lights(scene, &mut primitives, &mut materials);
     let order = SortedPrimitives::of(scene, primitives);
     connect_lights(&mut lights[..area_lights], order.all(), scene.shapes.len());
-    let (mut trees, item_padding) = geometry::trees(scene, &order.in_bvh(), |material| {
+    let (mut bvh, item_padding) = geometry::build_bvh(scene, &order.in_bvh(), |material| {
         shadow_casters::casts_shadow(scene, material)
     });
-    let mut shining = PackedEmitters::default();
+    let mut packed_emitters = PackedEmitters::default();
     if scene.render.integrator.needs_emitters() {
         let delta_lights = &lights[area_lights..];
-        shining = emitters::emitters(scene, &mut materials, delta_lights, order.all(), &trees, around.sum());
-        (area_lights, lights) = (0, std::mem::take(&mut shining.lighting.lights));
+        packed_emitters = emitters::emitters(
+            scene,
+            &mut materials,
+            delta_lights,
+            order.all(),
+            &bvh,
+            environment_map.sum(),
+        );
+        (area_lights, lights) = (0, std::mem::take(&mut packed_emitters.lighting.lights));
     }
-    for (instance, leaves) in trees.instances.iter_mut().zip(&shining.instance_leaves) {
+    for (instance, leaves) in bvh.instances.iter_mut().zip(&packed_emitters.instance_leaves) {
         instance.leaves = *leaves;
     }
     let counts = Counts {
-        tree: trees.rows().into(),
+        tree: bvh.rows().into(),
         item_padding,
         ..counts(
-            order.outside(),
+            order.linear(),
             area_lights,
             lights.len(),
             materials.len(),
-            &appearances,
-            (shining.lighting.emitters.len(), shining.lighting.nodes.len()),
+            appearances,
+            (
+                packed_emitters.lighting.emitters.len(),
+                packed_emitters.lighting.nodes.len(),
+            ),
         )
     };
-    let filter_table = match is_pixel(scene.render.filter) {
+    let filter_table = match is_one_pixel(scene.render.filter) {
         true => Vec::new(),
         false => filter::table(scene.render.filter),
     };
     let specialization = Parts {
         scene,
-        appearances: &appearances,
+        appearances,
         materials: &materials,
         area_lights,
         lights: &lights,
-        shining: &shining,
-        around: &around,
-        trees: &trees,
+        emitters: &packed_emitters,
+        environment_map,
+        bvh: &bvh,
         counts: &counts,
         filter_bins: filter_table.len(),
     }
     .specialization();
     let samples = scene.render.pixel_samples.count;
     let adaptive = scene.render.adaptive;
-    let environment = environment(scene, &around, shining.environment);
+    let environment = environment(scene, environment_map, packed_emitters.environment);
     let primitives = order.into_primitives();
     Packed {
         origin,
@@ -101,17 +123,17 @@ pub fn pack(scene: &Scene) -> Packed {
         environment,
         bounds: primitives.iter().map(primitive::bounding_sphere).collect(),
         primitives,
-        bvh: trees,
+        bvh,
         materials,
         lighting: Lighting {
             lights,
-            ..shining.lighting
+            ..packed_emitters.lighting
         },
         counts,
         textures: PackedTextures {
-            lookups: appearances.lookups,
-            records: appearances.textures,
-            texels: appearances.texels,
+            lookups: appearances.lookups.clone(),
+            records: appearances.textures.clone(),
+            texels,
         },
         sampling: Sampling {
             filter_table,
@@ -122,8 +144,21 @@ pub fn pack(scene: &Scene) -> Packed {
     }
 }
 
-/// Packs global values. `share` is the probability of sampling the environment map.
-fn environment(scene: &Scene, around: &EnvironmentMap, share: f64) -> Environment {
+/// Packs the camera of a scene again. The packed scene must have the same [`origin`], and its kernel the same
+/// [`camera_features`].
+pub fn set_camera(packed: &mut Packed, scene: &Scene) {
+    packed.camera = pack_camera(
+        &scene.camera,
+        packed.origin,
+        scene.width,
+        scene.height,
+        scene.render.seed,
+    );
+    packed.specialization = camera_features(&packed.specialization, &scene.camera);
+}
+
+/// Packs values that apply to the whole scene. `probability` is the probability of sampling the environment map.
+fn environment(scene: &Scene, environment_map: &EnvironmentMap, probability: f64) -> Environment {
     let environment = scene.environment.as_ref();
     let background = environment.and_then(|environment| environment.background);
     Environment {
@@ -133,13 +168,13 @@ fn environment(scene: &Scene, around: &EnvironmentMap, share: f64) -> Environmen
         light_weight: 1.0 / scene.render.light_samples.count as f32,
         radiance: environment.map_or(Vec3::ZERO, |environment| environment.color.as_vec3()),
         t_max: t_max(scene.render.shadow_epsilon),
-        ..around.record(share)
+        ..environment_map.record(probability)
     }
 }
 
-/// Counts the sorted primitives of each kind, and the rows of tables.
+/// Counts the primitives of each kind outside of the BVH, and the rows of tables. Sorted primitives are required.
 fn counts(
-    order: &[(Primitive, bool)],
+    linear_primitives: &[(Primitive, bool)],
     area_lights: usize,
     lights: usize,
     materials: usize,
@@ -148,34 +183,35 @@ fn counts(
 ) -> Counts {
     let mut first = 0;
     let primitives = std::array::from_fn(|kind| {
-        let of_kind = order[first as usize..]
+        let of_kind = linear_primitives[first as usize..]
             .iter()
             .take_while(|(p, _)| p.kind == kind as u32);
-        let (all, casting) = of_kind.fold((0, 0), |(all, casting), (_, casts)| {
-            (all + 1, casting + u32::from(*casts))
+        let (count, casters) = of_kind.fold((0, 0), |(count, casters), (_, casts)| {
+            (count + 1, casters + u32::from(*casts))
         });
-        let range = UVec4::new(first, first + casting, first + all, 0);
-        first += all;
+        let range = UVec4::new(first, first + casters, first + count, 0);
+        first += count;
         range
     });
     let rows = |count: usize, size: usize| (count * size / size_of::<UVec4>()) as u32;
-    let of_lights = rows(materials, size_of::<Material>());
-    let of_textures = of_lights + rows(lights, size_of::<Light>());
-    let of_emitters = of_textures + rows(appearances.textures.len(), size_of::<Texture>());
-    let of_lookups = of_emitters + rows(emitters, size_of::<Emitter>());
-    let of_light_nodes = of_lookups + rows(appearances.lookups.len(), size_of::<Lookup>());
-    let of_leaves = of_light_nodes + rows(light_nodes, size_of::<LightNode>());
+    // First row of each table.
+    let light_row = rows(materials, size_of::<Material>());
+    let texture_row = light_row + rows(lights, size_of::<Light>());
+    let emitter_row = texture_row + rows(appearances.textures.len(), size_of::<Texture>());
+    let lookup_row = emitter_row + rows(emitters, size_of::<Emitter>());
+    let light_node_row = lookup_row + rows(appearances.lookups.len(), size_of::<Lookup>());
+    let leaf_row = light_node_row + rows(light_nodes, size_of::<LightNode>());
     Counts {
         primitives,
         lights: UVec2::new(area_lights as u32, lights as u32),
-        tables: UVec2::new(of_lights, of_textures),
-        emitters: UVec4::new(of_emitters, emitters as u32, of_light_nodes, of_leaves),
-        lookups: UVec4::new(of_lookups, 0, 0, 0),
+        tables: UVec2::new(light_row, texture_row),
+        emitters: UVec4::new(emitter_row, emitters as u32, light_node_row, leaf_row),
+        lookups: UVec4::new(lookup_row, 0, 0, 0),
         ..Counts::zeroed()
     }
 }
 
 /// Returns true for the box filter of one pixel, which weights all samples equally.
-fn is_pixel(filter: PixelFilter) -> bool {
+fn is_one_pixel(filter: PixelFilter) -> bool {
     filter.kind == PixelFilterKind::Box && filter.radius == 0.5
 }

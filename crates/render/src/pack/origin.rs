@@ -1,5 +1,5 @@
-//! Origin of the packed coordinates, near the camera's target. At a distance of a thousand times its size from the
-//! origin, a scene would lose ten of the 24 bits of f32.
+//! Origin of the packed coordinates, near the camera's target. Otherwise, a scene at a distance of a thousand times its
+//! size from the origin would lose ten of the 24 bits of f32.
 
 use std::borrow::Cow;
 
@@ -43,7 +43,7 @@ mod tests {
             "[image]\nwidth = 1\nheight = 1\n[camera]\nposition = {position:?}\nlook_at = {look_at:?}\nfov = 40\n"
         );
         let description = Description::parse(&text, "test").expect("a scene");
-        description.validate().expect("a sound scene").camera
+        description.validate().expect("a valid scene").camera
     }
 
     #[test]
@@ -61,8 +61,8 @@ mod tests {
         ] {
             let camera = camera(position, look_at);
             let distance = camera.position.distance(camera.look_at);
-            let away = (origin(&camera) - camera.look_at).abs().max_element();
-            assert!(away <= distance, "{position:?}: {away}");
+            let offset = (origin(&camera) - camera.look_at).abs().max_element();
+            assert!(offset <= distance, "{position:?}: {offset}");
         }
     }
 }

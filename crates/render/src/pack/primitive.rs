@@ -8,8 +8,8 @@ use wgray_scene::{Bounds, Geometry, Parallelogram, Scene};
 /// Factor that enlarges bounding spheres, because records are rounded.
 const SPHERE_MARGIN: f64 = 1.0 + 1e-5;
 
-/// Radius of a plane's bounding sphere: beyond any scene, with a finite square.
-const UNBOUNDED: f64 = 1e18;
+/// Radius of a plane's bounding sphere: larger than any scene, but with a finite square.
+const PLANE_RADIUS: f64 = 1e18;
 
 pub(super) fn pack_shapes(scene: &Scene) -> Vec<Primitive> {
     let mut primitives = Vec::new();
@@ -21,10 +21,10 @@ pub(super) fn pack_shapes(scene: &Scene) -> Vec<Primitive> {
             }
             Geometry::Disk(disk) => primitives.push(parallelogram(DISK, disk, material, number)),
             Geometry::Ellipsoid { center, axes } => {
-                primitives.push(primitive(ELLIPSOID, *center, from_columns(axes), material, number));
+                primitives.push(primitive(ELLIPSOID, *center, matrix_of(axes), material, number));
             }
             Geometry::Cylinder { center, axes } => {
-                primitives.push(primitive(CYLINDER, *center, from_columns(axes), material, number));
+                primitives.push(primitive(CYLINDER, *center, matrix_of(axes), material, number));
             }
             Geometry::Triangles(triangles) => {
                 for &[v0, v1, v2] in triangles {
@@ -47,7 +47,7 @@ pub(super) fn pack_shapes(scene: &Scene) -> Vec<Primitive> {
     primitives
 }
 
-fn from_columns([a, b, c]: &[DVec3; 3]) -> DMat3 {
+fn matrix_of([a, b, c]: &[DVec3; 3]) -> DMat3 {
     DMat3::from_cols(*a, *b, *c)
 }
 
@@ -73,11 +73,11 @@ pub(crate) fn primitive(kind: u32, center: DVec3, columns: DMat3, material: u32,
         CYLINDER => Some(nearest_of_cylinder(origin)),
         _ => None,
     };
-    if let Some(outwards) = nearest {
-        anchor = (center + columns * outwards).as_vec3();
+    if let Some(local_point) = nearest {
+        anchor = (center + columns * local_point).as_vec3();
         middle = to_local * (center - anchor.as_dvec3());
     }
-    // `level` of a cylinder is the level of its side.
+    // The level of a cylinder is the level of the curved side.
     let square = match kind {
         CYLINDER => middle.truncate().length_squared(),
         _ => middle.length_squared(),
@@ -98,12 +98,12 @@ pub(crate) fn primitive(kind: u32, center: DVec3, columns: DMat3, material: u32,
 
 /// Returns a surface point near a local point: on a cap if the point is beyond the cap, otherwise on the side.
 fn nearest_of_cylinder(point: DVec3) -> DVec3 {
-    let across = point.truncate();
-    let across = match point.z.abs() > 1.0 && across.length() < 1.0 {
-        true => across,
-        false => across.normalize_or(DVec2::X),
+    let radial = point.truncate();
+    let radial = match point.z.abs() > 1.0 && radial.length() < 1.0 {
+        true => radial,
+        false => radial.normalize_or(DVec2::X),
     };
-    across.extend(point.z.clamp(-1.0, 1.0))
+    radial.extend(point.z.clamp(-1.0, 1.0))
 }
 
 /// Returns the local axes in world space.
@@ -157,7 +157,7 @@ pub fn bounding_sphere(primitive: &Primitive) -> Sphere {
         ELLIPSOID => (center, largest_stretch(DMat3::from_cols(a, b, c))),
         DISK => (center, largest_stretch(DMat3::from_cols(a, b, DVec3::ZERO))),
         CYLINDER => (center, a.length().max(b.length()).hypot(c.length())),
-        PLANE => (center, UNBOUNDED),
+        PLANE => (center, PLANE_RADIUS),
         kind => unreachable!("primitive kind {kind}"),
     };
     Sphere {
@@ -191,12 +191,15 @@ fn largest_stretch(map: DMat3) -> f64 {
     let square = map.transpose() * map;
     let trace = |m: &DMat3| m.x_axis.x + m.y_axis.y + m.z_axis.z;
     let mean = trace(&square) / 3.0;
-    let rest = square - DMat3::from_diagonal(glam::DVec3::splat(mean));
-    let spread = (trace(&(rest * rest)) / 6.0).sqrt();
+    let deviation = square - DMat3::from_diagonal(glam::DVec3::splat(mean));
+    let spread = (trace(&(deviation * deviation)) / 6.0).sqrt();
     if !(spread > 0.0) {
         return mean.sqrt();
     }
-    let angle = ((rest * (1.0 / spread)).determinant() / 2.0).clamp(-1.0, 1.0).acos() / 3.0;
+    let angle = ((deviation * (1.0 / spread)).determinant() / 2.0)
+        .clamp(-1.0, 1.0)
+        .acos()
+        / 3.0;
     (mean + 2.0 * spread * angle.cos()).sqrt()
 }
 
@@ -208,9 +211,9 @@ mod tests {
 
     #[test]
     fn the_largest_singular_value_is_the_longest_axis() {
-        let turn = DMat3::from_euler(glam::EulerRot::XYZ, 0.3, -1.1, 2.0);
+        let rotation = DMat3::from_euler(glam::EulerRot::XYZ, 0.3, -1.1, 2.0);
         for axes in [[1.0, 1.0, 1.0], [3.0, 1.0, 1.0], [0.5, 2.0, 1.0], [1e-4, 1.0, 1e3]] {
-            let map = turn * DMat3::from_diagonal(DVec3::from_array(axes)) * turn.transpose();
+            let map = rotation * DMat3::from_diagonal(DVec3::from_array(axes)) * rotation.transpose();
             let longest = axes.into_iter().fold(0.0, f64::max);
             assert!(
                 (largest_stretch(map) / longest - 1.0).abs() < 1e-6,

@@ -13,14 +13,14 @@ use wgray_scene::{Encoding, Image, Texels};
 pub fn pyramid(image: &Image, levels: u32, texels: &mut Vec<u32>) -> u32 {
     let table = texels.len();
     let is_float = matches!(image.texels, Texels::Floats(_));
-    let more = words(image.width, image.height, levels, is_float) as usize;
-    match more > 1 << 20 {
-        true => texels.reserve_exact(more), // large images are few: no spare capacity
-        false => texels.reserve(more),
+    let word_count = words(image.width, image.height, levels, is_float) as usize;
+    match word_count > 1 << 20 {
+        true => texels.reserve_exact(word_count), // large images are few: no spare capacity
+        false => texels.reserve(word_count),
     }
     texels.resize(table + levels as usize, 0);
     let height = image.height as usize;
-    // Not decoded as a whole: its linear colors would use six times the memory of its texels.
+    // The image is not decoded as a whole, because linear colors use six times the memory of the texels.
     let mut level = None;
     for i in 0..levels as usize {
         texels[table + i] = texels.len() as u32;
@@ -38,8 +38,8 @@ pub fn pyramid(image: &Image, levels: u32, texels: &mut Vec<u32>) -> u32 {
     table as u32
 }
 
-/// Appends rows of `words` words in parallel. Writes to uninitialized memory, because only a single thread would zero
-/// it.
+/// Appends rows of `words` words in parallel. Writes to uninitialized memory, because a single thread would zero the
+/// memory.
 fn append<I: Iterator<Item = u32>>(
     texels: &mut Vec<u32>,
     (words, rows): (usize, usize),
@@ -101,10 +101,10 @@ fn steps(x: f64, encoding: Encoding) -> f64 {
     }
 }
 
-/// Packs a color, in these units, into a word: see `unpacked_color` in `shaders/texel.wgsl`.
+/// Packs a color, in units of 8-bit steps, into a word: see `unpacked_color` in `shaders/texel.wgsl`.
 fn packed(steps: [f64; 3]) -> u32 {
     let exponent = exponent(steps.into_iter().fold(0.0, f64::max));
-    joined(steps.map(|x| mantissa(x, exponent)), exponent)
+    join_bits(steps.map(|x| mantissa(x, exponent)), exponent)
 }
 
 /// Returns the exponent for a color's largest component, with a mantissa of nine binary digits, or fewer if the
@@ -117,22 +117,22 @@ fn exponent(largest: f64) -> u32 {
 fn mantissa(x: f64, exponent: u32) -> u32 {
     // Rounds half up, without calling the C library.
     let x = x * units(exponent);
-    let whole = x as u32;
-    whole.saturating_add(u32::from(x - f64::from(whole) >= 0.5)) // tables include exponents too small for x
+    let integer = x as u32;
+    integer.saturating_add(u32::from(x - f64::from(integer) >= 0.5)) // tables include exponents too small for x
 }
 
-fn joined([red, green, blue]: [u32; 3], exponent: u32) -> u32 {
+fn join_bits([red, green, blue]: [u32; 3], exponent: u32) -> u32 {
     red | green << 9 | blue << 18 | exponent << 27
 }
 
 /// Returns [`packed`] of an sRGB-encoded color, computed in 32-bit floats in a third of the time; `None` if the error
 /// could change a bit.
 fn approximately_packed(color: DVec3) -> Option<u32> {
-    /// Bound of the curve's relative error, some hundred units in the last place.
+    /// Bound of the relative error of the curve, about a hundred units in the last place.
     const ERROR: f64 = 1e-5;
     /// A mantissa (at most 512) within this distance of an integer rounds to that integer despite the error of the
     /// approximation.
-    const CERTAIN: f64 = 0.5 - 2.0 * 512.0 * ERROR;
+    const MAX_DISTANCE: f64 = 0.5 - 2.0 * 512.0 * ERROR;
     let steps = color.as_vec3().to_array().map(|x| {
         let curve = if x <= 0.003_130_8 {
             12.92 * x
@@ -149,8 +149,8 @@ fn approximately_packed(color: DVec3) -> Option<u32> {
     let mantissas = steps.map(|x| x * units(exponent));
     // Faster than `round`, and equal where rounding is certain.
     let rounded = mantissas.map(|x| (x + 0.5) as u32);
-    let is_certain = (mantissas.iter().zip(rounded)).all(|(x, rounded)| (x - f64::from(rounded)).abs() < CERTAIN);
-    is_certain.then(|| joined(rounded, exponent))
+    let is_certain = (mantissas.iter().zip(rounded)).all(|(x, rounded)| (x - f64::from(rounded)).abs() < MAX_DISTANCE);
+    is_certain.then(|| join_bits(rounded, exponent))
 }
 
 /// Tables of [`packed`] for bytes: most texels belong to the finest levels.
@@ -177,7 +177,7 @@ impl PackedBytes {
         let [red, green, blue] = color.map(usize::from);
         let exponent = self.exponents[red.max(green).max(blue)];
         let mantissas = &self.mantissas[exponent as usize];
-        joined([mantissas[red], mantissas[green], mantissas[blue]], exponent)
+        join_bits([mantissas[red], mantissas[green], mantissas[blue]], exponent)
     }
 }
 
@@ -190,6 +190,7 @@ fn units(exponent: u32) -> f64 {
 mod tests {
     use super::*;
 
+    /// An additive recurrence with the golden ratio, 0 to 1.
     fn additive(start: f64) -> impl Iterator<Item = f64> {
         (0..).map(move |i| (start + 0.618_033_988_749_895 * f64::from(i)).fract())
     }

@@ -1,5 +1,5 @@
-//! Selection of primitives that can cast shadows. Flat primitives with all shapes and lights on one side cannot, like
-//! the walls of a room.
+//! Selection of primitives that can cast shadows. A flat primitive with all shapes and lights on one side casts no
+//! shadow, such as a wall of a room.
 
 use glam::DVec3;
 
@@ -10,8 +10,9 @@ use wgray_scene::{Geometry, Light, Reflection, Scene, Shadows};
 /// Maximum distance of points on a plane, relative to the coordinates: the rounding of the plane's record.
 const TOLERANCE: f64 = 1e-6;
 
-/// Returns, for each primitive outside of the BVH, whether it can occlude a surface from a light. With more than
-/// [`MAX_LINEAR_PRIMITIVES`], planes are not tested, because each test takes time proportional to the number of shapes.
+/// Returns a flag for each primitive outside of the BVH: true if the primitive can occlude a surface from a light. With
+/// more than [`MAX_LINEAR_PRIMITIVES`] primitives, flat primitives are not tested, because each test takes time
+/// proportional to the number of shapes.
 pub fn can_cast_shadow(scene: &Scene, primitives: &[Primitive]) -> Vec<bool> {
     let is_tested = primitives.len() <= MAX_LINEAR_PRIMITIVES && !has_environment_map(scene);
     let casts =
@@ -23,7 +24,7 @@ pub fn can_cast_shadow(scene: &Scene, primitives: &[Primitive]) -> Vec<bool> {
 pub fn may_cast_shadow(scene: &Scene, primitive: &Primitive) -> bool {
     match scene.shapes.get(primitive.shape as usize) {
         Some(shape) => casts_shadow(scene, shape.material),
-        // An area light that is an emitter occludes light from behind.
+        // The primitive of an area light. With `path`, it occludes light from behind.
         None => scene.render.integrator.needs_emitters(),
     }
 }
@@ -46,34 +47,34 @@ fn has_both_sides(scene: &Scene, primitive: &Primitive) -> bool {
     let normal = primitive.z.as_dvec3().normalize();
     let center = primitive.anchor.as_dvec3();
     let (mut below, mut above) = (false, false);
-    let mut height = |height: f64, size: f64| {
+    let mut add_height = |height: f64, size: f64| {
         below |= height < -TOLERANCE * size;
         above |= height > TOLERANCE * size;
         below && above
     };
-    let mut point = |p: DVec3| height((p - center).dot(normal), p.abs().max(center.abs()).max_element());
+    let mut add_point = |p: DVec3| add_height((p - center).dot(normal), p.abs().max(center.abs()).max_element());
     let both_by_lights = scene.lights.iter().any(|light| match light {
-        Light::Rectangle { rectangle, .. } => rectangle.corners().into_iter().any(&mut point),
-        Light::Point { position, .. } | Light::Spot { position, .. } => point(*position),
+        Light::Rectangle { rectangle, .. } => rectangle.corners().into_iter().any(&mut add_point),
+        Light::Point { position, .. } | Light::Spot { position, .. } => add_point(*position),
         Light::Directional { .. } => false,
     });
     let both_by_shapes = both_by_lights
         || scene.shapes.iter().any(|shape| {
             let mut found = false;
-            shape.geometry.each_extreme(normal, |p| found |= point(p));
+            shape.geometry.each_extreme(normal, |p| found |= add_point(p));
             found
         });
     // Directional lights and planes are infinite, so the direction decides.
     let both_by_directions = both_by_shapes
         || scene.lights.iter().any(|light| match light {
-            Light::Directional { direction, .. } => height(-direction.dot(normal), 1.0),
+            Light::Directional { direction, .. } => add_height(-direction.dot(normal), 1.0),
             _ => false,
         });
     both_by_directions
         || scene.shapes.iter().any(|shape| match shape.geometry {
             Geometry::Plane { tangent, bitangent, .. } => [tangent, bitangent, -tangent, -bitangent]
                 .into_iter()
-                .any(|direction| height(direction.dot(normal), 1.0)),
+                .any(|direction| add_height(direction.dot(normal), 1.0)),
             _ => false,
         })
 }
@@ -84,8 +85,8 @@ mod tests {
     use crate::pack::pack_shapes;
     use wgray_scene::Description;
 
-    /// Returns, for each primitive, whether it can cast a shadow.
-    fn casting(shapes: &str) -> Vec<bool> {
+    /// Returns a flag for each primitive: true if it can cast a shadow.
+    fn casters(shapes: &str) -> Vec<bool> {
         let text = format!(
             "image = {{ width = 4, height = 4 }}\ncamera = {{ position = [0, -9, 1], look_at = [0, 0, 0], fov = 45 }}\n\
              materials.m = {{ type = 'phong', color = [1, 1, 1] }}\n{shapes}"
@@ -106,27 +107,27 @@ mod tests {
     }
 
     #[test]
-    fn a_floor_under_everything_casts_no_shadow() {
-        assert_eq!(casting(FLOOR), [false]);
-        assert_eq!(casting(&(ball(1.0) + FLOOR)), [true, false]);
+    fn a_floor_below_all_geometry_and_lights_casts_no_shadow() {
+        assert_eq!(casters(FLOOR), [false]);
+        assert_eq!(casters(&(ball(1.0) + FLOOR)), [true, false]);
         let above =
             light("point", "position", [7.0, 2.0, 11.0]) + &light("directional", "direction", [-0.6, 0.0, -0.8]);
-        assert_eq!(casting(&(above + &ball(2.0) + FLOOR)), [true, false]);
+        assert_eq!(casters(&(above + &ball(2.0) + FLOOR)), [true, false]);
     }
 
     #[test]
-    fn anything_below_a_floor_makes_it_cast_a_shadow() {
+    fn a_floor_with_geometry_or_lights_below_casts_a_shadow() {
         assert_eq!(
-            casting(&(ball(0.99) + FLOOR)),
+            casters(&(ball(0.99) + FLOOR)),
             [true, true],
             "a sphere partly below the floor"
         );
         let below = light("point", "position", [0.0, 2.0, 2.0]);
-        assert_eq!(casting(&(below + &ball(2.0) + FLOOR)), [true, true]);
+        assert_eq!(casters(&(below + &ball(2.0) + FLOOR)), [true, true]);
         let upwards = light("directional", "direction", [0.6, 0.0, 0.8]);
-        assert_eq!(casting(&(upwards + &ball(2.0) + FLOOR)), [true, true]);
+        assert_eq!(casters(&(upwards + &ball(2.0) + FLOOR)), [true, true]);
         let slope = FLOOR.replace("0.8", "-0.8");
-        assert_eq!(casting(&(slope + FLOOR)), [true, true], "each crosses the other");
+        assert_eq!(casters(&(slope + FLOOR)), [true, true], "two intersecting planes");
     }
 
     #[test]
@@ -140,9 +141,9 @@ mod tests {
             })
             .concat();
         let inside = "[[shapes]]\ntype = 'triangle'\nmaterial = 'm'\nvertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]\n";
-        assert_eq!(casting(&walls), [false; 6]);
+        assert_eq!(casters(&walls), [false; 6]);
         assert_eq!(
-            casting(&(walls + inside)),
+            casters(&(walls + inside)),
             [false, false, false, false, false, false, true]
         );
     }

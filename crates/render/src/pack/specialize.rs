@@ -1,4 +1,4 @@
-//! Specialization of a kernel to a scene's features, so that unused ones cost nothing.
+//! Specialization of a kernel to a scene's features, so that unused features cost nothing.
 
 use glam::{UVec4, Vec3};
 
@@ -14,7 +14,7 @@ use crate::cpu::lobe::is_polished;
 use crate::records::{LOBES, Lobe, PackedBvh};
 use wgray_scene::{self as scene, Integrator, Pattern, Projection, Reflection, Samples, Scene};
 
-/// The parts of a scene that its specialization depends on.
+/// The parts of a scene that determine the specialization.
 pub(super) struct Parts<'a> {
     pub scene: &'a Scene,
     pub appearances: &'a Appearances,
@@ -22,15 +22,19 @@ pub(super) struct Parts<'a> {
     /// Number of area lights (rectangles), which come first.
     pub area_lights: usize,
     pub lights: &'a [Light],
-    pub shining: &'a PackedEmitters,
-    pub around: &'a EnvironmentMap,
-    pub trees: &'a PackedBvh,
+    pub emitters: &'a PackedEmitters,
+    pub environment_map: &'a EnvironmentMap,
+    pub bvh: &'a PackedBvh,
     pub counts: &'a Counts,
     pub filter_bins: usize,
 }
 
 impl Parts<'_> {
     pub fn specialization(&self) -> Specialization {
+        camera_features(&self.without_camera(), &self.scene.camera)
+    }
+
+    fn without_camera(&self) -> Specialization {
         let Parts {
             scene,
             appearances,
@@ -44,16 +48,14 @@ impl Parts<'_> {
         let is_path = scene.render.integrator.follows_paths();
         let (lookups, specular_lookups) = appearances.lookups(scene.render.integrator);
         let has_vertex_colors = materials.iter().any(|material| material.vertex_colors != NO_COLORS)
-            && self.trees.meshes.iter().any(|mesh| !mesh.colors.is_empty());
+            && self.bvh.meshes.iter().any(|mesh| !mesh.colors.is_empty());
         Specialization {
             primitives: self.kinds(|range| range.z),
             shadow_casters: self.kinds(|range| range.y),
-            tlas_kinds: (self.trees.items.iter()).fold(0, |bits, item| bits | 1 << (item.kind & 0xff)),
+            tlas_kinds: (self.bvh.items.iter()).fold(0, |bits, item| bits | 1 << (item.kind & 0xff)),
             lights: u32::from(area_lights > 0)
                 | u32::from(lights.len() > area_lights) << 1
                 | u32::from(lights.iter().any(|light| light.kind == SPOT)) << 2,
-            lens: scene.camera.lens.is_some().into(),
-            panoramic: (scene.camera.projection == Projection::Panorama).into(),
             camera_invisible: materials.iter().any(|material| material.camera_visibility != 0).into(),
             pixel_pattern: pattern(pixels),
             pixel_side: side(pixels),
@@ -83,8 +85,8 @@ impl Parts<'_> {
             texel_formats: appearances.formats(),
             ..match is_path {
                 true => Specialization {
-                    environment_flags: self.around.bits(scene),
-                    ..of_paths(scene, materials, appearances, self.shining, lights)
+                    environment_flags: self.environment_map.bits(scene),
+                    ..path_constants(scene, materials, appearances, self.emitters, lights)
                 },
                 false => Specialization::default(),
             }
@@ -98,11 +100,20 @@ impl Parts<'_> {
     }
 }
 
-/// Returns the number of pilot samples of adaptive sampling: whole rounds, at least as many samples as a variance
-/// estimate requires, at most `most`.
-fn pilot_samples(integrator: Integrator, round: u32, most: u32) -> u32 {
-    let least = integrator.pilot_samples();
-    least.next_multiple_of(round).max(round).min(most)
+/// Sets the constants that depend on the camera.
+pub fn camera_features(specialization: &Specialization, camera: &scene::Camera) -> Specialization {
+    Specialization {
+        lens: camera.lens.is_some().into(),
+        panoramic: (camera.projection == Projection::Panorama).into(),
+        ..*specialization
+    }
+}
+
+/// Returns the number of pilot samples of adaptive sampling: complete rounds with at least as many samples as a
+/// variance estimate requires, but at most `max`.
+fn pilot_samples(integrator: Integrator, round: u32, max: u32) -> u32 {
+    let min = integrator.pilot_samples();
+    min.next_multiple_of(round).max(round).min(max)
 }
 
 fn pattern(samples: Samples) -> u32 {
@@ -134,44 +145,48 @@ fn is_specular(material: &scene::Material) -> bool {
     }
 }
 
-/// Returns the bit length of the largest shininess if all are integers up to 4096, for which repeated squaring is
-/// faster than the general power; else 0.
+/// Returns the bit length of the largest shininess if all values are integers up to 4096, for which repeated squaring
+/// is faster than the general power; else 0.
 fn exponent_bits(validated: &[scene::Material], packed: &[Material]) -> u32 {
-    let whole = validated.iter().all(|material| {
+    let all_integers = validated.iter().all(|material| {
         if let Reflection::Phong { shininess, .. } = &material.reflection {
             return shininess.fract() == 0.0 && *shininess <= 4096.0;
         }
         true
     });
     let largest = packed.iter().map(|material| material.exponent).max().unwrap_or(1);
-    if whole { u32::BITS - largest.leading_zeros() } else { 0 }
+    if all_integers {
+        u32::BITS - largest.leading_zeros()
+    } else {
+        0
+    }
 }
 
 fn delta_kinds(materials: &[Material], appearances: &Appearances) -> u32 {
-    let may = |material: &&Material| {
+    let may_be_delta = |material: &&Material| {
         let textured = appearances.has_lookup(material, FOR_ROUGHNESS);
         let faceted = MICROFACET_KINDS >> material.kind & 1 != 0;
         SPECULAR_KINDS >> material.kind & 1 != 0 || faceted && (textured || is_polished(material))
     };
     materials
         .iter()
-        .filter(may)
+        .filter(may_be_delta)
         .fold(0, |bits, material| bits | 1 << material.kind)
 }
 
-/// Sets the constants of the integrator `path`.
-fn of_paths(
+/// Returns the constants of the integrator `path`.
+fn path_constants(
     scene: &Scene,
     materials: &[Material],
     appearances: &Appearances,
-    shining: &PackedEmitters,
+    packed: &PackedEmitters,
     lights: &[Light],
 ) -> Specialization {
     let any = |test: fn(&Material) -> bool| u32::from(materials.iter().any(test));
     let has_lookup = |purpose: u32| u32::from(appearances.have_lookup(purpose));
-    let emitters = &shining.lighting.emitters;
+    let emitters = &packed.lighting.emitters;
     let meshes_emit = emitters.iter().any(|emitter| emitter.instance != 0)
-        || shining.lighting.nodes.iter().any(|node| node.instance != UVec4::ZERO);
+        || packed.lighting.nodes.iter().any(|node| node.instance != UVec4::ZERO);
     Specialization {
         materials: materials.iter().fold(0, |bits, material| bits | 1 << material.kind),
         rough: any(|material| material.kind == DIFFUSE && material.roughness > 0.0) | has_lookup(FOR_ROUGHNESS),
@@ -182,7 +197,7 @@ fn of_paths(
         absorption: any(|material| material.absorption != Vec3::ZERO),
         emissive: any(|material| material.density > 0.0),
         emitters: emitters.len().min(2) as u32,
-        light_tree: (!shining.lighting.nodes.is_empty()).into(),
+        light_tree: (!packed.lighting.nodes.is_empty()).into(),
         emitter_kinds: lights
             .iter()
             .fold(u32::from(meshes_emit) << INSTANCE, |bits, light| bits | 1 << light.kind),

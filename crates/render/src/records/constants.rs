@@ -18,11 +18,11 @@ constants! {
     /// [`Camera::projection`]: equirectangular panorama.
     pub const PANORAMA: u32 = 2;
 
-    /// [`BvhItem::kind`]: an instance of a mesh.
+    /// [`BvhItem::kind`]: a mesh instance.
     pub const INSTANCE: u32 = KINDS;
     /// Flag in [`BvhItem::kind`]: casts shadows.
     pub const CASTS_SHADOW: u32 = 0x100;
-    /// Flag in a mesh group's word, besides the material index: casts no shadow.
+    /// Flag in a mesh group's word, in addition to the material index: casts no shadow.
     pub const NO_SHADOW: u32 = 0x8000_0000;
     /// [`Instance::shadows`]: some groups cast no shadow.
     pub const SOME_SHADOWS: u32 = 1;
@@ -57,7 +57,7 @@ constants! {
     pub const ANISO_LINES: u32 = 49;
     /// Number of columns of the table at [`Material::aniso_table`]; columns correspond to the cosine.
     pub const ANISO_COLUMNS: u32 = 48;
-    /// Minimum alpha of a microfacet lobe; below it in both axes it is a delta.
+    /// Minimum alpha of a microfacet lobe. If alpha is smaller along both axes, the lobe is a delta.
     pub const SMALLEST_ALPHA: f32 = 1e-3;
     /// [`Material::kind`]: glTF's metallic-roughness material.
     pub const PRINCIPLED: u32 = 8;
@@ -76,19 +76,21 @@ constants! {
     /// Bits of pure-delta kinds.
     pub const SPECULAR_KINDS: u32 = 1 << MIRROR | 1 << GLASS;
 
-    /// [`Light::kind`](super::Light::kind), after the kinds of primitives and instances: a point light.
+    /// [`Light::kind`](super::Light::kind): a point light. The kinds of lights without primitives follow [`INSTANCE`].
     pub const POINT: u32 = KINDS + 1;
     /// [`Light::kind`](super::Light::kind): directional.
     pub const DIRECTIONAL: u32 = KINDS + 2;
     /// [`Light::kind`](super::Light::kind): the environment map.
     pub const ENVIRONMENT: u32 = KINDS + 3;
 
-    /// Flag in [`Specialization::environment_flags`](super::Specialization::environment_flags), like the next two: the
-    /// scene has an environment map.
+    /// Flag in [`Specialization::environment_flags`](super::Specialization::environment_flags): the scene has an
+    /// environment map.
     pub const ENVIRONMENT_MAP: u32 = 1;
-    /// The environment is invisible to the camera.
+    /// Flag in [`Specialization::environment_flags`](super::Specialization::environment_flags): the environment is
+    /// invisible to the camera.
     pub const ENVIRONMENT_INVISIBLE: u32 = 2;
-    /// The camera sees a single color.
+    /// Flag in [`Specialization::environment_flags`](super::Specialization::environment_flags): camera rays that leave
+    /// the scene have a single color.
     pub const BACKGROUND: u32 = 4;
     /// Maximum number of blocks of the environment map per row or column, a power of two.
     pub const ENVIRONMENT_BLOCKS: u32 = 32;
@@ -104,12 +106,12 @@ constants! {
     pub const COLORS_OF_BASE: u32 = 1;
     /// [`Material::vertex_colors`]: multiply emission and opacity.
     pub const COLORS_OF_EMISSION: u32 = 2;
-    /// Maximum number of camera-invisible surfaces skipped; the next one is visible.
+    /// Maximum number of camera-invisible surfaces that a ray skips; the next such surface is visible.
     pub const MAX_CAMERA_SKIPS: u32 = 64;
 
     /// Number of first bounces at which glass splits a path.
     pub const MAX_SPLIT_DEPTH: u32 = 2;
-    /// Maximum leaves of a split path.
+    /// Maximum number of leaves of a split path.
     pub const MAX_PATH_LEAVES: u32 = 4;
 
     /// [`Texture::kind`]: a checkerboard.
@@ -139,59 +141,59 @@ constants! {
     /// [`Texture::wrap`]: repeat, mirroring every other copy.
     pub const MIRRORED: u32 = 2;
 
-    /// [`Lookup::purposes`], flags of parameters: [`Material::ambient`].
+    /// Flag in [`Lookup::purposes`]: the lookup sets [`Material::ambient`].
     pub const FOR_AMBIENT: u32 = 0x1;
-    /// [`Material::diffuse`].
+    /// Flag in [`Lookup::purposes`]: the lookup sets [`Material::diffuse`].
     pub const FOR_DIFFUSE: u32 = 0x2;
-    /// [`Material::specular`].
+    /// Flag in [`Lookup::purposes`]: the lookup sets [`Material::specular`].
     pub const FOR_SPECULAR: u32 = 0x4;
-    /// [`Material::tint`].
+    /// Flag in [`Lookup::purposes`]: the lookup sets [`Material::tint`].
     pub const FOR_TINT: u32 = 0x8;
-    /// The normal.
+    /// Flag in [`Lookup::purposes`]: the lookup sets the normal.
     pub const FOR_NORMAL: u32 = 0x10;
-    /// [`Material::emission`].
+    /// Flag in [`Lookup::purposes`]: the lookup sets [`Material::emission`].
     pub const FOR_EMISSION: u32 = 0x20;
-    /// [`Material::roughness`].
+    /// Flag in [`Lookup::purposes`]: the lookup sets [`Material::roughness`].
     pub const FOR_ROUGHNESS: u32 = 0x40;
-    /// [`Material::sheen`].
+    /// Flag in [`Lookup::purposes`]: the lookup sets [`Material::sheen`].
     pub const FOR_SHEEN: u32 = 0x80;
-    /// The clear coat's normal.
+    /// Flag in [`Lookup::purposes`]: the lookup sets the clear coat's normal.
     pub const FOR_COAT_NORMAL: u32 = 0x100;
-    /// [`Material::metallic`].
+    /// Flag in [`Lookup::purposes`]: the lookup sets [`Material::metallic`].
     pub const FOR_METALLIC: u32 = 0x200;
-    /// [`Material::anisotropy`].
+    /// Flag in [`Lookup::purposes`]: the lookup sets [`Material::anisotropy`].
     pub const FOR_ANISOTROPY: u32 = 0x400;
-    /// [`Material::specular_weight`].
+    /// Flag in [`Lookup::purposes`]: the lookup sets [`Material::specular_weight`].
     pub const FOR_WEIGHT: u32 = 0x800;
-    /// [`Material::transmission`].
+    /// Flag in [`Lookup::purposes`]: the lookup sets [`Material::transmission`].
     pub const FOR_TRANSMISSION: u32 = 0x1000;
-    /// [`Material::clearcoat`].
+    /// Flag in [`Lookup::purposes`]: the lookup sets [`Material::clearcoat`].
     pub const FOR_COAT: u32 = 0x2000;
-    /// [`Material::clearcoat_roughness`].
+    /// Flag in [`Lookup::purposes`]: the lookup sets [`Material::clearcoat_roughness`].
     pub const FOR_COAT_ROUGHNESS: u32 = 0x4000;
-    /// [`Material::sheen_roughness`].
+    /// Flag in [`Lookup::purposes`]: the lookup sets [`Material::sheen_roughness`].
     pub const FOR_SHEEN_ROUGHNESS: u32 = 0x8000;
-    /// [`Material::opacity`].
+    /// Flag in [`Lookup::purposes`]: the lookup sets [`Material::opacity`].
     pub const FOR_OPACITY: u32 = 0x10000;
-    /// Added to [`Material::rotation`].
+    /// Flag in [`Lookup::purposes`]: the lookup adds a direction to [`Material::rotation`].
     pub const FOR_DIRECTION: u32 = 0x20000;
-    /// [`Lookup::channels`], positions of the channels' pairs of bits: channel of [`Material::roughness`].
+    /// Index of a pair of bits in [`Lookup::channels`]: channel of [`Material::roughness`].
     pub const ROUGHNESS_CHANNEL: u32 = 0;
-    /// Channel of [`Material::metallic`].
+    /// Index of a pair of bits in [`Lookup::channels`]: channel of [`Material::metallic`].
     pub const METALLIC_CHANNEL: u32 = 1;
-    /// Channel of [`Material::anisotropy`].
+    /// Index of a pair of bits in [`Lookup::channels`]: channel of [`Material::anisotropy`].
     pub const ANISOTROPY_CHANNEL: u32 = 2;
-    /// Channel of [`Material::specular_weight`].
+    /// Index of a pair of bits in [`Lookup::channels`]: channel of [`Material::specular_weight`].
     pub const WEIGHT_CHANNEL: u32 = 3;
-    /// Channel of [`Material::transmission`].
+    /// Index of a pair of bits in [`Lookup::channels`]: channel of [`Material::transmission`].
     pub const TRANSMISSION_CHANNEL: u32 = 4;
-    /// Channel of [`Material::clearcoat`].
+    /// Index of a pair of bits in [`Lookup::channels`]: channel of [`Material::clearcoat`].
     pub const COAT_CHANNEL: u32 = 5;
-    /// Channel of [`Material::clearcoat_roughness`].
+    /// Index of a pair of bits in [`Lookup::channels`]: channel of [`Material::clearcoat_roughness`].
     pub const COAT_ROUGHNESS_CHANNEL: u32 = 6;
-    /// Channel of [`Material::sheen_roughness`].
+    /// Index of a pair of bits in [`Lookup::channels`]: channel of [`Material::sheen_roughness`].
     pub const SHEEN_ROUGHNESS_CHANNEL: u32 = 7;
-    /// Channel of [`Material::opacity`].
+    /// Index of a pair of bits in [`Lookup::channels`]: channel of [`Material::opacity`].
     pub const OPACITY_CHANNEL: u32 = 8;
 
     /// [`Pattern::Grid`].
@@ -207,7 +209,7 @@ constants! {
     /// [`Pattern::Sobol`].
     pub const SOBOL: u32 = 5;
 
-    /// Bins between center and radius of a pixel filter.
+    /// Number of bins between the center and the radius of a pixel filter.
     pub const FILTER_BINS_MAX: u32 = 128;
 
     /// Maximum hit distance; also the distance stored for a miss.
@@ -216,9 +218,9 @@ constants! {
     pub const NO_INDEX: u32 = u32::MAX;
     /// The primitive of a ray that does not start on a surface.
     pub const NO_PRIMITIVE: UVec2 = UVec2::new(0, NO_INDEX);
-    /// Shadow rays per block; each has a bit of a mask.
+    /// Number of shadow rays per block; each ray has one bit of a mask.
     pub const SAMPLE_BLOCK: u32 = 32;
 
-    /// Effective sample size of the variance estimate that is required for each repetition of the pilot samples.
+    /// Effective sample size of the variance estimate that each further multiple of the pilot samples requires.
     pub const EFFECTIVE_SAMPLES_PER_DOUBLING: f32 = 2.0;
 }

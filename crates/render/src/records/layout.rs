@@ -1,4 +1,4 @@
-//! Records that the host uploads and the shaders declare, in rows of 16 bytes: a `vec3f` and a scalar.
+//! Records that the host uploads and the shaders declare, in rows of 16 bytes, such as a `vec3f` and a scalar.
 
 use bytemuck::{Pod, Zeroable};
 use glam::{UVec2, UVec4, Vec2, Vec3, Vec4};
@@ -29,7 +29,7 @@ records! {
         pub seed: u32,
         /// Vector from the center of the lens to its edge or first corner; 0 if the camera has no lens.
         pub lens_u: Vec3,
-        /// Corners of the lens; 0 if it is round.
+        /// Number of corners of the lens; 0 if the lens is round.
         pub blades: u32,
         /// Perpendicular to `lens_u`, of the same length.
         pub lens_v: Vec3,
@@ -37,7 +37,7 @@ records! {
         pub inverse_focus: f32,
     }
 
-    /// Values of the whole scene, and its environment map.
+    /// Values that apply to the whole scene, and the environment map.
     pub struct Environment {
         /// Ambient light.
         pub ambient: Vec3,
@@ -49,7 +49,7 @@ records! {
         pub light_weight: f32,
         /// Constant radiance of the environment, for `path`.
         pub radiance: Vec3,
-        /// `t_max` of shadow rays to a point on a surface, relative to its distance.
+        /// `t_max` of shadow rays to a point on a surface, relative to the distance of the point.
         pub t_max: f32,
         /// World-space direction to the center of the map. 0 without a map, like all following fields.
         pub x: Vec3,
@@ -69,14 +69,14 @@ records! {
         pub cells: u32,
         /// A twelfth of the probability of sampling the map.
         pub density: f32,
-        /// Offset of 1 / (integrated radiance) of the blocks, [`ENVIRONMENT_BLOCKS`] per row. For each bin of normals
-        /// the cumulative distributions of the rows, then of the blocks of each row, follow.
+        /// Offset of 1 / (integrated radiance) of the blocks, [`ENVIRONMENT_BLOCKS`] per row. The cumulative
+        /// distributions of each bin of normals follow: of the rows, then of the blocks in each row.
         pub blocks: u32,
         /// log2 of a block's columns (bits 0 to 7) and rows (from bit 8).
         pub shifts: u32,
     }
 
-    /// A primitive. In object space, p is (x, y, z) (p - anchor) - middle, with matrix rows x, y and z.
+    /// A primitive: a world-space point p is (x, y, z) (p - anchor) - middle in object space.
     pub struct Primitive {
         /// Solids: a surface point towards the origin, for precision. Others: the origin of object space.
         pub anchor: Vec3,
@@ -88,7 +88,7 @@ records! {
         pub shape: u32,
         /// Second row.
         pub y: Vec3,
-        /// Such as [`RECTANGLE`].
+        /// A kind such as [`RECTANGLE`].
         pub kind: u32,
         /// Third row.
         pub z: Vec3,
@@ -112,7 +112,7 @@ records! {
     pub struct Material {
         /// [`PHONG`]: ambient reflectance.
         pub ambient: Vec3,
-        /// From [`PHONG`] to [`PRINCIPLED`].
+        /// A kind from [`PHONG`] to [`PRINCIPLED`].
         pub kind: u32,
         /// [`PHONG`], [`DIFFUSE`]: diffuse reflectance.
         pub diffuse: Vec3,
@@ -128,13 +128,14 @@ records! {
         pub ior: f32,
         /// Emitted radiance: with `phong` only of [`EMITTER`], with `path` of any kind.
         pub emission: Vec3,
-        /// Emitters with `path`: pdf of light samples per area (`ellipsoid_area`), or 1 with a light tree. Otherwise 0.
+        /// Emitters with `path`: pdf of light samples per area (for ellipsoids, `ellipsoid_area`), or 1 with a light
+        /// tree. Otherwise 0.
         pub density: f32,
         /// [`GLASS`], [`ROUGH_GLASS`], [`PRINCIPLED`]: absorption coefficient behind the surface, per length.
         pub absorption: Vec3,
         /// Kinds except [`PHONG`], [`EMITTER`], [`MIRROR`] and [`GLASS`]: roughness, 0 to 1.
         pub roughness: f32,
-        /// Index of the first texture lookup (x), and their number (y).
+        /// Index of the first texture lookup (x), and number of lookups (y).
         pub lookups: UVec2,
         /// [`ROUGH_GLASS`], [`PRINCIPLED`] with a volume: offset of the albedo table in the texels; [`NO_INDEX`]
         /// without multiple-scattering compensation.
@@ -183,7 +184,7 @@ records! {
     pub struct Lookup {
         /// Texture index.
         pub texture: u32,
-        /// Parameters that it sets: flags such as [`FOR_DIFFUSE`].
+        /// Parameters that the lookup sets: flags such as [`FOR_DIFFUSE`].
         pub purposes: u32,
         /// Channel of each scalar parameter in two bits: 0 red, 1 green, 2 blue.
         pub channels: u32,
@@ -209,7 +210,7 @@ records! {
         pub v: Vec3,
         /// [`REPEAT`], [`CLAMP`] or [`MIRRORED`] along u, plus four times the value along v.
         pub wrap: u32,
-        /// Offset of its level table in the texels.
+        /// Offset of the level table in the texels.
         pub texels: u32,
         /// Width of the finest level.
         pub width: u32,
@@ -219,7 +220,7 @@ records! {
         pub levels: u32,
     }
 
-    /// A light: the points center + a u + b v, with a and b in -1..=1, or with `path` in the range of its kind.
+    /// A light: the points center + a u + b v, with a and b in -1..=1 or, with `path`, in the range of the kind.
     pub struct Light {
         /// Center, or direction of a directional light.
         pub center: Vec3,
@@ -237,9 +238,9 @@ records! {
         pub color: Vec3,
         /// Index in the scene file.
         pub number: u32,
-        /// Flat emitters: unit normal of the emitting side. [`SPOT`]: unit direction of its axis.
+        /// Flat emitters: unit normal of the emitting side. [`SPOT`]: unit direction of the axis.
         pub normal: Vec3,
-        /// Kind of its primitive (for `path`), or [`POINT`], [`DIRECTIONAL`], [`SPOT`] or [`ENVIRONMENT`].
+        /// Kind of the primitive (for `path`), or [`POINT`], [`DIRECTIONAL`], [`SPOT`] or [`ENVIRONMENT`].
         pub kind: u32,
         /// For `path`: [`Material::density`], or the probability of a delta light or the environment; 0 in light trees.
         pub density: f32,
@@ -268,17 +269,17 @@ records! {
     pub struct LightNode {
         /// Centers of the bounding spheres: x.
         pub x: Vec4,
-        /// y.
+        /// Centers: y.
         pub y: Vec4,
-        /// z.
+        /// Centers: z.
         pub z: Vec4,
         /// Radii of the spheres.
         pub radius: Vec4,
         /// Axes of the cones around normals, unit length: x.
         pub axis_x: Vec4,
-        /// y.
+        /// Axes: y.
         pub axis_y: Vec4,
-        /// z.
+        /// Axes: z.
         pub axis_z: Vec4,
         /// Cosines of the cones' half angles.
         pub cosine: Vec4,
@@ -296,11 +297,11 @@ records! {
         pub instance: UVec4,
         /// Emitters: light index, or position of the triangle in its mesh.
         pub index: UVec4,
-        /// x: 4 times the parent's index plus its child number; [`NO_INDEX`] for the root. Else 0.
+        /// x: 4 times the parent's index plus the number of this child; [`NO_INDEX`] for the root. Other components: 0.
         pub parent: UVec4,
     }
 
-    /// Numbers and positions of records, for kernels that read buffers.
+    /// Counts and first rows of records, for kernels that read buffers.
     pub struct Counts {
         /// Primitives of each kind outside of the BVH: first (x), end of shadow casters (y), end (z).
         pub primitives: [UVec4; KINDS as usize],
@@ -314,7 +315,7 @@ records! {
         pub emitters: UVec4,
         /// First row of texture lookups (x).
         pub lookups: UVec4,
-        /// Padding of items' boxes relative to coordinates (x); largest coordinate of any box (y).
+        /// Padding of items' boxes, relative to coordinates (x); largest absolute coordinate of any box (y).
         pub item_padding: Vec4,
     }
 
@@ -326,31 +327,31 @@ records! {
         pub scales: u32,
         /// Index of the first inner child; the children are contiguous.
         pub first_child: u32,
-        /// First item of its leaves; the items are contiguous.
+        /// First item of the node's leaves; the items are contiguous.
         pub first_item: u32,
-        /// A byte per leaf: number of items (upper three bits) and offset of the first.
+        /// A byte per leaf: number of items (upper three bits) and offset of the first item.
         pub leaves: UVec2,
         /// Lower bounds along x in grid steps, a byte each.
         pub low_x: UVec2,
-        /// Along y.
+        /// Lower bounds along y.
         pub low_y: UVec2,
-        /// Along z.
+        /// Lower bounds along z.
         pub low_z: UVec2,
         /// Upper bounds along x.
         pub high_x: UVec2,
-        /// Along y.
+        /// Upper bounds along y.
         pub high_y: UVec2,
-        /// Along z.
+        /// Upper bounds along z.
         pub high_z: UVec2,
     }
 
     /// An item of the scene's BVH: a primitive or a mesh instance.
     pub struct BvhItem {
-        /// Lower corner of its box.
+        /// Lower corner of the bounding box.
         pub low: Vec3,
         /// [`INSTANCE`] or the primitive's kind, and the flag [`CASTS_SHADOW`].
         pub kind: u32,
-        /// Upper corner.
+        /// Upper corner of the bounding box.
         pub high: Vec3,
         /// Index of the instance or primitive.
         pub index: u32,
@@ -376,7 +377,7 @@ records! {
         pub groups: u32,
         /// First column of the object-to-world matrix.
         pub u: Vec3,
-        /// Index of its first group's word.
+        /// Index of the first group's word in `PackedBvh::group_words`.
         pub materials: u32,
         /// Second column.
         pub v: Vec3,
@@ -386,7 +387,7 @@ records! {
         pub w: Vec3,
         /// First row of vertex normals and v, or [`NO_INDEX`] if the mesh has neither.
         pub attributes: u32,
-        /// Largest object-space coordinate.
+        /// Largest absolute object-space coordinate.
         pub size: f32,
         /// Condition number of the transform: amplification of rounding errors.
         pub condition_number: f32,
@@ -400,7 +401,8 @@ records! {
         pub mesh: u32,
         /// First row of vertex tangents, two per vertex, or [`NO_INDEX`].
         pub tangents: u32,
-        /// Offset of its triangles in `Lighting::leaves`, [`NO_INDEX`] if none is emissive; 0 without a light tree.
+        /// Offset of the triangles in `Lighting::leaves`; [`NO_INDEX`] if no triangle is emissive; 0 without a light
+        /// tree.
         pub leaves: u32,
         /// First row of vertex colors, or [`NO_INDEX`].
         pub colors: u32,
@@ -408,7 +410,7 @@ records! {
         pub more_uvs: u32,
         /// Number of further sets of texture coordinates.
         pub uv_sets: u32,
-        /// 0.
+        /// Unused, 0.
         pub unused: u32,
     }
 
@@ -430,17 +432,17 @@ records! {
         pub primitive: u32,
         /// Barycentric coordinates of a mesh triangle's second and third vertex.
         pub barycentric: Vec2,
-        /// 0.
+        /// Unused, 0.
         pub unused: UVec2,
     }
 
-    /// Parameters of a dispatch: pixels and samples.
+    /// Parameters of a dispatch: the tile, the film and the samples.
     pub struct DispatchParams {
-        /// First pixel, in the image.
+        /// First pixel of the tile, in image coordinates.
         pub origin: UVec2,
-        /// Size in pixels.
+        /// Tile size in pixels.
         pub size: UVec2,
-        /// First pixel of the film, in the image.
+        /// First pixel of the film, in image coordinates.
         pub film_origin: UVec2,
         /// Film size in pixels.
         pub film_size: UVec2,

@@ -8,13 +8,13 @@ use glam::Vec3;
 
 /// A lobe of `principled` materials.
 pub struct Lobe {
-    /// Its bit in [`Specialization::lobes`](super::Specialization::lobes).
+    /// Bit in [`Specialization::lobes`](super::Specialization::lobes).
     pub bit: u32,
     /// Name in `wgray info`.
     pub name: &'static str,
     /// Purposes of lookups that may give a material this lobe.
     pub purposes: u32,
-    /// True if a material, ignoring its textures, has this lobe.
+    /// Returns true if a material has this lobe, even without textures.
     pub is_in: fn(&Material) -> bool,
 }
 
@@ -27,11 +27,11 @@ constants! {
     pub const LOBE_COAT: u32 = 4;
     /// Lobe of [`PRINCIPLED`]: sheen.
     pub const LOBE_SHEEN: u32 = 8;
-    /// Flag beside the lobes of [`PRINCIPLED`]: anisotropy.
+    /// Flag in addition to the lobes of [`PRINCIPLED`]: anisotropy.
     pub const LOBE_ANISOTROPY: u32 = 16;
 }
 
-/// All lobes.
+/// All lobes, and the flag for anisotropy.
 pub static LOBES: [Lobe; 5] = [
     Lobe {
         bit: LOBE_ANISOTROPY,

@@ -8,35 +8,35 @@ use super::Node;
 /// A packed mesh, in object space.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PackedMesh {
-    /// BVH over its triangles.
+    /// BVH over the triangles.
     pub nodes: Vec<Node>,
     /// Vertex indices and triangle index, in leaf order.
     pub triangles: Vec<UVec4>,
     /// Position and u of each vertex.
     pub vertices: Vec<Vec4>,
-    /// Normal, or 0, and v of each vertex; empty if the mesh has neither.
+    /// Normal (0 if the mesh has no normals) and v of each vertex; empty without normals and texture coordinates.
     pub attributes: Vec<Vec4>,
-    /// Tangents along u and v of each vertex; or empty.
+    /// Tangents along u and v of each vertex, or empty.
     pub tangents: Vec<[Vec4; 2]>,
-    /// Linear RGB and opacity of each vertex; or empty.
+    /// Linear RGB and opacity of each vertex, or empty.
     pub colors: Vec<Vec4>,
-    /// Further texture coordinates, two sets per row, a vertex's rows together; or empty.
+    /// Further texture coordinates, two sets per row, with the rows of a vertex in sequence; or empty.
     pub more_uvs: Vec<Vec4>,
     /// Group of each triangle, in triangle order; empty for a single group.
     pub groups: Vec<u32>,
-    /// Lower corner of its box.
+    /// Lower corner of the bounding box.
     pub low: Vec3,
-    /// Upper corner of its box.
+    /// Upper corner of the bounding box.
     pub high: Vec3,
 }
 
 impl PackedMesh {
-    /// Returns its size in bytes.
+    /// Returns the size of all lists in bytes.
     pub fn bytes(&self) -> u64 {
         self.lists().map(|bytes| bytes.len() as u64).sum()
     }
 
-    /// Returns all lists. Naming every field prevents forgetting one.
+    /// Returns all lists. The pattern names every field, so that the compiler rejects a forgotten field.
     pub fn lists(&self) -> impl Iterator<Item = &[u8]> {
         let PackedMesh {
             nodes,
@@ -63,7 +63,7 @@ impl PackedMesh {
         lists.into_iter()
     }
 
-    /// Returns its largest absolute coordinate.
+    /// Returns the largest absolute coordinate of the bounding box.
     pub fn size(&self) -> f32 {
         self.low.abs().max(self.high.abs()).max_element()
     }

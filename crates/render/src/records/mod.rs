@@ -1,4 +1,5 @@
-//! Records and constants that the CPU path and the kernels share. Each is declared once, for both Rust and WGSL.
+//! Records and constants that the CPU renderer and the kernels share. A single declaration defines each record and
+//! constant for both Rust and WGSL.
 
 mod constants;
 mod layout;

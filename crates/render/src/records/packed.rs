@@ -19,7 +19,7 @@ pub struct Packed {
     pub camera: Camera,
     /// The integrator.
     pub integrator: Integrator,
-    /// Values of the whole scene.
+    /// Values that apply to the whole scene.
     pub environment: Environment,
     /// Primitives, including lights' rectangles. Primitives outside of the BVH come first, sorted by kind, then by
     /// whether they can cast a shadow.
@@ -28,32 +28,33 @@ pub struct Packed {
     pub bounds: Vec<Sphere>,
     /// BVH over mesh instances and primitives.
     pub bvh: PackedBvh,
-    /// Materials of the scene, then of each area light.
+    /// Materials of the scene file, followed by one material per area light.
     pub materials: Vec<Material>,
     /// Lights and emitters.
     pub lighting: Lighting,
-    /// Numbers and positions of records.
+    /// Counts and first rows of records.
     pub counts: Counts,
-    /// The textures.
+    /// Textures and their texels.
     pub textures: PackedTextures,
-    /// Pixel samples.
+    /// Settings of pixel sampling.
     pub sampling: Sampling,
-    /// Constants of the kernel.
+    /// Override constants of the kernel.
     pub specialization: Specialization,
 }
 
-/// The BVH over all mesh instances, and over the bounded primitives if there are many.
+/// The BVH over all mesh instances and, if a scene has more than
+/// [`MAX_LINEAR_PRIMITIVES`](crate::pack::MAX_LINEAR_PRIMITIVES), the bounded primitives.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PackedBvh {
-    /// Its nodes.
+    /// Nodes of this BVH.
     pub nodes: Vec<Node>,
-    /// Items of its leaves, in order.
+    /// Items of the leaves, in leaf order.
     pub items: Vec<BvhItem>,
-    /// The instances of meshes.
+    /// The mesh instances.
     pub instances: Vec<Instance>,
     /// The meshes.
     pub meshes: Vec<Arc<PackedMesh>>,
-    /// Material of each group of each instance, with the flag [`NO_SHADOW`].
+    /// Material index of each group of each instance, combined with the flag [`NO_SHADOW`].
     pub group_words: Vec<u32>,
 }
 
@@ -65,10 +66,10 @@ pub struct Lighting {
     pub lights: Vec<Light>,
     /// Alias table of emitters, if the integrator needs it.
     pub emitters: Vec<Emitter>,
-    /// Light tree, a single entry of the alias table; empty if there are few emitters.
+    /// Nodes of the light tree, which is a single entry of the alias table; empty if the scene has few emitters.
     pub nodes: Vec<LightNode>,
-    /// Leaf of each primitive and each triangle of emissive instances in the light tree, encoded as
-    /// [`LightNode::parent`], else [`NO_INDEX`].
+    /// Leaf in the light tree of each primitive and of each triangle of emissive instances, encoded like
+    /// [`LightNode::parent`]; [`NO_INDEX`] without a leaf.
     pub leaves: Vec<u32>,
 }
 
@@ -77,16 +78,16 @@ pub struct Lighting {
 pub struct PackedTextures {
     /// Lookups of materials.
     pub lookups: Vec<Lookup>,
-    /// Textures of these lookups.
+    /// Textures that the lookups sample.
     pub records: Vec<Texture>,
-    /// Images of these textures: tables of offsets, and texels.
+    /// Words of images: tables of level offsets, and texels. Also sampling tables and albedo tables.
     pub texels: Vec<u32>,
 }
 
-/// The samples of pixels.
+/// Settings of pixel sampling: reconstruction filter and sample counts.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Sampling {
-    /// Bins of the pixel filter; empty for the box of the pixel.
+    /// Bins of the pixel filter; empty for a box filter of one pixel.
     pub filter_table: Vec<Vec4>,
     /// Samples per pixel; with adaptive sampling the maximum.
     pub pixel_samples: u32,
@@ -95,8 +96,8 @@ pub struct Sampling {
 }
 
 impl Packed {
-    /// Returns the number of light samples per hit: the samples of all lights, with one for a point or directional
-    /// light; with `path` one in total.
+    /// Returns the number of light samples per hit: with `path` at most 1, otherwise the sum over all lights. A light
+    /// without area has one sample.
     pub fn light_samples(&self) -> u64 {
         if self.integrator.needs_emitters() {
             return u64::from(!self.lighting.emitters.is_empty());
@@ -107,19 +108,19 @@ impl Packed {
 
     /// Returns the number of emitters sampled by the path tracer, including the environment.
     pub fn emitter_count(&self) -> u64 {
-        // A light tree is a single entry of the table.
+        // A light tree is a single entry of the alias table.
         let in_tree = self.lighting.leaves.iter().filter(|leaf| **leaf != NO_INDEX).count();
         self.lighting.emitters.len().saturating_sub(usize::from(in_tree > 0)) as u64 + in_tree as u64
     }
 
-    /// Adds layers to the film. Integrators without layers ignore it.
+    /// Adds layers to the film, if the integrator has layers.
     #[must_use]
     pub fn with_layers(mut self) -> Packed {
         self.specialization.layers = self.integrator.has_layers().into();
         self
     }
 
-    /// Removes layers from the film. The colors are the same.
+    /// Removes layers from the film. The radiance does not change.
     #[must_use]
     pub fn without_layers(mut self) -> Packed {
         self.specialization.layers = 0;
@@ -128,9 +129,9 @@ impl Packed {
 
     /// Returns the size of all BVHs in bytes.
     pub fn tree_bytes(&self) -> u64 {
-        let of_meshes = self.bvh.meshes.iter().map(|mesh| size_of_val(mesh.nodes.as_slice()));
-        let own = size_of_val(self.bvh.nodes.as_slice()) + size_of_val(self.bvh.items.as_slice());
-        (own + of_meshes.sum::<usize>()) as u64
+        let mesh_bvhs = self.bvh.meshes.iter().map(|mesh| size_of_val(mesh.nodes.as_slice()));
+        let scene_bvh = size_of_val(self.bvh.nodes.as_slice()) + size_of_val(self.bvh.items.as_slice());
+        (scene_bvh + mesh_bvhs.sum::<usize>()) as u64
     }
 
     /// Returns the size of texels and environment sampling tables in bytes.
@@ -140,11 +141,12 @@ impl Packed {
 
     /// Returns the size of all records in bytes.
     pub fn bytes(&self) -> u64 {
-        let of_meshes = self.bvh.meshes.iter().map(|mesh| mesh.bytes());
-        of_meshes.sum::<u64>() + self.lists().map(|bytes| bytes.len() as u64).sum::<u64>()
+        let meshes = self.bvh.meshes.iter().map(|mesh| mesh.bytes());
+        meshes.sum::<u64>() + self.lists().map(|bytes| bytes.len() as u64).sum::<u64>()
     }
 
-    /// Returns the bytes of all lists except the lists of meshes. Naming every field prevents forgetting one.
+    /// Returns the bytes of all lists except the lists of meshes. The patterns name every field, so that the compiler
+    /// rejects a forgotten field.
     pub fn lists(&self) -> impl Iterator<Item = &[u8]> {
         let Packed {
             origin: _,
@@ -204,7 +206,7 @@ impl Packed {
         self.specialization.alpha != 0
     }
 
-    /// Returns the layout of its film.
+    /// Returns the layout of the scene's films.
     pub fn film_layout(&self) -> FilmLayout {
         FilmLayout {
             adaptive: self.sampling.adaptive,
@@ -214,7 +216,7 @@ impl Packed {
 
     /// Returns true if the other scene differs only in the camera.
     pub fn same_but_camera(&self, other: &Packed) -> bool {
-        let plain = |scene: &Packed| {
+        let settings = |scene: &Packed| {
             let Sampling {
                 pixel_samples,
                 adaptive,
@@ -225,22 +227,22 @@ impl Packed {
                 (scene.environment, scene.counts, scene.specialization),
             )
         };
-        let (meshes, others) = (&self.bvh.meshes, &other.bvh.meshes);
-        let mut pairs = meshes.iter().zip(others);
-        plain(self) == plain(other)
+        let (meshes, other_meshes) = (&self.bvh.meshes, &other.bvh.meshes);
+        let mut pairs = meshes.iter().zip(other_meshes);
+        settings(self) == settings(other)
             && self.lists().eq(other.lists())
-            && meshes.len() == others.len()
+            && meshes.len() == other_meshes.len()
             && pairs.all(|(a, b)| Arc::ptr_eq(a, b) || a == b)
     }
 
-    /// Returns the kinds of primitives with their ranges.
+    /// Returns the kinds of primitives outside of the BVH, with their index ranges.
     pub fn kinds(&self) -> impl Iterator<Item = (u32, Range<usize>)> {
         let kinds = (0..).zip(self.counts.primitives);
         let ranges = kinds.map(|(kind, range)| (kind, range.x as usize..range.z as usize));
         ranges.filter(|(_, range)| !range.is_empty())
     }
 
-    /// Returns the kinds of shadow-casting primitives with their ranges.
+    /// Returns the kinds of shadow-casting primitives outside of the BVH, with their index ranges.
     pub fn shadow_casters(&self) -> impl Iterator<Item = (u32, Range<usize>)> {
         let kinds = (0..).zip(self.counts.primitives);
         let ranges = kinds.map(|(kind, range)| (kind, range.x as usize..range.y as usize));

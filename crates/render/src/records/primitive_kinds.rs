@@ -1,4 +1,4 @@
-//! The kinds of primitives, a table for backends, packing and the dispatch by kind in kernels.
+//! Table of the kinds of primitives, for the backends, for packing and for the selection by kind in kernels.
 
 #[cfg(doc)]
 use super::Primitive;
@@ -6,18 +6,18 @@ use super::record::constants;
 
 /// A kind of primitive.
 pub struct PrimitiveKind {
-    /// Name of its constant, in Rust and WGSL.
+    /// Name of the constant, in Rust and WGSL.
     pub name: &'static str,
-    /// Its form.
+    /// Form of the surface.
     pub form: PrimitiveForm,
 }
 
-/// Form of a kind.
+/// Geometric form of the primitives of a kind.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum PrimitiveForm {
     /// Flat and bounded.
     Flat,
-    /// The surface of a convex solid: a ray that leaves it through the inside hits it again.
+    /// The surface of a convex solid: a ray that starts on the surface towards the inside hits the surface again.
     Solid,
     /// A plane, never in a BVH.
     Infinite,
@@ -29,8 +29,8 @@ macro_rules! primitive_kinds {
             $($(#[$doc])* pub const $name: u32 = $number;)*
             /// Number of kinds.
             pub const KINDS: u32 = [$($number),*].len() as u32;
-            /// Bits of the kinds with an inside.
-            pub const SOLID_KINDS: u32 = solid(PRIMITIVE_KINDS);
+            /// Bits of the solid kinds.
+            pub const SOLID_KINDS: u32 = solid_bits(PRIMITIVE_KINDS);
         }
 
         /// All kinds, by number.
@@ -46,8 +46,8 @@ macro_rules! primitive_kinds {
                         let $d constant = $crate::records::$name;
                         $d body
                     })*
-                    other => {
-                        let $d constant = other;
+                    unknown_kind => {
+                        let $d constant = unknown_kind;
                         $d body
                     }
                 }
@@ -58,7 +58,7 @@ macro_rules! primitive_kinds {
 }
 
 primitive_kinds! { ($)
-    /// [`Primitive::kind`], in local space: |x| <= 1, |y| <= 1, z = 0.
+    /// [`Primitive::kind`]: in object space, |x| <= 1, |y| <= 1, z = 0.
     RECTANGLE = 0, Flat;
     /// [`Primitive::kind`]: x >= 0, y >= 0, x + y <= 1, z = 0.
     TRIANGLE = 1, Flat;
@@ -72,7 +72,7 @@ primitive_kinds! { ($)
     CYLINDER = 5, Solid;
 }
 
-const fn solid(kinds: &[PrimitiveKind]) -> u32 {
+const fn solid_bits(kinds: &[PrimitiveKind]) -> u32 {
     let (mut bits, mut i) = (0, 0);
     while i < kinds.len() {
         bits |= if matches!(kinds[i].form, PrimitiveForm::Solid) {

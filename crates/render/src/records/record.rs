@@ -1,14 +1,14 @@
-//! Records that the host and the shaders share, each declared once, as a list of fields that expands to a Rust struct
-//! and its WGSL declaration. `layout.rs` has the records, `constants.rs` and `specialization.rs` the numbers.
+//! Macros that expand a single declaration of a record or constant to Rust and to WGSL. `layout.rs` declares the
+//! records, `constants.rs` the constants, and `specialization.rs` the override constants.
 
 use super::KINDS;
 use glam::{UVec2, UVec4, Vec2, Vec3, Vec4};
 
-/// A type of a record's field.
+/// A type of record fields.
 pub trait Field: Copy {
     /// Name of the type in WGSL.
     const WGSL: &'static str;
-    /// Returns the WGSL expression of its value.
+    /// Returns the value as a WGSL expression.
     fn constant(self) -> String;
     /// Returns the WGSL expression that reads a value from `words`, which are components of a row.
     fn from_row(words: &str) -> String;
@@ -38,7 +38,7 @@ fields! {
         |words| format!("bitcast<vec4f>({words})");
     UVec2: "vec2u", |v| format!("vec2u({}u, {}u)", v.x, v.y), |words| words.to_string();
     [UVec4; KINDS as usize]: "array<vec4u, KINDS>",
-        |all| format!("array({})", all.map(Field::constant).join(", ")), |words| words.to_string();
+        |ranges| format!("array({})", ranges.map(Field::constant).join(", ")), |words| words.to_string();
     UVec4: "vec4u", |v| format!("vec4u({}u, {}u, {}u, {}u)", v.x, v.y, v.z, v.w), |words| words.to_string();
 }
 
@@ -48,7 +48,7 @@ pub trait Record: bytemuck::Pod {
     const NAME: &'static str;
     /// Returns the declaration of the record in WGSL.
     fn declaration() -> String;
-    /// Returns the WGSL expression of its value.
+    /// Returns the record as a WGSL expression.
     fn constant(&self) -> String;
     /// Returns the WGSL expression that reads a record from the 16-byte rows `r0`, `r1` and so on.
     fn from_rows() -> String;
@@ -109,11 +109,11 @@ macro_rules! constants {
 
         /// Returns the WGSL declarations of these constants.
         pub fn constant_declarations() -> String {
-            let all = [$(format!(
+            let declarations = [$(format!(
                 "const {}: {} = {};\n",
                 stringify!($name), <$ty as super::record::Field>::WGSL, super::record::Field::constant($value)
             )),*];
-            all.concat()
+            declarations.concat()
         }
     };
 }

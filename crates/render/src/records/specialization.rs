@@ -1,4 +1,4 @@
-//! The constants of a kernel: features of its scene, and its settings.
+//! The override constants of a kernel: features and settings of the scene.
 
 /// Declares [`Specialization`] and the shaders' overrides.
 macro_rules! specialization {
@@ -29,11 +29,11 @@ macro_rules! specialization {
 specialization! {
     /// Bit i: primitives of kind i exist outside of the BVH.
     primitives = "PRIMITIVES",
-    /// Bit i: any of these can cast a shadow.
+    /// Bit i: primitives of kind i outside of the BVH can cast shadows.
     shadow_casters = "SHADOW_CASTERS",
     /// Bit i: the scene's BVH has primitives of kind i; [`INSTANCE`](super::INSTANCE) for meshes.
     tlas_kinds = "TLAS_KINDS",
-    /// Bit 0: area lights exist; bit 1: other lights do; bit 2: these include spot lights.
+    /// Bit 0: area lights exist; bit 1: other lights exist; bit 2: spot lights exist.
     lights = "LIGHTS",
     /// 1 if the camera has a lens, else 0.
     lens = "LENS",
@@ -45,7 +45,7 @@ specialization! {
     pixel_pattern = "PIXEL_PATTERN",
     /// Side of the pattern's grid of cells; number of samples if the pattern has no grid.
     pixel_side = "PIXEL_SIDE",
-    /// Samples per pixel; with adaptive sampling samples per round.
+    /// Samples per pixel; with adaptive sampling, samples per round.
     pixel_samples = "PIXEL_SAMPLES",
     /// Pattern of area light samples.
     light_pattern = "LIGHT_PATTERN",
@@ -59,15 +59,15 @@ specialization! {
     pilot_samples = "PILOT_SAMPLES",
     /// Bits of the `f32` squared target error of adaptive sampling.
     squared_error = "SQUARED_ERROR",
-    /// Bit length of the largest shininess if all are integers up to 4096, else 0.
+    /// Bit length of the largest shininess if all values are integers up to 4096, else 0.
     exponent_bits = "EXPONENT_BITS",
-    /// Maximum number of bounces; with `phong` 0 if no material is specular.
+    /// Maximum number of bounces; with `phong`, 0 if no material is specular.
     bounces = "BOUNCES",
     /// 1 if ray differentials are needed, else 0.
     differentials = "DIFFERENTIALS",
-    /// Maximum texture lookups of a material except mirrors and glass.
+    /// Maximum number of texture lookups of a material that is neither mirror nor glass.
     lookups = "LOOKUPS",
-    /// Maximum texture lookups of a mirror or glass.
+    /// Maximum number of texture lookups of a mirror or glass.
     specular_lookups = "SPECULAR_LOOKUPS",
     /// 1 if normal maps exist, else 0.
     normal_maps = "NORMAL_MAPS",
@@ -75,11 +75,11 @@ specialization! {
     texture_kinds = "TEXTURE_KINDS",
     /// Bit i: texels of format i exist.
     texel_formats = "TEXEL_FORMATS",
-    /// 1 if textures use further texture coordinates, else 0.
+    /// 1 if textures use further sets of texture coordinates, else 0.
     uv_sets = "UV_SETS",
     /// 1 if vertex colors exist and are used, else 0.
     vertex_colors = "VERTEX_COLORS",
-    /// This and all following fields are for `path`. Bit i: materials of kind i exist.
+    /// Bit i: materials of kind i exist. This field and all following fields are for `path`.
     materials = "MATERIALS",
     /// 1 if rough diffuse materials exist, else 0.
     rough = "ROUGH",
@@ -108,7 +108,7 @@ specialization! {
     environment_flags = "ENVIRONMENT_FLAGS",
     /// First bounce of Russian roulette.
     rr_depth = "RR_DEPTH",
-    /// Bits of the `f32` limit of the largest component of an indirect sample; 0 for none.
+    /// Bits of the `f32` limit of the largest component of an indirect sample; 0 for no limit.
     max_indirect = "MAX_INDIRECT",
     /// 1 for a transparent background, else 0.
     alpha = "ALPHA",

@@ -11,7 +11,7 @@ use crate::{
 };
 
 /// A valid file, one key per line.
-const GOOD: &str = r#"{
+const VALID: &str = r#"{
   "spp": 256,
   "max_depth": 10,
   "image_resolution": [600, 600],
@@ -47,10 +47,10 @@ const GOOD: &str = r#"{
 "#;
 
 const FLOOR: &str = "v -1 0 -1\nv -1 0 1\nv 1 0 1\nv 1 0 -1\nf 1 2 3 4\n";
-const LEFT: &str = "v -1 0 -1\nv -1 2 -1\nv -1 2 1\nv -1 0 1\nf 1 2 3 4\n";
+const LEFT_WALL: &str = "v -1 0 -1\nv -1 2 -1\nv -1 2 1\nv -1 0 1\nf 1 2 3 4\n";
 
-/// The tall box; its top corners have the x and z coordinates of the course's scene.
-fn tall() -> String {
+/// The mesh of a tall box, whose top corners have the x and z coordinates of the course's scene.
+fn tall_box() -> String {
     let corners = [
         (-0.720444, 0.473882),
         (-0.146892, 0.673479),
@@ -72,8 +72,8 @@ fn folder() -> TempDir {
     fs::create_dir(folder.path().join("configs")).unwrap();
     fs::create_dir(folder.path().join("assets")).unwrap();
     write("assets/floor.obj", FLOOR);
-    write("assets/left.obj", LEFT);
-    write("assets/tall.obj", &tall());
+    write("assets/left.obj", LEFT_WALL);
+    write("assets/tall.obj", &tall_box());
     folder
 }
 
@@ -91,7 +91,7 @@ fn near(a: DVec3, b: DVec3) -> bool {
 
 fn extent(scene: &Scene, shape: usize) -> (DVec3, DVec3) {
     let Geometry::Mesh { mesh, to_world, .. } = &scene.shapes[shape].geometry else {
-        panic!("no mesh: {:?}", scene.shapes[shape]);
+        panic!("shape {shape} is not a mesh: {:?}", scene.shapes[shape]);
     };
     let world = |p: &glam::Vec3| to_world.transform_point3(mesh.center + p.as_dvec3());
     let low = mesh.positions.iter().map(world).reduce(DVec3::min).unwrap();
@@ -100,8 +100,8 @@ fn extent(scene: &Scene, shape: usize) -> (DVec3, DVec3) {
 }
 
 #[test]
-fn a_file_of_the_course_is_a_scene_with_z_up() {
-    let scene = load("cornell.json", GOOD, &Overrides::default()).unwrap();
+fn a_course_file_is_loaded_as_a_scene_with_z_up() {
+    let scene = load("cornell.json", VALID, &Overrides::default()).unwrap();
     assert_eq!((scene.width, scene.height), (600, 600));
     assert_eq!(scene.notes, Vec::<String>::new());
     let camera = scene.camera;
@@ -131,7 +131,7 @@ fn a_file_of_the_course_is_a_scene_with_z_up() {
 
     // In the order of the names: a mirror, gray, red.
     let plain = |r, g, b| Color::Plain(DVec3::new(r, g, b));
-    let plain_of = |reflection| Material {
+    let material = |reflection| Material {
         reflection,
         emission: Color::BLACK,
         visible: true,
@@ -146,8 +146,8 @@ fn a_file_of_the_course_is_a_scene_with_z_up() {
         color: plain(0.63, 0.065, 0.05),
         roughness: Value::Plain(0.0),
     };
-    assert_eq!(scene.materials[0], plain_of(mirror));
-    assert_eq!(scene.materials[2], plain_of(red));
+    assert_eq!(scene.materials[0], material(mirror));
+    assert_eq!(scene.materials[2], material(red));
     let materials: Vec<usize> = scene.shapes.iter().map(|shape| shape.material).collect();
     assert_eq!(materials, [1, 2, 0]);
     assert_eq!(extent(&scene, 0), (DVec3::ZERO, DVec3::new(1.0, 1.0, 0.0)));
@@ -166,11 +166,11 @@ fn a_file_of_the_course_is_a_scene_with_z_up() {
     );
 }
 
-/// Tests both ends of the ranges.
+/// Tests both ends of the ranges of `spp` and `max_depth`.
 #[test]
-fn samples_need_not_be_a_square() {
+fn sample_counts_need_not_be_square_numbers() {
     for (spp, max_depth) in [(1, 0), (200, 12), (65_536, 1024)] {
-        let text = GOOD
+        let text = VALID
             .replace("\"spp\": 256", &format!("\"spp\": {spp}"))
             .replace("\"max_depth\": 10", &format!("\"max_depth\": {max_depth}"));
         let render = load("a.json", &text, &Overrides::default()).unwrap().render;
@@ -181,45 +181,45 @@ fn samples_need_not_be_a_square() {
 #[test]
 fn a_camera_has_the_same_view_in_both_coordinate_systems() {
     // The axes of the camera must be converted like vectors.
-    let described = camera(&Camera {
+    let in_file = camera(&Camera {
         position: DVec3::new(1.0, 2.0, 3.0),
         look_at: DVec3::new(-1.0, 0.5, 0.25),
         ref_up: DVec3::new(0.1, 1.0, 0.2),
         vertical_fov: 30.0,
         focal_length: 1.0,
     });
-    let before = described.validate().unwrap();
-    let text = GOOD
+    let before = in_file.validate().unwrap();
+    let text = VALID
         .replace("\"position\": [0, 1, 6.8]", "\"position\": [1, 2, 3]")
         .replace("\"look_at\": [0, 1, 0]", "\"look_at\": [-1, 0.5, 0.25]")
         .replace("\"ref_up\": [0, 1, 0]", "\"ref_up\": [0.1, 1, 0.2]");
     let after = load("a.json", &text, &Overrides::default()).unwrap().camera;
-    assert!(near(turned(before.right), after.right));
-    assert!(near(turned(before.up), after.up));
-    assert!(near(turned(before.forward), after.forward));
-    assert!(near(turned(DVec3::X).cross(turned(DVec3::Y)), turned(DVec3::Z)));
+    assert!(near(to_z_up(before.right), after.right));
+    assert!(near(to_z_up(before.up), after.up));
+    assert!(near(to_z_up(before.forward), after.forward));
+    assert!(near(to_z_up(DVec3::X).cross(to_z_up(DVec3::Y)), to_z_up(DVec3::Z)));
 }
 
 #[test]
-fn names_end_in_json_in_any_case() {
+fn the_extension_json_may_be_in_any_case() {
     for name in ["a.JSON", "b.Json", "c.toml.json"] {
-        assert_eq!(load(name, GOOD, &Overrides::default()).unwrap().shapes.len(), 3);
+        assert_eq!(load(name, VALID, &Overrides::default()).unwrap().shapes.len(), 3);
     }
     for name in ["a.toml", "json"] {
-        let message = load(name, GOOD, &Overrides::default()).unwrap_err().to_string();
+        let message = load(name, VALID, &Overrides::default()).unwrap_err().to_string();
         assert!(message.contains(&format!("{name}:1:1: ")), "{message}");
     }
 }
 
 #[test]
 fn optional_keys_have_defaults() {
-    let text = GOOD
+    let text = VALID
         .replace(",\n    \"focal_length\": 1", "")
         .replace(", \"translate\": [0, 0, 0], \"scale\": 1, \"has_bvh\": false", "");
-    assert!(text.len() + 100 < GOOD.len());
-    let whole = load("a.json", GOOD, &Overrides::default()).unwrap();
+    assert!(text.len() + 100 < VALID.len());
+    let complete = load("a.json", VALID, &Overrides::default()).unwrap();
     let scene = load("a.json", &text, &Overrides::default()).unwrap();
-    assert_eq!((scene.camera, &scene.shapes), (whole.camera, &whole.shapes));
+    assert_eq!((scene.camera, &scene.shapes), (complete.camera, &complete.shapes));
 }
 
 #[test]
@@ -232,11 +232,11 @@ fn overrides_replace_values_of_the_file() {
         seed: Some(7),
         ..Overrides::default()
     };
-    let scene = load("a.json", GOOD, &overrides).unwrap();
+    let scene = load("a.json", VALID, &overrides).unwrap();
     let render = scene.render;
     assert_eq!((scene.width, scene.height, render.seed), (30, 20, 7));
     assert_eq!((render.pixel_samples.count, render.light_samples.count), (5, 3));
-    let refused = |overrides: &Overrides| load("a.json", GOOD, overrides).unwrap_err().to_string();
+    let refused = |overrides: &Overrides| load("a.json", VALID, overrides).unwrap_err().to_string();
     let overrides = Overrides {
         pixel_samples: Some(5),
         pixel_pattern: Some(Pattern::Grid),
@@ -251,17 +251,17 @@ fn overrides_replace_values_of_the_file() {
         max_depth,
         ..Overrides::default()
     };
-    let scene = load("a.json", GOOD, &overrides(None, Some(0))).unwrap();
+    let scene = load("a.json", VALID, &overrides(None, Some(0))).unwrap();
     assert_eq!(scene.render.max_depth, 0);
     assert_eq!(
         refused(&overrides(None, Some(1025))),
         "max_depth: 1025 must be from 0 to 1024"
     );
-    // The materials need the path integrator.
+    // The materials need the path tracer.
     let message = refused(&overrides(Some(Integrator::Phong), None));
     let rule = "a.json:20: materials[2].type: \"specular\" needs integrator = \"path\"";
     assert!(message.ends_with(rule), "{message}");
-    let diffuse = GOOD.replace("specular", "diffuse");
+    let diffuse = VALID.replace("specular", "diffuse");
     let message = load("a.json", &diffuse, &overrides(Some(Integrator::Phong), None)).unwrap_err();
     let rule = ":20: materials[2].type: \"diffuse\" needs integrator = \"path\"";
     assert!(message.to_string().ends_with(rule), "{message}");
@@ -271,7 +271,7 @@ fn overrides_replace_values_of_the_file() {
 fn all_errors_are_reported() {
     let errors = |changes: &[(&str, &str)]| {
         let change = |text: String, (from, to): &(&str, &str)| text.replacen(from, to, 1);
-        let text = changes.iter().fold(GOOD.to_owned(), change);
+        let text = changes.iter().fold(VALID.to_owned(), change);
         let error = load("a.json", &text, &Overrides::default()).unwrap_err();
         let lines = error
             .each()
@@ -280,7 +280,7 @@ fn all_errors_are_reported() {
             .map(|error| error.place().line.unwrap_or_default());
         lines.collect::<Vec<_>>()
     };
-    // Invalid keys and types, also within an object.
+    // Invalid keys and types, including a key within an object.
     let types = [
         ("256", "\"many\""),
         ("[0, 1, 6.8]", "[0, 1]"),
@@ -299,12 +299,12 @@ fn defines_use_the_keys_of_the_file() {
             define: vec![define.parse().unwrap()],
             ..Overrides::default()
         };
-        load("a.json", GOOD, &overrides)
+        load("a.json", VALID, &overrides)
     };
     let scene = load("spp=5").unwrap();
     assert_eq!(scene.render.pixel_samples.count, 5);
     let scene = load("cam_config.position[1]=-3.5").unwrap();
-    assert_eq!(scene.camera.position.z, -3.5, "+Y is up there");
+    assert_eq!(scene.camera.position.z, -3.5, "+Y is up in the file");
     for (define, expected) in [
         ("spp=0", "define.spp: 0 must be from 1 to 65536"),
         ("spp=many", "define.spp: \"many\" must be a whole number"),
@@ -317,7 +317,7 @@ fn defines_use_the_keys_of_the_file() {
         ("materials[0].color=[2, 0, 0]", "define.materials[0].color: "),
         (
             "materials[9].color=[2, 0, 0]",
-            "define.materials[9]: does not exist; the list has",
+            "define.materials[9]: does not exist; the length of the list is 3, and indices start at 0",
         ),
         (
             "materials.first.color=[2, 0, 0]",
@@ -335,8 +335,8 @@ fn meshes_must_be_in_the_parent_folder_or_the_asset_root() {
     let folder = folder();
     let configs = folder.path().join("configs");
     let path = configs.join("a.json");
-    fs::write(&path, GOOD).unwrap();
-    let within = |root: &Path| {
+    fs::write(&path, VALID).unwrap();
+    let load_within = |root: &Path| {
         let overrides = Overrides {
             asset_root: Some(root.to_owned()),
             ..Overrides::default()
@@ -344,13 +344,13 @@ fn meshes_must_be_in_the_parent_folder_or_the_asset_root() {
         Scene::load_with(&path, &overrides).map_err(|error| error.to_string())
     };
     Scene::load(&path).unwrap();
-    within(&folder.path().join("assets")).unwrap();
-    let message = within(&configs).unwrap_err();
+    load_within(&folder.path().join("assets")).unwrap();
+    let message = load_within(&configs).unwrap_err();
     assert!(
         message.contains(":23: objects[0].obj_file_path: \"../assets/floor.obj\" lies outside of the scene's folder"),
         "{message}"
     );
-    fs::write(&path, GOOD.replace("../assets", "../../assets")).unwrap();
+    fs::write(&path, VALID.replace("../assets", "../../assets")).unwrap();
     let message = Scene::load(&path).unwrap_err().to_string();
     assert!(
         message.contains(":23: objects[0].obj_file_path: \"../../assets/floor.obj\" "),
@@ -359,7 +359,7 @@ fn meshes_must_be_in_the_parent_folder_or_the_asset_root() {
 }
 
 /// Valid fragment, invalid replacement, and the message from the line number on.
-const BAD: &[(&str, &str, &str)] = &[
+const INVALID: &[(&str, &str, &str)] = &[
     // Invalid JSON.
     ("\"spp\": 256,", "\"spp\": 256", "3:3: expected \",\" or \"}\""),
     ("\"spp\": 256,", "\"spp\": NaN,", "2:10: spp: expected value"),
@@ -473,22 +473,22 @@ const BAD: &[(&str, &str, &str)] = &[
     (
         "[0, 1, 6.8]",
         "[0, 1, 2e9]",
-        "6: cam_config.position: 2e9 must be finite, from -1e9 to 1e9",
+        "6: cam_config.position: 2e9 must be from -1e9 to 1e9",
     ),
     (
         "[0, 1.98, 0]",
         "[0, 2e9, 0]",
-        "13: light_config.position: 2e9 must be finite, from -1e9 to 1e9",
+        "13: light_config.position: 2e9 must be from -1e9 to 1e9",
     ),
     (
         "[0.5, 0.25]",
         "[0.5, -1]",
-        "14: light_config.size: -1 must be finite and greater than 0, from 1e-9 to 1e9",
+        "14: light_config.size: -1 must be from 1e-9 to 1e9",
     ),
     (
         "[17, 12, 5]",
         "[17, -12, 5]",
-        "15: light_config.radiance: -12 must be finite, from 0 to 1e6",
+        "15: light_config.radiance: -12 must be from 0 to 1e6",
     ),
     (
         "[0.63, 0.065, 0.05]",
@@ -513,12 +513,12 @@ const BAD: &[(&str, &str, &str)] = &[
     (
         "[0.7, 0, -0.5]",
         "[0.7, 0, -2e9]",
-        "28: objects[2].translate: -2e9 must be finite, from -1e9 to 1e9",
+        "28: objects[2].translate: -2e9 must be from -1e9 to 1e9",
     ),
     (
         "\"scale\": 0.5",
         "\"scale\": 0",
-        "29: objects[2].scale: 0 must not be 0, and be from 1e-6 to 1e6, or from -1e6 to -1e-6",
+        "29: objects[2].scale: 0 must be from 1e-6 to 1e6, or from -1e6 to -1e-6",
     ),
     (
         "../assets/tall.obj",
@@ -529,9 +529,9 @@ const BAD: &[(&str, &str, &str)] = &[
 
 #[test]
 fn invalid_files_are_reported_with_location_key_value_and_rule() {
-    for (piece, bad, expected) in BAD {
-        assert_eq!(GOOD.matches(piece).count(), 1, "{piece}");
-        let text = GOOD.replace(piece, bad);
+    for (fragment, invalid, expected) in INVALID {
+        assert_eq!(VALID.matches(fragment).count(), 1, "{fragment}");
+        let text = VALID.replace(fragment, invalid);
         let error = load("a.json", &text, &Overrides::default()).unwrap_err().to_string();
         let (_, rest) = error.split_once("a.json:").unwrap();
         assert!(rest.starts_with(expected), "{rest}\n{expected}");
@@ -542,7 +542,7 @@ fn invalid_files_are_reported_with_location_key_value_and_rule() {
 const PAGE: &str = include_str!("../../../../docs/scene-format.md");
 
 #[test]
-fn the_page_has_every_key_and_a_good_example() {
+fn the_page_has_every_key_and_a_valid_example() {
     let (_, section) = PAGE.split_once("\n## Scenes in JSON\n").unwrap();
     let example = section.split("```json\n").nth(1).unwrap().split("```").next().unwrap();
     Description::parse(example, "page.json").unwrap();
@@ -551,20 +551,20 @@ fn the_page_has_every_key_and_a_good_example() {
         .filter_map(|line| Some(line.strip_prefix("| `")?.split_once('`')?.0));
     let mut rows: Vec<&str> = rows.collect();
     let mut keys = Vec::new();
-    for (place, before) in [
+    for (prefix, next_key) in [
         ("", "\"spp\""),
         ("cam_config.", "\"ref_up\""),
         ("light_config.", "\"radiance\""),
         ("materials[].", "\"name\": \"red\""),
         ("objects[].", "\"has_bvh\": true"),
     ] {
-        let text = GOOD.replace(before, &format!("\"?\": 1, {before}"));
+        let text = VALID.replace(next_key, &format!("\"?\": 1, {next_key}"));
         let message = Description::parse(&text, "a.json").unwrap_err().to_string();
         let (_, names) = message.split_once("expected one of ").unwrap();
         keys.extend(
             names
                 .split(", ")
-                .map(|name| format!("{place}{}", name.trim_matches('"'))),
+                .map(|name| format!("{prefix}{}", name.trim_matches('"'))),
         );
     }
     rows.sort_unstable();
@@ -573,9 +573,9 @@ fn the_page_has_every_key_and_a_good_example() {
 }
 
 #[test]
-fn any_prefix_of_a_file_is_refused_with_a_place() {
-    for end in 0..GOOD.trim_end().len() {
-        let error = Scene::parse(&GOOD[..end], "a.json").unwrap_err();
+fn any_prefix_of_a_file_is_refused_with_a_location() {
+    for end in 0..VALID.trim_end().len() {
+        let error = Scene::parse(&VALID[..end], "a.json").unwrap_err();
         assert!(matches!(error, SceneError::Syntax { .. }), "{end}: {error}");
     }
     for text in ["3", "[]", "null", "\"\"", "{}"] {
@@ -585,7 +585,7 @@ fn any_prefix_of_a_file_is_refused_with_a_place() {
     let deep = "[".repeat(100_000);
     let message = Scene::parse(&deep, "a.json").unwrap_err().to_string();
     assert!(message.contains("at most 127 levels deep"), "{message}");
-    let large = " ".repeat(LARGEST + 1);
+    let large = " ".repeat(MAX_FILE_BYTES + 1);
     let message = Scene::parse(&large, "a.json").unwrap_err().to_string();
     assert_eq!(message, "a.json:1:1: a JSON scene must not be larger than 4 MiB");
 }

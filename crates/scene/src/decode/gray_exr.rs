@@ -1,5 +1,5 @@
-//! EXR files with one channel of any name, decoded as gray; the crate `image` requires R, G and B. Files that have
-//! neither are rejected here.
+//! EXR files with one channel of any name, decoded as gray, because the crate `image` requires R, G and B. Files with
+//! other channels are rejected here.
 
 use std::io::Cursor;
 
@@ -13,17 +13,18 @@ use super::{Channels, DecodeError, Header};
 const COLORS: [&str; 3] = ["R", "G", "B"];
 
 /// Returns the image if the file has one layer with one channel and an optional, ignored `A`; `None` if it is a color
-/// image. Before decoding, calls `check_layer` with the size and the bytes per pixel of each layer, and `check` with
-/// the header.
+/// image. Before decoding, calls `check_layer` with the size and the bytes per pixel of each layer, and `check_header`
+/// with the header of the image.
 pub(super) fn gray_exr(
     bytes: &[u8],
     check_layer: impl Fn((u32, u32), u64) -> Result<(), DecodeError>,
-    check: impl Fn(Header) -> Result<(), DecodeError>,
+    check_header: impl Fn(Header) -> Result<(), DecodeError>,
 ) -> Result<Option<DynamicImage>, DecodeError> {
     let damaged = |error: Error| ImageError::Decoding(DecodingError::new(ImageFormat::OpenExr.into(), error));
     let meta = exr::meta::MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(damaged)?;
-    let side = |length: usize| u32::try_from(length).unwrap_or(u32::MAX);
-    let size = |header: &exr::meta::header::Header| (side(header.layer_size.width()), side(header.layer_size.height()));
+    let to_u32 = |length: usize| u32::try_from(length).unwrap_or(u32::MAX);
+    let size =
+        |header: &exr::meta::header::Header| (to_u32(header.layer_size.width()), to_u32(header.layer_size.height()));
     for header in &meta.headers {
         check_layer(size(header), header.channels.bytes_per_pixel as u64)?;
     }
@@ -39,28 +40,28 @@ pub(super) fn gray_exr(
     if meta.headers.iter().any(has_colors) {
         return Ok(None);
     }
-    let refused = || {
+    let unsupported_channels = || {
         DecodeError::Channels(Channels {
             names: meta.headers.iter().flat_map(names).collect(),
             are_deep: meta.headers.iter().all(|header| header.deep),
         })
     };
     let [header] = meta.headers.as_slice() else {
-        return Err(refused());
+        return Err(unsupported_channels());
     };
     let mut names = names(header);
     names.retain(|name| name != "A");
     let [name] = names.as_slice() else {
-        return Err(refused());
+        return Err(unsupported_channels());
     };
     if header.deep {
-        return Err(refused());
+        return Err(unsupported_channels());
     }
     let (width, height) = size(header);
-    check(Header {
+    check_header(Header {
         width,
         height,
-        is_deep: true,
+        exceeds_8_bits: true,
     })?;
     let image = exr::prelude::read()
         .no_deep_data()

@@ -11,7 +11,7 @@ use super::{CameraPathDescription, one};
 use crate::description::kinds::{Aperture, Blades, Degrees, FNumber, Fov, Length, Point, Vector};
 
 tagged! {
-    /// `[camera]`
+    /// The camera, by `type`.
     CameraDescription {
         /// Perspective projection.
         "perspective" => Perspective(PerspectiveDescription),
@@ -47,19 +47,19 @@ pub struct PerspectiveDescription {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Aperture>")]
     pub aperture: Option<f64>,
-    /// Focal length divided by the diameter, in place of `aperture`.
+    /// Focal length divided by the diameter of the lens; replaces `aperture`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<FNumber>")]
     pub f_number: Option<f64>,
-    /// Distance of the plane in focus, along the view direction. If absent, that of `look_at`.
+    /// Distance of the plane in focus, along the view direction. If absent, the distance of `look_at`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Length>")]
     pub focus_distance: Option<f64>,
-    /// Number of corners of the lens, 3 to 16; 0 if it is round.
+    /// Number of corners of the lens, 3 to 16; 0 for a round lens.
     #[serde(default)]
     #[schemars(with = "Blades")]
     pub blades: u32,
-    /// Rotation of the corners in degrees, counter-clockwise in the image. At 0, one is at the top.
+    /// Rotation of the corners in degrees, counter-clockwise in the image. At 0, a corner is at the top.
     #[serde(default)]
     #[schemars(with = "Degrees")]
     pub blade_rotation: f64,
@@ -69,7 +69,7 @@ pub struct PerspectiveDescription {
 }
 
 impl PerspectiveDescription {
-    /// Creates a camera with z up. `fov` is vertical, in degrees.
+    /// Creates a camera with z up. `fov` is the vertical field of view in degrees.
     pub fn new(position: impl Into<DVec3>, look_at: impl Into<DVec3>, fov: f64) -> Self {
         Self {
             position: position.into(),
@@ -110,7 +110,7 @@ pub struct OrthographicDescription {
 }
 
 impl OrthographicDescription {
-    /// Creates a camera with z up. `height` is that of the image plane in scene units.
+    /// Creates a camera with z up. `height` is the height of the image plane in scene units.
     pub fn new(position: impl Into<DVec3>, look_at: impl Into<DVec3>, height: f64) -> Self {
         Self {
             position: position.into(),

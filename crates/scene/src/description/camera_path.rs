@@ -5,6 +5,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::description::kinds::{Aperture, Fov, FrameNumber, Length, Point, Vector};
+
 /// A camera animation by keys. The camera is constant before the first key and after the last.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -39,8 +40,8 @@ pub enum Interpolation {
     Smooth,
 }
 
-/// The camera at one frame. Each value is interpolated between the keys that have it; values without keys are the
-/// camera's.
+/// The camera at one frame. Each value is interpolated between the keys that set it; values that no key sets come from
+/// the camera.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(extend("minProperties" = 2))] // at least one value
@@ -60,19 +61,19 @@ pub struct CameraKeyDescription {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Vector>")]
     pub up: Option<DVec3>,
-    /// Vertical field of view in degrees, of perspective cameras.
+    /// Vertical field of view in degrees; only for perspective cameras.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Fov>")]
     pub fov: Option<f64>,
-    /// Height of the image plane in scene units, of orthographic cameras.
+    /// Height of the image plane in scene units; only for orthographic cameras.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Length>")]
     pub height: Option<f64>,
-    /// Diameter of the lens in scene units, of perspective cameras.
+    /// Diameter of the lens in scene units; only for perspective cameras.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Aperture>")]
     pub aperture: Option<f64>,
-    /// Distance of the plane in focus, of perspective cameras.
+    /// Distance of the plane in focus; only for perspective cameras.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Length>")]
     pub focus_distance: Option<f64>,

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::{Rotation, one};
 use crate::description::kinds::{Degrees, Elevation, EnvironmentScale, Rgb, Turbidity};
 
-/// The environment, for `integrator = "path"`: one of `color`, `file` and `name`.
+/// The environment, for `integrator = "path"`: exactly one of `color`, `file` and `name`.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(extend("oneOf" = [{ "required": ["color"] }, { "required": ["file"] }, { "required": ["name"] }]))]
@@ -27,14 +27,14 @@ pub struct EnvironmentDescription {
     #[serde(default = "one")]
     #[schemars(with = "EnvironmentScale")]
     pub scale: f64,
-    /// Rotation: degrees about the z axis, counter-clockwise as seen from above, or as for a mesh; each angle from -360
-    /// to 360 degrees. None if absent.
+    /// Rotation: an angle about the z axis in degrees, counter-clockwise as seen from above, or a rotation as for a
+    /// mesh; each angle from -360 to 360 degrees. None if absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rotate: Option<EnvironmentRotation>,
     /// Visible to the camera.
-    #[serde(default = "yes")]
+    #[serde(default = "default_true")]
     pub visible: bool,
-    /// Radiance that the camera sees instead; linear RGB.
+    /// Radiance that the camera sees instead of the environment; linear RGB.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Rgb>")]
     pub background: Option<DVec3>,
@@ -57,7 +57,7 @@ impl EnvironmentDescription {
     pub fn new(color: impl Into<DVec3>) -> Self {
         Self {
             color: Some(color.into()),
-            ..Self::nothing()
+            ..Self::empty()
         }
     }
 
@@ -65,7 +65,7 @@ impl EnvironmentDescription {
     pub fn image(file: impl Into<String>) -> Self {
         Self {
             file: Some(file.into()),
-            ..Self::nothing()
+            ..Self::empty()
         }
     }
 
@@ -73,11 +73,11 @@ impl EnvironmentDescription {
     pub fn named(name: EnvironmentName) -> Self {
         Self {
             name: Some(name),
-            ..Self::nothing()
+            ..Self::empty()
         }
     }
 
-    fn nothing() -> Self {
+    fn empty() -> Self {
         Self {
             color: None,
             file: None,
@@ -93,7 +93,7 @@ impl EnvironmentDescription {
     }
 }
 
-/// Built-in environments, computed by formulas. In a file the names are in snake case: `"studio"`.
+/// Built-in environments, computed by formulas. In a file, the names are in snake case: `"studio"`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum EnvironmentName {
@@ -129,6 +129,6 @@ pub enum EnvironmentRotation {
     Any(Rotation),
 }
 
-fn yes() -> bool {
+fn default_true() -> bool {
     true
 }

@@ -8,7 +8,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{Rotation, Scale};
-use crate::description::kinds::{Matrix, Place, Point, Seconds};
+use crate::description::kinds::{ListIndex, Matrix, Point, Seconds};
 
 /// A glTF file: meshes with materials and textures, and lights.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
@@ -18,21 +18,21 @@ pub struct GltfDescription {
     /// The file, relative to the scene file's folder.
     #[schemars(length(min = 1))]
     pub file: String,
-    /// Scene of the file. If absent, its default scene, else the first.
+    /// Scene of the file. If absent, the default scene of the file, or else the first scene.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scene: Option<Selection>,
     /// Time of the animation. If absent, the file is not animated.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Seconds>")]
     pub time: Option<f64>,
-    /// Animation of the file. If absent, the first, if `time` is set.
+    /// Animation of the file. If absent, the first animation if `time` is set.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub animation: Option<Selection>,
-    /// Material variant of the file. If absent, none.
+    /// Material variant of the file. None if absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub variant: Option<Selection>,
     /// Use the lights of the file.
-    #[serde(default = "yes")]
+    #[serde(default = "default_true")]
     pub lights: bool,
     /// Names of the scene's materials, by the names of the file's materials that they replace.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
@@ -41,15 +41,15 @@ pub struct GltfDescription {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Point>", extend("default" = [0, 0, 0]))]
     pub translate: Option<DVec3>,
-    /// Rotation, applied after the scale: three angles about x, y and z, or one about an axis, each from -360 to 360
-    /// degrees. None if absent.
+    /// Rotation, applied after the scale: three angles about x, y and z, or one angle about an axis, each from -360 to
+    /// 360 degrees. None if absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rotate: Option<Rotation>,
-    /// Scale, one or three factors, each from 1e-6 to 1e6 or negative.
+    /// Scale: one factor or three factors, each from 1e-6 to 1e6, or from -1e6 to -1e-6.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("default" = 1))]
     pub scale: Option<Scale>,
-    /// Rows of an affine transform, in place of `scale`, `rotate` and `translate`. None if absent.
+    /// Rows of an affine transform, which replaces `scale`, `rotate` and `translate`. None if absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Matrix>")]
     pub matrix: Option<Vec<[f64; 4]>>,
@@ -64,7 +64,7 @@ impl GltfDescription {
             time: None,
             animation: None,
             variant: None,
-            lights: yes(),
+            lights: default_true(),
             materials: BTreeMap::new(),
             translate: None,
             rotate: None,
@@ -74,32 +74,32 @@ impl GltfDescription {
     }
 }
 
-/// One of several elements, by index from 0 or by name.
+/// An element of a list, selected by name or by an index counted from 0.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Deserialize, Serialize, JsonSchema)]
-#[serde(untagged, expecting = "must be a name or a number, from 0")]
+#[serde(untagged, expecting = "must be a name or an index, counted from 0")]
 pub enum Selection {
     /// Index in the list.
-    Number(#[schemars(with = "Place")] u32),
-    /// Its name.
+    Number(#[schemars(with = "ListIndex")] u32),
+    /// Name of the element.
     Name(String),
 }
 
 impl Selection {
     /// Returns the index of the first name that is selected. A name of digits takes precedence over an index.
     pub(crate) fn among(&self, names: &[Option<&str>]) -> Option<usize> {
-        let named = |wanted: &str| names.iter().position(|name| *name == Some(wanted));
+        let position = |selected: &str| names.iter().position(|name| *name == Some(selected));
         match self {
-            Selection::Name(name) => named(name),
+            Selection::Name(name) => position(name),
             Selection::Number(number) => {
-                let place = usize::try_from(*number).ok().filter(|place| *place < names.len());
-                named(&number.to_string()).or(place)
+                let index = usize::try_from(*number).ok().filter(|index| *index < names.len());
+                position(&number.to_string()).or(index)
             }
         }
     }
 }
 
 impl From<&str> for Selection {
-    /// Parses the text of an option: an index if it is a number, else a name.
+    /// Parses the text of an option: a number is an index, other text is a name.
     fn from(text: &str) -> Self {
         text.parse()
             .map_or_else(|_| Selection::Name(text.to_owned()), Selection::Number)
@@ -115,6 +115,6 @@ impl fmt::Display for Selection {
     }
 }
 
-fn yes() -> bool {
+fn default_true() -> bool {
     true
 }

@@ -1,4 +1,4 @@
-//! The integrators, with a row of properties for each.
+//! The integrators and their properties.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::Pattern;
 use crate::limits::DEEPEST;
 
-/// A light transport algorithm. In a file the names are in snake case: `"path"`.
+/// A light transport algorithm. In a file, the names are in snake case: `"path"`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Integrator {
@@ -45,7 +45,7 @@ impl Integrator {
                 needs_emitters: false,
                 has_layers: false,
             },
-            // More pilot samples: few of them may miss rare paths, and then underestimate the error.
+            // More pilot samples, because a few samples may miss rare paths and underestimate the error.
             Integrator::Path => Row {
                 name: "path",
                 depths: (0, DEEPEST),
@@ -89,7 +89,7 @@ impl Integrator {
         self.row().needs_emitters
     }
 
-    /// Returns whether the film can have layers, such as the albedo.
+    /// Returns true if the film can have layers, such as the albedo.
     pub const fn has_layers(self) -> bool {
         self.row().has_layers
     }

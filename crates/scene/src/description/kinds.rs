@@ -1,4 +1,4 @@
-//! Kinds of values of scene files: JSON schemas independent of the Rust types. Fields of descriptions name them:
+//! Kinds of values of scene files: JSON schemas independent of the Rust types. Fields of descriptions refer to kinds:
 //! `#[schemars(with = "Length")]`.
 
 use std::borrow::Cow;
@@ -9,12 +9,12 @@ use serde_json::{Value, json};
 use crate::limits::*;
 use crate::{MetalIndex, ViewSettings};
 
-/// Separator of a kind's words and its range, in schema titles.
-pub(crate) const SPLIT: &str = "|";
+/// Separator of a kind's label and its range, in schema titles.
+pub(crate) const TITLE_SEPARATOR: &str = "|";
 
-/// Defines kinds by name, words and schema.
+/// Defines kinds by name, label and schema.
 macro_rules! kinds {
-    ($($name:ident, $words:literal, $schema:expr;)+) => { $(
+    ($($name:ident, $label:literal, $schema:expr;)+) => { $(
         pub(crate) struct $name;
 
         impl JsonSchema for $name {
@@ -27,7 +27,7 @@ macro_rules! kinds {
             }
 
             fn json_schema(_: &mut SchemaGenerator) -> Schema {
-                kind($words, $schema)
+                kind($label, $schema)
             }
         }
     )+ };
@@ -36,8 +36,8 @@ macro_rules! kinds {
 kinds! {
     Point, "a point in scene units, three numbers", list(3, number(COORDINATES));
     Vector, "a direction, three numbers that are not all 0", direction();
-    Points3, "three points in scene units", of_lists(3, list(3, number(COORDINATES)));
-    Points4, "four points in scene units", of_lists(4, list(3, number(COORDINATES)));
+    Points3, "three points in scene units", list(3, list(3, number(COORDINATES)));
+    Points4, "four points in scene units", list(4, list(3, number(COORDINATES)));
     Length, "a length in scene units", number(LENGTHS);
     Size, "two lengths in scene units", list(2, number(LENGTHS));
     Rgb, "linear red, green and blue", list(3, number(COLORS));
@@ -46,12 +46,12 @@ kinds! {
     Degrees, "in degrees", number(TURNS);
     Angles, "three angles in degrees", list(3, number(TURNS));
 
-    Pixels, "in pixels", whole(1, MOST);
-    Count, "a whole number", whole(1, MOST);
-    MostSamples, "a whole number", whole(MIN_ADAPTIVE_SAMPLES, MOST);
+    Pixels, "in pixels", integer(1, MOST);
+    Count, "a whole number", integer(1, MOST);
+    MaxSamples, "a whole number", integer(MIN_ADAPTIVE_SAMPLES, MOST);
     Stops, "in stops", number((-ViewSettings::MAX_STOPS, ViewSettings::MAX_STOPS));
-    Depth, "a whole number", whole(0, DEEPEST);
-    Seed, "a whole number", whole(0, u32::MAX);
+    Depth, "a whole number", integer(0, DEEPEST);
+    Seed, "a whole number", integer(0, u32::MAX);
     Clamp, "", number(CLAMPS);
     ShadowEpsilon, "", number(SHADOW_EPSILONS);
     FilterRadius, "in pixels", number(FILTER_RADII);
@@ -74,10 +74,10 @@ kinds! {
 
     UvScale, "two numbers", list(2, scale());
     UvOffset, "two numbers", list(2, number(OFFSETS));
-    LineWidth, "above 0 and below 1", inside(LINE_WIDTHS);
+    LineWidth, "above 0 and below 1", open_range(LINE_WIDTHS);
     Anisotropy, "", number(ANISOTROPIES);
     Factors, "four numbers", list(4, number(FACTORS));
-    UvSet, "a whole number", whole(0, UV_SETS - 1);
+    UvSet, "a whole number", integer(0, UV_SETS - 1);
     Strength, "", number(STRENGTHS);
 
     ConeAngle, "in degrees", number(CONES);
@@ -90,10 +90,10 @@ kinds! {
     Factor, "", scale();
     Factor3, "three numbers", list(3, scale());
     Matrix, "three rows of four numbers", matrix();
-    Place, "a number", whole(0, u32::MAX);
+    ListIndex, "a number", integer(0, u32::MAX);
 }
 
-/// A color or texture with plain components from 0 to 1.
+/// A plain color with components from 0 to 1, or a texture.
 pub(crate) struct ShareColor;
 
 impl JsonSchema for ShareColor {
@@ -108,26 +108,28 @@ impl JsonSchema for ShareColor {
     fn json_schema(generator: &mut SchemaGenerator) -> Schema {
         let mut schema = generator.subschema_for::<crate::ColorDescription>();
         let share = generator.subschema_for::<ShareRgb>().to_value();
-        if let Some(Value::Array(either)) = schema.get_mut("anyOf")
-            && let Some(plain) = either.first_mut()
+        if let Some(Value::Array(alternatives)) = schema.get_mut("anyOf")
+            && let Some(plain) = alternatives.first_mut()
         {
             *plain = share;
         }
-        tell_plain(&mut schema);
+        copy_plain_title(&mut schema);
         schema
     }
 }
 
 /// Copies the title of the plain value to a key that also accepts a texture.
-pub(crate) fn tell_plain(schema: &mut Schema) {
-    let plain = schema.get("anyOf").and_then(|either| either.get(0)?.get("title"));
+pub(crate) fn copy_plain_title(schema: &mut Schema) {
+    let plain = schema
+        .get("anyOf")
+        .and_then(|alternatives| alternatives.get(0)?.get("title"));
     if let Some(title) = plain.and_then(Value::as_str) {
-        let title = title.replacen(SPLIT, &format!(", or a texture{SPLIT}"), 1);
+        let title = title.replacen(TITLE_SEPARATOR, &format!(", or a texture{TITLE_SEPARATOR}"), 1);
         schema.insert("title".to_owned(), Value::String(title));
     }
 }
 
-fn kind(words: &str, schema: Value) -> Schema {
+fn kind(label: &str, schema: Value) -> Schema {
     let mut schema: Schema = schema.try_into().unwrap_or_default();
     let mut inner = schema.as_value();
     while let Some(items) = inner.get("items") {
@@ -135,27 +137,27 @@ fn kind(words: &str, schema: Value) -> Schema {
     }
     let range = range(inner);
     let title = match range {
-        Some(range) => format!("{words}{SPLIT}{range}"),
-        None => words.to_owned(),
+        Some(range) => format!("{label}{TITLE_SEPARATOR}{range}"),
+        None => label.to_owned(),
     };
     schema.insert("title".to_owned(), Value::String(title));
     schema
 }
 
-/// Returns the range of a schema: `1e-9 to 1e9`, or several joined by "or".
+/// Returns the range of a schema, such as `1e-9 to 1e9`; several ranges are joined by "or".
 fn range(schema: &Value) -> Option<String> {
-    if let Some(either) = schema.get("anyOf").and_then(Value::as_array) {
-        let all: Option<Vec<String>> = either.iter().map(range).collect();
+    if let Some(alternatives) = schema.get("anyOf").and_then(Value::as_array) {
+        let all: Option<Vec<String>> = alternatives.iter().map(range).collect();
         return Some(all?.join(" or "));
     }
-    if let Some(only) = schema.get("const") {
-        return Some(only.to_string());
+    if let Some(constant) = schema.get("const") {
+        return Some(constant.to_string());
     }
     let [low, high] = ["minimum", "maximum"].map(|end| schema.get(end).and_then(Value::as_f64));
-    Some(format!("{} to {}", short(low?), short(high?)))
+    Some(format!("{} to {}", short_number(low?), short_number(high?)))
 }
 
-fn short(x: f64) -> String {
+fn short_number(x: f64) -> String {
     if x == 0.0 || (1e-4..1e6).contains(&x.abs()) || x == f64::from(u32::MAX) {
         x.to_string()
     } else {
@@ -167,20 +169,16 @@ fn number((low, high): (f64, f64)) -> Value {
     json!({ "type": "number", "minimum": low, "maximum": high })
 }
 
-fn inside((low, high): (f64, f64)) -> Value {
+fn open_range((low, high): (f64, f64)) -> Value {
     json!({ "type": "number", "exclusiveMinimum": low, "exclusiveMaximum": high })
 }
 
-fn whole(low: u32, high: u32) -> Value {
+fn integer(low: u32, high: u32) -> Value {
     json!({ "type": "integer", "minimum": low, "maximum": high })
 }
 
 fn list(count: usize, items: Value) -> Value {
     json!({ "type": "array", "items": items, "minItems": count, "maxItems": count })
-}
-
-fn of_lists(count: usize, items: Value) -> Value {
-    list(count, items)
 }
 
 fn direction() -> Value {
@@ -203,7 +201,7 @@ fn scale() -> Value {
     json!({ "type": "number", "anyOf": [{ "minimum": low, "maximum": high }, { "minimum": -high, "maximum": -low }] })
 }
 
-/// A matrix of three rows and an optional fourth.
+/// A matrix of three rows and an optional fourth row.
 fn matrix() -> Value {
     let mut schema = list(3, list(4, number(COORDINATES)));
     schema["maxItems"] = json!(4);

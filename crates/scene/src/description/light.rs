@@ -10,7 +10,7 @@ use super::tagged::{Tagged, tagged};
 use crate::description::kinds::{ConeAngle, InnerAngle, Point, Rgb, Size, Vector};
 
 tagged! {
-    /// `[[lights]]`
+    /// A light, by `type`.
     LightDescription {
         /// An area light.
         "rectangle" => Rectangle(RectangleLightDescription),
@@ -36,7 +36,7 @@ pub struct RectangleLightDescription {
     /// Normal; any length.
     #[schemars(with = "Vector")]
     pub normal: DVec3,
-    /// Direction of the first edge; any length. If absent, x, or y if the normal is nearly along x.
+    /// Direction of the first edge; any length. If absent, the x axis, or the y axis if the normal is nearly along x.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Vector>")]
     pub tangent: Option<DVec3>,
@@ -44,16 +44,16 @@ pub struct RectangleLightDescription {
     #[schemars(with = "Rgb")]
     pub color: DVec3,
     /// Visible to the camera.
-    #[serde(default = "yes")]
+    #[serde(default = "default_true")]
     pub visible: bool,
 }
 
-fn yes() -> bool {
+fn default_true() -> bool {
     true
 }
 
 impl RectangleLightDescription {
-    /// Creates a light. `size` is along tangent and bitangent; `color` is linear RGB.
+    /// Creates a light. `size` contains the lengths along the tangent and the bitangent; `color` is linear RGB.
     pub fn new(
         center: impl Into<DVec3>,
         size: [f64; 2],
@@ -67,7 +67,7 @@ impl RectangleLightDescription {
             normal: normal.into(),
             tangent: Some(tangent.into()),
             color: color.into(),
-            visible: yes(),
+            visible: default_true(),
         }
     }
 }
@@ -107,7 +107,7 @@ pub struct DirectionalLightDescription {
 }
 
 impl DirectionalLightDescription {
-    /// Creates a light. `direction` is that of propagation; `color` is linear RGB.
+    /// Creates a light. `direction` is the direction of propagation; `color` is linear RGB.
     pub fn new(direction: impl Into<DVec3>, color: impl Into<DVec3>) -> Self {
         Self {
             direction: direction.into(),
@@ -144,7 +144,7 @@ pub struct SpotLightDescription {
 }
 
 impl SpotLightDescription {
-    /// Creates a light. `color` is linear RGB; `cone_angle` is between axis and edge, in degrees.
+    /// Creates a light. `color` is linear RGB; `cone_angle` is the angle between axis and edge, in degrees.
     pub fn new(
         position: impl Into<DVec3>,
         look_at: impl Into<DVec3>,

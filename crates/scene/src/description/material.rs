@@ -11,7 +11,7 @@ use super::{ColorDescription, NormalMapDescription, PrincipledDescription, Value
 use crate::description::kinds::{Absorption, Degrees, Etas, Ior, Ks, Metal, Share, ShareColor, Shininess};
 
 tagged! {
-    /// `[materials.NAME]`
+    /// A material, by `type`.
     MaterialDescription {
         /// Phong reflection model.
         "phong" => Phong(PhongDescription),
@@ -57,7 +57,7 @@ impl MaterialDescription {
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PhongDescription {
-    /// Default of the three factors.
+    /// Default of `ambient`, `diffuse` and `specular`.
     pub color: Option<ColorDescription>,
     /// Factor of the ambient light: linear red, green and blue, or a texture. If absent, `color`.
     pub ambient: Option<ColorDescription>,
@@ -173,7 +173,7 @@ impl DiffuseDescription {
 }
 
 /// Defines the description of a microfacet material.
-macro_rules! faceted {
+macro_rules! microfacet_material {
     ($(#[$doc:meta])* $name:ident { $($(#[$field_doc:meta])* $field:ident: $ty:ty,)* }) => {
         $(#[$doc])*
         #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
@@ -187,12 +187,12 @@ macro_rules! faceted {
             #[serde(default)]
             #[schemars(with = "Share")]
             pub anisotropy: f64,
-            /// Rotation of that axis from the direction of u towards that of v, in degrees.
+            /// Rotation of the first axis from the direction of u towards the direction of v, in degrees.
             #[serde(default)]
             #[schemars(with = "Degrees")]
             pub anisotropy_rotation: f64,
-            /// Compensate the energy loss by multiple scattering between microfacets.
-            #[serde(default = "yes")]
+            /// Add the energy of multiple scattering between microfacets, which a single-scattering model loses.
+            #[serde(default = "default_true")]
             pub energy_compensation: bool,
             /// Normal map.
             pub normal_map: Option<NormalMapDescription>,
@@ -204,8 +204,8 @@ macro_rules! faceted {
     };
 }
 
-faceted! {
-    /// Smooth or rough metal. Its reflectance is given by one of `color`, `metal`, and `eta` with `k`.
+microfacet_material! {
+    /// Smooth or rough metal, whose reflectance is given by `color`, by `metal`, or by `eta` and `k`.
     ConductorDescription {
         /// Reflectance; 1 if no key sets it.
         #[schemars(with = "Option<ShareColor>")]
@@ -233,7 +233,7 @@ impl ConductorDescription {
 }
 
 impl Default for ConductorDescription {
-    /// Smooth metal with a reflectance of 1.
+    /// Returns smooth metal with a reflectance of 1.
     fn default() -> Self {
         Self {
             color: None,
@@ -243,7 +243,7 @@ impl Default for ConductorDescription {
             roughness: ValueDescription::default(),
             anisotropy: 0.0,
             anisotropy_rotation: 0.0,
-            energy_compensation: yes(),
+            energy_compensation: default_true(),
             normal_map: None,
             emission: None,
             visible: None,
@@ -251,8 +251,8 @@ impl Default for ConductorDescription {
     }
 }
 
-faceted! {
-    /// Smooth or rough glass or liquid, or a thin sheet of it.
+microfacet_material! {
+    /// Smooth or rough glass or liquid, or a thin sheet.
     DielectricDescription {
         /// Index of refraction.
         #[schemars(with = "Ior")]
@@ -282,7 +282,7 @@ impl DielectricDescription {
             roughness: ValueDescription::default(),
             anisotropy: 0.0,
             anisotropy_rotation: 0.0,
-            energy_compensation: yes(),
+            energy_compensation: default_true(),
             normal_map: None,
             emission: None,
             visible: None,
@@ -290,7 +290,7 @@ impl DielectricDescription {
     }
 }
 
-fn yes() -> bool {
+fn default_true() -> bool {
     true
 }
 

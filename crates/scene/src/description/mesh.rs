@@ -18,7 +18,7 @@ pub struct MeshFileDescription {
     /// The file, relative to the scene file's folder.
     #[schemars(length(min = 1))]
     pub file: String,
-    /// Shading normals. If absent, those of the file, else flat ones.
+    /// Shading normals. If absent, the normals of the file, or else flat normals.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub normals: Option<Normals>,
     /// Up axis of the file.
@@ -37,7 +37,7 @@ impl MeshFileDescription {
     }
 }
 
-/// A mesh.
+/// A mesh file with a material and a placement.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(extend("not" = { "required": ["matrix"], "anyOf": [{ "required": ["scale"] }, { "required": ["rotate"] }, { "required": ["translate"] }] }))]
@@ -45,7 +45,7 @@ pub struct MeshDescription {
     /// The file, relative to the scene file's folder.
     #[schemars(length(min = 1))]
     pub file: String,
-    /// Shading normals. If absent, those of the file, else flat ones.
+    /// Shading normals. If absent, the normals of the file, or else flat normals.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub normals: Option<Normals>,
     /// Up axis of the file.
@@ -54,22 +54,22 @@ pub struct MeshDescription {
     /// Name of the material of all groups that are not in `materials`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub material: Option<String>,
-    /// Names of materials by the names of the file's groups, or of its own materials.
+    /// Names of materials, by the names of groups or materials of the file.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub materials: BTreeMap<String, String>,
     /// Translation, applied last.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Point>", extend("default" = [0, 0, 0]))]
     pub translate: Option<DVec3>,
-    /// Rotation, applied after the scale: three angles about x, y and z, or one about an axis, each from -360 to 360
-    /// degrees. None if absent.
+    /// Rotation, applied after the scale: three angles about x, y and z, or one angle about an axis, each from -360 to
+    /// 360 degrees. None if absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rotate: Option<Rotation>,
-    /// Scale, one or three factors, each from 1e-6 to 1e6 or negative.
+    /// Scale: one factor or three factors, each from 1e-6 to 1e6, or from -1e6 to -1e-6.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("default" = 1))]
     pub scale: Option<Scale>,
-    /// Rows of an affine transform, in place of `scale`, `rotate` and `translate`. None if absent.
+    /// Rows of an affine transform, which replaces `scale`, `rotate` and `translate`. None if absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Matrix>")]
     pub matrix: Option<Vec<[f64; 4]>>,
@@ -102,22 +102,22 @@ pub struct InstanceDescription {
     /// Name of the material of all groups that are not in `materials`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub material: Option<String>,
-    /// Names of materials by the names of the mesh's groups, or of its file's own materials.
+    /// Names of materials, by the names of groups or materials of the mesh file.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub materials: BTreeMap<String, String>,
     /// Translation, applied last.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Point>", extend("default" = [0, 0, 0]))]
     pub translate: Option<DVec3>,
-    /// Rotation, applied after the scale: three angles about x, y and z, or one about an axis, each from -360 to 360
-    /// degrees. None if absent.
+    /// Rotation, applied after the scale: three angles about x, y and z, or one angle about an axis, each from -360 to
+    /// 360 degrees. None if absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rotate: Option<Rotation>,
-    /// Scale, one or three factors, each from 1e-6 to 1e6 or negative.
+    /// Scale: one factor or three factors, each from 1e-6 to 1e6, or from -1e6 to -1e-6.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("default" = 1))]
     pub scale: Option<Scale>,
-    /// Rows of an affine transform, in place of `scale`, `rotate` and `translate`. None if absent.
+    /// Rows of an affine transform, which replaces `scale`, `rotate` and `translate`. None if absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Matrix>")]
     pub matrix: Option<Vec<[f64; 4]>>,
@@ -176,12 +176,12 @@ pub struct RotationAbout {
     /// Axis; any length.
     #[schemars(with = "Vector")]
     pub axis: DVec3,
-    /// The angle.
+    /// Angle in degrees.
     #[schemars(with = "Degrees")]
     pub degrees: f64,
 }
 
-/// Factors of coordinates, not 0.
+/// Factors of the coordinates; none is 0.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(untagged, expecting = "must be a number or a list of 3 numbers")]
 pub enum Scale {

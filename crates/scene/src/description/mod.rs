@@ -1,8 +1,8 @@
-//! Scene files as Rust values, field by field; `docs/scene-format.md` describes every key.
+//! Scene files as Rust values, with a field for each key; `docs/scene-format.md` describes the keys.
 //!
 //! Only types are checked here: [`Description::validate`] creates a [`Scene`](super::Scene). A `Description` is parsed
-//! from a file, or created by [`Description::new`] and the constructors of its parts. The `toml` crate serializes it to
-//! a file that reads back as the same `Description`.
+//! from a file, or created by [`Description::new`] and the constructors of its parts. The `toml` crate serializes a
+//! `Description` to a file that parses to the same `Description`.
 
 mod camera;
 mod camera_path;
@@ -108,13 +108,13 @@ impl Description {
         self
     }
 
-    /// Adds a texture, or replaces the one of this name.
+    /// Adds a texture, or replaces the texture of this name.
     pub fn with_texture(mut self, name: impl Into<String>, texture: impl Into<TextureDescription>) -> Self {
         self.textures.insert(name.into(), texture.into());
         self
     }
 
-    /// Adds a material, or replaces the one of this name.
+    /// Adds a material, or replaces the material of this name.
     pub fn with_material(mut self, name: impl Into<String>, material: impl Into<MaterialDescription>) -> Self {
         self.materials.insert(name.into(), material.into());
         self
@@ -132,7 +132,7 @@ impl Description {
         self
     }
 
-    /// Adds a mesh for instances, or replaces the one of this name.
+    /// Adds a mesh for instances, or replaces the mesh of this name.
     pub fn with_mesh(mut self, name: impl Into<String>, mesh: MeshFileDescription) -> Self {
         self.meshes.insert(name.into(), mesh);
         self
@@ -145,7 +145,7 @@ impl Description {
     }
 
     /// Returns the files of the scene, except images in memory.
-    pub(super) fn files_beside(&self, assets: &Assets) -> impl Iterator<Item = PathBuf> {
+    pub(super) fn files_on_disk(&self, assets: &Assets) -> impl Iterator<Item = PathBuf> {
         let in_memory = |path: &PathBuf| {
             let mut names = assets.images.keys();
             names.any(|name| assets.folder.join(name) == *path)
@@ -165,8 +165,8 @@ impl Description {
             _ => None,
         });
         let meshes = self.meshes.values().map(|mesh| &mesh.file);
-        let around = (self.environment.iter()).filter_map(|environment| environment.file.as_ref());
-        let files: BTreeSet<&String> = images.chain(shapes).chain(meshes).chain(around).collect();
+        let environment_map = (self.environment.iter()).filter_map(|environment| environment.file.as_ref());
+        let files: BTreeSet<&String> = images.chain(shapes).chain(meshes).chain(environment_map).collect();
         files.into_iter().map(move |file| folder.join(file))
     }
 }
@@ -184,7 +184,7 @@ pub struct ImageDescription {
     /// View transform, from linear radiance to display values.
     #[serde(default)]
     pub view_transform: ViewTransform,
-    /// Exposure in stops: radiance is multiplied by 2 to this power before the view transform.
+    /// Exposure in stops: radiance is multiplied by 2 to the power of the exposure before the view transform.
     #[serde(default)]
     #[schemars(with = "Stops")]
     pub exposure: f64,

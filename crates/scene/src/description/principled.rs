@@ -23,24 +23,24 @@ pub struct PrincipledDescription {
     /// Rotation of the tangent, counter-clockwise in degrees.
     #[schemars(with = "Degrees")]
     pub anisotropy_rotation: f64,
-    /// Image of the tangent before that rotation: red and green, mapped to -1 to 1, are its components along u and v.
+    /// Texture of the unrotated tangent: red and green, mapped to -1 to 1, are the components along u and v.
     pub anisotropy_direction: Option<TextureReference>,
     /// Index of refraction of the dielectric.
     #[schemars(with = "PrincipledIor")]
     pub ior: f64,
     /// Factor of the dielectric's reflection, 0 to 1.
     pub specular: ValueDescription,
-    /// Factor of that reflection at normal incidence.
+    /// Color factor of the dielectric's reflection at normal incidence.
     pub specular_color: ColorDescription,
     /// Fraction of the dielectric's light that is transmitted, 0 to 1.
     pub transmission: ValueDescription,
-    /// 0 for a thin sheet; otherwise the surface encloses a volume.
+    /// Thickness: 0 for a thin sheet; otherwise the surface encloses a volume.
     #[schemars(with = "Thickness")]
     pub thickness: f64,
     /// Transmittance of the volume over `attenuation_distance`.
     #[schemars(with = "ShareRgb")]
     pub attenuation_color: DVec3,
-    /// Distance of `attenuation_color`; infinite if absent.
+    /// Distance over which the transmittance is `attenuation_color`; infinite if absent.
     #[schemars(with = "Option<AttenuationDistance>")]
     pub attenuation_distance: Option<f64>,
     /// Weight of the clear coat, 0 to 1.
@@ -58,7 +58,7 @@ pub struct PrincipledDescription {
     pub alpha: ValueDescription,
     /// Effect of `alpha`.
     pub alpha_mode: AlphaMode,
-    /// Minimum alpha of opaque points, under `"mask"`.
+    /// Minimum alpha of opaque points, with `alpha_mode = "mask"`.
     #[schemars(with = "Share")]
     pub alpha_cutoff: f64,
     /// Use of a mesh's vertex colors.
@@ -106,24 +106,24 @@ impl Default for PrincipledDescription {
     }
 }
 
-/// Effect of a material's alpha. In a file the names are in snake case: `"mask"`.
+/// Effect of a material's alpha. In a file, the names are in snake case: `"mask"`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum AlphaMode {
-    /// Ignored: the surface is opaque.
+    /// Alpha is ignored: the surface is opaque.
     #[default]
     Opaque,
     /// Opaque where alpha is at least the cutoff, else fully transparent.
     Mask,
-    /// Opacity: the rest of the light passes straight through.
+    /// Alpha is the opacity: the remaining light passes straight through.
     Blend,
 }
 
-/// Use of a mesh's vertex colors. In a file the names are in snake case: `"base_color"`.
+/// Use of a mesh's vertex colors. In a file, the names are in snake case: `"base_color"`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum VertexColors {
-    /// Ignored.
+    /// Vertex colors are ignored.
     #[default]
     None,
     /// Factors of the base color and of alpha.

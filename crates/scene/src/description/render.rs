@@ -11,17 +11,17 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 
 use super::integrator::Integrator;
-use crate::description::kinds::{Clamp, Count, Depth, FilterRadius, MostSamples, Rgb, Seed, ShadowEpsilon, Share};
+use crate::description::kinds::{Clamp, Count, Depth, FilterRadius, MaxSamples, Rgb, Seed, ShadowEpsilon, Share};
 use crate::limits::MOST;
 
-/// Shadows of glass. In a file the names are in snake case: `"opaque"`.
+/// Shadows of glass. In a file, the names are in snake case: `"opaque"`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Shadows {
     /// Glass casts shadows.
     #[default]
     Opaque,
-    /// Glass casts no shadows: light passes it straight and unattenuated.
+    /// Glass casts no shadows: light passes straight through glass without attenuation.
     Transparent,
 }
 
@@ -29,7 +29,8 @@ pub enum Shadows {
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RenderDescription {
-    /// Light transport algorithm. If absent, `"path"` if the scene uses a key that needs it, else `"phong"`.
+    /// Light transport algorithm. If absent, `"path"` if the scene uses a key that needs `"path"`, else
+    /// `"phong"`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub integrator: Option<Integrator>,
     /// Ambient light.
@@ -38,12 +39,12 @@ pub struct RenderDescription {
     /// Radiance of rays that leave the scene.
     #[schemars(with = "Rgb")]
     pub background: DVec3,
-    /// Minimum offset of ray origins above a surface, relative to the largest coordinate there.
+    /// Minimum offset of ray origins above a surface, relative to the largest coordinate of the origin.
     #[schemars(with = "ShadowEpsilon")]
     pub shadow_epsilon: f64,
     /// Shadows of glass.
     pub shadows: Shadows,
-    /// Maximum number of bounces of a path; under `"phong"`, by mirrors and glass.
+    /// Maximum number of bounces of a path; `"phong"` counts only bounces at mirrors and glass.
     #[schemars(with = "Depth")]
     pub max_depth: u32,
     /// First bounce with Russian roulette, for `integrator = "path"`; 5 if absent.
@@ -68,7 +69,7 @@ pub struct RenderDescription {
     pub light_samples: SamplesDescription,
     /// Reconstruction filter.
     pub filter: PixelFilterDescription,
-    /// Adaptive sampling: further samples where they are needed.
+    /// Adaptive sampling: further samples for pixels with a large error.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub adaptive: Option<AdaptiveDescription>,
 }
@@ -102,7 +103,7 @@ impl Default for RenderDescription {
     }
 }
 
-/// A number of samples and their pattern; in a scene file a table, or the number alone.
+/// A number of samples and their pattern; in a scene file, a table or only the number.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SamplesDescription {
     /// Pattern. If absent, `"sobol"` under `integrator = "path"`, else `"grid"`.
@@ -169,18 +170,18 @@ impl JsonSchema for SamplesDescription {
 }
 
 impl SamplesDescription {
-    /// Creates this number of samples in the default pattern of the integrator.
+    /// Creates a number of samples in the default pattern of the integrator.
     pub fn new(count: u32) -> Self {
         Self { pattern: None, count }
     }
 
-    /// Returns the pattern: its own, else `"sobol"` under `"path"` and `"grid"` under `"phong"`.
+    /// Returns the pattern; if it is absent, `"sobol"` under `"path"` and `"grid"` under `"phong"`.
     pub fn pattern(&self, integrator: Integrator) -> Pattern {
         self.pattern.unwrap_or(integrator.pattern())
     }
 }
 
-/// Layout of samples in the unit square. In a file the names are in snake case: `"grid"`.
+/// Layout of samples in the unit square. In a file, the names are in snake case: `"grid"`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Pattern {
@@ -227,7 +228,7 @@ impl Pattern {
         matches!(self, Pattern::Grid | Pattern::RotatedGrid | Pattern::Jittered)
     }
 
-    /// Returns true if the pattern can be extended beyond its count, as adaptive sampling requires.
+    /// Returns true if samples can be added to the pattern, as adaptive sampling requires.
     pub const fn is_extensible(self) -> bool {
         !matches!(self, Pattern::Grid | Pattern::RotatedGrid)
     }
@@ -240,9 +241,9 @@ pub struct AdaptiveDescription {
     /// Target standard error of a pixel's displayed value.
     #[schemars(with = "Share")]
     pub error: f64,
-    /// Maximum number of samples per pixel. If absent, 16 times the count.
+    /// Maximum number of samples per pixel. If absent, 16 times the count of `pixel_samples`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schemars(with = "Option<MostSamples>")]
+    #[schemars(with = "Option<MaxSamples>")]
     pub max_samples: Option<u32>,
 }
 
@@ -260,7 +261,7 @@ pub struct PixelFilterDescription {
     pub radius: Option<f64>,
 }
 
-/// Shape of a separable reconstruction filter. In a file the names are in snake case: `"blackman_harris"`.
+/// Shape of a separable reconstruction filter. In a file, the names are in snake case: `"blackman_harris"`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum PixelFilterKind {

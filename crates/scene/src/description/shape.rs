@@ -12,7 +12,7 @@ use super::tagged::{Tagged, tagged};
 use crate::description::kinds::{Length, Point, Points3, Points4, Size, Vector};
 
 tagged! {
-    /// `[[shapes]]`
+    /// A shape, by `type`.
     ShapeDescription {
         /// A rectangle.
         "rectangle" => Rectangle(RectangleDescription),
@@ -52,14 +52,14 @@ pub struct RectangleDescription {
     /// Normal; any length.
     #[schemars(with = "Vector")]
     pub normal: DVec3,
-    /// Direction of the first edge; any length. If absent, x, or y if the normal is nearly along x.
+    /// Direction of the first edge; any length. If absent, the x axis, or the y axis if the normal is nearly along x.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Vector>")]
     pub tangent: Option<DVec3>,
 }
 
 impl RectangleDescription {
-    /// Creates a rectangle. `size` is along tangent and bitangent.
+    /// Creates a rectangle. `size` contains the lengths along the tangent and the bitangent.
     pub fn new(
         material: impl Into<String>,
         center: impl Into<DVec3>,
@@ -92,7 +92,8 @@ pub struct DiskDescription {
     /// Normal; any length.
     #[schemars(with = "Vector")]
     pub normal: DVec3,
-    /// Direction of the texture coordinate u; any length. If absent, x, or y if the normal is nearly along x.
+    /// Direction of the texture coordinate u; any length. If absent, the x axis, or the y axis if the normal is
+    /// nearly along x.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Vector>")]
     pub tangent: Option<DVec3>,
@@ -184,14 +185,14 @@ pub struct CylinderDescription {
     /// Center of the cap where the texture coordinate v is 0.
     #[schemars(with = "Point")]
     pub start: DVec3,
-    /// Center of the cap where v is 1.
+    /// Center of the cap where the texture coordinate v is 1.
     #[schemars(with = "Point")]
     pub end: DVec3,
     /// Radius.
     #[schemars(with = "Length")]
     pub radius: f64,
-    /// Direction from the axis where the texture coordinate u is 0; any length. If absent, x, or y if the axis is
-    /// nearly along x.
+    /// Direction from the axis where the texture coordinate u is 0; any length. If absent, the x axis, or the y
+    /// axis if the cylinder is nearly along x.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Vector>")]
     pub tangent: Option<DVec3>,
@@ -264,7 +265,8 @@ pub struct PlaneDescription {
     /// Normal; any length.
     #[schemars(with = "Vector")]
     pub normal: DVec3,
-    /// Direction of the texture coordinate u; any length. If absent, x, or y if the normal is nearly along x.
+    /// Direction of the texture coordinate u; any length. If absent, the x axis, or the y axis if the normal is
+    /// nearly along x.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Vector>")]
     pub tangent: Option<DVec3>,

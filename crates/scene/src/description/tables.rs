@@ -1,4 +1,5 @@
-//! Deserializer of descriptions from tables of a scene file. Unlike serde's, it accepts no list of values as a table.
+//! Deserializer of descriptions from tables of a scene file. Unlike serde's deserializer, it does not accept a list of
+//! values instead of a table.
 
 use serde::de::value::{MapDeserializer, SeqDeserializer};
 use serde::de::{DeserializeOwned, Deserializer, Error as _, IntoDeserializer, Unexpected, Visitor};
@@ -41,7 +42,7 @@ impl<'de> Deserializer<'de> for ValueReader {
                 let pairs = table.into_iter().map(|(key, value)| (key, ValueReader(value)));
                 visitor.visit_map(MapDeserializer::new(pairs))
             }
-            // `Value::deserialize_any` would generate the derived code of tables and lists again.
+            // `Value::deserialize_any` would generate the derived code of tables and lists a second time.
             Value::Boolean(value) => visitor.visit_bool(value),
             Value::Integer(value) => visitor.visit_i64(value),
             Value::Float(value) => visitor.visit_f64(value),

@@ -9,7 +9,8 @@ pub(crate) trait Tagged: Sized {
     /// The values of `type`.
     const TYPES: &'static [&'static str];
 
-    /// Reads a table without its `type`, which is `tag`. Returns `None` for an unknown type.
+    /// Reads a table whose key `type` has the value `tag`; `body` contains the other keys. Returns `None` if the type
+    /// is unknown.
     fn read(tag: &str, body: Table) -> Option<Result<Self, ReadError>>;
 }
 
@@ -21,7 +22,7 @@ macro_rules! tagged {
         $(#[$doc])*
         #[derive(Clone, Debug, PartialEq, Serialize)]
         #[serde(tag = "type")]
-                #[allow(clippy::large_enum_variant, reason = "a scene has few of them")]
+        #[allow(clippy::large_enum_variant, reason = "a scene has few values of this type")]
         pub enum $name {
             $($(#[doc = $variant_doc])* #[serde(rename = $tag)] $variant($body),)+
         }

@@ -3,15 +3,15 @@
 use schemars::{Schema, SchemaGenerator};
 use serde_json::{Map, Value, json};
 
-/// Returns the schema of a table whose key `type` selects one of several types. Each has a tag, a description and a
-/// schema, which becomes a definition named after `shape`.
-pub(crate) fn tagged(generator: &mut SchemaGenerator, shape: &str, types: Vec<(&str, &str, Schema)>) -> Schema {
+/// Returns the schema of a table whose key `type` selects one of several types. Each type has a tag, a description and
+/// a schema, which becomes a definition named after `section`.
+pub(crate) fn tagged(generator: &mut SchemaGenerator, section: &str, types: Vec<(&str, &str, Schema)>) -> Schema {
     let tags: Vec<&str> = types.iter().map(|(tag, ..)| *tag).collect();
     let descriptions: Vec<&str> = types.iter().map(|(_, description, _)| description.trim()).collect();
     let key = json!({ "description": "The type.", "type": "string", "enum": tags, "enumDescriptions": descriptions });
-    // A condition for each type, so that an error is reported at its key. Some editors ignore conditions for
-    // completion: `anyOf` is for them.
-    let mut all = vec![json!({})];
+    // A condition for each type, so that an error is reported at the invalid key. `anyOf` is for the completion of
+    // editors that ignore conditions.
+    let mut alternatives = vec![json!({})];
     let mut conditions = Vec::new();
     for (tag, description, schema) in types {
         let mut schema = schema.to_value();
@@ -20,17 +20,17 @@ pub(crate) fn tagged(generator: &mut SchemaGenerator, shape: &str, types: Vec<(&
             "type".to_owned(),
             json!({ "description": description.trim(), "const": tag }),
         );
-        if let Some(Value::Object(own)) = schema.get_mut("properties") {
-            properties.append(own);
+        if let Some(Value::Object(body_properties)) = schema.get_mut("properties") {
+            properties.append(body_properties);
         }
         schema["properties"] = Value::Object(properties);
-        let name = definition(shape, tag);
+        let name = definition(section, tag);
         let reference = json!({ "$ref": format!("#/$defs/{name}") });
         conditions.push(json!({
             "if": { "properties": { "type": { "const": tag } }, "required": ["type"] },
             "then": reference.clone(),
         }));
-        all.push(reference);
+        alternatives.push(reference);
         generator.definitions_mut().insert(name, schema);
     }
     let schema = json!({
@@ -38,12 +38,13 @@ pub(crate) fn tagged(generator: &mut SchemaGenerator, shape: &str, types: Vec<(&
         "properties": { "type": key },
         "required": ["type"],
         "allOf": conditions,
-        "anyOf": all,
+        "anyOf": alternatives,
     });
     schema.try_into().unwrap_or_default()
 }
 
-/// Returns the name of the definition of a type: `camera-perspective`.
-pub(crate) fn definition(shape: &str, tag: &str) -> String {
-    format!("{}-{tag}", shape.trim_end_matches("Description").to_lowercase())
+/// Returns the name of the definition of a type: `camera-perspective`. `section` is a section or the Rust type of a
+/// section.
+pub(crate) fn definition(section: &str, tag: &str) -> String {
+    format!("{}-{tag}", section.trim_end_matches("Description").to_lowercase())
 }

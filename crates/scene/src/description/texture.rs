@@ -12,14 +12,14 @@ use toml::Table;
 use super::tables::ReadError;
 use super::tagged::{Tagged, tagged};
 use crate::description::kinds::{
-    Anisotropy, Degrees, Factors, LineWidth, Rgb, Share, Strength, UvOffset, UvScale, UvSet, tell_plain,
+    Anisotropy, Degrees, Factors, LineWidth, Rgb, Share, Strength, UvOffset, UvScale, UvSet, copy_plain_title,
 };
 use crate::{Channel, Encoding, TextureFilter, Wrap};
 
 /// A color of a material: `[r, g, b]` or `{ texture = "NAME" }`.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 #[serde(untagged)]
-#[schemars(transform = tell_plain)]
+#[schemars(transform = copy_plain_title)]
 pub enum ColorDescription {
     /// Linear RGB.
     Plain(#[schemars(with = "Rgb")] DVec3),
@@ -34,7 +34,7 @@ impl Default for ColorDescription {
 }
 
 impl From<[f64; 3]> for ColorDescription {
-    /// Linear RGB.
+    /// Converts linear RGB.
     fn from(color: [f64; 3]) -> Self {
         Self::Plain(color.into())
     }
@@ -83,7 +83,7 @@ pub enum ValueDescription {
 }
 
 impl Default for ValueDescription {
-    /// 0.
+    /// Returns the constant 0.
     fn default() -> Self {
         Self::Plain(0.0)
     }
@@ -110,7 +110,7 @@ impl ValueDescription {
     }
 }
 
-// Not derived, like that of colors.
+// Not derived, for the same reason as `ColorDescription`.
 impl<'de> Deserialize<'de> for ValueDescription {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         struct ValueVisitor;
@@ -178,13 +178,13 @@ pub struct NormalMapDescription {
 }
 
 tagged! {
-    /// `[textures.NAME]`
+    /// A texture, by `type`.
     TextureDescription {
         /// One color.
         "constant" => Constant(ConstantDescription),
         /// Squares of two colors.
         "checker" => Checker(CheckerDescription),
-        /// Lines.
+        /// Grid lines.
         "grid" => Lines(LinesDescription),
         /// An image file.
         "image" => Image(ImageTextureDescription),
@@ -214,7 +214,7 @@ pub struct CheckerDescription {
     /// Color of the square from (0, 0) to (1, 1); linear RGB.
     #[schemars(with = "Rgb")]
     pub even: DVec3,
-    /// Color of its neighbors.
+    /// Color of the neighboring squares; linear RGB.
     #[schemars(with = "Rgb")]
     pub odd: DVec3,
     /// Factors of u and v.
@@ -251,10 +251,10 @@ pub struct LinesDescription {
     /// Color between the lines; linear RGB.
     #[schemars(with = "Rgb")]
     pub cell: DVec3,
-    /// Color of the lines.
+    /// Color of the lines; linear RGB.
     #[schemars(with = "Rgb")]
     pub line: DVec3,
-    /// Width of the lines, relative to the cells with their lines.
+    /// Width of the lines, relative to the distance between lines.
     #[schemars(with = "LineWidth")]
     pub line_width: f64,
     /// Factors of u and v.
@@ -292,9 +292,9 @@ pub struct ImageTextureDescription {
     /// Path, relative to the scene file.
     #[schemars(length(min = 1))]
     pub file: String,
-    /// Encoding of the values. If absent, sRGB, but linear for EXR and HDR files.
+    /// Encoding of the values. If absent, linear for EXR and HDR files, and sRGB for other files.
     pub encoding: Option<Encoding>,
-    /// Addressing beyond the edges.
+    /// Addressing beyond the edges of the image.
     #[serde(default)]
     pub wrap: WrapDescription,
     /// Filter.
@@ -344,13 +344,13 @@ impl ImageTextureDescription {
     }
 }
 
-/// Texture addressing beyond the edges: `"repeat"`, or `["repeat", "clamp"]` along u and v.
+/// Texture addressing beyond the edges of the image: `"repeat"`, or `["repeat", "clamp"]` along u and v.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(untagged)]
 pub enum WrapDescription {
-    /// The same along u and v.
+    /// The same addressing along u and v.
     Both(Wrap),
-    /// Along u and along v.
+    /// The addressing along u, and the addressing along v.
     Each([Wrap; 2]),
 }
 
@@ -376,7 +376,7 @@ impl WrapDescription {
     }
 }
 
-// Not derived, like that of colors.
+// Not derived, for the same reason as `ColorDescription`.
 impl<'de> Deserialize<'de> for WrapDescription {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         struct WrapVisitor;

@@ -6,13 +6,16 @@ use crate::{Camera, CameraDescription, Projection};
 /// Returns the image position of a point, from -1 (left and lower edges) to 1.
 fn image_position(camera: &Camera, aspect: f64, point: DVec3) -> [f64; 2] {
     let Projection::Perspective { fov } = camera.projection else {
-        panic!("a perspective camera")
+        panic!("the camera is not perspective")
     };
-    let to = point - camera.position;
-    let ahead = to.dot(camera.forward);
+    let offset = point - camera.position;
+    let ahead = offset.dot(camera.forward);
     assert!(ahead > 0.0, "{point} is behind the camera");
-    let high = ahead * (fov / 2.0).tan();
-    [to.dot(camera.right) / (high * aspect), to.dot(camera.up) / high]
+    let half_height = ahead * (fov / 2.0).tan();
+    [
+        offset.dot(camera.right) / (half_height * aspect),
+        offset.dot(camera.up) / half_height,
+    ]
 }
 
 fn camera(points: &[DVec3], framing: Framing) -> Camera {
@@ -23,8 +26,8 @@ fn camera(points: &[DVec3], framing: Framing) -> Camera {
         .unwrap_or_else(|problem| panic!("{problem}: {text}"))
 }
 
-fn corners(low: [f64; 3], top: [f64; 3]) -> Vec<DVec3> {
-    let side = |i: usize, axis: usize| if i >> axis & 1 == 0 { low[axis] } else { top[axis] };
+fn corners(low: [f64; 3], high: [f64; 3]) -> Vec<DVec3> {
+    let side = |i: usize, axis: usize| if i >> axis & 1 == 0 { low[axis] } else { high[axis] };
     (0..8).map(|i| DVec3::new(side(i, 0), side(i, 1), side(i, 2))).collect()
 }
 
@@ -45,10 +48,10 @@ fn clouds() -> Vec<Vec<DVec3>> {
         ],
         (0..500)
             .map(|i| {
-                let turn = f64::from(i) * 2.4;
+                let angle = f64::from(i) * 2.4;
                 DVec3::new(
-                    turn.cos() * f64::from(i),
-                    turn.sin() * f64::from(i),
+                    angle.cos() * f64::from(i),
+                    angle.sin() * f64::from(i),
                     f64::from(i % 7) * 30.0,
                 )
             })
@@ -73,34 +76,34 @@ fn all_points_are_in_the_image_and_fill_it() {
             for aspect in ASPECTS {
                 let framing = Framing::new(view, aspect);
                 let camera = camera(&points, framing);
-                let (mut most, mut ends) = (0.0_f64, [[f64::INFINITY, f64::NEG_INFINITY]; 2]);
+                let (mut max_position, mut ends) = (0.0_f64, [[f64::INFINITY, f64::NEG_INFINITY]; 2]);
                 for point in &points {
-                    let at = image_position(&camera, aspect, *point);
+                    let position = image_position(&camera, aspect, *point);
                     assert!(
-                        at.iter().all(|x| x.abs() <= INSIDE + 1e-6),
-                        "{framing:?}: {point} at {at:?}"
+                        position.iter().all(|x| x.abs() <= FILL + 1e-6),
+                        "{framing:?}: {point} at {position:?}"
                     );
-                    most = most.max(at[0].abs()).max(at[1].abs());
-                    for (ends, x) in ends.iter_mut().zip(at) {
+                    max_position = max_position.max(position[0].abs()).max(position[1].abs());
+                    for (ends, x) in ends.iter_mut().zip(position) {
                         *ends = [ends[0].min(x), ends[1].max(x)];
                     }
                 }
-                // In an image of 2000 x 2000 pixels, a pixel is 1e-3 of half the side.
-                let [x, y] = ends.map(|[low, top]| (low + top).abs());
-                assert!(x.max(y) < 1e-6, "{framing:?}: off centre by {x}, {y}");
-                // The points reach the margins, unless the camera would be too near.
+                // In an image of 2000 x 2000 pixels, the side of a pixel is 1e-3.
+                let [x, y] = ends.map(|[low, high]| (low + high).abs());
+                assert!(x.max(y) < 1e-6, "{framing:?}: off center by {x}, {y}");
+                // The points reach the margins, unless the camera would be too close.
                 let size = (0..3).map(|i| {
-                    let along = || points.iter().map(|p| p[i]);
-                    along().fold(f64::MIN, f64::max) - along().fold(f64::MAX, f64::min)
+                    let coordinates = || points.iter().map(|p| p[i]);
+                    coordinates().fold(f64::MIN, f64::max) - coordinates().fold(f64::MAX, f64::min)
                 });
                 let size = size.map(|side| side * side).sum::<f64>().sqrt();
                 let depths = || points.iter().map(|p| (*p - camera.position).dot(camera.forward));
                 let (nearest, farthest) = (depths().fold(f64::MAX, f64::min), depths().fold(0.0, f64::max));
-                let near = if size > 0.0 { NEAREST * size } else { 1.0 };
-                if nearest > near * (1.0 + 1e-9) {
-                    assert!((most - INSIDE).abs() < 1e-6, "{framing:?}: {most}");
+                let min_distance = if size > 0.0 { MIN_DISTANCE * size } else { 1.0 };
+                if nearest > min_distance * (1.0 + 1e-9) {
+                    assert!((max_position - FILL).abs() < 1e-6, "{framing:?}: {max_position}");
                 } else {
-                    assert!(nearest > near * (1.0 - 1e-6), "{framing:?}: {nearest}");
+                    assert!(nearest > min_distance * (1.0 - 1e-6), "{framing:?}: {nearest}");
                     assert!(
                         farthest - nearest >= 0.8 * size,
                         "the camera is at its minimum distance although the scene is not elongated along the view \
@@ -121,23 +124,26 @@ fn rotating_scenes_stay_in_the_image() {
                     turns: true,
                     ..Framing::new(view, aspect)
                 };
-                let still = camera(&points, framing);
+                let camera_at_start = camera(&points, framing);
                 let (_, up) = view.direction();
-                let mut most = 0.0_f64;
+                let mut max_position = 0.0_f64;
                 for turn in 0..72 {
-                    let turned = glam::DQuat::from_axis_angle(up, f64::from(turn).to_radians() * 5.0);
+                    let rotation = glam::DQuat::from_axis_angle(up, f64::from(turn).to_radians() * 5.0);
                     for point in &points {
                         // Rotates the points instead of the camera.
-                        let point = still.look_at + turned * (*point - still.look_at);
-                        let at = image_position(&still, aspect, point);
+                        let point = camera_at_start.look_at + rotation * (*point - camera_at_start.look_at);
+                        let position = image_position(&camera_at_start, aspect, point);
                         assert!(
-                            at.iter().all(|x| x.abs() <= INSIDE + 1e-6),
-                            "{framing:?}: {point} at {at:?}"
+                            position.iter().all(|x| x.abs() <= FILL + 1e-6),
+                            "{framing:?}: {point} at {position:?}"
                         );
-                        most = most.max(at[0].abs()).max(at[1].abs());
+                        max_position = max_position.max(position[0].abs()).max(position[1].abs());
                     }
                 }
-                assert!(most > 0.85 || points.len() == 1 || !(most > 0.5), "{framing:?}: {most}");
+                assert!(
+                    max_position > 0.85 || points.len() == 1 || !(max_position > 0.5),
+                    "{framing:?}: {max_position}"
+                );
             }
         }
     }
@@ -146,7 +152,7 @@ fn rotating_scenes_stay_in_the_image() {
 #[test]
 fn views_look_at_the_side_that_they_are_named_after() {
     let points = corners([0.0; 3], [1.0; 3]);
-    let at = |view: View| camera(&points, Framing::new(view, 1.0));
+    let camera_of = |view: View| camera(&points, Framing::new(view, 1.0));
     for (view, forward, right) in [
         (View::Front, DVec3::Y, DVec3::X),
         (View::Back, DVec3::NEG_Y, DVec3::NEG_X),
@@ -155,19 +161,19 @@ fn views_look_at_the_side_that_they_are_named_after() {
         (View::Top, DVec3::NEG_Z, DVec3::X),
         (View::Bottom, DVec3::Z, DVec3::X),
     ] {
-        let camera = at(view);
+        let camera = camera_of(view);
         assert!((camera.forward - forward).length() < 1e-12, "{view:?}: {camera:?}");
         assert!((camera.right - right).length() < 1e-12, "{view:?}: {camera:?}");
     }
     for view in [View::Corner, View::Iso] {
-        let towards = -at(view).forward;
+        let towards = -camera_of(view).forward;
         assert!(
             towards.x > 0.0 && towards.y < 0.0 && towards.z > 0.0,
             "{view:?}: {towards}"
         );
-        assert!(at(view).up.z > 0.0);
+        assert!(camera_of(view).up.z > 0.0);
     }
-    assert!((DVec3::new(1.0, -1.0, 1.0).normalize() + at(View::Iso).forward).length() < 1e-12);
+    assert!((DVec3::new(1.0, -1.0, 1.0).normalize() + camera_of(View::Iso).forward).length() < 1e-12);
 }
 
 #[test]
@@ -177,8 +183,8 @@ fn the_margins_of_a_leaning_triangle_are_equal() {
     let points: Vec<DVec3> = points.chain([DVec3::new(0.0, -1.0, 3.0)]).collect();
     for aspect in [0.25, 4.0] {
         let camera = camera(&points, Framing::new(View::Front, aspect));
-        // The lower end is at depth D + 1 and the upper at D, for a camera at height h: -(0 - h) / (D + 1) = (3 - h) /
-        // D.
+        // The lower end is at depth D + 1, and the upper end is at depth D. For a camera at height h,
+        // -(0 - h) / (D + 1) = (3 - h) / D.
         let near = -1.0 - camera.position.y;
         let height = 3.0 * (near + 1.0) / (2.0 * near + 1.0);
         assert!(
@@ -202,18 +208,18 @@ fn a_turning_model_keeps_equal_margins() {
                 turns: true,
                 ..Framing::new(view, aspect)
             };
-            let still = camera(&points, framing);
-            let middle = still.look_at;
+            let camera_at_start = camera(&points, framing);
+            let center = camera_at_start.look_at;
             let mut ends = [f64::INFINITY, f64::NEG_INFINITY];
             for turn in 0..3600 {
-                let turned = glam::DQuat::from_rotation_z(f64::from(turn).to_radians() / 10.0);
+                let rotation = glam::DQuat::from_rotation_z(f64::from(turn).to_radians() / 10.0);
                 for point in &points {
-                    let [_, y] = image_position(&still, aspect, middle + turned * (*point - middle));
+                    let [_, y] = image_position(&camera_at_start, aspect, center + rotation * (*point - center));
                     ends = [ends[0].min(y), ends[1].max(y)];
                 }
             }
-            let off = (ends[0] + ends[1]).abs();
-            assert!(off < 1e-4, "{framing:?}: {ends:?}");
+            let difference = (ends[0] + ends[1]).abs();
+            assert!(difference < 1e-4, "{framing:?}: {ends:?}");
         }
     }
 }
@@ -221,7 +227,7 @@ fn a_turning_model_keeps_equal_margins() {
 #[test]
 fn an_orbit_is_a_direction_in_degrees() {
     let points = corners([0.0; 3], [1.0; 3]);
-    let from = |azimuth, elevation| {
+    let orbit_camera = |azimuth, elevation| {
         let framing = Framing {
             orbit: Some(Orbit { azimuth, elevation }),
             ..Framing::new(View::Back, 1.0)
@@ -238,21 +244,27 @@ fn an_orbit_is_a_direction_in_degrees() {
         (View::Bottom, 0.0, -90.0),
         (View::Iso, 45.0, 35.264_389_682_754_654),
     ] {
-        let (orbit, known) = (from(azimuth, elevation), camera(&points, Framing::new(view, 1.0)));
-        assert!(
-            orbit.position.distance(known.position) < 1e-9,
-            "{view:?}: {orbit:?}, {known:?}"
+        let (orbit, named_view) = (
+            orbit_camera(azimuth, elevation),
+            camera(&points, Framing::new(view, 1.0)),
         );
-        assert!(orbit.up.distance(known.up) < 1e-9, "{view:?}: {orbit:?}, {known:?}");
+        assert!(
+            orbit.position.distance(named_view.position) < 1e-9,
+            "{view:?}: {orbit:?}, {named_view:?}"
+        );
+        assert!(
+            orbit.up.distance(named_view.up) < 1e-9,
+            "{view:?}: {orbit:?}, {named_view:?}"
+        );
     }
     for elevation in [-89.95, -89.0, 89.0, 89.95, 90.0] {
         for azimuth in [-360.0, -45.0, 33.0, 270.0] {
-            from(azimuth, elevation);
+            orbit_camera(azimuth, elevation);
         }
     }
-    let read = |text: &str| text.parse::<Orbit>();
+    let parse = |text: &str| text.parse::<Orbit>();
     assert_eq!(
-        read("30,-15").unwrap(),
+        parse("30,-15").unwrap(),
         Orbit {
             azimuth: 30.0,
             elevation: -15.0
@@ -266,12 +278,12 @@ fn an_orbit_is_a_direction_in_degrees() {
         ("361,0", "the azimuth, 361, must be from -360 to 360"),
         ("0,91", "the elevation, 91, must be from -90 to 90"),
     ] {
-        assert_eq!(read(text).unwrap_err(), rule, "{text}");
+        assert_eq!(parse(text).unwrap_err(), rule, "{text}");
     }
 }
 
 #[test]
-fn a_field_of_view_is_kept() {
+fn a_requested_field_of_view_is_used() {
     let points = corners([-1.0; 3], [1.0; 3]);
     for (fov, aspect) in [(1.0, 1.0), (60.0, 1.0), (60.0, 4.0), (170.0, 0.5)] {
         let framing = Framing {
@@ -280,15 +292,15 @@ fn a_field_of_view_is_kept() {
         };
         let camera = camera(&points, framing);
         let Projection::Perspective { fov: found } = camera.projection else {
-            panic!("a perspective camera")
+            panic!("the camera is not perspective")
         };
         assert!((found.to_degrees() - fov).abs() < 1e-9, "{found}");
-        let inside = |p: &DVec3| {
+        let is_inside = |p: &DVec3| {
             image_position(&camera, aspect, *p)
                 .iter()
-                .all(|x| x.abs() <= INSIDE + 1e-6)
+                .all(|x| x.abs() <= FILL + 1e-6)
         };
-        assert!(points.iter().all(inside), "{fov}");
+        assert!(points.iter().all(is_inside), "{fov}");
     }
 }
 

@@ -8,14 +8,14 @@ use super::budget::Resource;
 use super::document::Document;
 use super::error::{GltfError, GltfFault};
 use super::extension;
-use super::json::missing;
+use super::json::out_of_range;
 
 /// Maximum element count of an accessor without a buffer view.
 const MAX_ZEROS: u64 = 1 << 22;
 /// Maximum decoded size of an accessor without a buffer view, in bytes.
 const MAX_ZEROS_BYTES: u64 = 64 << 20;
-/// Bytes charged per read in addition to the data; limits the number of small reads.
-const BESIDE: u64 = 64;
+/// Bytes charged per read in addition to the data, which limits the number of small reads.
+const READ_OVERHEAD: u64 = 64;
 
 /// Element type and memory layout of an accessor.
 #[derive(Clone, Copy)]
@@ -49,7 +49,7 @@ impl Layout {
     }
 
     /// Column stride in bytes; columns are aligned to 4 bytes (section 3.6.2.4).
-    fn column(self) -> usize {
+    fn column_stride(self) -> usize {
         let bytes = self.rows * self.component.size();
         if self.columns == 1 {
             bytes
@@ -60,15 +60,15 @@ impl Layout {
 
     /// Packed element stride in bytes.
     fn size(self) -> usize {
-        self.column() * self.columns
+        self.column_stride() * self.columns
     }
 
     /// Element size without trailing padding, in bytes.
-    fn used(self) -> usize {
-        self.column() * (self.columns - 1) + self.rows * self.component.size()
+    fn unpadded_size(self) -> usize {
+        self.column_stride() * (self.columns - 1) + self.rows * self.component.size()
     }
 
-    fn count(self) -> usize {
+    fn component_count(self) -> usize {
         self.rows * self.columns
     }
 }
@@ -81,10 +81,10 @@ struct Elements<'a> {
 }
 
 impl Elements<'_> {
-    /// Checks that `count` elements are within `bytes`. Error messages contain `place`.
+    /// Checks that `count` elements are within `bytes`. `view` is the name of `bytes` in errors.
     fn in_bytes<'a>(
         key: &str,
-        (bytes, place): (&'a [u8], &str),
+        (bytes, view): (&'a [u8], &str),
         offset: u64,
         count: u64,
         stride: Option<usize>,
@@ -92,20 +92,20 @@ impl Elements<'_> {
     ) -> Result<Elements<'a>, GltfFault> {
         let size = layout.size();
         let stride = stride.unwrap_or(size);
-        if stride < layout.used() {
-            let rule = format!("the stride of {stride} bytes must be at least the {size} of an element");
+        if stride < layout.unpadded_size() {
+            let rule = format!("the stride of {stride} bytes must be at least {size}, the size of an element");
             return Err(GltfFault::key(key, rule));
         }
         let last = count.saturating_sub(1);
         let needed = (stride as u64).checked_mul(last);
-        let needed = needed.and_then(|bytes| bytes.checked_add(layout.used() as u64));
+        let needed = needed.and_then(|bytes| bytes.checked_add(layout.unpadded_size() as u64));
         let end = needed.and_then(|bytes| bytes.checked_add(offset));
-        let has = bytes.len() as u64;
-        if count > 0 && end.is_none_or(|end| end > has) || offset > has {
+        let available = bytes.len() as u64;
+        if count > 0 && end.is_none_or(|end| end > available) || offset > available {
             return Err(GltfFault::key(
                 key,
                 format!(
-                    "{count} elements of {size} bytes, {stride} apart, from byte {offset} on; {place} has {has} bytes"
+                    "count {count}, element size {size}, stride {stride} and offset {offset} exceed the {available} bytes of {view}"
                 ),
             ));
         }
@@ -146,23 +146,24 @@ impl Elements<'_> {
         }
     }
 
-    fn gather<const N: usize, const S: usize>(&self, number: impl Fn([u8; S]) -> f32) -> Vec<[f32; N]> {
-        let column = self.layout.column();
-        let offsets: [usize; N] = std::array::from_fn(|k| k / self.layout.rows * column + k % self.layout.rows * S);
-        let used = self.layout.used();
+    fn gather<const N: usize, const S: usize>(&self, convert: impl Fn([u8; S]) -> f32) -> Vec<[f32; N]> {
+        let column_stride = self.layout.column_stride();
+        let offsets: [usize; N] =
+            std::array::from_fn(|k| k / self.layout.rows * column_stride + k % self.layout.rows * S);
+        let unpadded_size = self.layout.unpadded_size();
         (0..self.count)
             .map(|i| {
-                let element = &self.bytes[i * self.stride..][..used];
+                let element = &self.bytes[i * self.stride..][..unpadded_size];
                 offsets.map(|offset| {
                     let mut component = [0; S];
                     component.copy_from_slice(&element[offset..offset + S]);
-                    number(component)
+                    convert(component)
                 })
             })
             .collect()
     }
 
-    fn whole(&self) -> Vec<u32> {
+    fn integers(&self) -> Vec<u32> {
         let (bytes, stride) = (self.bytes, self.stride);
         let size = self.layout.component.size();
         let elements = (0..self.count).map(|i| &bytes[i * stride..][..size]);
@@ -180,7 +181,9 @@ impl Document {
         let layout = self
             .accessor(accessor)
             .and_then(|(key, accessor)| Layout::of(&key, accessor));
-        layout.map(Layout::count).map_err(|fault| fault.of(&self.path))
+        layout
+            .map(Layout::component_count)
+            .map_err(|fault| fault.of(&self.path))
     }
 
     /// Returns the elements of an accessor with `N` components, matrices column-major. Normalized integers become -1
@@ -191,38 +194,43 @@ impl Document {
 
     /// Returns the elements as indices. The primitive restart value is an error.
     pub fn indices(&self, accessor: usize) -> Result<Vec<u32>, GltfError> {
-        self.whole(accessor).map_err(|fault| fault.of(&self.path))
+        self.integers(accessor).map_err(|fault| fault.of(&self.path))
     }
 
     fn accessor(&self, index: usize) -> Result<(String, &Accessor), GltfFault> {
         let all = &self.json.accessors;
-        let accessor = all.get(index).ok_or_else(|| missing("accessors", index, all.len()))?;
+        let accessor = all
+            .get(index)
+            .ok_or_else(|| out_of_range("accessors", index, "accessors", all.len()))?;
         Ok((format!("accessors[{index}]"), accessor))
     }
 
     fn floats<const N: usize>(&self, index: usize) -> Result<Vec<[f32; N]>, GltfFault> {
         let (key, accessor) = self.accessor(index)?;
         let layout = Layout::of(&key, accessor)?;
-        if layout.count() != N {
-            let rule = format!("its elements have {} components; {N} are expected", layout.count());
+        if layout.component_count() != N {
+            let rule = format!(
+                "the elements have {} components; expected {N}",
+                layout.component_count()
+            );
             return Err(GltfFault::key(format!("{key}.type"), rule));
         }
         let elements = self.elements(&key, accessor, layout)?;
-        self.may_read(&key, accessor, 4 * N)?;
+        self.charge_read(&key, accessor, 4 * N)?;
         let mut vectors = match elements {
             Some(elements) => elements.vectors(),
             None => vec![[0.0; N]; accessor.count.0 as usize],
         };
         if let Some(sparse) = &accessor.sparse {
-            let (places, values) = self.replaced(&key, accessor, sparse, layout)?;
-            for (place, value) in places.into_iter().zip(values.vectors()) {
-                vectors[place as usize] = value;
+            let (sparse_indices, values) = self.sparse_elements(&key, accessor, sparse, layout)?;
+            for (i, value) in sparse_indices.into_iter().zip(values.vectors()) {
+                vectors[i as usize] = value;
             }
         }
         Ok(vectors)
     }
 
-    fn whole(&self, index: usize) -> Result<Vec<u32>, GltfFault> {
+    fn integers(&self, index: usize) -> Result<Vec<u32>, GltfFault> {
         let (key, accessor) = self.accessor(index)?;
         let layout = Layout::of(&key, accessor)?;
         let restart = match layout.component {
@@ -234,64 +242,68 @@ impl Document {
                 return Err(GltfFault::key(format!("{key}.componentType"), rule));
             }
         };
-        if layout.count() != 1 {
+        if layout.component_count() != 1 {
             return Err(GltfFault::key(format!("{key}.type"), "indices must be SCALAR"));
         }
         let elements = self.elements(&key, accessor, layout)?;
-        self.may_read(&key, accessor, size_of::<u32>())?;
+        self.charge_read(&key, accessor, size_of::<u32>())?;
         let mut indices = match elements {
-            Some(elements) => elements.whole(),
+            Some(elements) => elements.integers(),
             None => vec![0; accessor.count.0 as usize],
         };
         if let Some(sparse) = &accessor.sparse {
-            let (places, values) = self.replaced(&key, accessor, sparse, layout)?;
-            for (place, value) in places.into_iter().zip(values.whole()) {
-                indices[place as usize] = value;
+            let (sparse_indices, values) = self.sparse_elements(&key, accessor, sparse, layout)?;
+            for (k, value) in sparse_indices.into_iter().zip(values.integers()) {
+                indices[k as usize] = value;
             }
         }
         match indices.iter().position(|index| *index == restart) {
             None => Ok(indices),
             Some(i) => {
-                let rule = "which would restart a strip: an index must be smaller";
+                let rule = "the primitive restart value; an index must be less";
                 Err(GltfFault::key(key, format!("element {i} is {restart}, {rule}")))
             }
         }
     }
 
     /// Charges elements of `size` bytes to the budget.
-    fn may_read(&self, key: &str, accessor: &Accessor, size: usize) -> Result<(), GltfFault> {
-        let bytes = accessor.count.0.saturating_mul(size as u64).saturating_add(BESIDE);
-        let room = self.budget.take(Resource::Read, bytes);
-        room.map_err(|rule| GltfFault::key(format!("{key}.count"), rule))
+    fn charge_read(&self, key: &str, accessor: &Accessor, size: usize) -> Result<(), GltfFault> {
+        let bytes = accessor
+            .count
+            .0
+            .saturating_mul(size as u64)
+            .saturating_add(READ_OVERHEAD);
+        let charge = self.budget.take(Resource::Read, bytes);
+        charge.map_err(|rule| GltfFault::key(format!("{key}.count"), rule))
     }
 
-    /// Returns the elements of the buffer view; `None` for zeros.
+    /// Returns the elements of the buffer view; `None` if there is no view, so that all elements are zero.
     fn elements(&self, key: &str, accessor: &Accessor, layout: Layout) -> Result<Option<Elements<'_>>, GltfFault> {
         let count = accessor.count.0;
         let Some(view) = accessor.buffer_view else {
-            let others = accessor
+            let unsupported = accessor
                 .extensions
                 .as_ref()
-                .and_then(|all| extension::unknown(&all.others));
-            if let Some(name) = others.filter(|_| accessor.sparse.is_none()) {
-                return Err(extension::only_in(key, name));
+                .and_then(|all| extension::unsupported(&all.others));
+            if let Some(name) = unsupported.filter(|_| accessor.sparse.is_none()) {
+                return Err(extension::only_data_fault(key, name));
             }
-            let most = MAX_ZEROS.min(MAX_ZEROS_BYTES / (4 * layout.count() as u64));
-            if count > most {
-                let rule = format!("{count} elements without a bufferView; there must be at most {most}");
+            let max_count = MAX_ZEROS.min(MAX_ZEROS_BYTES / (4 * layout.component_count() as u64));
+            if count > max_count {
+                let rule = format!("{count} elements without a bufferView; there must be at most {max_count}");
                 return Err(GltfFault::key(format!("{key}.count"), rule));
             }
             return Ok(None);
         };
         let view = view.value();
         let stride = self.json.buffer_views.get(view).and_then(|view| view.byte_stride);
-        let bytes = (self.bytes_of(view)?, &*format!("bufferViews[{view}]"));
+        let bytes = (self.view_bytes(view)?, &*format!("bufferViews[{view}]"));
         let offset = accessor.byte_offset.unwrap_or_default().0;
         Elements::in_bytes(key, bytes, offset, count, stride.map(|stride| stride.0), layout).map(Some)
     }
 
     /// Returns the indices and values of the sparse elements.
-    fn replaced(
+    fn sparse_elements(
         &self,
         key: &str,
         accessor: &Accessor,
@@ -310,23 +322,24 @@ impl Document {
         let Checked::Valid(component) = sparse.indices.component_type else {
             return Err(GltfFault::key(key, "unknown type"));
         };
-        let places = Layout {
+        let index_layout = Layout {
             component: component.0,
             rows: 1,
             columns: 1,
             is_normalized: false,
         };
         let view = sparse.indices.buffer_view.value();
-        let bytes = (self.bytes_of(view)?, &*format!("bufferViews[{view}]"));
-        let places = Elements::in_bytes(&key, bytes, sparse.indices.byte_offset.0, count, None, places)?.whole();
-        for (i, place) in places.iter().enumerate() {
-            if i > 0 && *place <= places[i - 1] {
-                let rule = format!("element {i} is {place}, which must be greater than the one before it");
+        let bytes = (self.view_bytes(view)?, &*format!("bufferViews[{view}]"));
+        let indices =
+            Elements::in_bytes(&key, bytes, sparse.indices.byte_offset.0, count, None, index_layout)?.integers();
+        for (i, index) in indices.iter().enumerate() {
+            if i > 0 && *index <= indices[i - 1] {
+                let rule = format!("element {i} is {index}; it must be greater than the previous element");
                 return Err(GltfFault::key(key, rule));
             }
-            if u64::from(*place) >= accessor.count.0 {
+            if u64::from(*index) >= accessor.count.0 {
                 let rule = format!(
-                    "element {i} is {place}, which is not there; there are {}",
+                    "element {i} is {index}; it must be less than {}, the count of all elements",
                     accessor.count.0
                 );
                 return Err(GltfFault::key(key, rule));
@@ -334,9 +347,9 @@ impl Document {
         }
         let key = key.replace("indices", "values");
         let view = sparse.values.buffer_view.value();
-        let bytes = (self.bytes_of(view)?, &*format!("bufferViews[{view}]"));
+        let bytes = (self.view_bytes(view)?, &*format!("bufferViews[{view}]"));
         let values = Elements::in_bytes(&key, bytes, sparse.values.byte_offset.0, count, None, layout)?;
-        Ok((places, values))
+        Ok((indices, values))
     }
 }
 

@@ -17,42 +17,43 @@ const MAX_WEIGHTS: usize = 1 << 24;
 const MAX_NAMED: usize = 5;
 
 impl Document {
-    /// Returns the animations that do not drive a property of an earlier animation. The others are listed in `notes`.
+    /// Returns the animations that do not drive a property of an earlier animation. A note lists the skipped
+    /// animations.
     pub(super) fn compatible(&self, animations: Vec<usize>, notes: &mut Vec<String>) -> Vec<usize> {
         let mut driven = HashSet::new();
-        let (mut playing, mut others) = (Vec::new(), Vec::new());
+        let (mut playing, mut skipped) = (Vec::new(), Vec::new());
         for i in animations {
             let channels = self.json.animations[i].channels.iter();
-            let properties = channels.filter_map(|channel| match channel.target.path {
+            let targets = channels.filter_map(|channel| match channel.target.path {
                 Checked::Valid(path) => Some((channel.target.node.value(), path as u8)),
                 Checked::Invalid => None,
             });
-            let own: HashSet<(usize, u8)> = properties.collect();
-            match driven.is_disjoint(&own) {
+            let properties: HashSet<(usize, u8)> = targets.collect();
+            match driven.is_disjoint(&properties) {
                 true => {
-                    driven.extend(own);
+                    driven.extend(properties);
                     playing.push(i);
                 }
-                false => others.push(i),
+                false => skipped.push(i),
             }
         }
-        if !others.is_empty() {
+        if !skipped.is_empty() {
             let name = |i: &usize| match &self.json.animations[*i].name {
                 Some(name) => format!("{i} ({name:?})"),
                 None => i.to_string(),
             };
-            let mut named: Vec<String> = others.iter().take(MAX_NAMED).map(name).collect();
-            if others.len() > MAX_NAMED {
-                named.push(format!("{} more", others.len() - MAX_NAMED));
+            let mut named: Vec<String> = skipped.iter().take(MAX_NAMED).map(name).collect();
+            if skipped.len() > MAX_NAMED {
+                named.push(format!("{} more", skipped.len() - MAX_NAMED));
             }
-            let (what, verb) = match others.len() {
+            let (noun, verb) = match skipped.len() {
                 1 => ("animation", "drives"),
                 _ => ("animations", "drive"),
             };
             notes.push(format!(
-                "{what} {} {verb} properties that an earlier animation drives, and {} not play; choose one with --animation",
+                "{noun} {} {verb} properties that an earlier animation drives, and {} not play; choose one with --animation",
                 named.join(", "),
-                if others.len() == 1 { "does" } else { "do" },
+                if skipped.len() == 1 { "does" } else { "do" },
             ));
         }
         playing
@@ -66,82 +67,97 @@ impl Document {
         time: f64,
         notes: &mut Vec<String>,
     ) -> Result<(), GltfError> {
-        let place = |channel: usize| format!("animations[{animation}].channels[{channel}]");
+        let location = |channel: usize| format!("animations[{animation}].channels[{channel}]");
         let animation = &self.json.animations[animation];
         let mut weights = 0;
-        let mut moved = HashSet::new();
-        let (mut equal, mut twice) = (None, None);
+        let mut driven = HashSet::new();
+        let (mut equal_times, mut repeated_target) = (None, None);
         for (i, channel) in animation.channels.iter().enumerate() {
             let node = channel.target.node.value();
             let sampler = animation.samplers.get(channel.sampler.value());
             let (Some(pose), Some(sampler)) = (poses.get_mut(node), sampler) else {
-                return Err(self.fault(place(i), "refers to a node or a sampler that does not exist".to_owned()));
+                return Err(self.fault(
+                    location(i),
+                    "refers to a node or a sampler that does not exist".to_owned(),
+                ));
             };
             let times = self.vectors::<1>(sampler.input.value())?;
             let times: Vec<f64> = times.iter().map(|[time]| f64::from(*time)).collect();
             if times.is_empty() || !times.is_sorted() || !times.iter().all(|time| time.is_finite()) {
-                return Err(self.fault(place(i), "its times must be finite and increasing".to_owned()));
+                return Err(self.fault(
+                    location(i),
+                    "the times must be finite and in ascending order".to_owned(),
+                ));
             }
             if times.windows(2).any(|pair| pair[0] == pair[1]) {
-                equal.get_or_insert(i);
+                equal_times.get_or_insert(i);
             }
             if let Checked::Valid(path) = channel.target.path
-                && !moved.insert((node, path as u8))
+                && !driven.insert((node, path as u8))
             {
-                twice.get_or_insert(i);
+                repeated_target.get_or_insert(i);
             }
             let Checked::Valid(interpolation) = sampler.interpolation else {
-                return Err(self.fault(place(i), "its interpolation is unknown".to_owned()));
+                return Err(self.fault(location(i), "unknown interpolation".to_owned()));
             };
-            let between = KeyInterval::of(&times, time, interpolation);
-            let fault = |got: usize| {
-                let wanted = between.values(times.len());
-                self.fault(place(i), format!("its output must have {wanted} values; it has {got}"))
+            let interval = KeyInterval::of(&times, time, interpolation);
+            let wrong_count = |found: usize| {
+                let expected = interval.value_count(times.len());
+                self.fault(
+                    location(i),
+                    format!("number of output values: {found}; expected {expected}"),
+                )
             };
             match channel.target.path {
                 Checked::Valid(Property::Translation) => {
                     let values = self.vectors::<3>(sampler.output.value())?;
-                    let value = between.value(&values, times.len()).ok_or_else(|| fault(values.len()))?;
-                    pose.take_apart();
+                    let value = interval
+                        .value(&values, times.len())
+                        .ok_or_else(|| wrong_count(values.len()))?;
+                    pose.decompose();
                     pose.translation = DVec3::from_array(value);
                 }
                 Checked::Valid(Property::Scale) => {
                     let values = self.vectors::<3>(sampler.output.value())?;
-                    let value = between.value(&values, times.len()).ok_or_else(|| fault(values.len()))?;
-                    pose.take_apart();
+                    let value = interval
+                        .value(&values, times.len())
+                        .ok_or_else(|| wrong_count(values.len()))?;
+                    pose.decompose();
                     pose.scale = DVec3::from_array(value);
                 }
                 Checked::Valid(Property::Rotation) => {
                     let values = self.vectors::<4>(sampler.output.value())?;
-                    let value = between
+                    let value = interval
                         .rotation(&values, times.len())
-                        .ok_or_else(|| fault(values.len()))?;
-                    pose.take_apart();
+                        .ok_or_else(|| wrong_count(values.len()))?;
+                    pose.decompose();
                     pose.rotation = value;
                 }
                 Checked::Valid(Property::MorphTargetWeights) => {
                     let values = self.vectors::<1>(sampler.output.value())?;
-                    let found = between.list(&values, times.len()).ok_or_else(|| fault(values.len()))?;
-                    weights += found.len();
+                    let node_weights = interval
+                        .weights(&values, times.len())
+                        .ok_or_else(|| wrong_count(values.len()))?;
+                    weights += node_weights.len();
                     if weights > MAX_WEIGHTS {
                         let rule = format!("all nodes together must have at most {MAX_WEIGHTS} weights");
-                        return Err(self.fault(place(i), rule));
+                        return Err(self.fault(location(i), rule));
                     }
-                    pose.weights = Some(found);
+                    pose.weights = Some(node_weights);
                 }
                 Checked::Invalid => {} // a property of an extension
             }
         }
-        if let Some(i) = equal {
+        if let Some(i) = equal_times {
             notes.push(format!(
-                "{}: some of its times are equal; the last of them is used",
-                place(i)
+                "{}: some times are equal; the last key of equal times is used",
+                location(i)
             ));
         }
-        if let Some(i) = twice {
+        if let Some(i) = repeated_target {
             notes.push(format!(
-                "{}: drives the same property as an earlier channel; the last one is used",
-                place(i)
+                "{}: drives the same property as an earlier channel; the last channel is used",
+                location(i)
             ));
         }
         Ok(())
@@ -150,7 +166,7 @@ impl Document {
 
 impl Pose {
     /// Decomposes the matrix. The specification does not allow matrices on animated nodes.
-    fn take_apart(&mut self) {
+    fn decompose(&mut self) {
         if let Some(matrix) = self.matrix.take() {
             (self.scale, self.rotation, self.translation) = matrix.to_scale_rotation_translation();
         }
@@ -161,7 +177,7 @@ struct KeyInterval {
     interpolation: Interpolation,
     keys: [usize; 2],
     /// Position in the key interval, 0 to 1.
-    share: f64,
+    fraction: f64,
     /// Length of the key interval in seconds.
     seconds: f64,
 }
@@ -176,7 +192,7 @@ impl KeyInterval {
             next => [next - 1, next],
         };
         let seconds = times[keys[1]] - times[keys[0]];
-        let share = if seconds > 0.0 {
+        let fraction = if seconds > 0.0 {
             (time - times[keys[0]]) / seconds
         } else {
             0.0
@@ -184,12 +200,12 @@ impl KeyInterval {
         KeyInterval {
             interpolation,
             keys,
-            share,
+            fraction,
             seconds,
         }
     }
 
-    fn values(&self, keys: usize) -> usize {
+    fn value_count(&self, keys: usize) -> usize {
         match self.interpolation {
             Interpolation::CubicSpline => 3 * keys, // in-tangent, value and out-tangent
             _ => keys,
@@ -197,14 +213,14 @@ impl KeyInterval {
     }
 
     fn value<const N: usize>(&self, values: &[[f32; N]], keys: usize) -> Option<[f64; N]> {
-        if values.len() != self.values(keys) {
+        if values.len() != self.value_count(keys) {
             return None;
         }
-        let mut found = [0.0; N];
-        for (k, found) in found.iter_mut().enumerate() {
-            *found = self.number(|i| f64::from(values[i][k]));
+        let mut result = [0.0; N];
+        for (k, component) in result.iter_mut().enumerate() {
+            *component = self.interpolate(|i| f64::from(values[i][k]));
         }
-        Some(found)
+        Some(result)
     }
 
     fn rotation(&self, values: &[[f32; 4]], keys: usize) -> Option<DQuat> {
@@ -217,34 +233,34 @@ impl KeyInterval {
             return None;
         }
         let [a, b] = self.keys.map(|key| quaternion(values[key]));
-        Some(a.slerp(b, self.share)) // along the shorter arc
+        Some(a.slerp(b, self.fraction)) // along the shorter arc
     }
 
-    fn list(&self, values: &[[f32; 1]], keys: usize) -> Option<Vec<f32>> {
-        let each = self.values(keys);
-        let count = values.len() / each;
-        if count * each != values.len() {
+    fn weights(&self, values: &[[f32; 1]], keys: usize) -> Option<Vec<f32>> {
+        let values_per_weight = self.value_count(keys);
+        let count = values.len() / values_per_weight;
+        if count * values_per_weight != values.len() {
             return None;
         }
-        let found = (0..count).map(|k| self.number(|i| f64::from(values[i * count + k][0])) as f32);
-        Some(found.collect())
+        let weights = (0..count).map(|k| self.interpolate(|i| f64::from(values[i * count + k][0])) as f32);
+        Some(weights.collect())
     }
 
     /// Interpolates a scalar. A cubic spline has three output values per key.
-    fn number(&self, at: impl Fn(usize) -> f64) -> f64 {
-        let ([a, b], t) = (self.keys, self.share);
+    fn interpolate(&self, value: impl Fn(usize) -> f64) -> f64 {
+        let ([a, b], t) = (self.keys, self.fraction);
         match self.interpolation {
-            Interpolation::Step => at(a),
-            Interpolation::Linear if a == b => at(a),
-            Interpolation::Linear => at(a) * (1.0 - t) + at(b) * t,
+            Interpolation::Step => value(a),
+            Interpolation::Linear if a == b => value(a),
+            Interpolation::Linear => value(a) * (1.0 - t) + value(b) * t,
             Interpolation::CubicSpline => {
                 // Cubic Hermite spline (appendix C.5).
                 let (t2, t3) = (t * t, t * t * t);
-                let (before, behind) = (at(3 * a + 2) * self.seconds, at(3 * b) * self.seconds);
-                (2.0 * t3 - 3.0 * t2 + 1.0) * at(3 * a + 1)
-                    + (t3 - 2.0 * t2 + t) * before
-                    + (3.0 * t2 - 2.0 * t3) * at(3 * b + 1)
-                    + (t3 - t2) * behind
+                let (out_tangent, in_tangent) = (value(3 * a + 2) * self.seconds, value(3 * b) * self.seconds);
+                (2.0 * t3 - 3.0 * t2 + 1.0) * value(3 * a + 1)
+                    + (t3 - 2.0 * t2 + t) * out_tangent
+                    + (3.0 * t2 - 2.0 * t3) * value(3 * b + 1)
+                    + (t3 - t2) * in_tangent
             }
         }
     }

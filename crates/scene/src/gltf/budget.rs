@@ -17,14 +17,14 @@ pub(super) enum Resource {
 impl Resource {
     fn name(self) -> &'static str {
         match self {
-            Resource::Read => "bytes of accessors, counted as often as they are read",
+            Resource::Read => "bytes of accessors, counted once per read",
             Resource::Triangles => "triangles",
             Resource::Instances => "instances of meshes",
-            Resource::Decompressed => "bytes of compressed views, once they are decoded",
+            Resource::Decompressed => "bytes of decompressed buffer views",
         }
     }
 
-    /// Returns the base allowance, the additional fraction of the file size, and the maximum.
+    /// Returns the base allowance, the additional allowance per byte of the file (as a fraction), and the maximum.
     fn rates(self) -> (u64, (u64, u64), u64) {
         match self {
             Resource::Read => (1 << 30, (16, 1), u64::MAX),
@@ -42,38 +42,39 @@ impl Resource {
 pub(super) struct Budget {
     /// Total size of the JSON and of the referenced buffers.
     bytes: u64,
-    taken: [AtomicU64; 4],
+    used: [AtomicU64; 4],
 }
 
 impl Budget {
     pub fn of(bytes: u64) -> Budget {
         Budget {
             bytes,
-            taken: Default::default(),
+            used: Default::default(),
         }
     }
 
-    pub fn most(&self, thing: Resource) -> u64 {
-        let (any, (more, of), most) = thing.rates();
-        any.saturating_add(self.bytes.saturating_mul(more) / of).min(most)
+    pub fn limit(&self, resource: Resource) -> u64 {
+        let (base, (numerator, denominator), max) = resource.rates();
+        base.saturating_add(self.bytes.saturating_mul(numerator) / denominator)
+            .min(max)
     }
 
     /// Charges `count` to the budget; the error is the violated rule.
-    pub fn take(&self, thing: Resource, count: u64) -> Result<(), String> {
-        let most = self.most(thing);
-        let taken = &self.taken[thing as usize];
+    pub fn take(&self, resource: Resource, count: u64) -> Result<(), String> {
+        let limit = self.limit(resource);
+        let used = &self.used[resource as usize];
         // Rejected requests cannot overflow the counter.
-        let taking = taken.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |taken| {
-            taken.checked_add(count).filter(|all| *all <= most)
+        let result = used.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |used| {
+            used.checked_add(count).filter(|sum| *sum <= limit)
         });
         let rule = |_| {
             format!(
-                "a file of {} bytes must have at most {most} {}",
+                "a file of {} bytes must have at most {limit} {}",
                 self.bytes,
-                thing.name()
+                resource.name()
             )
         };
-        taking.map(drop).map_err(rule)
+        result.map(drop).map_err(rule)
     }
 }
 
@@ -84,9 +85,9 @@ mod tests {
     #[test]
     fn requests_beyond_the_limit_are_rejected_and_not_charged() {
         let budget = Budget::of(300);
-        let most = (1 << 22) + 100;
-        assert_eq!(budget.most(Resource::Triangles), most);
-        budget.take(Resource::Triangles, most - 1).unwrap();
+        let limit = (1 << 22) + 100;
+        assert_eq!(budget.limit(Resource::Triangles), limit);
+        budget.take(Resource::Triangles, limit - 1).unwrap();
         let rule = "a file of 300 bytes must have at most 4194404 triangles";
         for count in [2, u64::MAX] {
             assert_eq!(budget.take(Resource::Triangles, count).unwrap_err(), rule);
@@ -100,9 +101,9 @@ mod tests {
 
     #[test]
     fn limits_grow_with_the_file_up_to_a_maximum() {
-        assert_eq!(Budget::of(u64::MAX).most(Resource::Read), u64::MAX);
-        assert_eq!(Budget::of(u64::MAX).most(Resource::Instances), 1 << 20);
+        assert_eq!(Budget::of(u64::MAX).limit(Resource::Read), u64::MAX);
+        assert_eq!(Budget::of(u64::MAX).limit(Resource::Instances), 1 << 20);
         // Ten million triangles with three 32-bit indices each.
-        assert!(Budget::of(120 << 20).most(Resource::Triangles) >= 10_000_000);
+        assert!(Budget::of(120 << 20).limit(Resource::Triangles) >= 10_000_000);
     }
 }

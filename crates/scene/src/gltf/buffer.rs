@@ -9,8 +9,8 @@ use gltf_json::Root;
 
 use super::budget::{Budget, Resource};
 use super::error::GltfFault;
-use super::json::missing;
-use super::meshopt::{self, Compressed};
+use super::json::out_of_range;
+use super::meshopt::{self, Compression};
 use super::uri::{self, Folder};
 
 /// Maximum size of a file, and of all buffers in total.
@@ -19,7 +19,7 @@ pub(super) const MAX_BUFFER_BYTES: u64 = 8 << 30;
 enum Bytes {
     /// Unreferenced.
     Unused,
-    /// In the GLB file.
+    /// A range of the GLB file.
     Chunk(Range<usize>),
     /// From a file or data URI.
     Read(Vec<u8>),
@@ -27,8 +27,8 @@ enum Bytes {
 
 pub(super) struct Buffers {
     file: Vec<u8>,
-    list: Vec<Bytes>,
-    compressed: Vec<Option<Compressed>>,
+    buffers: Vec<Bytes>,
+    compressed: Vec<Option<Compression>>,
     /// Decompressed buffer views, filled on first use.
     decoded: Vec<OnceLock<Vec<u8>>>,
     total: u64,
@@ -47,61 +47,68 @@ impl Buffers {
         let mut used = vec![false; root.buffers.len()];
         let mut compressed = Vec::with_capacity(root.buffer_views.len());
         for (i, view) in root.buffer_views.iter().enumerate() {
-            let how = match &view.extensions {
-                Some(all) => meshopt::compressed(&format!("bufferViews[{i}]"), &all.others, view.byte_length.0)?,
+            let compression = match &view.extensions {
+                Some(all) => meshopt::parse_compression(&format!("bufferViews[{i}]"), &all.others, view.byte_length.0)?,
                 None => None,
             };
             // The core `buffer` is a fallback for loaders without the extension.
-            let buffer = how.map_or(view.buffer.value(), |how| how.buffer);
+            let buffer = compression.map_or(view.buffer.value(), |compression| compression.buffer);
             match used.get_mut(buffer) {
                 Some(used) => *used = true,
-                None => return Err(missing(format!("bufferViews[{i}]"), buffer, root.buffers.len())),
+                None => {
+                    return Err(out_of_range(
+                        format!("bufferViews[{i}]"),
+                        buffer,
+                        "buffers",
+                        root.buffers.len(),
+                    ));
+                }
             }
-            compressed.push(how);
+            compressed.push(compression);
         }
         let mut total = 0;
-        let mut list = Vec::with_capacity(root.buffers.len());
+        let mut buffers = Vec::with_capacity(root.buffers.len());
         for (i, buffer) in root.buffers.iter_mut().enumerate() {
             if !used[i] {
-                list.push(Bytes::Unused);
+                buffers.push(Bytes::Unused);
                 continue;
             }
             let length = buffer.byte_length.0;
             let key = || format!("buffers[{i}]");
-            let (bytes, has) = match (buffer.uri.take(), &chunk) {
+            let (bytes, size) = match (buffer.uri.take(), &chunk) {
                 (Some(data), _) if uri::is_data(&data) => {
                     let bytes = uri::data(&data).map_err(|rule| GltfFault::key(format!("buffers[{i}].uri"), rule))?;
-                    let has = bytes.len();
-                    (Bytes::Read(bytes), has)
+                    let size = bytes.len();
+                    (Bytes::Read(bytes), size)
                 }
                 (Some(name), _) => {
                     let fault = |rule| GltfFault::key(format!("buffers[{i}].uri"), rule);
-                    let path = folder.find(&name).map_err(|unfound| fault(unfound.into()))?;
-                    let left = MAX_BUFFER_BYTES.saturating_sub(total);
-                    let bytes =
-                        uri::read(&path, left).map_err(|error| fault(format!("{name:?} cannot be read: {error}")))?;
+                    let path = folder.find(&name).map_err(|error| fault(error.into()))?;
+                    let remaining = MAX_BUFFER_BYTES.saturating_sub(total);
+                    let bytes = uri::read(&path, remaining)
+                        .map_err(|error| fault(format!("{name:?} cannot be read: {error}")))?;
                     files.insert(path);
-                    let has = bytes.len();
+                    let size = bytes.len();
                     buffer.uri = Some(name);
-                    (Bytes::Read(bytes), has)
+                    (Bytes::Read(bytes), size)
                 }
                 (None, Some(chunk)) if i == 0 => (Bytes::Chunk(chunk.clone()), chunk.len()),
                 (None, _) => return Err(GltfFault::key(key(), "has no uri, but buffer views refer to it")),
             };
-            total = total.saturating_add(has as u64);
+            total = total.saturating_add(size as u64);
             if total > MAX_BUFFER_BYTES {
                 let rule = format!("all buffers together must have at most {MAX_BUFFER_BYTES} bytes");
                 return Err(GltfFault::key(key(), rule));
             }
-            if length > has as u64 {
-                let rule = format!("{length} bytes; its data has {has}");
+            if length > size as u64 {
+                let rule = format!("{length} must be at most {size}, the size of the data");
                 return Err(GltfFault::key(format!("buffers[{i}].byteLength"), rule));
             }
-            list.push(bytes);
+            buffers.push(bytes);
         }
         Ok(Buffers {
             file,
-            list,
+            buffers,
             total,
             compressed,
             decoded: root.buffer_views.iter().map(|_| OnceLock::new()).collect(),
@@ -114,10 +121,10 @@ impl Buffers {
 
     /// Charges the decompressed views to `budget`.
     pub fn check(&self, budget: &Budget) -> Result<(), GltfFault> {
-        for (i, how) in self.compressed.iter().enumerate() {
-            let size = how.map_or(0, |how| how.size());
-            let room = budget.take(Resource::Decompressed, size);
-            room.map_err(|rule| GltfFault::key(format!("bufferViews[{i}]"), rule))?;
+        for (i, compression) in self.compressed.iter().enumerate() {
+            let size = compression.map_or(0, |compression| compression.size());
+            let charge = budget.take(Resource::Decompressed, size);
+            charge.map_err(|rule| GltfFault::key(format!("bufferViews[{i}]"), rule))?;
         }
         Ok(())
     }
@@ -125,8 +132,8 @@ impl Buffers {
     /// Returns the first `byteLength` bytes of a buffer.
     fn buffer(&self, root: &Root, index: usize) -> Result<&[u8], GltfFault> {
         let key = || format!("buffers[{index}]");
-        let (Some(bytes), Some(buffer)) = (self.list.get(index), root.buffers.get(index)) else {
-            return Err(missing(key(), index, root.buffers.len()));
+        let (Some(bytes), Some(buffer)) = (self.buffers.get(index), root.buffers.get(index)) else {
+            return Err(out_of_range(key(), index, "buffers", root.buffers.len()));
         };
         let bytes = match bytes {
             Bytes::Chunk(range) => self.file.get(range.clone()),
@@ -141,15 +148,15 @@ impl Buffers {
 
     /// Returns a buffer view, decompressed.
     pub fn view(&self, root: &Root, index: usize) -> Result<&[u8], GltfFault> {
-        let view =
-            (root.buffer_views.get(index)).ok_or_else(|| missing("bufferViews", index, root.buffer_views.len()))?;
-        if let (Some(Some(how)), Some(decoded)) = (self.compressed.get(index), self.decoded.get(index)) {
+        let view = (root.buffer_views.get(index))
+            .ok_or_else(|| out_of_range("bufferViews", index, "buffer views", root.buffer_views.len()))?;
+        if let (Some(Some(compression)), Some(decoded)) = (self.compressed.get(index), self.decoded.get(index)) {
             if let Some(bytes) = decoded.get() {
                 return Ok(bytes);
             }
-            let key = format!("bufferViews[{index}].extensions.{}", how.name);
-            let stream = self.part(root, &key, how.buffer, how.offset, how.length)?;
-            let bytes = how.decode(stream).map_err(|rule| GltfFault::key(key, rule))?;
+            let key = format!("bufferViews[{index}].extensions.{}", compression.name);
+            let stream = self.part(root, &key, compression.buffer, compression.offset, compression.length)?;
+            let bytes = compression.decode(stream).map_err(|rule| GltfFault::key(key, rule))?;
             return Ok(decoded.get_or_init(|| bytes));
         }
         let offset = view.byte_offset.unwrap_or_default().0;
@@ -167,10 +174,10 @@ impl Buffers {
         let bytes = self.buffer(root, buffer)?;
         let end = offset.checked_add(length).filter(|end| *end <= bytes.len() as u64);
         let end = end.ok_or_else(|| {
-            let has = bytes.len();
+            let size = bytes.len();
             GltfFault::key(
                 key,
-                format!("{length} bytes from byte {offset} on; buffers[{buffer}] has {has}"),
+                format!("offset {offset} and length {length} exceed the {size} bytes of buffers[{buffer}]"),
             )
         })?;
         Ok(&bytes[offset as usize..end as usize])

@@ -9,7 +9,7 @@ use super::{ImportedCamera, UPRIGHT};
 use crate::{OrthographicDescription, PerspectiveDescription};
 
 impl Document {
-    /// Returns the camera of a node. The look-at point has the depth of the centre of the scene bounds.
+    /// Returns the camera of a node. The look-at point has the depth of the center of the scene bounds.
     pub(super) fn camera(
         &self,
         node: usize,
@@ -18,17 +18,20 @@ impl Document {
         notes: &mut Vec<String>,
     ) -> Result<Option<ImportedCamera>, GltfError> {
         let json = &self.json.nodes[node];
-        let Some(number) = json.camera.map(|camera| camera.value()) else {
+        let Some(camera_index) = json.camera.map(|camera| camera.value()) else {
             return Ok(None);
         };
-        let place = format!("cameras[{number}]");
-        let Some(camera) = self.json.cameras.get(number) else {
-            return Err(self.fault(format!("nodes[{node}].camera"), format!("{number} is out of range")));
+        let location = format!("cameras[{camera_index}]");
+        let Some(camera) = self.json.cameras.get(camera_index) else {
+            return Err(self.fault(
+                format!("nodes[{node}].camera"),
+                format!("{camera_index} is out of range"),
+            ));
         };
-        let map = UPRIGHT * *global;
-        let position = map.translation;
-        let forward = map.transform_vector3(DVec3::NEG_Z).normalize_or_zero();
-        let up = map.transform_vector3(DVec3::Y).normalize_or_zero();
+        let to_world = UPRIGHT * *global;
+        let position = to_world.translation;
+        let forward = to_world.transform_vector3(DVec3::NEG_Z).normalize_or_zero();
+        let up = to_world.transform_vector3(DVec3::Y).normalize_or_zero();
         if !position.is_finite() || !(forward.cross(up).length() > 1e-6) {
             note(
                 notes,
@@ -41,33 +44,33 @@ impl Document {
         let distance = if depth > 1e-3 * size { depth } else { size.max(1.0) };
         let look_at = position + forward * distance;
         let (description, aspect) = match (&camera.perspective, &camera.orthographic) {
-            (Some(of), _) => {
-                let fov = f64::from(of.yfov).to_degrees();
+            (Some(perspective), _) => {
+                let fov = f64::from(perspective.yfov).to_degrees();
                 if !(0.001..=179.999).contains(&fov) {
-                    let rule = format!("yfov: {} must be from 0.00002 to 3.1415 radians", of.yfov);
-                    note(notes, format!("{place}.{rule}; the camera is skipped"));
+                    let rule = format!("yfov: {} must be from 0.00002 to 3.1415 radians", perspective.yfov);
+                    note(notes, format!("{location}.{rule}; the camera is skipped"));
                     return Ok(None);
                 }
-                let camera = PerspectiveDescription {
+                let description = PerspectiveDescription {
                     up,
                     ..PerspectiveDescription::new(position, look_at, fov)
                 };
-                (camera.into(), of.aspect_ratio.map(f64::from))
+                (description.into(), perspective.aspect_ratio.map(f64::from))
             }
-            (None, Some(of)) => {
-                let (width, height) = (f64::from(of.xmag).abs(), f64::from(of.ymag).abs());
+            (None, Some(orthographic)) => {
+                let (width, height) = (f64::from(orthographic.xmag).abs(), f64::from(orthographic.ymag).abs());
                 if !(1e-9..=1e9).contains(&height) || !(1e-9..=1e9).contains(&width) {
-                    let rule = format!("xmag and ymag: {} and {} must not be 0", of.xmag, of.ymag);
-                    note(notes, format!("{place}: {rule}; the camera is skipped"));
+                    let rule = "the magnitudes of xmag and ymag must be from 1e-9 to 1e9";
+                    note(notes, format!("{location}: {rule}; the camera is skipped"));
                     return Ok(None);
                 }
-                let camera = OrthographicDescription {
+                let description = OrthographicDescription {
                     up,
                     ..OrthographicDescription::new(position, look_at, 2.0 * height)
                 };
-                (camera.into(), Some(width / height))
+                (description.into(), Some(width / height))
             }
-            (None, None) => return Err(self.fault(place, "is neither perspective nor orthographic".to_owned())),
+            (None, None) => return Err(self.fault(location, "is neither perspective nor orthographic".to_owned())),
         };
         let name = json.name.clone().or_else(|| camera.name.clone());
         Ok(Some(ImportedCamera {

@@ -2,31 +2,32 @@
 
 use serde_json::{Value, json};
 
-fn ways(value: &Value, pointer: &mut String, all: &mut Vec<String>) {
-    all.push(pointer.clone());
+fn collect_pointers(value: &Value, pointer: &mut String, pointers: &mut Vec<String>) {
+    pointers.push(pointer.clone());
     let length = pointer.len();
-    let mut inner = |key: &str, value: &Value| {
+    let mut visit = |key: &str, value: &Value| {
         pointer.push('/');
         pointer.push_str(key);
-        ways(value, pointer, all);
+        collect_pointers(value, pointer, pointers);
         pointer.truncate(length);
     };
     match value {
-        Value::Object(map) => map.iter().for_each(|(key, value)| inner(key, value)),
+        Value::Object(map) => map.iter().for_each(|(key, value)| visit(key, value)),
         Value::Array(list) => list
             .iter()
             .enumerate()
-            .for_each(|(i, value)| inner(&i.to_string(), value)),
+            .for_each(|(i, value)| visit(&i.to_string(), value)),
         _ => {}
     }
 }
 
-/// Replaces or removes one value. `below(n)` returns a random number less than `n`.
+/// Replaces or removes one value, or repeats the last element of its list. `below(n)` returns a random number less than
+/// `n`.
 pub fn changed(json: &mut Value, below: &mut dyn FnMut(usize) -> usize) {
-    let mut all = Vec::new();
-    ways(json, &mut String::new(), &mut all);
-    let other = json.pointer(&all[below(all.len())]).cloned();
-    let pointer = &all[1 + below(all.len() - 1)];
+    let mut pointers = Vec::new();
+    collect_pointers(json, &mut String::new(), &mut pointers);
+    let replacement = json.pointer(&pointers[below(pointers.len())]).cloned();
+    let pointer = &pointers[1 + below(pointers.len() - 1)];
     let (outer, key) = pointer.rsplit_once('/').unwrap_or_default();
     let values = [
         json!(0),
@@ -63,17 +64,17 @@ pub fn changed(json: &mut Value, below: &mut dyn FnMut(usize) -> usize) {
         json!([0, 0, 0]),
         json!([0, 0, 0, 0]),
     ];
-    let kind = below(10);
-    if kind < 2 {
+    let choice = below(10);
+    if choice < 2 {
         match json.pointer_mut(outer) {
             Some(Value::Object(map)) => drop(map.remove(key)),
-            Some(Value::Array(list)) if kind == 0 => drop(list.pop()),
+            Some(Value::Array(list)) if choice == 0 => drop(list.pop()),
             Some(Value::Array(list)) => list.extend(list.last().cloned()),
             _ => {}
         }
     } else if let Some(value) = json.pointer_mut(pointer) {
-        *value = match (kind, other) {
-            (2, Some(other)) => other,
+        *value = match (choice, replacement) {
+            (2, Some(replacement)) => replacement,
             // In most cases, numbers are replaced by numbers.
             (3..7, _) if value.is_number() => values[below(21)].clone(),
             _ => values[below(values.len())].clone(),

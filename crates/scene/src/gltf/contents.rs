@@ -18,11 +18,11 @@ pub struct ModelContents {
     pub cameras: Vec<Option<String>>,
     /// Animations.
     pub animations: Vec<Option<String>>,
-    /// Variants of materials.
+    /// Material variants.
     pub variants: Vec<Option<String>>,
     /// Materials.
     pub materials: Vec<Option<String>>,
-    /// Images, by name or else by file name.
+    /// Images; the file name if an image has no name.
     pub images: Vec<Option<String>>,
 }
 

@@ -11,19 +11,19 @@ use gltf_json::Root;
 use super::budget::Budget;
 use super::buffer::{Buffers, MAX_BUFFER_BYTES};
 use super::error::{GltfError, GltfFault};
-use super::json::missing;
+use super::json::out_of_range;
 use super::uri::{self, Folder, UriError};
 use super::{extension, glb, json};
 
 /// Maximum size of an image file in bytes.
 const MAX_IMAGE_BYTES: u64 = 512 << 20;
 /// Texture extensions with further image formats, in three.js's order of precedence.
-const SOURCES: [&str; 2] = ["KHR_texture_basisu", "EXT_texture_webp"];
+const SOURCE_EXTENSIONS: [&str; 2] = ["KHR_texture_basisu", "EXT_texture_webp"];
 /// Maximum total size of all image reads in bytes.
 const MAX_IMAGES_BYTES: u64 = 4 << 30;
 
-/// An open file. JSON indices (except in raw extension data) and enumerations are valid, and all numbers are finite;
-/// the node hierarchy and values have not been checked.
+/// An open file. JSON indices (except in raw extension data) and enumerations are valid, and all numbers are finite.
+/// The node hierarchy and other values are not validated yet.
 pub(super) struct Document {
     /// JSON without data URIs of buffers.
     pub json: Root,
@@ -33,7 +33,7 @@ pub(super) struct Document {
     folder: Folder,
     buffers: Buffers,
     /// Total size of all image reads in bytes.
-    given: AtomicU64,
+    image_bytes_read: AtomicU64,
 }
 
 enum ImageFault {
@@ -70,23 +70,28 @@ impl Document {
         root: &Path,
         files: &mut BTreeSet<PathBuf>,
     ) -> Result<Document, GltfFault> {
-        let here = |path: &Path| match path.as_os_str().is_empty() {
+        let or_current = |path: &Path| match path.as_os_str().is_empty() {
             true => PathBuf::from("."),
             false => path.to_owned(),
         };
         let folder = Folder {
-            folder: here(path.parent().unwrap_or(Path::new(""))),
-            root: here(root),
+            folder: or_current(path.parent().unwrap_or(Path::new(""))),
+            root: or_current(root),
         };
         if file.is_empty() {
             return Err(GltfFault::file("the file is empty"));
         }
         let mut notes = Vec::new();
-        let (mut json, text, file, chunk) = match glb::is_container(&file) {
+        let (mut json, json_size, file, chunk) = match glb::is_container(&file) {
             true => {
                 let chunks = glb::chunks(&file)?;
-                let text = chunks.json.len();
-                (json::root(&file[chunks.json], &mut notes)?, text, file, chunks.binary)
+                let json_size = chunks.json.len();
+                (
+                    json::root(&file[chunks.json], &mut notes)?,
+                    json_size,
+                    file,
+                    chunks.binary,
+                )
             }
             false => (json::root(&file, &mut notes)?, file.len(), Vec::new(), None),
         };
@@ -99,7 +104,7 @@ impl Document {
             }
         }
         let buffers = Buffers::read(&mut json, file, chunk, &folder, files)?;
-        let budget = Budget::of(buffers.total().saturating_add(text as u64));
+        let budget = Budget::of(buffers.total().saturating_add(json_size as u64));
         buffers.check(&budget)?;
         Ok(Document {
             json,
@@ -108,7 +113,7 @@ impl Document {
             budget,
             folder,
             buffers,
-            given: AtomicU64::new(0),
+            image_bytes_read: AtomicU64::new(0),
         })
     }
 
@@ -119,46 +124,47 @@ impl Document {
     /// Returns a buffer view, decompressed.
     #[cfg(test)]
     pub fn view(&self, view: usize) -> Result<&[u8], GltfError> {
-        self.bytes_of(view).map_err(|fault| fault.of(&self.path))
+        self.view_bytes(view).map_err(|fault| fault.of(&self.path))
     }
 
-    pub(super) fn bytes_of(&self, view: usize) -> Result<&[u8], GltfFault> {
+    pub(super) fn view_bytes(&self, view: usize) -> Result<&[u8], GltfFault> {
         self.buffers.view(&self.json, view)
     }
 
-    /// Returns the image of a texture: the image of the first extension in [`SOURCES`] that is present, or the core
-    /// source.
+    /// Returns the image of a texture: the image of the first extension in [`SOURCE_EXTENSIONS`] that is present, or
+    /// the core source.
     pub fn image_of(&self, texture: usize) -> Result<usize, GltfError> {
         self.source_of(texture).map_err(|fault| fault.of(&self.path))
     }
 
     fn source_of(&self, index: usize) -> Result<usize, GltfFault> {
         let textures = &self.json.textures;
-        let texture = (textures.get(index)).ok_or_else(|| missing("textures", index, textures.len()))?;
+        let texture =
+            (textures.get(index)).ok_or_else(|| out_of_range("textures", index, "textures", textures.len()))?;
         let key = format!("textures[{index}]");
-        let others = texture.extensions.as_ref().map(|all| &all.others);
-        let extended = SOURCES
+        let extensions = texture.extensions.as_ref().map(|all| &all.others);
+        let source_from_extension = SOURCE_EXTENSIONS
             .iter()
-            .find_map(|name| Some((name, others?.get(*name)?.get("source")?)));
-        if let Some((name, source)) = extended {
+            .find_map(|name| Some((name, extensions?.get(*name)?.get("source")?)));
+        if let Some((name, source)) = source_from_extension {
             let count = self.json.images.len();
             let source = source.as_u64().and_then(|source| usize::try_from(source).ok());
             return source.filter(|source| *source < count).ok_or_else(|| {
-                let rule = format!("must be the index of an image; the file has {count}");
+                let rule = format!("must be the index of an image; number of images: {count}");
                 GltfFault::key(format!("{key}.extensions.{name}.source"), rule)
             });
         }
         // A missing source has an index that is out of range.
         match self.json.get(texture.source) {
             Some(_) => Ok(texture.source.value()),
-            None => Err(match others.and_then(extension::unknown) {
-                Some(name) => extension::only_in(&key, name),
+            None => Err(match extensions.and_then(extension::unsupported) {
+                Some(name) => extension::only_data_fault(&key, name),
                 None => GltfFault::key(key, "has no source"),
             }),
         }
     }
 
-    /// Returns the encoded bytes of an image, or why it is missing.
+    /// Returns the encoded bytes of an image, or the reason why it is missing.
     ///
     /// # Errors
     ///
@@ -166,7 +172,7 @@ impl Document {
     pub fn image_bytes(&self, image: usize) -> Result<Result<Arc<[u8]>, String>, GltfError> {
         match self.encoded(image) {
             Ok(bytes) => Ok(Ok(bytes)),
-            Err(ImageFault::Missing(why)) => Ok(Err(format!("images[{image}].uri: {why}"))),
+            Err(ImageFault::Missing(reason)) => Ok(Err(format!("images[{image}].uri: {reason}"))),
             Err(ImageFault::Invalid(fault)) => Err(fault.of(&self.path)),
         }
     }
@@ -175,50 +181,55 @@ impl Document {
         let images = &self.json.images;
         let image = images
             .get(index)
-            .ok_or_else(|| missing("images", index, images.len()))?;
+            .ok_or_else(|| out_of_range("images", index, "images", images.len()))?;
         let fault = |rule| GltfFault::key(format!("images[{index}].uri"), rule);
         if let Some(view) = image.buffer_view {
-            let bytes = self.bytes_of(view.value())?;
-            self.has_room(index, bytes.len() as u64)?;
+            let bytes = self.view_bytes(view.value())?;
+            self.charge_image(index, bytes.len() as u64)?;
             return Ok(bytes.into());
         }
         let Some(name) = &image.uri else {
             let key = format!("images[{index}]");
-            let others = image
+            let unsupported = image
                 .extensions
                 .as_ref()
-                .and_then(|all| extension::unknown(&all.others));
-            return Err(ImageFault::Invalid(match others {
-                Some(name) => extension::only_in(&key, name),
+                .and_then(|all| extension::unsupported(&all.others));
+            return Err(ImageFault::Invalid(match unsupported {
+                Some(name) => extension::only_data_fault(&key, name),
                 None => GltfFault::key(key, "has neither a uri nor a bufferView"),
             }));
         };
         let bytes = match uri::is_data(name) {
             true => uri::data(name).map_err(ImageFault::Missing)?,
             false => {
-                let path = self.folder.find(name).map_err(|unfound| match unfound {
-                    UriError::Absent(why) => ImageFault::Missing(why),
+                let path = self.folder.find(name).map_err(|error| match error {
+                    UriError::Absent(reason) => ImageFault::Missing(reason),
                     UriError::Invalid(rule) => ImageFault::Invalid(fault(rule)),
                 })?;
                 uri::read(&path, MAX_IMAGE_BYTES).map_err(|error| {
-                    let why = format!("{} cannot be read: {error}", super::error::shown(name));
+                    let reason = format!("{} cannot be read: {error}", super::error::quoted(name));
                     match error.kind() {
-                        io::ErrorKind::FileTooLarge => ImageFault::Invalid(fault(why)),
-                        _ => ImageFault::Missing(why),
+                        io::ErrorKind::FileTooLarge => ImageFault::Invalid(fault(reason)),
+                        _ => ImageFault::Missing(reason),
                     }
                 })?
             }
         };
-        self.has_room(index, bytes.len() as u64)?;
+        self.charge_image(index, bytes.len() as u64)?;
         Ok(bytes.into())
     }
 
     /// Limits the size of an image, and the total size of all reads, because an image may be referenced repeatedly.
-    fn has_room(&self, index: usize, bytes: u64) -> Result<(), GltfFault> {
-        let given = self.given.fetch_add(bytes, Ordering::Relaxed).saturating_add(bytes);
+    fn charge_image(&self, index: usize, bytes: u64) -> Result<(), GltfFault> {
+        let total = self
+            .image_bytes_read
+            .fetch_add(bytes, Ordering::Relaxed)
+            .saturating_add(bytes);
         let fault = |rule: String| Err(GltfFault::key(format!("images[{index}]"), rule));
-        match (bytes > MAX_IMAGE_BYTES, given > MAX_IMAGES_BYTES) {
-            (true, _) => fault(format!("{bytes} bytes; an image must have at most {MAX_IMAGE_BYTES}")),
+        match (bytes > MAX_IMAGE_BYTES, total > MAX_IMAGES_BYTES) {
+            (true, _) => fault(format!(
+                "{bytes} bytes; an image must have at most {MAX_IMAGE_BYTES} bytes"
+            )),
             (_, true) => fault(format!(
                 "all images together must have at most {MAX_IMAGES_BYTES} bytes"
             )),

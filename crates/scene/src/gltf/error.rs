@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 use crate::ErrorPlace;
 
-/// An error of a glTF file. Messages begin with its location: `a.gltf: accessors[3]: 9 elements of 12 bytes, 12 apart,
-/// from byte 0 on; bufferViews[1] has 96 bytes`.
+/// An error of a glTF file. Messages begin with the location: `a.gltf: accessors[3]: count 9, element size 12, stride
+/// 12 and offset 0 exceed the 96 bytes of bufferViews[1]`.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum GltfError {
@@ -95,23 +95,23 @@ impl GltfError {
         place
     }
 
-    pub(crate) fn at(mut self, other: &Path) -> GltfError {
+    pub(crate) fn at(mut self, file: &Path) -> GltfError {
         match &mut self {
             GltfError::Read { path, .. }
             | GltfError::Syntax { path, .. }
             | GltfError::Byte { path, .. }
             | GltfError::Key { path, .. }
             | GltfError::Choice { path, .. }
-            | GltfError::File { path, .. } => *path = other.to_owned(),
+            | GltfError::File { path, .. } => *path = file.to_owned(),
         }
         self
     }
 }
 
-/// An error without its file.
+/// An error that does not contain the path of its file.
 #[derive(Debug)]
 pub(super) struct GltfFault {
-    pub place: Location,
+    pub location: Location,
     pub message: String,
 }
 
@@ -125,19 +125,19 @@ pub(super) enum Location {
     Key(String),
 }
 
-/// Maximum length of messages and keys in characters.
-const LONGEST: usize = 1000;
+/// Maximum length of a message or a key in characters.
+const MAX_MESSAGE_LEN: usize = 1000;
 
 impl GltfFault {
-    pub fn new(place: Location, message: impl Into<String>) -> GltfFault {
+    pub fn new(location: Location, message: impl Into<String>) -> GltfFault {
         GltfFault {
-            place,
-            message: cut(message.into()),
+            location,
+            message: elide(message.into()),
         }
     }
 
     pub fn key(key: impl Into<String>, message: impl Into<String>) -> GltfFault {
-        GltfFault::new(Location::Key(cut(key.into())), message)
+        GltfFault::new(Location::Key(elide(key.into())), message)
     }
 
     pub fn file(message: impl Into<String>) -> GltfFault {
@@ -146,7 +146,7 @@ impl GltfFault {
 
     pub fn of(self, path: &Path) -> GltfError {
         let (path, message) = (path.to_owned(), self.message);
-        match self.place {
+        match self.location {
             Location::File => GltfError::File { path, message },
             Location::Line(line, column) => GltfError::Syntax {
                 path,
@@ -160,24 +160,24 @@ impl GltfFault {
     }
 }
 
-fn cut(text: String) -> String {
+fn elide(text: String) -> String {
     let count = text.chars().count();
-    if count <= LONGEST {
+    if count <= MAX_MESSAGE_LEN {
         return text;
     }
-    let start: String = text.chars().take(LONGEST * 2 / 3).collect();
-    let end: String = text.chars().skip(count - LONGEST / 4).collect();
+    let start: String = text.chars().take(MAX_MESSAGE_LEN * 2 / 3).collect();
+    let end: String = text.chars().skip(count - MAX_MESSAGE_LEN / 4).collect();
     format!("{start}...{end}")
 }
 
 /// Rewrites a `serde_json` type error in terms of JSON.
-pub(super) fn plain(message: &dyn std::fmt::Display) -> String {
+pub(super) fn json_message(message: &dyn std::fmt::Display) -> String {
     let message = message.to_string();
     if let Some((name, _)) = message
         .strip_prefix("missing field `")
         .and_then(|rest| rest.split_once('`'))
     {
-        return format!("{} is required", shown(name));
+        return format!("{} is required", quoted(name));
     }
     let starts = ["invalid type: ", "invalid value: ", "invalid length "];
     let Some((start, rest)) = starts
@@ -187,7 +187,7 @@ pub(super) fn plain(message: &dyn std::fmt::Display) -> String {
         return message.replace('`', "\"");
     };
     // The quoted value may contain the separator.
-    let Some((found, wanted)) = rest.rsplit_once(", expected ") else {
+    let Some((found, expected)) = rest.rsplit_once(", expected ") else {
         return rest.replace('`', "\"");
     };
     let found = match found {
@@ -198,38 +198,38 @@ pub(super) fn plain(message: &dyn std::fmt::Display) -> String {
         _ => match (found.strip_prefix("string "), found.split_once('`')) {
             // Already quoted.
             (Some(text), _) if text.chars().count() <= 60 => text.to_owned(),
-            (Some(text), _) => shown(text.trim_matches('"')),
+            (Some(text), _) => quoted(text.trim_matches('"')),
             (None, Some((_, number))) => number.trim_end_matches('`').to_owned(),
             (None, None) => found.to_owned(),
         },
     };
-    let digits: String = wanted.chars().filter(char::is_ascii_digit).collect();
-    let wanted = match wanted {
+    let digits: String = expected.chars().filter(char::is_ascii_digit).collect();
+    let expected = match expected {
         "f32" | "f64" => "a number".to_owned(),
         "u8" | "u16" | "u32" | "u64" | "usize" => "a non-negative integer".to_owned(),
         "a boolean" => "true or false".to_owned(),
         "a string" | "a borrowed string" | "string" => "a string".to_owned(),
-        _ if wanted.starts_with("index into ") => "an index".to_owned(),
+        _ if expected.starts_with("index into ") => "an index".to_owned(),
         "a sequence" => "a list".to_owned(),
         "a map" | "map" => "an object".to_owned(),
-        _ if wanted.starts_with("struct ") => "an object".to_owned(),
-        _ if wanted.starts_with("an array of length ") || wanted.starts_with("a tuple of size ") => {
+        _ if expected.starts_with("struct ") => "an object".to_owned(),
+        _ if expected.starts_with("an array of length ") || expected.starts_with("a tuple of size ") => {
             format!("a list of {digits}")
         }
         other => other.to_owned(),
     };
-    format!("expected {wanted}, found {found}")
+    format!("expected {expected}, found {found}")
 }
 
 /// Quotes a name for a message, with the middle elided if it is long.
-pub(super) fn shown(name: &str) -> String {
-    const LONGEST: usize = 60;
+pub(super) fn quoted(name: &str) -> String {
+    const MAX_LEN: usize = 60;
     let count = name.chars().count();
-    if count <= LONGEST {
+    if count <= MAX_LEN {
         return format!("{name:?}");
     }
-    let start: String = name.chars().take(LONGEST * 2 / 3).collect();
-    let end: String = name.chars().skip(count - LONGEST / 4).collect();
+    let start: String = name.chars().take(MAX_LEN * 2 / 3).collect();
+    let end: String = name.chars().skip(count - MAX_LEN / 4).collect();
     format!("{:?}", format!("{start}...{end}"))
 }
 
@@ -237,21 +237,21 @@ pub(super) fn shown(name: &str) -> String {
 mod tests {
     use serde_json::json;
 
-    use super::plain;
+    use super::json_message;
 
     #[test]
     fn type_errors_are_reported_in_terms_of_json() {
         #[derive(serde::Deserialize, Debug)]
-        #[expect(dead_code, reason = "it is for its errors")]
+        #[expect(dead_code, reason = "the fields only produce errors")]
         struct View {
             name: String,
             length: u32,
-            place: [f32; 3],
+            position: [f32; 3],
             list: Vec<f32>,
             is_on: bool,
         }
-        let good = json!({ "name": "a", "length": 1, "place": [1, 2, 3], "list": [1], "is_on": true });
-        serde_json::from_value::<View>(good.clone()).unwrap();
+        let valid = json!({ "name": "a", "length": 1, "position": [1, 2, 3], "list": [1], "is_on": true });
+        serde_json::from_value::<View>(valid.clone()).unwrap();
         for (key, value, expected) in [
             ("name", json!(3), "expected a string, found 3"),
             (
@@ -262,8 +262,8 @@ mod tests {
             ("length", json!(-1), "expected a non-negative integer, found -1"),
             ("length", json!(1.5), "expected a non-negative integer, found 1.5"),
             ("length", json!({}), "expected a non-negative integer, found an object"),
-            ("place", json!([1, 2]), "expected a list of 3, found a list of 2"),
-            ("place", json!({}), "expected a list of 3, found an object"),
+            ("position", json!([1, 2]), "expected a list of 3, found a list of 2"),
+            ("position", json!({}), "expected a list of 3, found an object"),
             ("list", json!(null), "expected a list, found null"),
             (
                 "list",
@@ -272,10 +272,10 @@ mod tests {
             ),
             ("is_on", json!(0), "expected true or false, found 0"),
         ] {
-            let mut bad = good.clone();
-            bad[key] = value;
-            let error = serde_json::from_value::<View>(bad).unwrap_err();
-            assert_eq!(plain(&error), expected, "{error}");
+            let mut invalid = valid.clone();
+            invalid[key] = value;
+            let error = serde_json::from_value::<View>(invalid).unwrap_err();
+            assert_eq!(json_message(&error), expected, "{error}");
         }
         for (value, expected) in [
             (json!([1, 2, 3]), "expected a string, found 1"),
@@ -284,7 +284,7 @@ mod tests {
             (json!({}), "\"name\" is required"),
         ] {
             let error = serde_json::from_value::<View>(value).unwrap_err();
-            assert!(plain(&error).starts_with(expected), "{error}");
+            assert!(json_message(&error).starts_with(expected), "{error}");
         }
     }
 }

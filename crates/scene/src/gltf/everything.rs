@@ -39,30 +39,30 @@ pub fn everything() -> (Value, Vec<u8>) {
     let indices = accessor(vec![0, 1, 2, 2, 1, 3], 5121, "SCALAR", 6, false);
     let joints = accessor([0, 1, 0, 0].repeat(4), 5121, "VEC4", 4, false);
     let weights = accessor(floats(&[0.75, 0.25, 0.0, 0.0].repeat(4)), 5126, "VEC4", 4, false);
-    let moves = accessor(floats(&[0.0, 0.0, 0.5].repeat(4)), 5126, "VEC3", 4, false);
+    let displacements = accessor(floats(&[0.0, 0.0, 0.5].repeat(4)), 5126, "VEC3", 4, false);
     let times = accessor(floats(&[0.0, 1.0, 2.0]), 5126, "SCALAR", 3, false);
-    let ways = accessor(
+    let translations = accessor(
         floats(&[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 1.0, 0.0]),
         5126,
         "VEC3",
         3,
         false,
     );
-    let turns = accessor(
+    let rotations = accessor(
         floats(&[0.0, 0.0, 0.0, 1.0, 0.0, 0.6, 0.0, 0.8, 0.0, 1.0, 0.0, 0.0]),
         5126,
         "VEC4",
         3,
         false,
     );
-    let shares = accessor(
+    let weight_keys = accessor(
         floats(&[0.0, 1.0, 0.5, 0.0, 0.25, 1.0, 0.0, 0.0, 1.0]),
         5126,
         "SCALAR",
         9,
         false,
     );
-    let bind = accessor(
+    let inverse_bind = accessor(
         floats(&[1.0, 0.0, 0.0, 0.0, 0.0].repeat(7)[..32]),
         5126,
         "MAT4",
@@ -104,7 +104,7 @@ pub fn everything() -> (Value, Vec<u8>) {
             { "mesh": 1, "skin": 0, "children": [3] },
             { "translation": [0, 1, 0] },
             { "mesh": 0, "extensions": { "EXT_mesh_gpu_instancing": {
-                "attributes": { "TRANSLATION": ways, "ROTATION": turns, "SCALE": ways } } } },
+                "attributes": { "TRANSLATION": translations, "ROTATION": rotations, "SCALE": translations } } } },
             { "camera": 0, "extensions": { "KHR_lights_punctual": { "light": 0 } } },
             { "camera": 1, "matrix": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 5, 6, 7, 1],
               "extensions": { "KHR_lights_punctual": { "light": 1 } } },
@@ -114,13 +114,13 @@ pub fn everything() -> (Value, Vec<u8>) {
             { "type": "perspective", "perspective": { "yfov": 0.8, "znear": 0.1, "aspectRatio": 1.5 } },
             { "type": "orthographic", "orthographic": { "xmag": 2, "ymag": 1, "znear": 0.1, "zfar": 10 } },
         ],
-        "skins": [{ "joints": [0, 3], "inverseBindMatrices": bind }],
+        "skins": [{ "joints": [0, 3], "inverseBindMatrices": inverse_bind }],
         "animations": [{
             "name": "all",
             "samplers": [
-                { "input": times, "output": ways },
-                { "input": times, "output": turns, "interpolation": "STEP" },
-                { "input": times, "output": shares, "interpolation": "CUBICSPLINE" },
+                { "input": times, "output": translations },
+                { "input": times, "output": rotations, "interpolation": "STEP" },
+                { "input": times, "output": weight_keys, "interpolation": "CUBICSPLINE" },
             ],
             "channels": [
                 { "sampler": 0, "target": { "node": 0, "path": "translation" } },
@@ -134,7 +134,7 @@ pub fn everything() -> (Value, Vec<u8>) {
                 {
                     "attributes": { "POSITION": positions, "NORMAL": normals, "TEXCOORD_0": uvs, "COLOR_0": colors },
                     "indices": indices, "material": 0,
-                    "targets": [{ "POSITION": moves, "NORMAL": moves }, { "POSITION": sparse }],
+                    "targets": [{ "POSITION": displacements, "NORMAL": displacements }, { "POSITION": sparse }],
                     "extensions": { "KHR_materials_variants": {
                         "mappings": [{ "material": 1, "variants": [1] }, { "material": 2, "variants": [0] }] } },
                 },

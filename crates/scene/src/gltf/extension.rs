@@ -8,7 +8,7 @@ use gltf_json::mesh::Semantic;
 use gltf_json::validation::Checked;
 use serde_json::{Map, Value};
 
-use super::error::{GltfFault, shown};
+use super::error::{GltfFault, quoted};
 
 pub(super) const KNOWN: &[&str] = &[
     "EXT_mesh_gpu_instancing",
@@ -34,7 +34,7 @@ pub(super) const KNOWN: &[&str] = &[
     "KHR_xmp_json_ld",
 ];
 
-fn is_known(name: &str) -> bool {
+fn is_supported(name: &str) -> bool {
     KNOWN.contains(&name)
 }
 
@@ -42,17 +42,17 @@ fn is_known(name: &str) -> bool {
 /// other unsupported extensions.
 pub(super) fn check(root: &Root, notes: &mut Vec<String>) -> Result<(), GltfFault> {
     for (i, name) in root.extensions_required.iter().enumerate() {
-        if !is_known(name) {
+        if !is_supported(name) {
             let rule = "is required but not supported";
             return Err(GltfFault::key(
                 format!("extensionsRequired[{i}]"),
-                format!("{} {rule}{}", shown(name), remedy(name)),
+                format!("{} {rule}{}", quoted(name), remedy(name)),
             ));
         }
     }
     for (i, mesh) in root.meshes.iter().enumerate() {
         for (k, primitive) in mesh.primitives.iter().enumerate() {
-            let Some(name) = primitive.extensions.as_ref().and_then(|all| unknown(&all.others)) else {
+            let Some(name) = primitive.extensions.as_ref().and_then(|all| unsupported(&all.others)) else {
                 continue;
             };
             let positions = primitive.attributes.get(&Checked::Valid(Semantic::Positions));
@@ -60,20 +60,23 @@ pub(super) fn check(root: &Root, notes: &mut Vec<String>) -> Result<(), GltfFaul
             let is_empty = |accessor: &Accessor| accessor.buffer_view.is_none() && accessor.sparse.is_none();
             let mut accessors = accessors.into_iter().flatten().filter_map(|index| root.get(*index));
             if positions.is_none() || accessors.any(is_empty) {
-                return Err(only_in(&format!("meshes[{i}].primitives[{k}]"), name));
+                return Err(only_data_fault(&format!("meshes[{i}].primitives[{k}]"), name));
             }
         }
     }
-    let unknown: BTreeSet<&String> = (root.extensions_used.iter())
-        .filter(|name| !is_known(name) && !root.extensions_required.contains(name))
+    let ignored: BTreeSet<&String> = (root.extensions_used.iter())
+        .filter(|name| !is_supported(name) && !root.extensions_required.contains(name))
         .collect();
-    const MOST: usize = 20;
-    for name in unknown.iter().take(MOST) {
-        notes.push(format!("the extension {} is not supported and is ignored", shown(name)));
+    const MAX_NOTES: usize = 20;
+    for name in ignored.iter().take(MAX_NOTES) {
+        notes.push(format!(
+            "the extension {} is not supported and is ignored",
+            quoted(name)
+        ));
     }
-    if unknown.len() > MOST {
-        let more = unknown.len() - MOST;
-        notes.push(format!("{more} more extensions are not supported and are ignored"));
+    if ignored.len() > MAX_NOTES {
+        let remaining = ignored.len() - MAX_NOTES;
+        notes.push(format!("{remaining} more extensions are not supported and are ignored"));
     }
     Ok(())
 }
@@ -81,17 +84,17 @@ pub(super) fn check(root: &Root, notes: &mut Vec<String>) -> Result<(), GltfFaul
 fn remedy(name: &str) -> &'static str {
     match name {
         "KHR_draco_mesh_compression" => "; export without Draco compression, or run gltf-transform copy IN.glb OUT.glb",
-        _ => "; export the file without it",
+        _ => "; export the file without this extension",
     }
 }
 
-/// Returns the fault of data that is only present in an unsupported extension.
-pub(super) fn only_in(key: &str, name: &str) -> GltfFault {
-    let rule = "holds its only data and is not supported";
-    GltfFault::key(key, format!("{} {rule}{}", shown(name), remedy(name)))
+/// Returns the fault of an object whose data is only present in an unsupported extension.
+pub(super) fn only_data_fault(key: &str, name: &str) -> GltfFault {
+    let rule = "is not supported, but contains the only data";
+    GltfFault::key(key, format!("{} {rule}{}", quoted(name), remedy(name)))
 }
 
 /// Returns the first unsupported extension of an object.
-pub(super) fn unknown(others: &Map<String, Value>) -> Option<&str> {
-    others.keys().map(String::as_str).find(|name| !is_known(name))
+pub(super) fn unsupported(extensions: &Map<String, Value>) -> Option<&str> {
+    extensions.keys().map(String::as_str).find(|name| !is_supported(name))
 }

@@ -25,8 +25,8 @@ impl Random {
 }
 
 fn check(imported: &Imported) {
-    let all_flat = |note: &String| note.ends_with("their scale is zero");
-    assert!(!imported.instances.is_empty() || imported.notes.iter().any(all_flat));
+    let is_zero_scale_note = |note: &String| note.ends_with("their scale is zero");
+    assert!(!imported.instances.is_empty() || imported.notes.iter().any(is_zero_scale_note));
     for mesh in &imported.meshes {
         let count = mesh.positions.len();
         assert!(mesh.center.is_finite() && mesh.positions.iter().all(|p| p.is_finite()));
@@ -38,18 +38,18 @@ fn check(imported: &Imported) {
         assert!(mesh.normals.iter().all(|normal| (normal.length() - 1.0).abs() < 1e-3));
         let mut sets = std::iter::once(&mesh.uvs).chain(&mesh.more_uvs);
         assert!(sets.all(|uvs| fits(uvs.len()) && uvs.iter().all(|uv| uv.is_finite())));
-        let inside = |x: &f32| (0.0..=1.0).contains(x);
-        assert!(mesh.colors.iter().all(|color| color.to_array().iter().all(inside)));
+        let is_in_range = |x: &f32| (0.0..=1.0).contains(x);
+        assert!(mesh.colors.iter().all(|color| color.to_array().iter().all(is_in_range)));
         assert!(
             mesh.tangents
                 .iter()
                 .all(|tangent| tangent.is_finite() && tangent.length() < 1.5)
         );
     }
-    for placed in &imported.instances {
-        assert!(placed.to_world.is_finite() && placed.mesh < imported.meshes.len());
+    for instance in &imported.instances {
+        assert!(instance.to_world.is_finite() && instance.mesh < imported.meshes.len());
         assert!(
-            placed
+            instance
                 .materials
                 .iter()
                 .all(|material| *material < imported.materials.len())
@@ -61,33 +61,33 @@ fn check(imported: &Imported) {
 fn read(bytes: &[u8], path: &std::path::Path) -> usize {
     std::fs::write(path, bytes).unwrap();
     let root = path.parent().unwrap();
-    let none = ImportOptions {
+    let defaults = ImportOptions {
         scene: None,
         time: None,
         animation: None,
         variant: None,
     };
-    let all = ImportOptions {
+    let all_options = ImportOptions {
         time: Some(0.7),
         animation: Some(Selection::Number(0)),
         variant: Some(Selection::Number(1)),
         scene: None,
     };
-    let choices = [none, all];
-    let read = choices
+    let option_sets = [defaults, all_options];
+    let imported = option_sets
         .iter()
-        .filter_map(|choice| import(path, root, choice, &mut BTreeSet::new()).ok());
-    read.inspect(check).count()
+        .filter_map(|options| import(path, root, options, &mut BTreeSet::new()).ok());
+    imported.inspect(check).count()
 }
 
 #[test]
-fn changed_files_are_read_or_told() {
+fn mutated_files_are_imported_or_rejected() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.glb");
     let (json, binary) = everything();
     assert_eq!(read(&container(&json, &binary), &path), 2);
     let mut random = Random(0x9e37_79b9_7f4a_7c15);
-    let (mut good, mut bad, mut scenes) = (0, 0, 0);
+    let (mut accepted, mut rejected, mut scenes) = (0, 0, 0);
     let rounds = std::env::var("WGRAY_TEST_ROUNDS")
         .ok()
         .and_then(|rounds| rounds.parse().ok())
@@ -98,24 +98,24 @@ fn changed_files_are_read_or_told() {
             changed(&mut json, &mut |count| random.below(count));
         }
         for _ in 0..random.below(3) {
-            let at = random.below(binary.len() / 4) * 4;
+            let offset = random.below(binary.len() / 4) * 4;
             let words = [f32::NAN, f32::INFINITY, -3e38, 1e-40, 1e9, 0.0].map(f32::to_bits);
             let word = match random.below(8) {
                 i @ 0..6 => words[i],
                 _ => random.word(),
             };
-            binary[at..at + 4].copy_from_slice(&word.to_le_bytes());
+            binary[offset..offset + 4].copy_from_slice(&word.to_le_bytes());
         }
         match read(&container(&json, &binary), &path) {
-            0 => bad += 1,
-            _ => good += 1,
+            0 => rejected += 1,
+            _ => accepted += 1,
         }
         if round % 8 == 0 {
             scenes += usize::from(crate::Scene::load(&path).is_ok());
         }
     }
     assert!(
-        good * 5 > rounds && bad * 10 > rounds && scenes * 50 > rounds,
-        "{good} {bad} {scenes}"
+        accepted * 5 > rounds && rejected * 10 > rounds && scenes * 50 > rounds,
+        "{accepted} {rejected} {scenes}"
     );
 }

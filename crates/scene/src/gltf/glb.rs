@@ -21,11 +21,11 @@ pub(super) fn is_container(bytes: &[u8]) -> bool {
     bytes.starts_with(MAGIC)
 }
 
-/// Finds the chunks. Other and repeated chunks, and bytes beyond the declared length, are skipped.
+/// Finds the chunks. Chunks of other types, repeated chunks, and bytes beyond the declared length are skipped.
 pub(super) fn chunks(bytes: &[u8]) -> Result<Chunks, GltfFault> {
     if bytes.len() < HEADER {
         let rule = format!(
-            "the file is truncated: it has {} bytes, and its header {HEADER}",
+            "the file is truncated: it has {} of the {HEADER} bytes of the header",
             bytes.len()
         );
         return Err(GltfFault::new(Location::Byte(0), rule));
@@ -42,43 +42,46 @@ pub(super) fn chunks(bytes: &[u8]) -> Result<Chunks, GltfFault> {
     }
     let mut json = None;
     let mut binary = None;
-    let mut at = HEADER;
+    let mut offset = HEADER;
     // A remainder shorter than a chunk header is padding.
-    while length.saturating_sub(at) >= CHUNK_HEADER {
-        let (size, kind) = (word(bytes, at) as usize, word(bytes, at + 4));
-        let start = at + CHUNK_HEADER;
+    while length.saturating_sub(offset) >= CHUNK_HEADER {
+        let (size, kind) = (word(bytes, offset) as usize, word(bytes, offset + 4));
+        let start = offset + CHUNK_HEADER;
         if size > length - start {
-            let rule = format!("the chunk has {size} bytes; {} are left", length - start);
-            return Err(GltfFault::new(Location::Byte(at as u64), rule));
+            let rule = format!(
+                "the chunk size {size} must be at most {}, the remaining bytes",
+                length - start
+            );
+            return Err(GltfFault::new(Location::Byte(offset as u64), rule));
         }
         let range = start..start + size;
         match (kind, &json) {
             (JSON, None) => json = Some(range),
             (_, None) => {
                 return Err(GltfFault::new(
-                    Location::Byte(at as u64),
+                    Location::Byte(offset as u64),
                     "the first chunk must be JSON",
                 ));
             }
             (BIN, Some(_)) if binary.is_none() => binary = Some(range),
             _ => {}
         }
-        at = start + size;
+        offset = start + size;
     }
-    let json = json.ok_or_else(|| GltfFault::new(Location::Byte(HEADER as u64), "there must be a chunk of JSON"))?;
+    let json = json.ok_or_else(|| GltfFault::new(Location::Byte(HEADER as u64), "the file must have a JSON chunk"))?;
     Ok(Chunks { json, binary })
 }
 
 /// Returns a little-endian word; the caller checks the bounds.
-fn word(bytes: &[u8], at: usize) -> u32 {
-    u32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]])
+fn word(bytes: &[u8], offset: usize) -> u32 {
+    u32::from_le_bytes([bytes[offset], bytes[offset + 1], bytes[offset + 2], bytes[offset + 3]])
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn made(length: u32, chunks: &[(u32, &[u8])]) -> Vec<u8> {
+    fn glb(length: u32, chunks: &[(u32, &[u8])]) -> Vec<u8> {
         let mut bytes = MAGIC.to_vec();
         for word in [2, length] {
             bytes.extend(word.to_le_bytes());
@@ -93,12 +96,12 @@ mod tests {
 
     fn error_of(bytes: &[u8]) -> (Location, String) {
         let fault = chunks(bytes).unwrap_err();
-        (fault.place, fault.message)
+        (fault.location, fault.message)
     }
 
     #[test]
-    fn chunks_are_found_and_others_are_skipped() {
-        let bytes = made(
+    fn json_and_binary_chunks_are_found() {
+        let bytes = glb(
             12 + 8 + 4 + 8 + 4 + 8 + 4,
             &[(JSON, b"{}  "), (7, b"1234"), (BIN, b"abcd")],
         );
@@ -107,12 +110,12 @@ mod tests {
         assert_eq!(&bytes[found.json], b"{}  ");
         assert_eq!(&bytes[found.binary.unwrap()], b"abcd");
         // A second BIN chunk and trailing bytes are skipped.
-        let mut bytes = made(12 + 8 + 4 + 8 + 1, &[(JSON, b"{}  "), (BIN, b"a"), (BIN, b"b")]);
+        let mut bytes = glb(12 + 8 + 4 + 8 + 1, &[(JSON, b"{}  "), (BIN, b"a"), (BIN, b"b")]);
         let found = chunks(&bytes).unwrap();
         assert_eq!(&bytes[found.binary.unwrap()], b"a");
         bytes[8] += 9;
         assert_eq!(&bytes[chunks(&bytes).unwrap().binary.unwrap()], b"a");
-        assert_eq!(chunks(&made(24, &[(JSON, b"{}  ")])).unwrap().binary, None);
+        assert_eq!(chunks(&glb(24, &[(JSON, b"{}  ")])).unwrap().binary, None);
     }
 
     #[test]
@@ -120,30 +123,33 @@ mod tests {
         let byte = |offset: u64, rule: &str| (Location::Byte(offset), rule.to_owned());
         assert_eq!(
             error_of(b"glTF"),
-            byte(0, "the file is truncated: it has 4 bytes, and its header 12")
+            byte(0, "the file is truncated: it has 4 of the 12 bytes of the header")
         );
-        let mut bytes = made(24, &[(JSON, b"{}  ")]);
+        let mut bytes = glb(24, &[(JSON, b"{}  ")]);
         bytes[4] = 1;
         assert_eq!(
             error_of(&bytes),
             byte(4, "the version of the container is 1; it must be 2")
         );
         assert_eq!(
-            error_of(&made(25, &[(JSON, b"{}  ")])),
+            error_of(&glb(25, &[(JSON, b"{}  ")])),
             byte(8, "the file is truncated: it has 24 of 25 bytes")
         );
         assert_eq!(
-            error_of(&made(23, &[(JSON, b"{}  ")])),
-            byte(12, "the chunk has 4 bytes; 3 are left")
+            error_of(&glb(23, &[(JSON, b"{}  ")])),
+            byte(12, "the chunk size 4 must be at most 3, the remaining bytes")
         );
-        let mut bytes = made(24, &[(JSON, b"{}  ")]);
+        let mut bytes = glb(24, &[(JSON, b"{}  ")]);
         bytes[12..16].fill(0xff);
-        assert_eq!(error_of(&bytes), byte(12, "the chunk has 4294967295 bytes; 4 are left"));
         assert_eq!(
-            error_of(&made(24, &[(BIN, b"{}  ")])),
+            error_of(&bytes),
+            byte(12, "the chunk size 4294967295 must be at most 4, the remaining bytes")
+        );
+        assert_eq!(
+            error_of(&glb(24, &[(BIN, b"{}  ")])),
             byte(12, "the first chunk must be JSON")
         );
-        assert_eq!(error_of(&made(12, &[])), byte(12, "there must be a chunk of JSON"));
-        assert_eq!(error_of(&made(0, &[])), byte(12, "there must be a chunk of JSON"));
+        assert_eq!(error_of(&glb(12, &[])), byte(12, "the file must have a JSON chunk"));
+        assert_eq!(error_of(&glb(0, &[])), byte(12, "the file must have a JSON chunk"));
     }
 }

@@ -19,8 +19,8 @@ fn read(json: &Value, binary: &[u8]) -> Result<Imported, String> {
 /// Returns a triangle. Accessor 0 contains positions, 1 texture coordinates, 2 normals, and 3 zeros.
 fn triangle(corners: [f32; 9], uvs: [f32; 6]) -> (Value, Vec<u8>) {
     let normals = [0.0, 0.0, 1.0].repeat(3);
-    let all = corners.iter().chain(&uvs).chain(&normals);
-    let binary: Vec<u8> = all.flat_map(|x| x.to_le_bytes()).collect();
+    let values = corners.iter().chain(&uvs).chain(&normals);
+    let binary: Vec<u8> = values.flat_map(|x| x.to_le_bytes()).collect();
     let accessor =
         |view: usize, kind: &str| json!({ "bufferView": view, "componentType": 5126, "count": 3, "type": kind });
     let json = json!({
@@ -111,9 +111,9 @@ fn non_finite_and_too_large_coordinates_are_reported() {
             corners[k] = x;
             let (json, binary) = triangle(corners, UVS);
             let message = read(&json, &binary).unwrap_err();
-            let what = "meshes[0].primitives[0].attributes.POSITION: 1 triangle has a vertex with a coordinate";
+            let damage = "meshes[0].primitives[0].attributes.POSITION: 1 triangle has a vertex with a coordinate";
             assert!(
-                message.starts_with("scene: has no triangles") && message.contains(what),
+                message.starts_with("scene: has no triangles") && message.contains(damage),
                 "{message}"
             );
         }

@@ -5,16 +5,16 @@ use gltf_json::validation::{Checked, Error, Validate as _};
 use gltf_json::{Path, Root};
 use serde_json::{Map, Number, Value};
 
-use super::error::{GltfFault, Location, plain, shown};
+use super::error::{GltfFault, Location, json_message, quoted};
 
-/// Maximum length in bytes; data URIs are long.
+/// Maximum length of the JSON in bytes. The limit is high because data URIs are long.
 pub(super) const MAX_JSON_BYTES: usize = 512 << 20;
-/// Maximum number of objects; each takes up to 1 KiB.
+/// Maximum number of objects. An object takes up to 1 KiB of memory.
 const MAX_OBJECTS: usize = 2 << 20;
 /// Maximum number of elements of objects and arrays.
 const MAX_VALUES: usize = 32 << 20;
 
-/// Keys of indices and OpenGL codes. The crate truncates their 64-bit values to 32 bits.
+/// Keys of indices and OpenGL codes. The crate `gltf-json` truncates 64-bit values of these keys to 32 bits.
 const INDICES: &[&str] = &[
     "attributes",
     "buffer",
@@ -72,11 +72,11 @@ pub(super) fn root(text: &[u8], notes: &mut Vec<String>) -> Result<Root, GltfFau
         return Err(GltfFault::new(Location::Line(1, 1), "the JSON must be an object"));
     };
     check_version(top)?;
-    tidy(&mut value, None).map_err(|(key, rule)| GltfFault::key(key.trim_start_matches('.'), rule))?;
+    normalize(&mut value, None).map_err(|(key, rule)| GltfFault::key(key.trim_start_matches('.'), rule))?;
     repair(&mut value, notes);
     let root: Root = serde_path_to_error::deserialize(value).map_err(|error| {
         let key = error.path().to_string();
-        GltfFault::key(key, plain(error.inner()))
+        GltfFault::key(key, json_message(error.inner()))
     })?;
     check(&root)?;
     Ok(root)
@@ -113,8 +113,8 @@ fn check_size(text: &[u8]) -> Result<(), GltfFault> {
             _ => {}
         }
     }
-    let too_many = |count: usize, what: &str, most: usize| {
-        GltfFault::file(format!("the JSON has {count} {what}; it must have at most {most}"))
+    let too_many = |count: usize, kind: &str, max: usize| {
+        GltfFault::file(format!("the JSON has {count} {kind}; it must have at most {max}"))
     };
     if objects > MAX_OBJECTS {
         return Err(too_many(objects, "objects", MAX_OBJECTS));
@@ -128,7 +128,7 @@ fn check_size(text: &[u8]) -> Result<(), GltfFault> {
 /// Checks the version first (specification, section 3.2), because everything else depends on it.
 fn check_version(top: &Map<String, Value>) -> Result<(), GltfFault> {
     let asset = top.get("asset").and_then(Value::as_object);
-    let asset = asset.ok_or_else(|| GltfFault::key("asset", "is required: an object with the version"))?;
+    let asset = asset.ok_or_else(|| GltfFault::key("asset", "must be an object with the version"))?;
     let number = |text: &str| {
         let (major, minor) = text.split_once('.')?;
         Some((major.parse::<u32>().ok()?, minor.parse::<u32>().ok()?))
@@ -146,11 +146,14 @@ fn check_version(top: &Map<String, Value>) -> Result<(), GltfFault> {
     }
     match member("minVersion") {
         None => Ok(()),
-        Some(least) => match least.as_str().and_then(number) {
-            Some(least) if least <= (2, 0) => Ok(()),
+        Some(min_version) => match min_version.as_str().and_then(number) {
+            Some(min_version) if min_version <= (2, 0) => Ok(()),
             _ => Err(GltfFault::key(
                 "asset.minVersion",
-                format!("{} must be at most \"2.0\", the supported version", text_of(least)),
+                format!(
+                    "{} must be at most \"2.0\", the supported version",
+                    text_of(min_version)
+                ),
             )),
         },
     }
@@ -158,30 +161,30 @@ fn check_version(top: &Map<String, Value>) -> Result<(), GltfFault> {
 
 fn text_of(value: &Value) -> String {
     match value {
-        Value::String(text) => shown(text),
+        Value::String(text) => quoted(text),
         Value::Object(_) => "an object".to_owned(),
         Value::Array(_) => "a list".to_owned(),
         other => other.to_string(),
     }
 }
 
-/// Removes `extras`, converts whole floats to integers, and checks that numbers fit 32 bits. The error is a key path
+/// Removes `extras`, converts integral floats to integers, and checks that numbers fit 32 bits. The error is a key path
 /// and a rule.
-fn tidy(value: &mut Value, index: Option<&str>) -> Result<(), (String, String)> {
+fn normalize(value: &mut Value, index: Option<&str>) -> Result<(), (String, String)> {
     match value {
         Value::Object(map) => {
             map.remove("extras");
             for (key, value) in map {
                 // The elements of `attributes` and `targets` are indices as well.
                 let is_index = INDICES.contains(&key.as_str());
-                let inner = index.filter(|outer| ["attributes", "targets"].contains(outer));
-                let index = if is_index { Some(key.as_str()) } else { inner };
-                tidy(value, index).map_err(|(path, rule)| (format!(".{key}{path}"), rule))?;
+                let inherited = index.filter(|outer| ["attributes", "targets"].contains(outer));
+                let index = if is_index { Some(key.as_str()) } else { inherited };
+                normalize(value, index).map_err(|(path, rule)| (format!(".{key}{path}"), rule))?;
             }
         }
         Value::Array(list) => {
             for (i, value) in list.iter_mut().enumerate() {
-                tidy(value, index).map_err(|(path, rule)| (format!("[{i}]{path}"), rule))?;
+                normalize(value, index).map_err(|(path, rule)| (format!("[{i}]{path}"), rule))?;
             }
         }
         Value::Number(number) => {
@@ -203,42 +206,40 @@ fn tidy(value: &mut Value, index: Option<&str>) -> Result<(), (String, String)> 
     Ok(())
 }
 
-/// Rewrites valid JSON that the parser crate rejects, and errors that can be corrected unambiguously.
+/// Rewrites valid JSON that the crate `gltf-json` rejects, and corrects unambiguous errors.
 fn repair(top: &mut Value, notes: &mut Vec<String>) {
     for scene in list(top, "scenes") {
-        default(scene, "nodes", Value::Array(Vec::new()));
+        set_default(scene, "nodes", Value::Array(Vec::new()));
     }
     for view in list(top, "bufferViews") {
-        let is_none = |stride: &Value| stride.as_u64() == Some(0);
+        let is_zero = |stride: &Value| stride.as_u64() == Some(0);
         if let Value::Object(view) = view
-            && view.get("byteStride").is_some_and(is_none)
+            && view.get("byteStride").is_some_and(is_zero)
         {
             view.remove("byteStride");
         }
     }
-    let mut left_out = 0;
+    let mut ignored = 0;
     for animation in list(top, "animations") {
-        default(animation, "channels", Value::Array(Vec::new()));
-        default(animation, "samplers", Value::Array(Vec::new()));
+        set_default(animation, "channels", Value::Array(Vec::new()));
+        set_default(animation, "samplers", Value::Array(Vec::new()));
         if let Some(Value::Array(channels)) = animation.get_mut("channels") {
             let count = channels.len();
-            channels.retain(|channel| !is_of_an_extension(channel));
-            left_out += count - channels.len();
+            channels.retain(|channel| !targets_extension(channel));
+            ignored += count - channels.len();
         }
     }
-    if left_out > 0 {
-        let (what, moves) = match left_out {
-            1 => ("channel", "moves"),
-            _ => ("channels", "move"),
+    if ignored > 0 {
+        let rule = match ignored {
+            1 => "channel with a target other than a node is ignored",
+            _ => "channels with targets other than nodes are ignored",
         };
-        notes.push(format!(
-            "animations: {left_out} {what} that {moves} something other than a node are ignored"
-        ));
+        notes.push(format!("animations: {ignored} {rule}"));
     }
 }
 
 /// Returns true for channels of extensions such as `KHR_animation_pointer` (specification, section 3.11).
-fn is_of_an_extension(channel: &Value) -> bool {
+fn targets_extension(channel: &Value) -> bool {
     let Some(Value::Object(target)) = channel.get("target") else {
         return false;
     };
@@ -248,15 +249,15 @@ fn is_of_an_extension(channel: &Value) -> bool {
     !has_node || path.is_some_and(|path| !core.contains(&path))
 }
 
-fn list<'a>(of: &'a mut Value, key: &str) -> &'a mut [Value] {
-    match of.get_mut(key) {
+fn list<'a>(object: &'a mut Value, key: &str) -> &'a mut [Value] {
+    match object.get_mut(key) {
         Some(Value::Array(list)) => list,
         _ => &mut [],
     }
 }
 
-fn default(of: &mut Value, key: &str, value: Value) {
-    if let Value::Object(map) = of
+fn set_default(object: &mut Value, key: &str, value: Value) {
+    if let Value::Object(map) = object
         && map.get(key).is_none_or(Value::is_null)
     {
         map.insert(key.to_owned(), value);
@@ -265,13 +266,13 @@ fn default(of: &mut Value, key: &str, value: Value) {
 
 /// Checks indices and enumerations.
 fn check(root: &Root) -> Result<(), GltfFault> {
-    // The validation of the parser crate assumes these properties.
+    // The validation of the crate `gltf-json` assumes valid attributes, animation channels and cameras.
     for (i, mesh) in root.meshes.iter().enumerate() {
         for (k, primitive) in mesh.primitives.iter().enumerate() {
             for (name, accessor) in &primitive.attributes {
                 if accessor.value() >= root.accessors.len() {
                     let key = format!("meshes[{i}].primitives[{k}].attributes.{}", name.to_string());
-                    return Err(missing(key, accessor.value(), root.accessors.len()));
+                    return Err(out_of_range(key, accessor.value(), "accessors", root.accessors.len()));
                 }
             }
         }
@@ -281,7 +282,7 @@ fn check(root: &Root) -> Result<(), GltfFault> {
             let node = channel.target.node.value();
             if node >= root.nodes.len() {
                 let key = format!("animations[{i}].channels[{k}].target.node");
-                return Err(missing(key, node, root.nodes.len()));
+                return Err(out_of_range(key, node, "nodes", root.nodes.len()));
             }
             if matches!(channel.target.path, Checked::Invalid) {
                 let key = format!("animations[{i}].channels[{k}].target.path");
@@ -290,28 +291,28 @@ fn check(root: &Root) -> Result<(), GltfFault> {
         }
     }
     for (i, camera) in root.cameras.iter().enumerate() {
-        let (is_there, name) = match camera.type_ {
+        let (is_present, name) = match camera.type_ {
             Checked::Valid(Type::Perspective) => (camera.perspective.is_some(), "perspective"),
             Checked::Valid(Type::Orthographic) => (camera.orthographic.is_some(), "orthographic"),
             Checked::Invalid => continue,
         };
-        if !is_there {
+        if !is_present {
             return Err(GltfFault::key(
                 format!("cameras[{i}].{name}"),
                 "is required by the type of the camera",
             ));
         }
     }
-    let mut first = None;
+    let mut first_error = None;
     root.validate(root, Path::new, &mut |path, error| {
-        if first.is_none() {
+        if first_error.is_none() {
             let path = path().0;
             if !is_allowed(&path, error) {
-                first = Some((path, error));
+                first_error = Some((path, error));
             }
         }
     });
-    match first {
+    match first_error {
         None => Ok(()),
         Some((path, error)) => Err(GltfFault::key(
             path,
@@ -326,24 +327,26 @@ fn check(root: &Root) -> Result<(), GltfFault> {
     }
 }
 
-pub(super) fn missing(key: impl Into<String>, index: usize, count: usize) -> GltfFault {
-    GltfFault::key(key, format!("{index} is out of range; the file has {count}"))
+/// Returns the fault of an index into a list of `count` entries. `entries` is their name, for example `accessors`.
+pub(super) fn out_of_range(key: impl Into<String>, index: usize, entries: &str, count: usize) -> GltfFault {
+    GltfFault::key(key, format!("{index} is out of range; number of {entries}: {count}"))
 }
 
-/// Returns true for validation errors of the glTF parser crate that are tolerated here.
+/// Returns true for validation errors of the crate `gltf-json` that this importer tolerates.
 fn is_allowed(path: &str, error: Error) -> bool {
-    let is_in = |list: &str| path.starts_with(list);
+    let starts_with = |prefix: &str| path.starts_with(prefix);
     match error {
         // `extension::check` checks required extensions.
-        Error::Unsupported => is_in("extensionsRequired["),
+        Error::Unsupported => starts_with("extensionsRequired["),
         // Accessors without data are zero, bounds are not used, and primitives without positions are skipped.
         Error::Missing => {
-            is_in("accessors[") && path.ends_with("].bufferView")
-                || is_in("meshes[") && path.contains("attributes[\"POSITION\"]")
+            starts_with("accessors[") && path.ends_with("].bufferView")
+                || starts_with("meshes[") && path.contains("attributes[\"POSITION\"]")
         }
-        // Application-specific attributes, and strides that are only invalid for GPUs.
+        // Application-specific attributes are ignored, and some strides are only invalid for GPUs.
         Error::Invalid => {
-            is_in("meshes[") && path.contains(".attributes[") || is_in("bufferViews[") && path.ends_with("].byteStride")
+            starts_with("meshes[") && path.contains(".attributes[")
+                || starts_with("bufferViews[") && path.ends_with("].byteStride")
         }
         Error::IndexOutOfBounds | Error::Oversize => false,
     }

@@ -8,10 +8,10 @@ use serde::Deserialize;
 
 use super::UPRIGHT;
 use super::document::Document;
-use super::error::{GltfError, plain};
+use super::error::{GltfError, json_message};
 use crate::{DirectionalLightDescription, LightDescription, PointLightDescription, SpotLightDescription};
 
-const BRIGHTEST: f64 = 1e6;
+const MAX_INTENSITY: f64 = 1e6;
 
 #[derive(Deserialize)]
 struct Light {
@@ -59,20 +59,20 @@ impl Document {
         notes: &mut Vec<String>,
     ) -> Result<Option<LightDescription>, GltfError> {
         const NAME: &str = "KHR_lights_punctual";
-        let of_node = self.json.nodes[node].extensions.as_ref();
-        let Some(of_node) = of_node.and_then(|all| all.others.get(NAME)) else {
+        let node_extensions = self.json.nodes[node].extensions.as_ref();
+        let Some(node_extension) = node_extensions.and_then(|all| all.others.get(NAME)) else {
             return Ok(None);
         };
-        let all = self.json.extensions.as_ref();
-        let lights = all.and_then(|all| all.others.get(NAME)?.get("lights")?.as_array());
-        let number = of_node.get("light").and_then(serde_json::Value::as_u64);
-        let found = number.and_then(|i| lights?.get(usize::try_from(i).ok()?));
-        let Some((number, light)) = number.zip(found) else {
+        let extensions = self.json.extensions.as_ref();
+        let lights = extensions.and_then(|all| all.others.get(NAME)?.get("lights")?.as_array());
+        let light_index = node_extension.get("light").and_then(serde_json::Value::as_u64);
+        let listed_light = light_index.and_then(|i| lights?.get(usize::try_from(i).ok()?));
+        let Some((light_index, light)) = light_index.zip(listed_light) else {
             let rule = "refers to a light that does not exist".to_owned();
             return Err(self.fault(format!("nodes[{node}].extensions.{NAME}.light"), rule));
         };
-        let place = format!("extensions.{NAME}.lights[{number}]");
-        let light = Light::deserialize(light).map_err(|error| self.fault(&place, plain(&error)))?;
+        let location = format!("extensions.{NAME}.lights[{light_index}]");
+        let light = Light::deserialize(light).map_err(|error| self.fault(&location, json_message(&error)))?;
         if light.range.is_some() {
             note(
                 notes,
@@ -81,7 +81,7 @@ impl Document {
         }
         let mut color = DVec3::from_array(light.color) * light.intensity;
         if color.min_element() < 0.0 {
-            note(notes, format!("{place}: a negative intensity counts as 0"));
+            note(notes, format!("{location}: a negative intensity counts as 0"));
             color = color.max(DVec3::ZERO);
         }
         if !color.is_finite() {
@@ -89,16 +89,16 @@ impl Document {
                 "color {:?} times intensity {} must be finite",
                 light.color, light.intensity
             );
-            return Err(self.fault(&place, rule));
+            return Err(self.fault(&location, rule));
         }
-        if color.max_element() > BRIGHTEST {
-            note(notes, format!("{place}: the intensity is clamped to 1e6"));
-            color *= BRIGHTEST / color.max_element();
-            color = color.min(DVec3::splat(BRIGHTEST));
+        if color.max_element() > MAX_INTENSITY {
+            note(notes, format!("{location}: the intensity is clamped to 1e6"));
+            color *= MAX_INTENSITY / color.max_element();
+            color = color.min(DVec3::splat(MAX_INTENSITY));
         }
-        let map = UPRIGHT * *global;
-        let position = map.translation;
-        let direction = map.transform_vector3(DVec3::NEG_Z).normalize_or_zero();
+        let to_world = UPRIGHT * *global;
+        let position = to_world.translation;
+        let direction = to_world.transform_vector3(DVec3::NEG_Z).normalize_or_zero();
         if !position.is_finite() || direction == DVec3::ZERO && light.kind != "point" {
             note(
                 notes,
@@ -112,16 +112,14 @@ impl Document {
             "spot" => {
                 let [outer, inner] = [light.spot.outer_cone_angle, light.spot.inner_cone_angle].map(f64::to_degrees);
                 if !(0.0..=180.0).contains(&outer) || !(0.0..=outer).contains(&inner) {
-                    let rule = "its cone's angles must be 0 <= inner <= outer <= pi".to_owned();
-                    return Err(self.fault(&place, rule));
+                    let rule = "the cone angles must satisfy 0 <= inner <= outer <= pi".to_owned();
+                    return Err(self.fault(&location, rule));
                 }
                 // Allows for rounding: pi/2 in f32 exceeds 90 degrees.
                 if outer > 90.001 {
                     note(
                         notes,
-                        format!(
-                            "{place}: spot.outerConeAngle is larger than pi/2, as it must not be; it is taken as it is"
-                        ),
+                        format!("{location}: spot.outerConeAngle exceeds the maximum of pi/2 and is used unchanged"),
                     );
                 }
                 SpotLightDescription {
@@ -134,7 +132,7 @@ impl Document {
             }
             other => {
                 return Err(self.fault(
-                    &place,
+                    &location,
                     format!("type {other:?} must be \"directional\", \"point\" or \"spot\""),
                 ));
             }
@@ -142,35 +140,36 @@ impl Document {
     }
 }
 
-/// Warns if a white surface at `middle` would be overexposed, as with physical units.
-pub(super) fn brightness(lights: &[LightDescription], middle: DVec3) -> Option<String> {
+/// Returns a warning if a white surface at `center` would be overexposed, for example by lights with physical units.
+pub(super) fn overexposure(lights: &[LightDescription], center: DVec3) -> Option<String> {
     /// Maximum radiance without a warning.
-    const MOST: f64 = 30.0;
+    const MAX_RADIANCE: f64 = 30.0;
     let irradiance = |light: &LightDescription| match light {
         LightDescription::Directional(light) => light.color,
-        LightDescription::Point(light) => light.color / light.position.distance_squared(middle),
-        LightDescription::Spot(light) => light.color / light.position.distance_squared(middle),
+        LightDescription::Point(light) => light.color / light.position.distance_squared(center),
+        LightDescription::Spot(light) => light.color / light.position.distance_squared(center),
         LightDescription::Rectangle(_) => DVec3::ZERO,
     };
     let radiance = lights.iter().map(irradiance).sum::<DVec3>().max_element() / PI;
     let stops = radiance.log2().round();
-    (radiance > MOST && stops.is_finite()).then(|| {
+    (radiance > MAX_RADIANCE && stops.is_finite()).then(|| {
         format!(
-            "its lights are bright: white in its middle shows as {radiance:.0}, where 1 is white. --exposure -{stops} takes that back"
+            "the lights are bright: a white surface at the center of the scene has radiance {radiance:.0}, and 1 is \
+             displayed as white. --exposure -{stops} compensates"
         )
     })
 }
 
 /// Adds a note, unless it already exists or there are too many notes.
 pub(super) fn note(notes: &mut Vec<String>, note: String) {
-    const MOST: usize = 200;
-    let is_room = notes.len() < MOST;
-    let note = if is_room {
+    const MAX_NOTES: usize = 200;
+    let has_room = notes.len() < MAX_NOTES;
+    let note = if has_room {
         note
     } else {
-        "and more of the kind".to_owned()
+        "further warnings are omitted".to_owned()
     };
-    if notes.len() <= MOST && !notes.contains(&note) {
+    if notes.len() <= MAX_NOTES && !notes.contains(&note) {
         notes.push(note);
     }
 }

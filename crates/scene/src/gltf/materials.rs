@@ -18,15 +18,15 @@ const MAX_NAME_LEN: usize = 200;
 pub struct Materials<'a> {
     document: &'a Document,
     variant: Option<usize>,
-    /// Maps materials of the file to indices into `used`; `None` is the default material.
-    numbers: BTreeMap<Option<usize>, usize>,
+    /// For each material of the file, the index into `used`; `None` is the default material.
+    use_indices: BTreeMap<Option<usize>, usize>,
     used: Vec<MaterialUse>,
 }
 
 pub struct MaterialUse {
     /// Material index of the file.
     index: Option<usize>,
-    /// Used with vertex colours.
+    /// True if a primitive with vertex colors uses the material.
     is_colored: bool,
     /// Required texture coordinate sets.
     pub sets: BTreeSet<u32>,
@@ -39,56 +39,56 @@ impl<'a> Materials<'a> {
         Materials {
             document,
             variant,
-            numbers: BTreeMap::new(),
+            use_indices: BTreeMap::new(),
             used: Vec::new(),
         }
     }
 
     /// Returns the index of a primitive's material, and marks the material as used.
-    pub fn number(&mut self, primitive: &Primitive, place: &str, is_colored: bool) -> Result<usize, GltfError> {
-        let index = self.index(primitive);
+    pub fn mark_used(&mut self, primitive: &Primitive, location: &str, is_colored: bool) -> Result<usize, GltfError> {
+        let index = self.material_index(primitive);
         let count = self.document.json.materials.len();
         if let Some(index) = index
             && index >= count
         {
-            let rule = format!("{index} is out of range; the file has {count} materials");
-            return Err(self.document.fault(format!("{place}.material"), rule));
+            let rule = format!("{index} is out of range; number of materials: {count}");
+            return Err(self.document.fault(format!("{location}.material"), rule));
         }
-        let number = match self.numbers.get(&index) {
-            Some(number) => *number,
+        let use_index = match self.use_indices.get(&index) {
+            Some(use_index) => *use_index,
             None => {
                 self.used.push(MaterialUse::of(self.document, index)?);
-                self.numbers.insert(index, self.used.len() - 1);
+                self.use_indices.insert(index, self.used.len() - 1);
                 self.used.len() - 1
             }
         };
-        self.used[number].is_colored |= is_colored;
-        Ok(number)
+        self.used[use_index].is_colored |= is_colored;
+        Ok(use_index)
     }
 
-    pub fn get(&self, number: usize) -> &MaterialUse {
-        &self.used[number]
+    pub fn get(&self, index: usize) -> &MaterialUse {
+        &self.used[index]
     }
 
-    fn index(&self, primitive: &Primitive) -> Option<usize> {
+    fn material_index(&self, primitive: &Primitive) -> Option<usize> {
         let extension = || primitive.extensions.as_ref()?.others.get("KHR_materials_variants");
         let mappings = || extension()?.get("mappings")?.as_array();
-        let is_of = |mapping: &&Value, variant: usize| {
+        let has_variant = |mapping: &&Value, variant: usize| {
             let variants = mapping.get("variants").and_then(Value::as_array);
-            variants.is_some_and(|all| all.iter().any(|of| of.as_u64() == Some(variant as u64)))
+            variants.is_some_and(|all| all.iter().any(|entry| entry.as_u64() == Some(variant as u64)))
         };
-        let varied = self.variant.and_then(|variant| {
-            let mapping = mappings()?.iter().find(|mapping| is_of(mapping, variant))?;
+        let variant_material = self.variant.and_then(|variant| {
+            let mapping = mappings()?.iter().find(|mapping| has_variant(mapping, variant))?;
             usize::try_from(mapping.get("material")?.as_u64()?).ok()
         });
-        varied.or(primitive.material.map(|material| material.value()))
+        variant_material.or(primitive.material.map(|material| material.value()))
     }
 
     pub fn finish(self, notes: &mut Vec<String>) -> Result<(Vec<ImportedMaterial>, Images), GltfError> {
         let mut images = Images::default();
         let mut names = BTreeSet::new();
-        // Next suffix of each name.
-        let mut next: BTreeMap<String, usize> = BTreeMap::new();
+        // The next suffix of each repeated name.
+        let mut next_suffixes: BTreeMap<String, usize> = BTreeMap::new();
         let mut materials = Vec::with_capacity(self.used.len());
         for used in &self.used {
             let mut name = match used.index {
@@ -98,15 +98,15 @@ impl<'a> Materials<'a> {
             if let Some((end, _)) = name.char_indices().nth(MAX_NAME_LEN) {
                 name.truncate(end);
             }
-            let plain = name.clone();
+            let base_name = name.clone();
             while !names.insert(name.clone()) {
-                let number = next.entry(plain.clone()).or_insert(2);
-                name = format!("{plain} ({number})");
-                *number += 1;
+                let suffix = next_suffixes.entry(base_name.clone()).or_insert(2);
+                name = format!("{base_name} ({suffix})");
+                *suffix += 1;
             }
             let mut converter = Converter {
                 document: self.document,
-                place: String::new(),
+                location: String::new(),
                 name: name.clone(),
                 textures: Textures::new(),
                 images: &mut images,
@@ -163,7 +163,7 @@ impl MaterialUse {
             return Ok(used);
         };
         let material = &document.json.materials[index];
-        let place = format!("materials[{index}]");
+        let location = format!("materials[{index}]");
         let pbr = &material.pbr_metallic_roughness;
         let infos = [
             pbr.base_color_texture.as_ref(),
@@ -171,22 +171,23 @@ impl MaterialUse {
             material.emissive_texture.as_ref(),
         ];
         for info in infos.into_iter().flatten() {
-            let others = info.extensions.as_ref().map(|all| &all.others);
-            let slot = Slot::new(document, &place, (info.index.value(), info.tex_coord), others)?;
+            let extensions = info.extensions.as_ref().map(|all| &all.others);
+            let slot = Slot::new(document, &location, (info.index.value(), info.tex_coord), extensions)?;
             used.sets.insert(slot.set);
         }
-        let others = material.extensions.as_ref().map(|all| &all.others);
-        let extension = |name: &str| others.and_then(|all| all.get(name));
+        let extensions = material.extensions.as_ref().map(|all| &all.others);
+        let extension = |name: &str| extensions.and_then(|all| all.get(name));
         for (extension, texture) in EXTENSION_TEXTURES.map(|(name, texture)| (extension(name), texture)) {
             if let Some(value) = extension.and_then(|extension| extension.get(texture)) {
-                let (slot, _) = Slot::of_value(document, &format!("{place}.{texture}"), value)?;
+                let (slot, _) = Slot::of_value(document, &format!("{location}.{texture}"), value)?;
                 used.sets.insert(slot.set);
                 if ["clearcoatNormalTexture", "anisotropyTexture"].contains(&texture) {
                     used.tangents = Some(slot);
                 }
             }
         }
-        let strength = extension("KHR_materials_anisotropy").and_then(|of| of.get("anisotropyStrength")?.as_f64());
+        let strength =
+            extension("KHR_materials_anisotropy").and_then(|values| values.get("anisotropyStrength")?.as_f64());
         if used.tangents.is_none() && strength.is_some_and(|strength| strength != 0.0) {
             used.sets.insert(0);
             used.tangents = Some(Slot {
@@ -196,8 +197,13 @@ impl MaterialUse {
             });
         }
         if let Some(normal) = &material.normal_texture {
-            let others = normal.extensions.as_ref().map(|all| &all.others);
-            let slot = Slot::new(document, &place, (normal.index.value(), normal.tex_coord), others)?;
+            let extensions = normal.extensions.as_ref().map(|all| &all.others);
+            let slot = Slot::new(
+                document,
+                &location,
+                (normal.index.value(), normal.tex_coord),
+                extensions,
+            )?;
             used.sets.insert(slot.set);
             used.tangents = Some(slot);
         }

@@ -58,13 +58,13 @@ use crate::{
 pub use self::contents::ModelContents;
 pub use self::error::GltfError;
 
-/// Maximum number of instances, and maximum total number of their groups. Each takes more than 1 KiB in a scene.
+/// Maximum number of instances, and of all their groups together. An instance takes more than 1 KiB in a scene.
 const MAX_INSTANCES: usize = 1 << 20;
 
 /// Maximum axis length of an instance's transform.
 const MAX_AXIS_LENGTH: f64 = 1e6;
 
-const STILL: &str = "the file has no animations";
+const NO_ANIMATIONS: &str = "the file has no animations";
 
 /// Rotation from glTF to scene space: +Y becomes +Z.
 pub const UPRIGHT: DAffine3 = DAffine3 {
@@ -129,9 +129,9 @@ pub struct Imported {
 /// A damaged part of the file that was replaced by a stand-in.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Damage {
-    /// Location and damage.
+    /// Message: the location and the damage.
     pub what: String,
-    /// The stand-in.
+    /// Message: what is used instead.
     pub stand_in: &'static str,
 }
 
@@ -151,7 +151,7 @@ pub struct MeshInstance {
 pub struct ImportedMaterial {
     /// Unique name.
     pub name: String,
-    /// Description.
+    /// Parameters of the material.
     pub description: MaterialDescription,
     /// Textures by the names in the description.
     pub textures: BTreeMap<String, TextureDescription>,
@@ -162,9 +162,9 @@ pub struct ImportedMaterial {
 pub struct ImportedCamera {
     /// Name in the file.
     pub name: Option<String>,
-    /// Description.
+    /// Parameters of the camera.
     pub description: CameraDescription,
-    /// Aspect ratio (width / height), if given.
+    /// Aspect ratio (width / height), if the file has one.
     pub aspect: Option<f64>,
 }
 
@@ -172,89 +172,87 @@ impl Imported {
     /// Returns points that bound the scene: the vertices, or the corners of bounding boxes if there are too many
     /// vertices.
     pub fn points(&self) -> Vec<DVec3> {
-        const MOST: usize = 1 << 21;
+        const MAX_POINTS: usize = 1 << 21;
         let vertices = self
             .instances
             .iter()
-            .map(|placed| self.meshes[placed.mesh].positions.len());
-        if vertices.sum::<usize>() > MOST {
+            .map(|instance| self.meshes[instance.mesh].positions.len());
+        if vertices.sum::<usize>() > MAX_POINTS {
             return self.corners();
         }
-        let points = self.instances.iter().flat_map(|placed| {
-            let mesh = &self.meshes[placed.mesh];
+        let points = self.instances.iter().flat_map(|instance| {
+            let mesh = &self.meshes[instance.mesh];
             let points = mesh.positions.iter().map(|p| p.as_dvec3() + mesh.center);
-            points.map(|p| placed.to_world.transform_point3(p))
+            points.map(|p| instance.to_world.transform_point3(p))
         });
         points.collect()
     }
 
     fn corners(&self) -> Vec<DVec3> {
-        let corners = self.instances.par_iter().map(|placed| {
-            let corners = self.meshes[placed.mesh].corners();
+        let corners = self.instances.par_iter().map(|instance| {
+            let corners = self.meshes[instance.mesh].corners();
             corners
-                .map(|corner| placed.to_world.transform_point3(corner))
+                .map(|corner| instance.to_world.transform_point3(corner))
                 .collect::<Vec<_>>()
         });
         corners.flatten_iter().collect()
     }
 }
 
-/// Returns the message about an unavailable selection.
-pub fn unknown(what: &str, wanted: &Selection, names: &[Option<&str>]) -> String {
-    const MOST: usize = 20;
-    let listed = |(i, name): (usize, &Option<&str>)| match name {
+/// Returns the message about a selection that does not exist, with the available names.
+pub fn unknown(kind: &str, selection: &Selection, names: &[Option<&str>]) -> String {
+    const MAX_LISTED: usize = 20;
+    let numbered = |(i, name): (usize, &Option<&str>)| match name {
         Some(name) => format!("{i} ({name:?})"),
         None => i.to_string(),
     };
-    let mut all: Vec<String> = names.iter().enumerate().take(MOST).map(listed).collect();
-    if names.len() > MOST {
-        all.push(format!("{} more", names.len() - MOST));
+    let mut entries: Vec<String> = names.iter().enumerate().take(MAX_LISTED).map(numbered).collect();
+    if names.len() > MAX_LISTED {
+        entries.push(format!("{} more", names.len() - MAX_LISTED));
     }
-    match all.is_empty() {
-        true => format!("the file has no {what} {wanted}; it has none"),
-        false => format!(
-            "the file has no {what} {wanted}; it has {}: {}",
-            names.len(),
-            all.join(", ")
-        ),
-    }
+    let available = match entries.is_empty() {
+        true => "none".to_owned(),
+        false => entries.join(", "),
+    };
+    format!("the file has no {kind} {selection}; available: {available}")
 }
 
-/// Imports a file. If the import is still in use and its files have not changed, returns the existing import.
+/// Imports a file. Returns the existing import if it is in use and its files have not changed.
 pub fn load(
     path: &Path,
     root: &Path,
-    choice: &ImportOptions,
+    options: &ImportOptions,
     files: &mut BTreeSet<PathBuf>,
 ) -> Result<Arc<Imported>, GltfError> {
     static IN_USE: Mutex<Vec<CachedImport>> = Mutex::new(Vec::new());
-    let same = |known: &CachedImport| known.path == path && known.root == root && known.choice == *choice;
+    let is_same_import =
+        |cached: &CachedImport| cached.path == path && cached.root == root && cached.options == *options;
     {
         let mut in_use = IN_USE.lock().unwrap_or_else(PoisonError::into_inner);
-        in_use.retain(|known| known.imported.strong_count() > 0);
-        let known = in_use.iter().find(|known| same(known) && known.is_fresh());
-        if let Some(imported) = known.and_then(|known| known.imported.upgrade()) {
+        in_use.retain(|cached| cached.imported.strong_count() > 0);
+        let cached = in_use.iter().find(|cached| is_same_import(cached) && cached.is_fresh());
+        if let Some(imported) = cached.and_then(|cached| cached.imported.upgrade()) {
             files.extend(imported.files.iter().cloned());
             return Ok(imported);
         }
     }
     let _span = tracing::debug_span!("gltf", path = %path.display()).entered();
-    // The stamp is taken before reading, so that a change while reading is noticed.
-    let before = stamp(path);
-    let mut own = BTreeSet::new();
-    let read = import(path, root, choice, &mut own);
-    files.extend(own.iter().cloned());
-    let mut imported = read?;
-    let stamps = own.iter().map(|file| (file.clone(), stamp(file)));
-    let stamps = stamps.chain([(path.to_owned(), before)]).collect();
-    imported.files = own;
+    // The stamp is taken before reading, so that a change of the file during the import is noticed.
+    let old_stamp = stamp(path);
+    let mut imported_files = BTreeSet::new();
+    let result = import(path, root, options, &mut imported_files);
+    files.extend(imported_files.iter().cloned());
+    let mut imported = result?;
+    let stamps = imported_files.iter().map(|file| (file.clone(), stamp(file)));
+    let stamps = stamps.chain([(path.to_owned(), old_stamp)]).collect();
+    imported.files = imported_files;
     let imported = Arc::new(imported);
     let mut in_use = IN_USE.lock().unwrap_or_else(PoisonError::into_inner);
-    in_use.retain(|known| !same(known));
+    in_use.retain(|cached| !is_same_import(cached));
     in_use.push(CachedImport {
         path: path.to_owned(),
         root: root.to_owned(),
-        choice: choice.clone(),
+        options: options.clone(),
         stamps,
         imported: Arc::downgrade(&imported),
     });
@@ -267,7 +265,7 @@ type FileStamp = Option<(u64, SystemTime)>;
 struct CachedImport {
     path: PathBuf,
     root: PathBuf,
-    choice: ImportOptions,
+    options: ImportOptions,
     stamps: Vec<(PathBuf, FileStamp)>,
     imported: Weak<Imported>,
 }
@@ -276,100 +274,100 @@ impl CachedImport {
     fn is_fresh(&self) -> bool {
         self.stamps
             .iter()
-            .all(|(path, known)| known.is_some() && stamp(path) == *known)
+            .all(|(path, recorded)| recorded.is_some() && stamp(path) == *recorded)
     }
 }
 
 fn stamp(path: &Path) -> FileStamp {
-    let data = fs::metadata(path).ok()?;
-    Some((data.len(), data.modified().ok()?))
+    let metadata = fs::metadata(path).ok()?;
+    Some((metadata.len(), metadata.modified().ok()?))
 }
 
 fn import(
     path: &Path,
     root: &Path,
-    choice: &ImportOptions,
+    options: &ImportOptions,
     files: &mut BTreeSet<PathBuf>,
 ) -> Result<Imported, GltfError> {
     let document = Document::open(path, root, files)?;
-    let animations = document.animations(choice)?;
+    let animations = document.animations(options)?;
     let mut poses: Vec<Pose> = document.json.nodes.iter().map(Pose::of).collect();
     let mut notes = Vec::new();
     for animation in document.compatible(animations, &mut notes) {
-        document.animate(&mut poses, animation, choice.time.unwrap_or(0.0), &mut notes)?;
+        document.animate(&mut poses, animation, options.time.unwrap_or(0.0), &mut notes)?;
     }
     let nodes = Nodes::of(&document, &poses)?;
-    let shown = nodes.of_scene(&document, document.scene(choice)?)?;
-    let mut placed = Vec::new();
-    let mut numbers: HashMap<Key, usize> = HashMap::new();
+    let scene_nodes = nodes.in_scene(&document, document.scene(options)?)?;
+    let mut placements = Vec::new();
+    let mut key_indices: HashMap<Key, usize> = HashMap::new();
     let mut keys = Vec::new();
-    let (mut flat, mut total) = (0, 0_usize);
-    for &number in &shown {
-        let node = &document.json.nodes[number];
+    let (mut zero_scale_count, mut instance_count) = (0, 0_usize);
+    for &node_index in &scene_nodes {
+        let node = &document.json.nodes[node_index];
         let Some(mesh) = node.mesh else { continue };
-        let key = Key::of(&document, number, mesh.value(), &poses[number]);
+        let key = Key::of(&document, node_index, mesh.value(), &poses[node_index]);
         let global = match key.skin {
             Some(_) => DAffine3::IDENTITY, // skins ignore the transform of the node
-            None => nodes.globals[number],
+            None => nodes.globals[node_index],
         };
-        let mut own_key = None;
-        let own_maps = document.instances(number)?;
-        let room = document.budget.take(Resource::Instances, own_maps.len() as u64);
-        room.map_err(|rule| document.fault(format!("nodes[{number}]"), rule))?;
-        for own in own_maps {
-            let to_world = UPRIGHT * global * own;
-            total += 1;
+        let mut shared_key_index = None;
+        let transforms = document.instances(node_index)?;
+        let charge = document.budget.take(Resource::Instances, transforms.len() as u64);
+        charge.map_err(|rule| document.fault(format!("nodes[{node_index}]"), rule))?;
+        for transform in transforms {
+            let to_world = UPRIGHT * global * transform;
+            instance_count += 1;
             if !to_world.is_finite() {
-                flat += 1;
+                zero_scale_count += 1;
                 continue;
             }
             if !is_placeable(&to_world) {
-                let key = key.at(&to_world);
-                let number = *numbers.entry(key.clone()).or_insert_with(|| {
+                let key = key.with_baked_transform(&to_world);
+                let key_index = *key_indices.entry(key.clone()).or_insert_with(|| {
                     keys.push(key);
                     keys.len() - 1
                 });
-                placed.push((number, DAffine3::IDENTITY));
+                placements.push((key_index, DAffine3::IDENTITY));
                 continue;
             }
-            let own_key = own_key.get_or_insert_with(|| {
-                *numbers.entry(key.clone()).or_insert_with(|| {
+            let key_index = shared_key_index.get_or_insert_with(|| {
+                *key_indices.entry(key.clone()).or_insert_with(|| {
                     keys.push(key.clone());
                     keys.len() - 1
                 })
             });
-            placed.push((*own_key, to_world));
+            placements.push((*key_index, to_world));
         }
     }
-    let mut materials = Materials::of(&document, document.variant(choice)?);
+    let mut materials = Materials::of(&document, document.variant(options)?);
     let meshes = Meshes::of(&document, &mut materials, keys.iter())?;
     let built = keys.par_iter().map(|key| meshes.build(key, &nodes, &materials));
     let built: Vec<Option<mesh::BuiltMesh>> = built.collect::<Result<_, GltfError>>()?;
-    let mut places = vec![None; keys.len()];
+    let mut mesh_indices = vec![None; keys.len()];
     let mut imported = Imported {
         contents: ModelContents::of(&document),
         animations: document.json.animations.len(),
         ..Imported::default()
     };
-    let mut groups = Vec::new();
-    for ((place, built), key) in places.iter_mut().zip(built).zip(&keys) {
+    let mut mesh_materials = Vec::new();
+    for ((mesh_index, built), key) in mesh_indices.iter_mut().zip(built).zip(&keys) {
         if let Some(built) = built {
-            *place = Some(imported.meshes.len());
+            *mesh_index = Some(imported.meshes.len());
             let mut mesh = built.mesh;
             for note in mesh.notes.drain(..) {
                 tracing::debug!(mesh = key.mesh, "{note}"); // debug: open meshes are common
             }
             imported.meshes.push(Arc::new(mesh));
-            groups.push(built.materials);
+            mesh_materials.push(built.materials);
         }
     }
-    let mut count = 0;
-    for (key, to_world) in placed {
-        flat += usize::from(places[key].is_none() && keys[key].is_flat());
-        if let Some(mesh) = places[key] {
-            let materials: Vec<usize> = groups[mesh].clone();
-            count += materials.len();
-            if count > MAX_INSTANCES {
+    let mut group_count = 0;
+    for (key, to_world) in placements {
+        zero_scale_count += usize::from(mesh_indices[key].is_none() && keys[key].is_flat());
+        if let Some(mesh) = mesh_indices[key] {
+            let materials: Vec<usize> = mesh_materials[mesh].clone();
+            group_count += materials.len();
+            if group_count > MAX_INSTANCES {
                 let rule = format!("all instances of meshes together must have at most {MAX_INSTANCES} primitives");
                 return Err(document.fault("nodes", rule));
             }
@@ -380,30 +378,30 @@ fn import(
             });
         }
     }
-    if flat > 0 {
+    if zero_scale_count > 0 {
         notes.push(format!(
-            "{flat} of {total} instances of meshes are skipped: their scale is zero"
+            "{zero_scale_count} of {instance_count} instances of meshes are skipped: their scale is zero"
         ));
     }
     notes.extend(meshes.notes());
     imported.damage = meshes.damage();
     // A zero scale is accepted, because an animation may change it.
-    if imported.instances.is_empty() && flat == 0 {
-        return Err(document.fault("scene", meshes.nothing()));
+    if imported.instances.is_empty() && zero_scale_count == 0 {
+        return Err(document.fault("scene", meshes.no_triangles_reason()));
     }
     let corners = imported.corners();
     let first = corners.first().copied().unwrap_or_default();
     let low = corners.iter().copied().fold(first, DVec3::min);
     let high = corners.iter().copied().fold(first, DVec3::max);
-    for &number in &shown {
+    for &node_index in &scene_nodes {
         imported
             .lights
-            .extend(document.light(number, &nodes.globals[number], &mut notes)?);
+            .extend(document.light(node_index, &nodes.globals[node_index], &mut notes)?);
         imported
             .cameras
-            .extend(document.camera(number, &nodes.globals[number], (low, high), &mut notes)?);
+            .extend(document.camera(node_index, &nodes.globals[node_index], (low, high), &mut notes)?);
     }
-    notes.extend(light::brightness(&imported.lights, (low + high) / 2.0));
+    notes.extend(light::overexposure(&imported.lights, (low + high) / 2.0));
     imported.contents.cameras = imported.cameras.iter().map(|camera| camera.name.clone()).collect();
     let (materials, images) = materials.finish(&mut notes)?;
     imported.materials = materials;
@@ -414,10 +412,14 @@ fn import(
     Ok(imported)
 }
 
-/// Returns true if an instance can have this transform; otherwise it is applied to the vertices.
-fn is_placeable(map: &DAffine3) -> bool {
-    let [x, y, z] = [map.matrix3.x_axis, map.matrix3.y_axis, map.matrix3.z_axis];
+/// Returns true if an instance can have this transform; otherwise, the transform is applied to the vertices.
+fn is_placeable(transform: &DAffine3) -> bool {
+    let [x, y, z] = [
+        transform.matrix3.x_axis,
+        transform.matrix3.y_axis,
+        transform.matrix3.z_axis,
+    ];
     let lengths = [x, y, z].map(DVec3::length);
     let volume = x.cross(y).dot(z).abs() / (lengths[0] * lengths[1] * lengths[2]);
-    map.is_finite() && lengths.iter().all(|length| (1e-6..=MAX_AXIS_LENGTH).contains(length)) && volume > 1e-6
+    transform.is_finite() && lengths.iter().all(|length| (1e-6..=MAX_AXIS_LENGTH).contains(length)) && volume > 1e-6
 }

@@ -20,32 +20,32 @@ pub struct Pose {
 impl Pose {
     pub fn of(node: &Node) -> Pose {
         let vector =
-            |of: Option<[f32; 3]>, default: DVec3| of.map_or(default, |of| DVec3::from_array(of.map(f64::from)));
-        let rotation = node.rotation.map_or(DQuat::IDENTITY, |of| quaternion(of.0));
+            |value: Option<[f32; 3]>, default: DVec3| value.map_or(default, |v| DVec3::from_array(v.map(f64::from)));
+        let rotation = node.rotation.map_or(DQuat::IDENTITY, |rotation| quaternion(rotation.0));
         Pose {
             translation: vector(node.translation, DVec3::ZERO),
             rotation,
             scale: vector(node.scale, DVec3::ONE),
-            matrix: node.matrix.map(|of| {
-                let whole = DMat4::from_cols_array(&of.map(f64::from));
-                DAffine3::from_mat4(whole)
+            matrix: node.matrix.map(|columns| {
+                let matrix = DMat4::from_cols_array(&columns.map(f64::from));
+                DAffine3::from_mat4(matrix)
             }),
             weights: node.weights.clone(),
         }
     }
 
     fn local(&self) -> DAffine3 {
-        let plain = || DAffine3::from_scale_rotation_translation(self.scale, self.rotation, self.translation);
-        self.matrix.unwrap_or_else(plain)
+        let from_components = || DAffine3::from_scale_rotation_translation(self.scale, self.rotation, self.translation);
+        self.matrix.unwrap_or_else(from_components)
     }
 }
 
 /// Converts a quaternion; a zero quaternion becomes the identity.
-pub fn quaternion(of: [f32; 4]) -> DQuat {
-    let of = DQuat::from_array(of.map(f64::from));
-    let length = of.length();
+pub fn quaternion(components: [f32; 4]) -> DQuat {
+    let quaternion = DQuat::from_array(components.map(f64::from));
+    let length = quaternion.length();
     match length > 0.0 && length.is_finite() {
-        true => of / length,
+        true => quaternion / length,
         false => DQuat::IDENTITY,
     }
 }
@@ -63,27 +63,30 @@ impl Nodes {
         let mut children = vec![Vec::new(); count];
         for (i, node) in document.json.nodes.iter().enumerate() {
             for child in node.children.iter().flatten().map(|child| child.value()) {
-                let place = || format!("nodes[{i}].children");
+                let location = || format!("nodes[{i}].children");
                 if child >= count {
-                    return Err(document.fault(place(), format!("{child} is out of range; the file has {count} nodes")));
+                    return Err(
+                        document.fault(location(), format!("{child} is out of range; number of nodes: {count}"))
+                    );
                 }
-                if let Some(other) = parents[child].replace(i) {
-                    let rule = format!("node {child} has two parents, {other} and {i}; a node must have at most one");
-                    return Err(document.fault(place(), rule));
+                if let Some(first_parent) = parents[child].replace(i) {
+                    let rule =
+                        format!("node {child} has two parents, {first_parent} and {i}; a node must have at most one");
+                    return Err(document.fault(location(), rule));
                 }
                 children[i].push(child);
             }
         }
         let mut globals = vec![DAffine3::IDENTITY; count];
-        let mut seen = 0;
-        let mut open: Vec<usize> = (0..count).filter(|i| parents[*i].is_none()).collect();
-        while let Some(i) = open.pop() {
-            let above = parents[i].map_or(DAffine3::IDENTITY, |parent| globals[parent]);
-            globals[i] = above * poses[i].local();
-            seen += 1;
-            open.extend(&children[i]);
+        let mut visited = 0;
+        let mut stack: Vec<usize> = (0..count).filter(|i| parents[*i].is_none()).collect();
+        while let Some(i) = stack.pop() {
+            let parent_transform = parents[i].map_or(DAffine3::IDENTITY, |parent| globals[parent]);
+            globals[i] = parent_transform * poses[i].local();
+            visited += 1;
+            stack.extend(&children[i]);
         }
-        if seen < count {
+        if visited < count {
             let rule = "a node is its own ancestor; nodes must form trees".to_owned();
             return Err(document.fault("nodes", rule));
         }
@@ -91,27 +94,27 @@ impl Nodes {
     }
 
     /// Returns the nodes of a scene in depth-first order, or all nodes if `scene` is `None`.
-    pub fn of_scene(&self, document: &Document, scene: Option<usize>) -> Result<Vec<usize>, GltfError> {
+    pub fn in_scene(&self, document: &Document, scene: Option<usize>) -> Result<Vec<usize>, GltfError> {
         let Some(scene) = scene else {
             return Ok((0..self.globals.len()).collect());
         };
-        let mut shown = Vec::new();
-        let mut is_shown = vec![false; self.globals.len()];
+        let mut nodes = Vec::new();
+        let mut is_visited = vec![false; self.globals.len()];
         let roots = document.json.scenes[scene].nodes.iter().map(|root| root.value());
-        let mut open: Vec<usize> = roots.collect();
-        open.reverse();
-        while let Some(i) = open.pop() {
-            match is_shown.get_mut(i) {
+        let mut stack: Vec<usize> = roots.collect();
+        stack.reverse();
+        while let Some(i) = stack.pop() {
+            match is_visited.get_mut(i) {
                 None => {
-                    let rule = format!("{i} is out of range; the file has {} nodes", is_shown.len());
+                    let rule = format!("{i} is out of range; number of nodes: {}", is_visited.len());
                     return Err(document.fault(format!("scenes[{scene}].nodes"), rule));
                 }
                 Some(true) => continue,
-                Some(shown) => *shown = true,
+                Some(is_visited) => *is_visited = true,
             }
-            shown.push(i);
-            open.extend(self.children[i].iter().rev());
+            nodes.push(i);
+            stack.extend(self.children[i].iter().rev());
         }
-        Ok(shown)
+        Ok(nodes)
     }
 }

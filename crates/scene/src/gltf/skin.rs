@@ -14,36 +14,40 @@ pub struct Skin {
 }
 
 impl Skin {
-    pub fn of(document: &Document, number: usize, nodes: &Nodes) -> Result<Skin, GltfError> {
-        let Some(skin) = document.json.skins.get(number) else {
+    pub fn of(document: &Document, skin_index: usize, nodes: &Nodes) -> Result<Skin, GltfError> {
+        let Some(skin) = document.json.skins.get(skin_index) else {
             let count = document.json.skins.len();
-            return Err(document.fault("nodes", format!("{number} is out of range; the file has {count} skins")));
+            return Err(document.fault(
+                "nodes",
+                format!("{skin_index} is out of range; number of skins: {count}"),
+            ));
         };
-        let place = |key: &str| format!("skins[{number}].{key}");
-        let bind = match skin.inverse_bind_matrices {
+        let location = |key: &str| format!("skins[{skin_index}].{key}");
+        let inverse_bind = match skin.inverse_bind_matrices {
             None => vec![DAffine3::IDENTITY; skin.joints.len()],
             Some(accessor) => {
                 let matrices = document.vectors::<16>(accessor.value())?;
-                let map = |of: [f32; 16]| DAffine3::from_mat4(DMat4::from_cols_array(&of.map(f64::from)));
-                matrices.into_iter().take(skin.joints.len()).map(map).collect()
+                let transform =
+                    |columns: [f32; 16]| DAffine3::from_mat4(DMat4::from_cols_array(&columns.map(f64::from)));
+                matrices.into_iter().take(skin.joints.len()).map(transform).collect()
             }
         };
-        if bind.len() < skin.joints.len() {
-            let (has, joints) = (bind.len(), skin.joints.len());
-            let rule = format!("has {has} matrices for {joints} joints; it must have one for each");
-            return Err(document.fault(place("inverseBindMatrices"), rule));
+        if inverse_bind.len() < skin.joints.len() {
+            let (matrices, joints) = (inverse_bind.len(), skin.joints.len());
+            let rule = format!("each joint must have a matrix; number of joints: {joints}, of matrices: {matrices}");
+            return Err(document.fault(location("inverseBindMatrices"), rule));
         }
         let mut joints = Vec::with_capacity(skin.joints.len());
-        for (joint, bind) in skin.joints.iter().zip(bind) {
+        for (joint, inverse_bind) in skin.joints.iter().zip(inverse_bind) {
             match nodes.globals.get(joint.value()) {
-                Some(global) => joints.push(*global * bind),
+                Some(global) => joints.push(*global * inverse_bind),
                 None => {
                     let rule = format!(
-                        "{} is out of range; the file has {} nodes",
+                        "{} is out of range; number of nodes: {}",
                         joint.value(),
                         nodes.globals.len()
                     );
-                    return Err(document.fault(place("joints"), rule));
+                    return Err(document.fault(location("joints"), rule));
                 }
             }
         }
@@ -51,14 +55,14 @@ impl Skin {
     }
 
     /// Returns the transform of each vertex: the weighted mean of the transforms of its joints.
-    pub fn maps(
+    pub fn vertex_transforms(
         &self,
         document: &Document,
         primitive: &Primitive,
-        place: &str,
+        location: &str,
         count: usize,
     ) -> Result<Vec<DAffine3>, GltfError> {
-        let fault = |key: String, rule: String| document.fault(format!("{place}.attributes.{key}"), rule);
+        let fault = |key: String, rule: String| document.fault(format!("{location}.attributes.{key}"), rule);
         let accessor = |semantic: Semantic| primitive.attributes.get(&Checked::Valid(semantic)).map(|i| i.value());
         let mut sums = vec![(DAffine3::ZERO, 0.0); count];
         for set in 0.. {
@@ -69,7 +73,7 @@ impl Skin {
             let (joints, weights) = (document.vectors::<4>(joints)?, document.vectors::<4>(weights)?);
             if joints.len() != count || weights.len() != count {
                 let rule = format!(
-                    "has {} elements, WEIGHTS_{set} {}; POSITION has {count}",
+                    "the counts of JOINTS_{set} ({}), WEIGHTS_{set} ({}) and POSITION ({count}) must be equal",
                     joints.len(),
                     weights.len()
                 );
@@ -81,16 +85,19 @@ impl Skin {
                         continue;
                     }
                     if !weight.is_finite() {
-                        let rule = format!("has the weight {weight}; weights must be finite");
+                        let rule = format!("the weight {weight} must be finite");
                         return Err(fault(format!("WEIGHTS_{set}"), rule));
                     }
-                    let Some(map) = self.joints.get(*joint as usize) else {
-                        let rule = format!("{joint} is out of range; the skin has {} joints", self.joints.len());
+                    let Some(transform) = self.joints.get(*joint as usize) else {
+                        let rule = format!(
+                            "{joint} is out of range; number of joints of the skin: {}",
+                            self.joints.len()
+                        );
                         return Err(fault(format!("JOINTS_{set}"), rule));
                     };
                     let weight = f64::from(*weight);
-                    sum.0.matrix3 += map.matrix3 * weight;
-                    sum.0.translation += map.translation * weight;
+                    sum.0.matrix3 += transform.matrix3 * weight;
+                    sum.0.translation += transform.translation * weight;
                     sum.1 += weight;
                 }
             }

@@ -60,7 +60,8 @@ impl Geometry for Corners<'_> {
     }
 }
 
-pub fn generated(
+/// Generates MikkTSpace tangents. Vertices are split where tangents differ.
+pub fn generate(
     positions: &[DVec3],
     normals: &[Vec3],
     uvs: &[Vec2],
@@ -77,51 +78,53 @@ pub fn generated(
                 triangles: &part.triangles,
             };
             generate_tangents(&mut corners).ok()?;
-            Some(corners.tangents[part.own].to_vec())
+            Some(corners.tangents[part.range].to_vec())
         })
         .collect::<Option<_>>()?;
-    let mut made = TangentVertices {
+    let mut result = TangentVertices {
         triangles: Vec::with_capacity(triangles.len()),
         origins: Vec::new(),
         tangents: Vec::new(),
     };
-    // Linked lists of new vertices by origin: heads in `last`, links in `before`.
-    let mut last = vec![u32::MAX; positions.len()];
-    let mut before = Vec::new();
+    // A linked list of new vertices for each original vertex.
+    let mut heads = vec![u32::MAX; positions.len()];
+    let mut links = Vec::new();
     for (triangle, tangents) in triangles.iter().zip(parts.iter().flatten()) {
-        let mut own = *triangle;
-        for (vertex, tangent) in own.iter_mut().zip(tangents) {
+        let mut new_triangle = *triangle;
+        for (vertex, tangent) in new_triangle.iter_mut().zip(tangents) {
             let origin = *vertex;
-            let mut found = last[origin as usize];
-            while found != u32::MAX && made.tangents[found as usize] != *tangent {
-                found = before[found as usize];
+            let mut found = heads[origin as usize];
+            while found != u32::MAX && result.tangents[found as usize] != *tangent {
+                found = links[found as usize];
             }
             if found == u32::MAX {
-                found = made.origins.len() as u32;
-                made.origins.push(origin);
-                made.tangents.push(*tangent);
-                before.push(std::mem::replace(&mut last[origin as usize], found));
+                found = result.origins.len() as u32;
+                result.origins.push(origin);
+                result.tangents.push(*tangent);
+                links.push(std::mem::replace(&mut heads[origin as usize], found));
             }
             *vertex = found;
         }
-        made.triangles.push(own);
+        result.triangles.push(new_triangle);
     }
-    Some(made)
+    Some(result)
 }
 
-/// The triangles `own` and the triangles that touch them, in the original order, so that sums are reproducible.
+/// The triangles of a part and the triangles that touch them, in the original order, so that sums are reproducible.
 struct Part {
-    own: Range<usize>,
+    /// The triangles of the part, without the triangles that touch them.
+    range: Range<usize>,
     triangles: Vec<[u32; 3]>,
 }
 
-/// Partitions the triangles, so that threads can process the parts: tangents only depend on triangles that share a
-/// vertex.
+/// Partitions the triangles so that threads can process the parts: the tangents of a vertex only depend on its
+/// triangles.
 fn parts(positions: &[DVec3], normals: &[Vec3], uvs: &[Vec2], triangles: &[[u32; 3]]) -> Vec<Part> {
-    const MOST: usize = 1 << 16;
-    if triangles.len() <= MOST {
+    /// Maximum number of triangles of a part.
+    const MAX_TRIANGLES: usize = 1 << 16;
+    if triangles.len() <= MAX_TRIANGLES {
         return vec![Part {
-            own: 0..triangles.len(),
+            range: 0..triangles.len(),
             triangles: triangles.to_vec(),
         }];
     }
@@ -143,42 +146,40 @@ fn parts(positions: &[DVec3], normals: &[Vec3], uvs: &[Vec2], triangles: &[[u32;
         point += u32::from(bits(pair[0]) != bits(pair[1]));
         point_of[pair[1] as usize] = point;
     }
-    let chunks: Vec<(usize, &[[u32; 3]])> = triangles.chunks(MOST).enumerate().collect();
-    let part = |(number, own): (usize, &[[u32; 3]])| {
+    let chunks: Vec<(usize, &[[u32; 3]])> = triangles.chunks(MAX_TRIANGLES).enumerate().collect();
+    let part = |(chunk_index, chunk): (usize, &[[u32; 3]])| {
         let mut is_touched = vec![false; positions.len()];
-        for vertex in own.iter().flatten() {
+        for vertex in chunk.iter().flatten() {
             is_touched[point_of[*vertex as usize] as usize] = true;
         }
-        let start = number * MOST;
+        let start = chunk_index * MAX_TRIANGLES;
         let touches = |triangle: &&[u32; 3]| {
             let mut points = triangle.iter().map(|vertex| point_of[*vertex as usize]);
             points.any(|point| is_touched[point as usize])
         };
         let mut part: Vec<[u32; 3]> = triangles[..start].iter().filter(touches).copied().collect();
-        let own_place = part.len()..part.len() + own.len();
-        part.extend(own);
-        part.extend(triangles[start + own.len()..].iter().filter(touches));
-        Part {
-            own: own_place,
-            triangles: part,
-        }
+        let range = part.len()..part.len() + chunk.len();
+        part.extend(chunk);
+        part.extend(triangles[start + chunk.len()..].iter().filter(touches));
+        Part { range, triangles: part }
     };
     chunks.into_par_iter().map(part).collect()
 }
 
-/// Rotates a file's tangent back by the texture transform: the renderer rotates normal maps with the texture, but glTF
-/// does not. With the transform's second row (x, y), tangent t and bitangent b, the result is y t - x b up to a factor.
-pub fn unturned(tangent: Vec4, normal: Vec3, slot: &Slot) -> Vec4 {
-    if !slot.is_turned() {
+/// Rotates a tangent of the file back by the texture transform: the renderer rotates normal maps with the texture, but
+/// glTF does not. With the second row (x, y) of the transform, tangent t and bitangent b, the result is y t + x b up to
+/// a factor; if the determinant is negative, x b - y t with the opposite handedness.
+pub fn rotate_back(tangent: Vec4, normal: Vec3, slot: &Slot) -> Vec4 {
+    if !slot.rotates_tangents() {
         return tangent;
     }
     let (row, determinant) = slot.second_row();
-    let along = tangent.truncate();
-    let across = normal.cross(along) * tangent.w;
+    let t = tangent.truncate();
+    let b = normal.cross(t) * tangent.w;
     let [x, y] = row.map(|x| x as f32);
     match determinant > 0.0 {
-        true => (along * y + across * x).normalize_or_zero().extend(tangent.w),
-        false => (across * x - along * y).normalize_or_zero().extend(-tangent.w),
+        true => (t * y + b * x).normalize_or_zero().extend(tangent.w),
+        false => (b * x - t * y).normalize_or_zero().extend(-tangent.w),
     }
 }
 
@@ -187,7 +188,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn parts_have_the_tangents_of_the_whole() {
+    fn parts_have_the_tangents_of_the_full_mesh() {
         // A curved sheet with a half-mirrored texture; squares have their own vertices.
         const SIDE: usize = 190;
         let mut positions = Vec::new();
@@ -201,23 +202,23 @@ mod tests {
                 normals.push(Vec3::new(x as f32 - 0.5, y as f32 - 0.5, 1.0).normalize());
                 uvs.push(Vec2::new((x - 0.5).abs() as f32, (y + 0.2 * x * x) as f32));
             }
-            triangles.extend([[0, 1, 2], [2, 1, 3]].map(|of: [u32; 3]| of.map(|vertex| first + vertex)));
+            triangles.extend([[0, 1, 2], [2, 1, 3]].map(|triangle: [u32; 3]| triangle.map(|vertex| first + vertex)));
         }
         assert!(triangles.len() > 1 << 16);
-        let made = generated(&positions, &normals, &uvs, &triangles).unwrap();
-        let mut whole = Corners {
+        let result = generate(&positions, &normals, &uvs, &triangles).unwrap();
+        let mut full = Corners {
             positions: &positions,
             normals: &normals,
             uvs: &uvs,
             triangles: &triangles,
             tangents: vec![[Vec4::ZERO; 3]; triangles.len()],
         };
-        generate_tangents(&mut whole).unwrap();
+        generate_tangents(&mut full).unwrap();
         let mut sides = [false; 2];
-        for (i, triangle) in made.triangles.iter().enumerate() {
-            let found = triangle.map(|vertex| made.tangents[vertex as usize]);
-            assert_eq!(found, whole.tangents[i], "{i}");
-            assert_eq!(triangle.map(|vertex| made.origins[vertex as usize]), triangles[i]);
+        for (i, triangle) in result.triangles.iter().enumerate() {
+            let found = triangle.map(|vertex| result.tangents[vertex as usize]);
+            assert_eq!(found, full.tangents[i], "{i}");
+            assert_eq!(triangle.map(|vertex| result.origins[vertex as usize]), triangles[i]);
             sides[usize::from(found[0].w > 0.0)] = true;
         }
         assert_eq!(sides, [true; 2]);

@@ -9,15 +9,15 @@ use serde::Deserialize;
 use serde_json::{Map, Value};
 
 use super::document::Document;
-use super::error::{GltfError, plain};
+use super::error::{GltfError, json_message};
 use crate::ktx2;
 use crate::{Encoding, ImageTextureDescription, TextureFilter, Wrap};
 
-/// Minimum scale, and maximum scale and offset of texture coordinates.
-const FACTORS: (f64, f64) = (1e-6, 1e6);
+/// Minimum scale, and maximum scale and offset, of texture coordinates.
+const SCALE_LIMITS: (f64, f64) = (1e-6, 1e6);
 
 /// Maximum texture coordinate set.
-pub(super) const LAST_SET: u32 = 7;
+pub(super) const MAX_SET: u32 = 7;
 
 /// A texture reference of a material.
 #[derive(Clone, Debug, PartialEq)]
@@ -50,7 +50,7 @@ impl Default for Transform {
 
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
-struct Info {
+struct TextureInfo {
     index: usize,
     #[serde(default)]
     tex_coord: u32,
@@ -63,30 +63,33 @@ impl Slot {
     /// Creates the slot of a texture reference from core glTF (not from an extension).
     pub fn new(
         document: &Document,
-        place: &str,
+        location: &str,
         (texture, set): (usize, u32),
         extensions: Option<&Map<String, Value>>,
     ) -> Result<Slot, GltfError> {
         let transform = match extensions.and_then(|all| all.get("KHR_texture_transform")) {
             None => Transform::default(),
             Some(transform) => {
-                let read = Transform::deserialize(transform);
-                read.map_err(|error| {
-                    document.fault(format!("{place}.extensions.KHR_texture_transform"), plain(&error))
+                let parsed = Transform::deserialize(transform);
+                parsed.map_err(|error| {
+                    document.fault(
+                        format!("{location}.extensions.KHR_texture_transform"),
+                        json_message(&error),
+                    )
                 })?
             }
         };
         let count = document.json.textures.len();
         if texture >= count {
             return Err(document.fault(
-                format!("{place}.index"),
-                format!("{texture} is out of range; the file has {count} textures"),
+                format!("{location}.index"),
+                format!("{texture} is out of range; number of textures: {count}"),
             ));
         }
         let set = transform.tex_coord.unwrap_or(set);
-        if set > LAST_SET {
-            let rule = format!("{set} must be from 0 to {LAST_SET}");
-            return Err(document.fault(format!("{place}.texCoord"), rule));
+        if set > MAX_SET {
+            let rule = format!("{set} must be from 0 to {MAX_SET}");
+            return Err(document.fault(format!("{location}.texCoord"), rule));
         }
         Ok(Slot {
             texture,
@@ -96,13 +99,13 @@ impl Slot {
     }
 
     /// Creates the slot of a texture reference from an extension; also returns the `scale` of a normal map.
-    pub fn of_value(document: &Document, place: &str, value: &Value) -> Result<(Slot, f64), GltfError> {
-        let info = Info::deserialize(value).map_err(|error| document.fault(place, plain(&error)))?;
-        let slot = Slot::new(document, place, (info.index, info.tex_coord), Some(&info.extensions))?;
+    pub fn of_value(document: &Document, location: &str, value: &Value) -> Result<(Slot, f64), GltfError> {
+        let info = TextureInfo::deserialize(value).map_err(|error| document.fault(location, json_message(&error)))?;
+        let slot = Slot::new(document, location, (info.index, info.tex_coord), Some(&info.extensions))?;
         Ok((slot, info.scale.unwrap_or(1.0)))
     }
 
-    /// Returns the second row of the transform, and the sign of its determinant.
+    /// Returns the second row of the transform, and the determinant.
     pub fn second_row(&self) -> ([f64; 2], f64) {
         let Transform { rotation, scale, .. } = self.transform;
         let (sin, cos) = rotation.sin_cos();
@@ -110,19 +113,19 @@ impl Slot {
     }
 
     /// Returns true if the transform contains a rotation or a reflection.
-    pub fn is_turned(&self) -> bool {
+    pub fn rotates_tangents(&self) -> bool {
         let Transform { rotation, scale, .. } = self.transform;
         rotation != 0.0 || scale.iter().any(|scale| *scale < 0.0)
     }
 }
 
 impl Document {
-    /// Returns the texture with its transform. At the first image row, v is 0 in glTF, but 1 here, so the transform is
-    /// flipped like the texture coordinates of the mesh.
+    /// Returns the texture with its transform. In the top row of an image, v is 0 in glTF, but 1 in wgray, so the
+    /// transform is flipped like the texture coordinates of the mesh.
     pub(super) fn lookup(
         &self,
         slot: &Slot,
-        place: &str,
+        location: &str,
         file: &str,
         encoding: Encoding,
     ) -> Result<ImageTextureDescription, GltfError> {
@@ -130,29 +133,29 @@ impl Document {
         let sampler = texture
             .sampler
             .and_then(|sampler| self.json.samplers.get(sampler.value()));
-        let wrap = |of: Option<&Checked<WrappingMode>>| match of {
+        let wrap = |mode: Option<&Checked<WrappingMode>>| match mode {
             Some(Checked::Valid(WrappingMode::ClampToEdge)) => Wrap::Clamp,
             Some(Checked::Valid(WrappingMode::MirroredRepeat)) => Wrap::Mirror,
             _ => Wrap::Repeat,
         };
-        let is_coarse = sampler.is_some_and(|of| of.mag_filter == Some(Checked::Valid(MagFilter::Nearest)));
+        let is_nearest = sampler.is_some_and(|sampler| sampler.mag_filter == Some(Checked::Valid(MagFilter::Nearest)));
         let Transform {
             offset,
             rotation,
             scale,
             ..
         } = slot.transform;
-        let fine = |x: f64| x.is_finite() && x.abs() <= FACTORS.1;
-        if !(offset.into_iter().chain(scale).all(fine) && rotation.is_finite()) {
+        let is_valid = |x: f64| x.is_finite() && x.abs() <= SCALE_LIMITS.1;
+        if !(offset.into_iter().chain(scale).all(is_valid) && rotation.is_finite()) {
             let rule = "offset, rotation and scale must be finite, offset and scale from -1e6 to 1e6".to_owned();
-            return Err(self.fault(format!("{place}.extensions.KHR_texture_transform"), rule));
+            return Err(self.fault(format!("{location}.extensions.KHR_texture_transform"), rule));
         }
-        let scale = scale.map(|of| if of.abs() < FACTORS.0 { FACTORS.0 } else { of });
+        let scale = scale.map(|x| if x.abs() < SCALE_LIMITS.0 { SCALE_LIMITS.0 } else { x });
         let (sin, cos) = rotation.sin_cos();
         Ok(ImageTextureDescription {
             encoding: Some(encoding),
-            wrap: [wrap(sampler.map(|of| &of.wrap_s)), wrap(sampler.map(|of| &of.wrap_t))].into(),
-            filter: if is_coarse {
+            wrap: [wrap(sampler.map(|s| &s.wrap_s)), wrap(sampler.map(|s| &s.wrap_t))].into(),
+            filter: if is_nearest {
                 TextureFilter::Nearest
             } else {
                 TextureFilter::default()

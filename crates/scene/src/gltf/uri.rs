@@ -9,7 +9,7 @@ use base64::Engine as _;
 use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
 use percent_encoding::percent_decode_str;
 
-use super::error::shown;
+use super::error::quoted;
 use wgray_image::memory::fallible;
 
 /// Base64 with or without padding.
@@ -57,9 +57,9 @@ impl From<String> for UriError {
 }
 
 impl From<UriError> for String {
-    fn from(unfound: UriError) -> Self {
-        match unfound {
-            UriError::Absent(why) | UriError::Invalid(why) => why,
+    fn from(error: UriError) -> Self {
+        match error {
+            UriError::Absent(reason) | UriError::Invalid(reason) => reason,
         }
     }
 }
@@ -68,6 +68,7 @@ impl From<UriError> for String {
 pub(super) struct Folder {
     /// Folder that paths are relative to.
     pub folder: PathBuf,
+    /// Asset root: the folder that must contain all files.
     pub root: PathBuf,
 }
 
@@ -76,39 +77,39 @@ impl Folder {
     pub fn find(&self, uri: &str) -> Result<PathBuf, UriError> {
         if let Some(scheme) = scheme(uri) {
             let rule = "it must be a relative path, or a data URI";
-            return Err(format!("{} begins with \"{scheme}:\"; {rule}", shown(uri)).into());
+            return Err(format!("{} begins with \"{scheme}:\"; {rule}", quoted(uri)).into());
         }
         let decoded = percent_decode_str(uri)
             .decode_utf8()
-            .map_err(|_| format!("{} must be UTF-8 where it is percent-encoded", shown(uri)))?;
+            .map_err(|_| format!("{} must be UTF-8 where it is percent-encoded", quoted(uri)))?;
         // Allows unencoded percent signs, and the backslashes of Windows paths.
-        let turned = decoded.replace('\\', "/");
-        let names = [&*decoded, uri, &turned];
+        let with_slashes = decoded.replace('\\', "/");
+        let names = [&*decoded, uri, &with_slashes];
         for name in names {
             if name.starts_with(['/', '\\']) || Path::new(name).has_root() || Path::new(name).is_absolute() {
-                return Err(format!("{} must be a relative path", shown(uri)).into());
+                return Err(format!("{} must be a relative path", quoted(uri)).into());
             }
         }
         if decoded.is_empty() {
             return Err("\"\" must be the path of a file".to_owned().into());
         }
-        let mut found = names.iter().map(|name| self.folder.join(name).canonicalize());
-        let first = found.next().unwrap_or_else(|| Err(io::ErrorKind::NotFound.into()));
+        let mut paths = names.iter().map(|name| self.folder.join(name).canonicalize());
+        let first = paths.next().unwrap_or_else(|| Err(io::ErrorKind::NotFound.into()));
         let path = match first {
-            Err(error) if error.kind() == io::ErrorKind::NotFound => found.find_map(Result::ok).ok_or(error),
+            Err(error) if error.kind() == io::ErrorKind::NotFound => paths.find_map(Result::ok).ok_or(error),
             first => first,
         };
-        let path = path.map_err(|error| UriError::Absent(format!("{} cannot be read: {error}", shown(uri))))?;
+        let path = path.map_err(|error| UriError::Absent(format!("{} cannot be read: {error}", quoted(uri))))?;
         let root = self.root.canonicalize().map_err(|error| {
             let root = self.root.display();
-            format!("{} must lie in {root}, which cannot be found: {error}", shown(uri))
+            format!("{} must lie in {root}, which cannot be found: {error}", quoted(uri))
         })?;
         if !path.starts_with(&root) {
             let root = self.root.display();
-            return Err(format!("{} must not leave the folder {root}", shown(uri)).into());
+            return Err(format!("{} must not leave the folder {root}", quoted(uri)).into());
         }
         if !path.is_file() {
-            return Err(format!("{} must be a file", shown(uri)).into());
+            return Err(format!("{} must be a file", quoted(uri)).into());
         }
         Ok(path)
     }
@@ -122,21 +123,26 @@ fn scheme(uri: &str) -> Option<&str> {
     is_scheme.then_some(scheme)
 }
 
-pub(super) fn read(path: &Path, most: u64) -> io::Result<Vec<u8>> {
+pub(super) fn read(path: &Path, max_bytes: u64) -> io::Result<Vec<u8>> {
     // Checked before opening, because opening a pipe blocks until it has a writer.
     if !fs::metadata(path)?.is_file() {
         return Err(io::Error::new(io::ErrorKind::InvalidInput, "it must be a file"));
     }
     let file = File::open(path)?;
-    let data = file.metadata()?;
-    let too_large = || io::Error::new(io::ErrorKind::FileTooLarge, format!("it is larger than {most} bytes"));
-    if !data.is_file() || data.len() > most {
+    let metadata = file.metadata()?;
+    let too_large = || {
+        io::Error::new(
+            io::ErrorKind::FileTooLarge,
+            format!("it is larger than {max_bytes} bytes"),
+        )
+    };
+    if !metadata.is_file() || metadata.len() > max_bytes {
         return Err(too_large());
     }
     let mut bytes = Vec::new();
-    fallible(|| bytes.try_reserve_exact(data.len() as usize))?;
-    file.take(most.saturating_add(1)).read_to_end(&mut bytes)?;
-    match bytes.len() as u64 > most {
+    fallible(|| bytes.try_reserve_exact(metadata.len() as usize))?;
+    file.take(max_bytes.saturating_add(1)).read_to_end(&mut bytes)?;
+    match bytes.len() as u64 > max_bytes {
         true => Err(too_large()),
         false => Ok(bytes),
     }
@@ -173,11 +179,11 @@ mod tests {
     }
 
     #[test]
-    fn files_lie_inside_the_root() {
-        let outer = tempfile::tempdir().unwrap();
-        let root = outer.path().join("model");
+    fn files_outside_of_the_root_are_rejected() {
+        let temp_folder = tempfile::tempdir().unwrap();
+        let root = temp_folder.path().join("model");
         fs::create_dir_all(root.join("sub dir")).unwrap();
-        fs::write(outer.path().join("secret.bin"), b"no").unwrap();
+        fs::write(temp_folder.path().join("secret.bin"), b"no").unwrap();
         for name in ["a b.bin", "100%.bin", "sub dir/c.bin"] {
             fs::write(root.join(name), b"yes").unwrap();
         }
@@ -241,20 +247,20 @@ mod tests {
         assert!(error_of(".").ends_with("must be a file"));
         assert!(read(&root.join("a b.bin"), 2).is_err());
         assert!(read(&root, 9).is_err());
-        let wide = Folder {
+        let wider_folder = Folder {
             folder: root,
-            root: outer.path().to_owned(),
+            root: temp_folder.path().to_owned(),
         };
-        assert!(wide.find("../secret.bin").is_ok());
+        assert!(wider_folder.find("../secret.bin").is_ok());
     }
 
     #[cfg(unix)]
     #[test]
-    fn links_out_of_the_root_and_pipes_are_rejected() {
-        let outer = tempfile::tempdir().unwrap();
-        let root = outer.path().join("model");
+    fn links_to_the_outside_and_pipes_are_rejected() {
+        let temp_folder = tempfile::tempdir().unwrap();
+        let root = temp_folder.path().join("model");
         fs::create_dir(&root).unwrap();
-        fs::write(outer.path().join("secret.bin"), b"no").unwrap();
+        fs::write(temp_folder.path().join("secret.bin"), b"no").unwrap();
         fs::write(root.join("a.bin"), b"yes").unwrap();
         std::os::unix::fs::symlink("../secret.bin", root.join("out.bin")).unwrap();
         std::os::unix::fs::symlink("a.bin", root.join("in.bin")).unwrap();
@@ -270,8 +276,8 @@ mod tests {
                 "{uri}"
             );
         }
-        let made = std::process::Command::new("mkfifo").arg(root.join("pipe")).status();
-        if made.is_ok_and(|status| status.success()) {
+        let mkfifo_status = std::process::Command::new("mkfifo").arg(root.join("pipe")).status();
+        if mkfifo_status.is_ok_and(|status| status.success()) {
             assert!(String::from(folder.find("pipe").unwrap_err()).ends_with("must be a file"));
             assert!(read(&root.join("pipe"), 9).is_err());
         }

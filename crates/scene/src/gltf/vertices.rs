@@ -7,13 +7,13 @@ use gltf_json::validation::Checked;
 use super::document::Document;
 use super::error::GltfError;
 use super::skin::Skin;
-use super::texture::LAST_SET;
+use super::texture::MAX_SET;
 use crate::mesh::unit;
 
 /// Maximum number of vertices of a mesh, including unused vertices.
 const MAX_VERTICES: usize = 1 << 27;
 
-const TEXCOORDS: [&str; LAST_SET as usize + 1] = [
+const TEXCOORDS: [&str; MAX_SET as usize + 1] = [
     "TEXCOORD_0",
     "TEXCOORD_1",
     "TEXCOORD_2",
@@ -28,17 +28,17 @@ const TEXCOORDS: [&str; LAST_SET as usize + 1] = [
 pub struct Source<'a> {
     document: &'a Document,
     primitive: &'a Primitive,
-    place: &'a str,
+    location: &'a str,
     /// Called with the name of each attribute that has non-finite values.
     report: &'a dyn Fn(&'static str),
     positions: Vec<Vec3>,
 }
 
 impl<'a> Source<'a> {
-    /// Reads the positions, if any. `first` is the number of vertices that precede these.
+    /// Reads the positions, if any. `first` is the number of preceding vertices of the mesh.
     pub fn of(
         document: &'a Document,
-        (primitive, place): (&'a Primitive, &'a str),
+        (primitive, location): (&'a Primitive, &'a str),
         report: &'a dyn Fn(&'static str),
         first: usize,
     ) -> Result<Option<Self>, GltfError> {
@@ -48,7 +48,7 @@ impl<'a> Source<'a> {
         let source = Source {
             document,
             primitive,
-            place,
+            location,
             report,
             positions: vectors(document, accessor)?,
         };
@@ -63,7 +63,7 @@ impl<'a> Source<'a> {
         self.positions.len()
     }
 
-    /// Reads normals and, if they are wanted, tangents.
+    /// Reads normals and, if `with_tangents` is set, tangents.
     pub fn frames(&self, with_tangents: bool) -> Result<Frames, GltfError> {
         let normals = self.read::<3>("NORMAL", Semantic::Normals)?;
         let tangents = match with_tangents && normals.is_some() {
@@ -93,11 +93,11 @@ impl<'a> Source<'a> {
             }
             _ => self.read::<4>("COLOR_0", Semantic::Colors(0))?.unwrap_or_default(),
         };
-        let inside = |x: f32| if x > 0.0 { x.min(1.0) } else { 0.0 };
+        let clamp = |x: f32| if x > 0.0 { x.min(1.0) } else { 0.0 };
         Ok(Some(
             colors
                 .into_iter()
-                .map(|color| Vec4::from_array(color.map(inside)))
+                .map(|color| Vec4::from_array(color.map(clamp)))
                 .collect(),
         ))
     }
@@ -127,17 +127,17 @@ impl<'a> Source<'a> {
             true => Ok(()),
             false => Err(self.fault(
                 &format!("attributes.{name}"),
-                format!("has {count} elements; POSITION has {}", self.count()),
+                format!("count {count} must equal {}, the count of POSITION", self.count()),
             )),
         }
     }
 
     fn fault(&self, key: &str, rule: String) -> GltfError {
-        self.document.fault(format!("{}.{key}", self.place), rule)
+        self.document.fault(format!("{}.{key}", self.location), rule)
     }
 }
 
-/// Normals and tangents, which morph targets, skins and transforms change together with the positions.
+/// Positions, normals and tangents, which morph targets, skins and transforms change.
 pub struct Frames {
     positions: Vec<Vec3>,
     pub normals: Option<Vec<Vec3>>,
@@ -170,25 +170,26 @@ impl Frames {
     }
 
     /// Transforms all vertices by the skin and the transform, if any. Returns the positions.
-    pub fn place(
+    pub fn apply_transforms(
         &mut self,
         source: &Source,
         skin: Option<&Skin>,
         transform: Option<DAffine3>,
     ) -> Result<Vec<DVec3>, GltfError> {
-        let mut placed: Vec<DVec3> = self.positions.iter().map(|p| p.as_dvec3()).collect();
+        let mut positions: Vec<DVec3> = self.positions.iter().map(|p| p.as_dvec3()).collect();
         if let Some(skin) = skin {
-            let transforms = skin.maps(source.document, source.primitive, source.place, source.count())?;
+            let transforms =
+                skin.vertex_transforms(source.document, source.primitive, source.location, source.count())?;
             for (i, transform) in transforms.iter().enumerate() {
-                self.transform(transform, i, &mut placed[i]);
+                self.transform(transform, i, &mut positions[i]);
             }
         }
         if let Some(transform) = transform {
-            for (i, position) in placed.iter_mut().enumerate() {
+            for (i, position) in positions.iter_mut().enumerate() {
                 self.transform(&transform, i, position);
             }
         }
-        Ok(placed)
+        Ok(positions)
     }
 
     /// Transforms a vertex. Its normal is transformed by the cofactor matrix, which exists even for singular

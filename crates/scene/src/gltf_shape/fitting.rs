@@ -8,60 +8,65 @@ use super::super::texture::{levels, words};
 use super::super::validate::TEXEL_MEMORY;
 use super::super::{Assets, Channel, Description, Encoding, MaterialDescription, TextureDescription, ValueDescription};
 
-/// Limit on the number of decoded texels, which limits the time: a constant, plus an allowance per byte of the files.
-const TEXELS: (u64, u64) = (1 << 28, 64);
+/// Limit on the number of decoded texels, and thereby on the time: a constant, plus an allowance per byte of the files.
+const TEXEL_LIMIT: (u64, u64) = (1 << 28, 64);
 /// Memory reserved for other textures and the environment, in bytes.
-const OTHERS: u64 = 128 << 20;
+const RESERVED_BYTES: u64 = 128 << 20;
 
-/// An image, and its copies as colours, data and alpha.
+/// An image file and the number of its copies, which contain sRGB colors, linear data or alpha.
 struct ImportedImage {
     header: Header,
     /// Encoded size in bytes.
     length: u64,
-    times: u64,
+    copies: u64,
     has_levels: bool,
 }
 
 impl ImportedImage {
-    /// Returns the memory use in bytes if the image is halved until no side exceeds `longest`.
-    fn bytes(&self, longest: u32) -> u64 {
-        let Header { width, height, is_deep } = self.header;
-        let halvings = (0..32).take_while(|i| width.max(height) >> i > longest).count();
+    /// Returns the memory use in bytes if the image is halved until no side exceeds `max_side`.
+    fn bytes(&self, max_side: u32) -> u64 {
+        let Header {
+            width,
+            height,
+            exceeds_8_bits,
+        } = self.header;
+        let halvings = (0..32).take_while(|i| width.max(height) >> i > max_side).count();
         let (width, height) = ((width >> halvings).max(1), (height >> halvings).max(1));
         let levels = if self.has_levels { levels(width, height) } else { 1 };
-        4 * self.times * words(width, height, levels, is_deep)
+        4 * self.copies * words(width, height, levels, exceeds_8_bits)
     }
 }
 
-/// Returns the maximum side at which all images fit, and their full size in bytes; `None` if they fit at full size. The
-/// error is the violated rule.
+/// Returns the maximum side at which all images fit, and the full size of all images in bytes; `None` if the images fit
+/// at full size. The error is the violated rule.
 pub fn longest_side(description: &Description, assets: &Assets) -> Result<Option<(u32, u64)>, String> {
-    let kept = kept(description, assets);
-    let texels = |of: &ImportedImage| u64::from(of.header.width) * u64::from(of.header.height) * of.times;
-    let (texels, bytes) = kept.iter().fold((0_u64, 0_u64), |(texels_before, bytes), image| {
+    let images = imported_images(description, assets);
+    let texels = |image: &ImportedImage| u64::from(image.header.width) * u64::from(image.header.height) * image.copies;
+    let (texels, bytes) = images.iter().fold((0_u64, 0_u64), |(texels_before, bytes), image| {
         (texels_before.saturating_add(texels(image)), bytes + image.length)
     });
-    let most = TEXELS.0 + bytes * TEXELS.1;
-    if texels > most {
+    let limit = TEXEL_LIMIT.0 + bytes * TEXEL_LIMIT.1;
+    if texels > limit {
         return Err(format!(
-            "the images of all glTF files have {texels} texels in total; for files of {bytes} bytes, at most {most} are allowed"
+            "the images of all glTF files have {texels} texels in total; for files of {bytes} bytes, at most {limit} are allowed"
         ));
     }
-    let all = |longest: u32| kept.iter().map(|image| image.bytes(longest)).sum::<u64>();
-    let whole = all(MAX_IMAGE_SIDE);
-    if whole <= TEXEL_MEMORY - OTHERS {
+    let total_bytes = |max_side: u32| images.iter().map(|image| image.bytes(max_side)).sum::<u64>();
+    let full_bytes = total_bytes(MAX_IMAGE_SIDE);
+    if full_bytes <= TEXEL_MEMORY - RESERVED_BYTES {
         return Ok(None);
     }
-    let mut longest = MAX_IMAGE_SIDE;
-    while longest > 1 && all(longest) > TEXEL_MEMORY - OTHERS {
-        longest /= 2;
+    let mut max_side = MAX_IMAGE_SIDE;
+    while max_side > 1 && total_bytes(max_side) > TEXEL_MEMORY - RESERVED_BYTES {
+        max_side /= 2;
     }
-    Ok(Some((longest, whole)))
+    Ok(Some((max_side, full_bytes)))
 }
 
-fn kept(description: &Description, assets: &Assets) -> Vec<ImportedImage> {
+/// Returns the images of the glTF files.
+fn imported_images(description: &Description, assets: &Assets) -> Vec<ImportedImage> {
     let values = description.materials.values().flat_map(MaterialDescription::values);
-    let opaque: BTreeSet<&str> = values
+    let alpha_textures: BTreeSet<&str> = values
         .filter_map(|value| match value {
             ValueDescription::Texture(reference) if reference.channel == Channel::A => Some(reference.texture.as_str()),
             _ => None,
@@ -71,35 +76,35 @@ fn kept(description: &Description, assets: &Assets) -> Vec<ImportedImage> {
     let mut files: BTreeMap<&str, (BTreeSet<Option<bool>>, bool)> = BTreeMap::new();
     for (name, texture) in &description.textures {
         if let TextureDescription::Image(image) = texture {
-            let (parts, has_levels) = files.entry(&image.file).or_default();
-            parts.insert(Some(image.encoding == Some(Encoding::Linear)));
-            if opaque.contains(name.as_str()) {
-                parts.insert(None);
+            let (encodings, has_levels) = files.entry(&image.file).or_default();
+            encodings.insert(Some(image.encoding == Some(Encoding::Linear)));
+            if alpha_textures.contains(name.as_str()) {
+                encodings.insert(None);
             }
             *has_levels |= image.filter.needs_levels();
         }
     }
-    let kept = files.into_iter().filter_map(|(file, (parts, has_levels))| {
+    let images = files.into_iter().filter_map(|(file, (encodings, has_levels))| {
         let bytes = assets.encoded.get(file)?;
         Some(ImportedImage {
             header: header(bytes)?,
             length: bytes.len() as u64,
-            times: parts.len() as u64,
+            copies: encodings.len() as u64,
             has_levels,
         })
     });
-    kept.collect()
+    images.collect()
 }
 
 /// Returns the header; `None` for unreadable images, which the decoder reports.
 fn header(bytes: &[u8]) -> Option<Header> {
     let format = Format::of(bytes)?;
-    let seen = Cell::new(None);
+    let read = Cell::new(None);
     let _ = decode(bytes, format, |header| {
-        seen.set(Some(header));
+        read.set(Some(header));
         Err(String::new())
     });
-    seen.take()
+    read.take()
 }
 
 #[cfg(test)]
@@ -130,7 +135,7 @@ mod tests {
                 ..ImageTextureDescription::new(file)
             })
         };
-        // With mip levels, each encoding takes 180 MB, independent of the number of textures.
+        // With mip levels, each encoding of "large" takes 180 MB, independent of the number of textures.
         for (name, encoding) in [("a", Encoding::Srgb), ("b", Encoding::Linear), ("c", Encoding::Srgb)] {
             description.textures.insert(name.to_owned(), texture("large", encoding));
         }

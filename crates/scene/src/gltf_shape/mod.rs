@@ -31,19 +31,19 @@ pub struct ExpandedScene {
     /// The imported files, which must outlive the scene.
     pub imported: Vec<Arc<Imported>>,
     origins: Vec<Origin>,
-    /// Number of shapes per file.
-    numbers: BTreeMap<String, usize>,
+    /// The last number in a prefix, by file.
+    prefix_numbers: BTreeMap<String, usize>,
     prefixes: BTreeSet<String>,
-    /// Number of imported parts, plus [`SHAPE`] per shape: for all files, and for repeated files only.
-    brought: [usize; 2],
+    /// Number of imported parts, plus [`SHAPE_COST`] per shape: for all files, and for repeated files only.
+    part_counts: [usize; 2],
 }
 
-/// Maximum total number of instances, meshes, materials and lights of all shapes.
+/// Maximum number of parts: the instances, meshes, materials and lights of all shapes.
 const MAX_IMPORTED_INSTANCES: usize = 1 << 21;
-/// Maximum total number of these parts that come from repeated files. Each part takes at least 1 KiB.
+/// Maximum number of parts of repeated files. Each part takes at least 1 KiB.
 const MAX_REPEATED_IMPORTS: usize = 1 << 18;
-/// Amount that a shape adds to these counts.
-const SHAPE: usize = 16;
+/// Amount that a shape adds to the number of parts.
+const SHAPE_COST: usize = 16;
 
 struct Origin {
     shape: usize,
@@ -65,24 +65,24 @@ impl ExpandedScene {
             notes: Vec::new(),
             imported: Vec::new(),
             origins: Vec::new(),
-            numbers: BTreeMap::new(),
+            prefix_numbers: BTreeMap::new(),
             prefixes: BTreeSet::new(),
-            brought: [0; 2],
+            part_counts: [0; 2],
         };
         for (i, shape) in description.shapes.iter().enumerate() {
             if let ShapeDescription::Gltf(gltf) = shape {
                 expanded.add(i, gltf, files).at(i).at("shapes")?;
             }
         }
-        let fitting = longest_side(&expanded.description, &expanded.assets).map_err(|rule| {
+        let limit = longest_side(&expanded.description, &expanded.assets).map_err(|rule| {
             let first = expanded.origins.first().map_or(0, |origin| origin.shape);
             Problem::of("file", rule).at(first).at("shapes")
         })?;
-        if let Some((longest, bytes)) = fitting {
-            expanded.assets.longest_side = Some(longest);
+        if let Some((max_side, bytes)) = limit {
+            expanded.assets.longest_side = Some(max_side);
             let gib = bytes as f64 / f64::from(1 << 30);
             let note = format!(
-                "images of glTF files take {gib:.1} GiB: those with more than {longest} texels along a side are halved until they have no more, so that all fit 1 GiB"
+                "images of glTF files take {gib:.1} GiB: images with more than {max_side} texels along a side are halved until no side is longer, so that all images fit in 1 GiB"
             );
             expanded.notes.push(note.into());
         }
@@ -92,14 +92,14 @@ impl ExpandedScene {
     }
 
     /// Maps a problem from the expanded to the original description.
-    pub fn place(&self, description: &Description, problem: Problem) -> Problem {
-        let brought = self.origins.iter().find(|origin| match problem.key.0.as_slice() {
+    pub fn original_problem(&self, description: &Description, problem: Problem) -> Problem {
+        let origin = self.origins.iter().find(|origin| match problem.key.0.as_slice() {
             [Segment::Key(list), Segment::Index(i), ..] if list == "instances" => origin.instances.contains(i),
             [Segment::Key(list), Segment::Index(i), ..] if list == "lights" => origin.lights.contains(i),
             [Segment::Key(_), Segment::Key(name), ..] => name.starts_with(&origin.prefix),
             _ => false,
         });
-        match (brought, problem.key.0.as_slice()) {
+        match (origin, problem.key.0.as_slice()) {
             (Some(origin), _) => Problem {
                 is_damage: problem.is_damage,
                 ..match problem.is_damage {
@@ -111,14 +111,14 @@ impl ExpandedScene {
             .at(origin.shape)
             .at("shapes"),
             (None, [Segment::Key(list), Segment::Index(i), rest @ ..]) if list == "shapes" => {
-                let plain = |(_, shape): &(usize, &ShapeDescription)| !matches!(shape, ShapeDescription::Gltf(_));
-                let number = description.shapes.iter().enumerate().filter(plain).nth(*i);
-                let mut moved = problem.clone();
-                moved.key.0 = [Segment::from("shapes"), number.map_or(*i, |(number, _)| number).into()]
+                let is_plain = |(_, shape): &(usize, &ShapeDescription)| !matches!(shape, ShapeDescription::Gltf(_));
+                let shape = description.shapes.iter().enumerate().filter(is_plain).nth(*i);
+                let mut problem = problem.clone();
+                problem.key.0 = [Segment::from("shapes"), shape.map_or(*i, |(index, _)| index).into()]
                     .into_iter()
                     .chain(rest.iter().cloned())
                     .collect();
-                moved
+                problem
             }
             _ => problem,
         }
@@ -129,7 +129,7 @@ impl ExpandedScene {
         let AssetKey::File(path) = self.assets.find(&gltf.file).at("file")? else {
             return Err(Problem::of(
                 "file",
-                format!("{:?} is in memory, and no glTF file", gltf.file),
+                format!("{:?} is an image in memory, not a glTF file", gltf.file),
             ));
         };
         let choice = ImportOptions::of(gltf)?;
@@ -141,19 +141,19 @@ impl ExpandedScene {
             imported.materials.len(),
             imported.lights.len(),
         ];
-        let brought = SHAPE + counts.iter().sum::<usize>();
-        let is_again = self.numbers.contains_key(&gltf.file);
-        let what = "instances, meshes, materials and lights";
-        self.brought[0] += brought;
-        self.brought[1] += if is_again { brought } else { 0 };
-        if self.brought[0] > MAX_IMPORTED_INSTANCES {
+        let part_count = SHAPE_COST + counts.iter().sum::<usize>();
+        let is_repeated = self.prefix_numbers.contains_key(&gltf.file);
+        let parts = "instances, meshes, materials and lights";
+        self.part_counts[0] += part_count;
+        self.part_counts[1] += if is_repeated { part_count } else { 0 };
+        if self.part_counts[0] > MAX_IMPORTED_INSTANCES {
             let rule =
-                format!("all shapes of type \"gltf\" together must bring at most {MAX_IMPORTED_INSTANCES} {what}");
+                format!("all shapes of type \"gltf\" together must import at most {MAX_IMPORTED_INSTANCES} {parts}");
             return Err(Problem::of("file", rule));
         }
-        if self.brought[1] > MAX_REPEATED_IMPORTS {
+        if self.part_counts[1] > MAX_REPEATED_IMPORTS {
             let rule =
-                format!("shapes that name a glTF file again together must bring at most {MAX_REPEATED_IMPORTS} {what}");
+                format!("shapes that repeat a glTF file together must import at most {MAX_REPEATED_IMPORTS} {parts}");
             return Err(Problem::of("file", rule));
         }
         let prefix = self.prefix(&gltf.file);
@@ -169,27 +169,27 @@ impl ExpandedScene {
             let name = format!("{prefix}{name}");
             self.assets.encoded.insert(name, Arc::clone(bytes));
         }
-        for (name, why) in &imported.absent {
-            let why = format!("{}: {why}", gltf.file);
-            self.assets.absent.insert(format!("{prefix}{name}"), why);
+        for (name, reason) in &imported.absent {
+            let reason = format!("{}: {reason}", gltf.file);
+            self.assets.absent.insert(format!("{prefix}{name}"), reason);
         }
-        let first = self.description.instances.len();
-        for placed in &imported.instances {
-            let materials = placed.materials.iter().enumerate();
+        let first_instance = self.description.instances.len();
+        for instance in &imported.instances {
+            let materials = instance.materials.iter().enumerate();
             let materials = materials.map(|(group, material)| (group.to_string(), names[*material].clone()));
             self.description.instances.push(InstanceDescription {
-                mesh: mesh_name(placed.mesh),
+                mesh: mesh_name(instance.mesh),
                 material: None,
                 materials: materials.collect(),
                 translate: None,
                 rotate: None,
                 scale: None,
-                matrix: Some(rows(&(transform * placed.to_world))),
+                matrix: Some(rows(&(transform * instance.to_world))),
             });
         }
         let first_light = self.description.lights.len();
         let lights = imported.lights.iter().filter(|_| gltf.lights);
-        (self.description.lights).extend(lights.map(|light| moved(light, &transform)));
+        (self.description.lights).extend(lights.map(|light| transformed(light, &transform)));
         let notes = imported
             .notes
             .iter()
@@ -197,8 +197,8 @@ impl ExpandedScene {
         self.notes.extend(notes);
         for damage in &imported.damage {
             if self.assets.strict {
-                let what = Problem::damage(format!("{}: {}", gltf.file, damage.what));
-                return Err(what.at("file"));
+                let problem = Problem::damage(format!("{}: {}", gltf.file, damage.what));
+                return Err(problem.at("file"));
             }
             let note = Note::from(format!("{}; {}", damage.what, damage.stand_in));
             self.notes.push(note.in_file(&gltf.file));
@@ -206,7 +206,7 @@ impl ExpandedScene {
         self.origins.push(Origin {
             shape,
             prefix,
-            instances: first..self.description.instances.len(),
+            instances: first_instance..self.description.instances.len(),
             lights: first_light..self.description.lights.len(),
         });
         self.imported.push(imported);
@@ -215,7 +215,7 @@ impl ExpandedScene {
 
     /// Returns a unique prefix for a file's names.
     fn prefix(&mut self, file: &str) -> String {
-        let number = self.numbers.entry(file.to_owned()).or_default();
+        let number = self.prefix_numbers.entry(file.to_owned()).or_default();
         loop {
             *number += 1;
             let prefix = match *number {
@@ -231,35 +231,35 @@ impl ExpandedScene {
 
     /// Returns the names of a file's materials after the shape's overrides.
     fn materials(&mut self, gltf: &GltfDescription, imported: &Imported, prefix: &str) -> Result<Vec<String>, Problem> {
-        let known: BTreeSet<&str> = imported.materials.iter().map(|material| &*material.name).collect();
-        for (name, own) in &gltf.materials {
-            if !known.contains(name.as_str()) {
-                let rule = format!("the file has no such material; there are {}", list(&known));
+        let names_in_file: BTreeSet<&str> = imported.materials.iter().map(|material| &*material.name).collect();
+        for (name, replacement) in &gltf.materials {
+            if !names_in_file.contains(name.as_str()) {
+                let rule = format!("the file has no such material; available: {}", list(&names_in_file));
                 return Err(Problem::of(name, rule)).at("materials");
             }
-            if !self.description.materials.contains_key(own) {
+            if !self.description.materials.contains_key(replacement) {
                 let names = self.description.materials.keys().map(String::as_str);
-                let rule = suggest::unknown("material", own, names);
+                let rule = suggest::unknown("material", replacement, names);
                 return Err(Problem::of(name, rule)).at("materials");
             }
         }
         let mut names = Vec::with_capacity(imported.materials.len());
         for material in &imported.materials {
-            if let Some(own) = gltf.materials.get(&material.name) {
-                names.push(own.clone());
+            if let Some(replacement) = gltf.materials.get(&material.name) {
+                names.push(replacement.clone());
                 continue;
             }
             let name = format!("{prefix}{}", material.name);
-            let described = renamed(&material.description, prefix);
-            self.description.materials.insert(name.clone(), described);
-            for (texture, described) in &material.textures {
-                let mut described = described.clone();
-                if let TextureDescription::Image(image) = &mut described {
+            let description = with_texture_prefix(&material.description, prefix);
+            self.description.materials.insert(name.clone(), description);
+            for (texture, description) in &material.textures {
+                let mut description = description.clone();
+                if let TextureDescription::Image(image) = &mut description {
                     image.file = format!("{prefix}{}", image.file);
                 }
                 self.description
                     .textures
-                    .insert(format!("{prefix}{texture}"), described);
+                    .insert(format!("{prefix}{texture}"), description);
             }
             names.push(name);
         }
@@ -267,62 +267,66 @@ impl ExpandedScene {
     }
 }
 
-fn rows(map: &DAffine3) -> Vec<[f64; 4]> {
-    let rows = map.matrix3.transpose();
-    let row = |i: usize| rows.col(i).extend(map.translation[i]).to_array();
+fn rows(transform: &DAffine3) -> Vec<[f64; 4]> {
+    let rows = transform.matrix3.transpose();
+    let row = |i: usize| rows.col(i).extend(transform.translation[i]).to_array();
     vec![row(0), row(1), row(2)]
 }
 
-/// Transforms a light without changing the emission.
-fn moved(light: &LightDescription, map: &DAffine3) -> LightDescription {
-    let turned = |direction: DVec3| map.transform_vector3(direction);
+/// Transforms the position and direction of a light; its emission does not change.
+fn transformed(light: &LightDescription, transform: &DAffine3) -> LightDescription {
+    let rotate = |direction: DVec3| transform.transform_vector3(direction);
     let mut light = light.clone();
     match &mut light {
-        LightDescription::Point(point) => point.position = map.transform_point3(point.position),
-        LightDescription::Directional(sun) => sun.direction = turned(sun.direction),
+        LightDescription::Point(point) => point.position = transform.transform_point3(point.position),
+        LightDescription::Directional(directional) => directional.direction = rotate(directional.direction),
         LightDescription::Spot(spot) => {
-            spot.position = map.transform_point3(spot.position);
-            spot.direction = spot.direction.map(turned);
+            spot.position = transform.transform_point3(spot.position);
+            spot.direction = spot.direction.map(rotate);
         }
         LightDescription::Rectangle(_) => {} // not in glTF
     }
     light
 }
 
-/// Prefixes the textures of a material.
-fn renamed(material: &MaterialDescription, prefix: &str) -> MaterialDescription {
+/// Returns the material with prefixed names of textures.
+fn with_texture_prefix(material: &MaterialDescription, prefix: &str) -> MaterialDescription {
     let mut material = material.clone();
-    let MaterialDescription::Principled(of) = &mut material else {
+    let MaterialDescription::Principled(principled) = &mut material else {
         return material;
     };
-    let rename = |name: &mut String| *name = format!("{prefix}{name}");
-    let colors = [&mut of.base_color, &mut of.specular_color, &mut of.sheen_color];
-    for color in colors.into_iter().chain(&mut of.emission) {
+    let add_prefix = |name: &mut String| *name = format!("{prefix}{name}");
+    let colors = [
+        &mut principled.base_color,
+        &mut principled.specular_color,
+        &mut principled.sheen_color,
+    ];
+    for color in colors.into_iter().chain(&mut principled.emission) {
         if let ColorDescription::Texture(reference) = color {
-            rename(&mut reference.texture);
+            add_prefix(&mut reference.texture);
         }
     }
     let values = [
-        &mut of.metallic,
-        &mut of.roughness,
-        &mut of.anisotropy,
-        &mut of.specular,
-        &mut of.transmission,
-        &mut of.clearcoat,
-        &mut of.clearcoat_roughness,
-        &mut of.sheen_roughness,
-        &mut of.alpha,
+        &mut principled.metallic,
+        &mut principled.roughness,
+        &mut principled.anisotropy,
+        &mut principled.specular,
+        &mut principled.transmission,
+        &mut principled.clearcoat,
+        &mut principled.clearcoat_roughness,
+        &mut principled.sheen_roughness,
+        &mut principled.alpha,
     ];
     for value in values {
         if let ValueDescription::Texture(reference) = value {
-            rename(&mut reference.texture);
+            add_prefix(&mut reference.texture);
         }
     }
-    let directions = of.anisotropy_direction.iter_mut();
-    directions.for_each(|direction| rename(&mut direction.texture));
-    let maps = [&mut of.normal_map, &mut of.clearcoat_normal_map];
+    let directions = principled.anisotropy_direction.iter_mut();
+    directions.for_each(|direction| add_prefix(&mut direction.texture));
+    let maps = [&mut principled.normal_map, &mut principled.clearcoat_normal_map];
     for NormalMapDescription { texture, .. } in maps.into_iter().flatten() {
-        rename(texture);
+        add_prefix(texture);
     }
     material
 }

@@ -8,8 +8,8 @@ use super::*;
 /// Output of `tests/textures/ktx2.mjs`.
 const FOLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/textures/ktx2");
 
-fn path(name: &str, ending: &str) -> PathBuf {
-    PathBuf::from(FOLDER).join(format!("{name}.{ending}"))
+fn path(name: &str, extension: &str) -> PathBuf {
+    PathBuf::from(FOLDER).join(format!("{name}.{extension}"))
 }
 
 fn file(name: &str) -> Vec<u8> {
@@ -22,7 +22,7 @@ fn reference(name: &str) -> RgbaImage {
 
 fn names() -> Vec<String> {
     let files = fs::read_dir(FOLDER).unwrap().map(|entry| entry.unwrap().path());
-    let files = files.filter(|path| path.extension().is_some_and(|ending| ending == "ktx2"));
+    let files = files.filter(|path| path.extension().is_some_and(|extension| extension == "ktx2"));
     files
         .map(|path| path.file_stem().unwrap().to_str().unwrap().to_owned())
         .collect()
@@ -32,8 +32,8 @@ fn decoded(bytes: &[u8]) -> Result<DynamicImage, String> {
     Ktx2::parse(bytes)?.decode()
 }
 
-fn put<const N: usize>(bytes: &mut [u8], at: usize, value: [u8; N]) {
-    bytes[at..at + N].copy_from_slice(&value);
+fn write_at<const N: usize>(bytes: &mut [u8], offset: usize, value: [u8; N]) {
+    bytes[offset..offset + N].copy_from_slice(&value);
 }
 
 /// Replaces the Zstandard frame of a file; the declared size of the texels does not change.
@@ -42,18 +42,18 @@ fn with_frame(frame: &[u8]) -> Vec<u8> {
     let level = long(&bytes, INDEX).unwrap() as usize;
     bytes.truncate(level);
     bytes.extend(frame);
-    put(&mut bytes, INDEX + 8, (frame.len() as u64).to_le_bytes());
+    write_at(&mut bytes, INDEX + 8, (frame.len() as u64).to_le_bytes());
     bytes
 }
 
 #[test]
-fn files_decode_to_what_the_reference_makes_of_them() {
+fn files_decode_to_the_images_of_the_reference_transcoder() {
     let names = names();
     assert_eq!(names.len(), 12);
     for name in &names {
         let image = decoded(&file(name)).unwrap();
         assert_eq!(image.color().has_alpha(), has_alpha(&file(name)).unwrap(), "{name}");
-        // uastc-1x1 has alpha too.
+        // The file uastc-1x1 has alpha too.
         let has_alpha = name.contains("alpha") || name == "uastc-1x1";
         assert_eq!(image.color().has_alpha(), has_alpha, "{name}");
         assert!(image.into_rgba8() == reference(name), "{name}");
@@ -81,24 +81,25 @@ fn prefixes_are_errors() {
 
 #[test]
 fn headers_are_checked() {
-    let kind = "must contain ETC1S texels with BasisLZ, or UASTC texels with or without Zstandard; it has format ";
-    let shape = "must contain one 2D image, not an array, a cube map or a volume";
+    let format_rule =
+        "must contain ETC1S texels with BasisLZ, or UASTC texels with or without Zstandard; it has format ";
+    let shape_rule = "must contain one 2D image, not an array, a cube map or a volume";
     let damaged = "is damaged or truncated: ";
-    for (name, at, value, start) in [
-        ("uastc-5x7-levels", 12, 37, kind),
-        ("uastc-5x7-levels", 20, 0, shape),
+    for (name, offset, value, expected_start) in [
+        ("uastc-5x7-levels", 12, 37, format_rule),
+        ("uastc-5x7-levels", 20, 0, shape_rule),
         ("uastc-5x7-levels", 20, 9, damaged),
         ("uastc-5x7-levels", 20, u32::MAX, damaged),
-        ("uastc-5x7-levels", 24, 0, shape),
-        ("uastc-5x7-levels", 28, 1, shape),
-        ("uastc-5x7-levels", 32, 2, shape),
-        ("uastc-5x7-levels", 36, 6, shape),
+        ("uastc-5x7-levels", 24, 0, shape_rule),
+        ("uastc-5x7-levels", 28, 1, shape_rule),
+        ("uastc-5x7-levels", 32, 2, shape_rule),
+        ("uastc-5x7-levels", 36, 6, shape_rule),
         ("uastc-5x7-levels", 40, 0, damaged),
         ("uastc-5x7-levels", 40, 17, damaged),
         ("uastc-5x7-levels", 40, u32::MAX, damaged),
-        ("uastc-5x7-levels", 44, 1, kind),
+        ("uastc-5x7-levels", 44, 1, format_rule),
         ("uastc-5x7-levels", 44, 2, damaged),
-        ("uastc-5x7-levels", 44, 3, kind),
+        ("uastc-5x7-levels", 44, 3, format_rule),
         ("uastc-5x7-levels", 48, u32::MAX, damaged),
         (
             "uastc-5x7-levels",
@@ -113,7 +114,7 @@ fn headers_are_checked() {
         ("zstandard-48x20", 44, 0, damaged),
         ("zstandard-48x20", INDEX + 16, u32::MAX, damaged),
         ("zstandard-48x20", INDEX + 20, u32::MAX, damaged),
-        ("etc1s-48x20", 44, 0, kind),
+        ("etc1s-48x20", 44, 0, format_rule),
         ("etc1s-48x20", 64, u32::MAX, damaged),
         ("etc1s-48x20", 68, u32::MAX, damaged),
         ("etc1s-48x20", 72, u32::MAX, damaged),
@@ -121,10 +122,13 @@ fn headers_are_checked() {
         ("etc1s-48x20", INDEX + 16, 1, damaged),
     ] {
         let mut bytes = file(name);
-        put(&mut bytes, at, value.to_le_bytes());
+        write_at(&mut bytes, offset, value.to_le_bytes());
         let error = decoded(&bytes).map(|_| String::new()).unwrap_or_else(|error| error);
-        assert!(error.starts_with(start), "{name} {at} {value}: {error}");
-        assert!(!start.is_empty() || error.is_empty(), "{name} {at} {value}: {error}");
+        assert!(error.starts_with(expected_start), "{name} {offset} {value}: {error}");
+        assert!(
+            !expected_start.is_empty() || error.is_empty(),
+            "{name} {offset} {value}: {error}"
+        );
     }
     // A file with separate channels for red and green.
     let mut bytes = file("etc1s-48x20");
@@ -150,7 +154,7 @@ fn zstandard_frames_must_have_the_declared_length() {
         frame
     };
     let error = |frame: &[u8]| decoded(&with_frame(frame)).unwrap_err();
-    // Windows of 1 KiB and 8 MiB; further below, a window of 16 MiB. Zeros are blocks of black texels.
+    // Windows of 1 KiB and 8 MiB are accepted; a window of 16 MiB is rejected below. Zeros are blocks of black texels.
     for frame in [
         frame(0, &[texels]),
         frame(13 << 3, &[texels]),
@@ -159,7 +163,7 @@ fn zstandard_frames_must_have_the_declared_length() {
         let image = decoded(&with_frame(&frame)).unwrap();
         assert!(image.into_rgb8().iter().all(|value| *value == 0));
     }
-    let not_inflated = "is damaged or truncated: its Zstandard data cannot be decompressed: ";
+    let not_decompressed = "is damaged or truncated: its Zstandard data cannot be decompressed: ";
     for frame in [
         frame(14 << 3, &[texels]),
         frame(0, &[texels - 1]),
@@ -169,7 +173,7 @@ fn zstandard_frames_must_have_the_declared_length() {
         vec![0; 100],
     ] {
         let error = error(&frame);
-        assert!(error.starts_with(not_inflated), "{error}");
+        assert!(error.starts_with(not_decompressed), "{error}");
     }
 }
 
@@ -181,17 +185,17 @@ fn changed_files_are_errors_or_images() {
     };
     let (mut images, mut errors) = (0, 0);
     for name in names() {
-        let sound = file(&name);
+        let valid = file(&name);
         for seed in 0..500 {
             let mut state = seed;
-            let mut bytes = sound.clone();
+            let mut bytes = valid.clone();
             for _ in 0..1 + random(&mut state) % 3 {
-                let at = random(&mut state) % bytes.len();
-                bytes[at] = [0, 255, random(&mut state) as u8][random(&mut state) % 3];
+                let offset = random(&mut state) % bytes.len();
+                bytes[offset] = [0, 255, random(&mut state) as u8][random(&mut state) % 3];
             }
-            let has_room = |file: &Ktx2| file.width.max(file.height) < 1000;
+            let is_small = |file: &Ktx2| file.width.max(file.height) < 1000;
             match Ktx2::parse(&bytes).and_then(|file| {
-                if has_room(&file) {
+                if is_small(&file) {
                     file.decode()
                 } else {
                     Err(String::new())

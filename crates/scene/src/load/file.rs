@@ -1,4 +1,4 @@
-//! Reads scene files whose size is limited.
+//! Reads scene files of limited size.
 
 use std::fs::File;
 use std::io::{self, Read as _};
@@ -8,7 +8,7 @@ use crate::error::SceneError;
 use crate::parse::{NOT_UTF8, encoding, syntax_error};
 use wgray_image::blocking_path;
 
-/// Maximum size of a scene file in bytes: far larger than handwritten files, far smaller than the memory.
+/// Maximum size of a scene file in bytes: far larger than handwritten files, far smaller than the available memory.
 const MAX_FILE_BYTES: u64 = 64 << 20;
 
 /// Returns the folder of a file.
@@ -25,7 +25,7 @@ pub fn read_text(path: &Path) -> Result<String, SceneError> {
     String::from_utf8(bytes).map_err(|error| {
         let text = String::from_utf8_lossy(error.as_bytes());
         // Up to this byte, the lossy text is identical to the file.
-        let valid = error.utf8_error().valid_up_to();
+        let valid_len = error.utf8_error().valid_up_to();
         let name = path.display().to_string();
         match encoding(error.as_bytes()) {
             Some(message) => SceneError::Syntax {
@@ -34,7 +34,7 @@ pub fn read_text(path: &Path) -> Result<String, SceneError> {
                 column: 1,
                 message,
             },
-            None => syntax_error(&text, &name, valid, NOT_UTF8),
+            None => syntax_error(&text, &name, valid_len, NOT_UTF8),
         }
     })
 }
@@ -45,7 +45,7 @@ pub fn read_bytes(path: &Path) -> io::Result<Vec<u8>> {
     if path.is_dir() {
         return Err(io::Error::new(
             io::ErrorKind::IsADirectory,
-            "it is a folder, and a scene is a file",
+            "it is a folder, not a scene file",
         ));
     }
     let mut bytes = Vec::new();
@@ -67,14 +67,14 @@ camera = { position = [0, 1, 0], look_at = [1, 0, 0], fov = 40 }
 ";
 
     #[test]
-    fn files_are_read_or_the_message_says_why_not() {
+    fn files_are_read_or_the_message_states_the_reason() {
         let folder = tempfile::tempdir().unwrap();
         let load = |name: &str| Scene::load(folder.path().join(name));
         let message_of = |name: &str| load(name).unwrap_err().to_string();
         let path = |name: &str| folder.path().join(name).display().to_string();
         let write = |name: &str, bytes: &[u8]| std::fs::write(folder.path().join(name), bytes).unwrap();
-        write("good.toml", SCENE.as_bytes());
-        assert_eq!(load("good.toml").unwrap().width, 4);
+        write("valid.toml", SCENE.as_bytes());
+        assert_eq!(load("valid.toml").unwrap().width, 4);
         write("latin.toml", b"# \xc3\xa9t\xc3\xa9\n# \xc3\xa9t\xe9");
         assert_eq!(
             message_of("latin.toml"),

@@ -8,15 +8,15 @@ use crate::{Selection, View};
 /// The parts of a glTF file that are rendered, and the view.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct GltfChoice {
-    /// The scene; `None` is the default scene of the file, or its first one.
+    /// The scene; `None` selects the default scene of the file, or else the first scene.
     pub scene: Option<Selection>,
-    /// The camera; `None` is the first one, if the file has cameras.
+    /// The camera; `None` selects the first camera, if the file has cameras.
     pub camera: Option<Selection>,
-    /// A view of the whole model instead of a camera of the file; [`View::Corner`] if the file has no camera.
+    /// A view of the entire model instead of a camera of the file; [`View::Corner`] if the file has no camera.
     pub view: Option<View>,
     /// The time of the animation in seconds.
     pub time: Option<f64>,
-    /// The animation; `None` is the first one if `time` is set.
+    /// The animation; `None` selects the first animation if `time` is set.
     pub animation: Option<Selection>,
     /// The material variant.
     pub variant: Option<Selection>,
@@ -24,8 +24,8 @@ pub struct GltfChoice {
 
 impl GltfChoice {
     /// Returns the name of the first option that is set, as on the command line.
-    pub(crate) fn first(&self) -> Option<&'static str> {
-        let all = [
+    pub(crate) fn first_option(&self) -> Option<&'static str> {
+        let options = [
             (self.scene.is_some(), "gltf_scene"),
             (self.camera.is_some(), "camera"),
             (self.view.is_some(), "view"),
@@ -33,20 +33,20 @@ impl GltfChoice {
             (self.animation.is_some(), "animation"),
             (self.variant.is_some(), "variant"),
         ];
-        let chosen = all.into_iter().find(|(is_chosen, _)| *is_chosen);
-        chosen.map(|(_, name)| name)
+        let first = options.into_iter().find(|(is_set, _)| *is_set);
+        first.map(|(_, name)| name)
     }
 
     /// Converts an error to an error of the file, or of the option that selects a missing part.
     pub(super) fn error(&self, error: GltfError) -> SceneError {
-        let given = |option: &str| match option {
+        let is_set = |option: &str| match option {
             "gltf_scene" => self.scene.is_some(),
             "animation" => self.animation.is_some(),
             "variant" => self.variant.is_some(),
             _ => self.time.is_some(),
         };
         match error {
-            GltfError::Choice { option, message, .. } if given(option) => {
+            GltfError::Choice { option, message, .. } if is_set(option) => {
                 SceneError::Override(Problem::of(option, message))
             }
             error => SceneError::Gltf(error),

@@ -21,8 +21,8 @@ const VERTICAL: f64 = 1e-6;
 
 /// Returns true if a file name ends in `.gltf` or `.glb`.
 pub fn is_gltf(name: &Path) -> bool {
-    let ending = name.extension();
-    ending.is_some_and(|ending| ["gltf", "glb"].iter().any(|known| ending.eq_ignore_ascii_case(known)))
+    let extension = name.extension();
+    extension.is_some_and(|extension| extension.eq_ignore_ascii_case("gltf") || extension.eq_ignore_ascii_case("glb"))
 }
 
 impl Scene {
@@ -42,7 +42,7 @@ impl Scene {
     }
 }
 
-/// Describes a glTF file as a scene. The caller must keep the import alive until the scene refers to it.
+/// Describes a glTF file as a scene. The caller must keep the import alive until the scene refers to the import.
 pub(crate) fn describe(
     path: &Path,
     overrides: &Overrides,
@@ -66,33 +66,33 @@ pub(crate) fn describe(
     };
     let folder = folder_of(path);
     let root = overrides.assets(folder, folder).root;
-    let whole = path.canonicalize().map_err(|error| SceneError::Read {
+    let canonical = path.canonicalize().map_err(|error| SceneError::Read {
         path: path.to_owned(),
         error,
     })?;
     let choice = ImportOptions::of(&shape).map_err(SceneError::Override)?;
-    let imported = load(&whole, &root, &choice, files).map_err(|error| overrides.gltf.error(error.at(path)))?;
+    let imported = load(&canonical, &root, &choice, files).map_err(|error| overrides.gltf.error(error.at(path)))?;
     let presentation = &overrides.presentation;
     let camera = match view.is_some() || presentation.orbit.is_some() {
         true => None,
-        false => chosen(&imported.cameras, camera.as_ref()).map_err(SceneError::Override)?,
+        false => select_camera(&imported.cameras, camera.as_ref()).map_err(SceneError::Override)?,
     };
     let (width, height) = overrides
         .size
         .unwrap_or_else(|| size(camera.and_then(|camera| camera.aspect)));
-    if let (Some(_), Some(option)) = (camera, presentation.of_camera()) {
+    if let (Some(_), Some(option)) = (camera, presentation.camera_option()) {
         let rule = "only applies to the automatic camera, and the file has its own camera; add --view or --orbit";
         return Err(SceneError::Override(Problem::of(option, rule)));
     }
-    let upright = |axis: DVec3| UPRIGHT.transform_vector3(axis);
-    let turn = presentation.up.and_then(|up| up.rotation(upright));
+    let to_scene = |axis: DVec3| UPRIGHT.transform_vector3(axis);
+    let up_rotation = presentation.up.and_then(|up| up.rotation(to_scene));
     let mut points = Vec::new();
     if camera.is_none() || presentation.ground {
         points = imported.points();
     }
-    if let Some((rotation, turn)) = turn {
+    if let Some((rotation, matrix)) = up_rotation {
         shape.rotate = Some(rotation);
-        points.iter_mut().for_each(|point| *point = turn * *point);
+        points.iter_mut().for_each(|point| *point = matrix * *point);
     }
     let aspect = f64::from(width.max(1)) / f64::from(height.max(1));
     let framing = Framing {
@@ -121,7 +121,8 @@ pub(crate) fn describe(
     Ok((description, imported))
 }
 
-/// Makes orbits horizontal: `up` becomes +z unless the view is vertical. In glTF, `up` is perpendicular to the view.
+/// Makes orbits horizontal: sets `up` to +z unless the view is vertical. In glTF, `up` is perpendicular to the view
+/// direction.
 fn with_horizontal_orbit(mut camera: CameraDescription) -> CameraDescription {
     let (position, look_at, up) = match &mut camera {
         CameraDescription::Perspective(camera) => (camera.position, camera.look_at, &mut camera.up),
@@ -135,17 +136,17 @@ fn with_horizontal_orbit(mut camera: CameraDescription) -> CameraDescription {
     camera
 }
 
-/// Returns the selected camera, or the first camera if none is selected.
-fn chosen<'a>(
+/// Returns the selected camera, or the first camera if no camera is selected.
+fn select_camera<'a>(
     cameras: &'a [ImportedCamera],
-    wanted: Option<&Selection>,
+    selection: Option<&Selection>,
 ) -> Result<Option<&'a ImportedCamera>, Problem> {
-    let Some(wanted) = wanted else {
+    let Some(selection) = selection else {
         return Ok(cameras.first());
     };
     let names: Vec<Option<&str>> = cameras.iter().map(|camera| camera.name.as_deref()).collect();
-    let found = wanted.among(&names).and_then(|i| cameras.get(i));
-    let unknown = || Problem::of("camera", crate::gltf::unknown("camera", wanted, &names));
+    let found = selection.among(&names).and_then(|i| cameras.get(i));
+    let unknown = || Problem::of("camera", crate::gltf::unknown("camera", selection, &names));
     found.map(Some).ok_or_else(unknown)
 }
 

@@ -69,7 +69,7 @@ impl Scene {
         }
         model::check_format(path)?;
         let text = read_text(path)?;
-        parse_beside(&text, &path.display().to_string(), folder_of(path), overrides, files)
+        parse_in_folder(&text, &path.display().to_string(), folder_of(path), overrides, files)
     }
 
     /// Parses and validates the text of a scene file. `origin` is the path of the file, for messages and for relative
@@ -89,7 +89,7 @@ impl Scene {
     /// The errors of [`Scene::parse`]; also fails if an override is invalid.
     pub fn parse_with(text: &str, origin: &str, overrides: &Overrides) -> Result<Scene, SceneError> {
         let folder = folder_of(Path::new(origin));
-        parse_beside(text, origin, folder, overrides, &mut BTreeSet::new()).map(|(scene, _)| scene)
+        parse_in_folder(text, origin, folder, overrides, &mut BTreeSet::new()).map(|(scene, _)| scene)
     }
 }
 
@@ -98,28 +98,28 @@ fn load_gltf(
     overrides: &Overrides,
     files: &mut BTreeSet<PathBuf>,
 ) -> Result<(Scene, Description), SceneError> {
-    let (mut description, _kept) = describe(path, overrides, files)?;
+    let (mut description, _imported) = describe(path, overrides, files)?;
     let mut defines = Defines::new(&overrides.define);
     if !overrides.define.is_empty() {
-        description = description.defined(&mut defines).map_err(SceneError::Override)?;
+        description = description.with_defines(&mut defines).map_err(SceneError::Override)?;
     }
     overrides.apply(&mut description).map_err(SceneError::Override)?;
     // Errors of the shape are reported as errors of the file.
     let name = path.file_name().unwrap_or_default().to_string_lossy();
-    let place = format!("{name}: ");
-    let own = |message: &str| {
-        let message = message.strip_prefix(&place).unwrap_or(message);
+    let prefix = format!("{name}: ");
+    let without_name = |message: &str| {
+        let message = message.strip_prefix(&prefix).unwrap_or(message);
         message.replace(&format!("\"{name}/"), "\"")
     };
     let invalid = |problems: Problems| {
-        if let Some(error) = problems.of_define(&defines) {
+        if let Some(error) = problems.define_error(&defines) {
             return error;
         }
         let first = problems.first;
         SceneError::Gltf(GltfError::File {
             path: path.to_owned(),
             message: match first.key.to_string() == "shapes[0].file" {
-                true => own(&first.message),
+                true => without_name(&first.message),
                 false => first.to_string(),
             },
         })
@@ -127,12 +127,12 @@ fn load_gltf(
     let assets = overrides.assets(folder_of(path), folder_of(path));
     let mut scene = overrides.finish(description.validate_and_list(&assets, files), invalid, |_| {})?;
     for note in &mut scene.notes {
-        *note = std::mem::take(note).of_loaded(&name);
-        note.message = own(&note.message);
+        *note = std::mem::take(note).without_loaded_file(&name);
+        note.message = without_name(&note.message);
     }
     scene
         .notes
-        .extend(overrides.presentation.hiding_ground(&scene).map(Note::from));
+        .extend(overrides.presentation.ground_warning(&scene).map(Note::from));
     Ok((scene, description))
 }
 
@@ -144,27 +144,27 @@ fn load_mesh(
     let (mut description, _mesh) = model::describe(path, overrides)?;
     let mut defines = Defines::new(&overrides.define);
     if !overrides.define.is_empty() {
-        description = description.defined(&mut defines).map_err(SceneError::Override)?;
+        description = description.with_defines(&mut defines).map_err(SceneError::Override)?;
     }
     overrides.apply(&mut description).map_err(SceneError::Override)?;
     let assets = overrides.assets(folder_of(path), folder_of(path));
-    let checked = description.validate_and_list(&assets, files);
-    let invalid = |problems: Problems| match problems.of_define(&defines) {
+    let validated = description.validate_and_list(&assets, files);
+    let invalid = |problems: Problems| match problems.define_error(&defines) {
         Some(error) => error,
         None => model::error_of(path, problems.first),
     };
-    let mut scene = overrides.finish(checked, invalid, |_| {})?;
+    let mut scene = overrides.finish(validated, invalid, |_| {})?;
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     for note in &mut scene.notes {
-        *note = std::mem::take(note).of_loaded(&name);
+        *note = std::mem::take(note).without_loaded_file(&name);
     }
     scene
         .notes
-        .extend(overrides.presentation.hiding_ground(&scene).map(Note::from));
+        .extend(overrides.presentation.ground_warning(&scene).map(Note::from));
     Ok((scene, description))
 }
 
-fn parse_beside(
+fn parse_in_folder(
     text: &str,
     origin: &str,
     folder: &Path,
@@ -195,7 +195,7 @@ impl<'a> PendingScene<'a> {
     ) -> Result<PendingScene<'a>, SceneError> {
         let mut defines = Defines::new(&overrides.define);
         let description = Description::parse_with(text, origin, &mut defines)?;
-        let draft = PendingScene {
+        let pending = PendingScene {
             text,
             origin,
             folder,
@@ -203,23 +203,23 @@ impl<'a> PendingScene<'a> {
             defines,
             description,
         };
-        draft.overridden()
+        pending.with_overrides()
     }
 
-    /// Parses a text that differs from the text of `before` only in the table at the first two segments of a path.
-    /// Parses only this table if it has its own header. Also returns the locations of the parts, if found.
+    /// Parses a text that differs from the text of `before` only in the table at the first two segments of `path`.
+    /// Parses only this table if it has its own header. Also returns the locations of the parts if they were found.
     pub fn change(
         text: &'a str,
         origin: &'a str,
         folder: &'a Path,
         overrides: &'a Overrides,
-        (before, at): (&Description, &KeyPath),
+        (before, path): (&Description, &KeyPath),
     ) -> Result<(PendingScene<'a>, Option<Places>), SceneError> {
         let mut defines = Defines::new(&overrides.define);
-        let Some(change) = Description::parse_change(text, origin, &mut defines, before, at)? else {
+        let Some(change) = Description::parse_change(text, origin, &mut defines, before, path)? else {
             return Ok((PendingScene::read(text, origin, folder, overrides)?, None));
         };
-        let mut draft = PendingScene {
+        let mut pending = PendingScene {
             text,
             origin,
             folder,
@@ -228,17 +228,17 @@ impl<'a> PendingScene<'a> {
             description: change.description,
         };
         // Overrides outside of the parts are still in effect, unless the rest of the file was parsed again.
-        if change.is_rest {
-            draft = draft.overridden()?;
+        if change.parsed_rest {
+            pending = pending.with_overrides()?;
         }
-        Ok((draft, Some(change.places)))
+        Ok((pending, Some(change.places)))
     }
 
-    fn overridden(mut self) -> Result<PendingScene<'a>, SceneError> {
+    fn with_overrides(mut self) -> Result<PendingScene<'a>, SceneError> {
         let applied = self.overrides.apply(&mut self.description);
         applied.map_err(SceneError::Override)?;
-        let gltf = self.overrides.gltf.first();
-        if let Some(option) = gltf.or(self.overrides.presentation.first()) {
+        let gltf_option = self.overrides.gltf.first_option();
+        if let Some(option) = gltf_option.or(self.overrides.presentation.first_option()) {
             let rule = format!("only applies to model files, and {} is a scene file", self.origin);
             return Err(SceneError::Override(Problem::of(option, rule)));
         }
@@ -266,8 +266,8 @@ impl<'a> PendingScene<'a> {
             true => course::invalid(text, origin, problems, &defines),
             false => invalid(text, origin, problems, &defines),
         };
-        let checked = description.validate_and_list(&assets, files);
-        let scene = overrides.finish(checked, invalid, |path| path.set_place(origin, line_of_path(text)))?;
+        let validated = description.validate_and_list(&assets, files);
+        let scene = overrides.finish(validated, invalid, |path| path.set_location(origin, line_of_path(text)))?;
         Ok((scene, description))
     }
 }

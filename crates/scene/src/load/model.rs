@@ -11,14 +11,15 @@ use crate::error::SceneError;
 use crate::framing::check_extent;
 use crate::mesh::{Mesh, MeshError};
 use crate::problem::Problem;
-use crate::validate::turned_up;
+use crate::validate::to_z_up;
 use crate::{
     CameraDescription, Description, EnvironmentDescription, EnvironmentName, Framing, ImageDescription, Integrator,
     MeshDescription, RenderDescription, SamplesDescription, ShapeDescription, Up, ViewTransform, framed, is_gltf,
 };
 
-/// Defaults: longer side of the image in pixels, and samples per pixel.
+/// Default of the longer side of the image in pixels.
 pub(super) const SIDE: u32 = 720;
+/// Default of the samples per pixel.
 const SAMPLES: u32 = 32;
 /// Radiance of the background: middle gray.
 const BACKGROUND: DVec3 = DVec3::splat(0.18);
@@ -51,66 +52,68 @@ const UNSUPPORTED: [(&[&str], &str); 4] = [
 
 /// Returns true if the file has the extension of a mesh file: `.obj`, `.ply` or `.stl`.
 pub fn is_mesh(name: &Path) -> bool {
-    up(name).is_some()
+    up_axis(name).is_some()
 }
 
-/// Returns true for the extensions of models, glTF or mesh files, which need no scene file.
+/// Returns true if the file has the extension of a model: a glTF or mesh file, which needs no scene file.
 pub fn is_model(name: &Path) -> bool {
     is_gltf(name) || is_mesh(name)
 }
 
-fn has_ending(name: &Path, ending: &str) -> bool {
-    name.extension().is_some_and(|own| own.eq_ignore_ascii_case(ending))
+fn has_extension(name: &Path, extension: &str) -> bool {
+    name.extension()
+        .is_some_and(|found| found.eq_ignore_ascii_case(extension))
 }
 
-fn up(name: &Path) -> Option<Up> {
-    let known = MESHES.into_iter().find(|(ending, _)| has_ending(name, ending));
-    known.map(|(_, up)| up)
+/// Returns the usual up axis of a mesh file.
+fn up_axis(name: &Path) -> Option<Up> {
+    let format = MESHES.into_iter().find(|(extension, _)| has_extension(name, extension));
+    format.map(|(_, up)| up)
 }
 
 /// Rejects files whose extension belongs to a format that cannot be a scene.
 pub(super) fn check_format(path: &Path) -> Result<(), SceneError> {
-    let is_of = |endings: &[&str]| endings.iter().any(|ending| has_ending(path, ending));
-    let Some((_, what)) = UNSUPPORTED.into_iter().find(|(endings, _)| is_of(endings)) else {
+    let is_any = |extensions: &[&str]| extensions.iter().any(|extension| has_extension(path, extension));
+    let Some((_, advice)) = UNSUPPORTED.into_iter().find(|(extensions, _)| is_any(extensions)) else {
         return Ok(());
     };
-    let ending = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+    let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
     Err(SceneError::Unsupported {
         path: path.to_owned(),
-        message: format!(".{ending} is {what}"),
+        message: format!(".{extension} is {advice}"),
     })
 }
 
 /// Describes a mesh file as a scene. Also returns the mesh, which must be kept alive until the scene refers to it.
 pub(super) fn describe(path: &Path, overrides: &Overrides) -> Result<(Description, Arc<Mesh>), SceneError> {
-    let others = GltfChoice {
+    let gltf_only = GltfChoice {
         view: None,
         ..overrides.gltf.clone()
     };
-    if let Some(option) = others.first() {
+    if let Some(option) = gltf_only.first_option() {
         let rule = format!("only applies to glTF files, and {} is a mesh", path.display());
         return Err(SceneError::Override(Problem::of(option, rule)));
     }
-    let whole = path.canonicalize().map_err(|error| SceneError::Read {
+    let canonical = path.canonicalize().map_err(|error| SceneError::Read {
         path: path.to_owned(),
         error,
     })?;
-    let mesh = crate::mesh_file::load(&whole, None).map_err(|error| SceneError::Mesh(error.at(path)))?;
+    let mesh = crate::mesh_file::load(&canonical, None).map_err(|error| SceneError::Mesh(error.at(path)))?;
     if let (true, Some(damage)) = (overrides.strict, mesh.damage.first()) {
         return Err(SceneError::Mesh(damage.clone().of(path)));
     }
     let presentation = &overrides.presentation;
     let mut shape = MeshDescription {
-        up: up(path).unwrap_or_default(),
+        up: up_axis(path).unwrap_or_default(),
         material: None,
         ..MeshDescription::new("", path.file_name().unwrap_or_default().to_string_lossy())
     };
-    let upright = turned_up(shape.up);
-    let turn = (presentation.up).and_then(|up| up.rotation(|axis| upright.transform_vector3(axis)));
-    let mut to_world = upright;
-    if let Some((rotation, turn)) = turn {
+    let z_up = to_z_up(shape.up);
+    let up_rotation = (presentation.up).and_then(|up| up.rotation(|axis| z_up.transform_vector3(axis)));
+    let mut to_world = z_up;
+    if let Some((rotation, matrix)) = up_rotation {
         shape.rotate = Some(rotation);
-        to_world = DAffine3::from_mat3(turn) * upright;
+        to_world = DAffine3::from_mat3(matrix) * z_up;
     }
     let mut points = points(&mesh);
     points

@@ -4,11 +4,11 @@ use std::path::{Path, PathBuf};
 
 use super::gltf_choice::GltfChoice;
 use crate::define::Define;
-use crate::environment_override::{Background, of_option, surround};
+use crate::environment_override::{Background, option_problem, replace_environment};
 use crate::error::SceneError;
 use crate::key_path::KeyPath;
 use crate::problem::{At, Problem, Problems};
-use crate::turntable::turning;
+use crate::turntable::with_orbit;
 use crate::validate::{LIGHT_SAMPLES, adaptive, adaptive_error, max_depth, sample_count, side};
 use crate::{
     AdaptiveDescription, Assets, CameraPath, Description, EnvironmentDescription, Integrator, Pattern, Presentation,
@@ -37,10 +37,10 @@ pub struct Overrides {
     pub max_depth: Option<u32>,
     /// Folder that must contain all files of the scene; `None` is the folder of the scene file.
     pub asset_root: Option<PathBuf>,
-    /// Frame of an animated camera; `None` uses `[camera]`, and the first key for values that are missing there.
+    /// Frame of an animated camera; `None` uses `[camera]`, and the first key for values that `[camera]` does not set.
     pub frame: Option<f64>,
-    /// The environment, for [`Integrator::Path`]. Keeps its visibility to the camera. A file with an absolute path may
-    /// be anywhere.
+    /// The environment, for [`Integrator::Path`]; the visibility to the camera is not changed. A file with an absolute
+    /// path may be anywhere.
     pub environment: Option<EnvironmentDescription>,
     /// The background.
     pub background: Option<Background>,
@@ -49,7 +49,7 @@ pub struct Overrides {
     /// The exposure in stops, -100 to 100.
     pub exposure: Option<f64>,
     /// Number of frames of an orbit around the look-at point, 1 to 100,000, instead of the camera's path.
-    /// [`Overrides::frame`] selects one, from 1.
+    /// [`Overrides::frame`] selects a frame, counted from 1.
     pub turntable: Option<u32>,
     /// True to report damage to a file as an error, instead of using a placeholder with a warning.
     pub strict: bool,
@@ -77,7 +77,7 @@ impl Overrides {
         }
         // Applied first, because the environment and the background may determine the integrator.
         if let Some(environment) = &self.environment {
-            surround(description, environment);
+            replace_environment(description, environment);
         }
         if let Some(background) = self.background {
             background.show(description).at("background")?;
@@ -96,14 +96,14 @@ impl Overrides {
         if let Some(error) = self.adaptive {
             adaptive_error(error).at("adaptive")?;
             let max_samples = (render.adaptive.as_ref()).and_then(|adaptive| adaptive.max_samples);
-            let further = AdaptiveDescription { error, max_samples };
-            adaptive(&further, &render.pixel_samples, integrator).at("adaptive")?;
-            render.adaptive = Some(further);
+            let settings = AdaptiveDescription { error, max_samples };
+            adaptive(&settings, &render.pixel_samples, integrator).at("adaptive")?;
+            render.adaptive = Some(settings);
         }
         if let Some(frames) = self.turntable
             && description.camera.validate().is_ok()
         {
-            description.camera = turning(&description.camera, frames).at("turntable")?;
+            description.camera = with_orbit(&description.camera, frames).at("turntable")?;
         }
         Ok(())
     }
@@ -139,12 +139,12 @@ impl Overrides {
             ),
         ];
         let path = key.exact();
-        let is_in = |whole: &&str| {
-            path.strip_prefix(*whole)
+        let is_within = |option_key: &&str| {
+            path.strip_prefix(*option_key)
                 .is_some_and(|rest| rest.is_empty() || rest.starts_with(['.', '[']))
         };
-        let mut given = options.into_iter().filter(|(is_given, ..)| *is_given);
-        let found = given.find(|(_, _, keys)| keys.iter().any(is_in));
+        let mut active = options.into_iter().filter(|(is_set, ..)| *is_set);
+        let found = active.find(|(_, _, keys)| keys.iter().any(is_within));
         found.map(|(_, name, _)| name.to_owned())
     }
 }
@@ -163,35 +163,36 @@ impl Overrides {
         if let Some(root) = self.asset_root.as_deref().or((root != folder).then_some(root)) {
             assets.root = root.to_owned();
         }
-        let around = self.environment.as_ref().and_then(|around| around.file.clone());
-        assets.elsewhere.extend(around.map(PathBuf::from));
+        let environment = self.environment.as_ref();
+        let environment_file = environment.and_then(|environment| environment.file.clone());
+        assets.elsewhere.extend(environment_file.map(PathBuf::from));
         assets.strict = self.strict;
         assets
     }
 
-    /// Applies the frame to a validated scene, or returns its errors.
+    /// Applies the frame to a validated scene, or returns the errors of the validation.
     pub(super) fn finish(
         &self,
-        checked: Result<Scene, Problems>,
+        validated: Result<Scene, Problems>,
         invalid: impl Fn(Problems) -> SceneError,
-        place: impl Fn(&mut CameraPath),
+        set_location: impl Fn(&mut CameraPath),
     ) -> Result<Scene, SceneError> {
-        let mut scene = checked.map_err(|problems| {
-            let of_option = self
+        let mut scene = validated.map_err(|problems| {
+            let environment_problem = self
                 .environment
                 .as_ref()
-                .and_then(|_| problems.iter().find_map(of_option));
-            of_option.map_or_else(|| invalid(problems), SceneError::Override)
+                .and_then(|_| problems.iter().find_map(option_problem));
+            environment_problem.map_or_else(|| invalid(problems), SceneError::Override)
         })?;
         if let Some(path) = &mut scene.camera_path {
-            place(path);
+            set_location(path);
         }
         if let Some(frame) = self.frame {
             scene.camera = scene.camera_at(frame)?;
         }
         // A count that equals the default looks like an absent count to the validation.
-        let is_asked = self.light_samples.is_some() && scene.render.integrator.follows_paths();
-        if is_asked && !scene.notes.iter().any(|note| note.message == LIGHT_SAMPLES) {
+        let is_ignored = self.light_samples.is_some() && scene.render.integrator.follows_paths();
+        if is_ignored && !scene.notes.iter().any(|note| note.message == LIGHT_SAMPLES) {
             scene.notes.push(LIGHT_SAMPLES.into());
         }
         Ok(scene)
@@ -286,33 +287,33 @@ light_samples = { pattern = 'random', count = 5 }
 
     #[test]
     fn invalid_overrides_are_reported_by_name() {
-        let none = Overrides::default;
+        let default = Overrides::default;
         for (overrides, expected) in [
             (
                 Overrides {
                     size: Some((0, 1)),
-                    ..none()
+                    ..default()
                 },
                 "size: 0 must be from 1 to 65536",
             ),
             (
                 Overrides {
                     size: Some((1, 65_537)),
-                    ..none()
+                    ..default()
                 },
                 "size: 65537 must be from 1 to 65536",
             ),
             (
                 Overrides {
                     pixel_samples: Some(8),
-                    ..none()
+                    ..default()
                 },
                 "pixel_samples: 8 must be a square number, such as 4 or 9: the pattern \"grid\" is an n x n grid; other patterns take any number",
             ),
             (
                 Overrides {
                     light_samples: Some(0),
-                    ..none()
+                    ..default()
                 },
                 "light_samples: 0 must be from 1 to 65536",
             ),

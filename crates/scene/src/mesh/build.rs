@@ -1,4 +1,4 @@
-//! Mesh construction: 32-bit positions, removal of degenerate triangles, and normals.
+//! Mesh construction: 32-bit positions, removal of degenerate and duplicate triangles, and normals.
 
 use crate::note::Note;
 use glam::{DVec3, DVec4, Vec3, Vec4};
@@ -6,56 +6,58 @@ use rayon::prelude::*;
 use robust::{Coord, orient2d};
 
 use super::error::{Location, MeshFault};
-use super::neighbours::Neighbours;
+use super::neighbours::Adjacency;
 use super::raw_mesh::{RawMesh, counted};
-use super::{MAX_COLOR, MOST, Mesh, Normals, polygon};
+use super::{MAX_COLOR, MAX_ELEMENTS, Mesh, Normals, polygon};
 
-pub(super) fn build_mesh(mut draft: RawMesh, normals: Option<Normals>) -> Result<Mesh, MeshFault> {
-    polygon::triangulate(&mut draft);
+pub(super) fn build_mesh(mut raw: RawMesh, normals: Option<Normals>) -> Result<Mesh, MeshFault> {
+    polygon::triangulate(&mut raw);
     let mut mesh = Mesh {
-        normals: draft.normals,
-        uvs: draft.uvs,
-        more_uvs: draft.more_uvs,
-        colors: draft.colors,
-        tangents: draft.tangents,
-        triangles: draft.triangles,
-        groups: draft.groups,
-        notes: draft.notes,
+        normals: raw.normals,
+        uvs: raw.uvs,
+        more_uvs: raw.more_uvs,
+        colors: raw.colors,
+        tangents: raw.tangents,
+        triangles: raw.triangles,
+        groups: raw.groups,
+        notes: raw.notes,
         ..Mesh::default()
     };
     let count = mesh.triangles.len();
     if count == 0 {
-        let reason = draft.without_triangles.map(|reason| format!(": {reason}"));
+        let reason = raw.no_triangles_reason.map(|reason| format!(": {reason}"));
         return Err(MeshFault::empty(&reason.unwrap_or_default()));
     }
     if mesh.groups.len() > 1 {
-        let ends = draft.runs.iter().skip(1).map(|(start, _)| *start).chain([count]);
-        for ((_, group), end) in draft.runs.iter().zip(ends) {
+        let ends = raw.runs.iter().skip(1).map(|(start, _)| *start).chain([count]);
+        for ((_, group), end) in raw.runs.iter().zip(ends) {
             mesh.group_of.resize(end, *group);
         }
     }
     // NaN becomes 0.
-    let bounded = |x: f32, most: f32| if x > 0.0 { x.min(most) } else { 0.0 };
+    let bounded = |x: f32, max: f32| if x > 0.0 { x.min(max) } else { 0.0 };
     for color in &mut mesh.colors {
-        let most = Vec4::new(MAX_COLOR, MAX_COLOR, MAX_COLOR, 1.0);
-        *color = Vec4::from_array(std::array::from_fn(|i| bounded(color[i], most[i])));
+        let max = Vec4::new(MAX_COLOR, MAX_COLOR, MAX_COLOR, 1.0);
+        *color = Vec4::from_array(std::array::from_fn(|i| bounded(color[i], max[i])));
     }
     keep_triangles(&mut mesh, |triangle| {
         triangle
             .iter()
-            .all(|vertex| draft.positions[*vertex as usize].is_finite())
+            .all(|vertex| raw.positions[*vertex as usize].is_finite())
     });
     let count = mesh.triangles.len();
     if count == 0 {
         return Err(MeshFault::empty(""));
     }
-    round(&mut mesh, &draft.positions);
-    drop(draft.positions);
+    round(&mut mesh, &raw.positions);
+    drop(raw.positions);
     drop_degenerate(&mut mesh);
     drop_unused(&mut mesh);
     let dropped = count - mesh.triangles.len();
     if mesh.triangles.is_empty() {
-        return Err(MeshFault::empty(&format!(" but {dropped} without an area")));
+        return Err(MeshFault::empty(&format!(
+            " with an area; degenerate triangles: {dropped}"
+        )));
     }
     if dropped > 0 {
         mesh.notes.push(removed(
@@ -66,34 +68,33 @@ pub(super) fn build_mesh(mut draft: RawMesh, normals: Option<Normals>) -> Result
         ));
     }
 
-    // Together with the edges, this takes 0.05 s for a million triangles: a third of the time to load a binary PLY
-    // file.
-    let mut neighbours = Neighbours::of(&mesh.positions, &mesh.triangles);
-    let edges = neighbours.edges(&mesh.triangles, &mesh.group_of);
-    if !edges.repeated.is_empty() {
-        drop_repeated(&mut mesh, &edges.repeated);
-        neighbours = Neighbours::of(&mesh.positions, &mesh.triangles);
+    // The adjacency and the edges of a million triangles take 0.05 s: a third of the time to load a binary PLY file.
+    let mut adjacency = Adjacency::of(&mesh.positions, &mesh.triangles);
+    let edges = adjacency.edges(&mesh.triangles, &mesh.group_of);
+    if !edges.duplicates.is_empty() {
+        drop_duplicates(&mut mesh, &edges.duplicates);
+        adjacency = Adjacency::of(&mesh.positions, &mesh.triangles);
     }
-    if edges.crowded > 0 {
+    if edges.non_manifold > 0 {
         mesh.notes.push(counted(
-            edges.crowded,
+            edges.non_manifold,
             "edge is shared by more than two triangles (non-manifold mesh); rendered unchanged",
             "edges are shared by more than two triangles (non-manifold mesh); rendered unchanged",
         ));
     }
-    if edges.turned > 0 {
+    if edges.inconsistent > 0 {
         mesh.notes.push(counted(
-            edges.turned,
+            edges.inconsistent,
             "edge has inconsistent winding order (its triangles face opposite sides); rendered unchanged",
             "edges have inconsistent winding order (their triangles face opposite sides); rendered unchanged",
         ));
     }
     match normals {
-        Some(Normals::Smooth) => mesh.normals = smooth(&mesh, &neighbours),
+        Some(Normals::Smooth) => mesh.normals = smooth(&mesh, &adjacency),
         Some(Normals::Flat) => mesh.normals = Vec::new(),
         Some(Normals::File) if mesh.normals.is_empty() => {
             return Err(
-                Location::File.fault("has no normals; \"smooth\" and \"flat\" ones are made from the triangles")
+                Location::File.fault("has no normals; \"smooth\" and \"flat\" normals are computed from the triangles")
             );
         }
         Some(Normals::File) | None => {
@@ -101,8 +102,8 @@ pub(super) fn build_mesh(mut draft: RawMesh, normals: Option<Normals>) -> Result
             if missing > 0 {
                 mesh.notes.push(counted(
                     missing,
-                    "vertex has no normal, or one that is zero or not finite; it gets that of its triangles",
-                    "vertices have no normal, or one that is zero or not finite; they get those of their triangles",
+                    "vertex has no valid normal; the triangle normal is used instead",
+                    "vertices have no valid normals; the triangle normals are used instead",
                 ));
             }
         }
@@ -118,7 +119,7 @@ pub(super) fn build_mesh(mut draft: RawMesh, normals: Option<Normals>) -> Result
     Ok(mesh)
 }
 
-/// Converts positions to 32 bits, relative to their centre.
+/// Converts positions to 32 bits, relative to the center of the used positions.
 fn round(mesh: &mut Mesh, positions: &[DVec3]) {
     let used = used(&mesh.triangles, positions.len());
     mesh.center = center(positions.iter().zip(&used).filter(|(_, used)| **used).map(|(p, _)| *p));
@@ -142,13 +143,13 @@ fn drop_unused(mesh: &mut Mesh) {
         return;
     }
     let mut next = 0;
-    let mut numbers = vec![0; used.len()];
-    for (number, used) in numbers.iter_mut().zip(&used) {
-        *number = next;
+    let mut new_indices = vec![0; used.len()];
+    for (new_index, used) in new_indices.iter_mut().zip(&used) {
+        *new_index = next;
         next += u32::from(*used);
     }
     for vertex in mesh.triangles.iter_mut().flatten() {
-        *vertex = numbers[*vertex as usize];
+        *vertex = new_indices[*vertex as usize];
     }
     keep(&mut mesh.positions, &used);
     keep(&mut mesh.normals, &used);
@@ -165,13 +166,13 @@ fn keep<T>(list: &mut Vec<T>, marks: &[bool]) {
 }
 
 /// Appends a copy of an element to a list, which may be empty.
-fn repeat<T: Copy>(list: &mut Vec<T>, vertex: usize) {
+fn push_copy<T: Copy>(list: &mut Vec<T>, vertex: usize) {
     if let Some(value) = list.get(vertex).copied() {
         list.push(value);
     }
 }
 
-/// Returns the centre, rounded to a grid whose cell size is the extent, rounded up to a power of 2. Meshes around the
+/// Returns the center, rounded to a grid whose cell size is the extent, rounded up to a power of 2. Meshes around the
 /// origin thus keep their coordinates, and no coordinate needs more bits than before.
 fn center(positions: impl Iterator<Item = DVec3>) -> DVec3 {
     let (low, high) = positions.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| {
@@ -185,17 +186,17 @@ fn center(positions: impl Iterator<Item = DVec3>) -> DVec3 {
     DVec3::from_array(middle.to_array().map(|x| (x / cell).round_ties_even() * cell + 0.0))
 }
 
-/// Returns the triangle normal; its length is twice the area. It is zero only if the exact area is zero (Shewchuk,
-/// "Adaptive Precision Floating-Point Arithmetic and Fast Robust Geometric Predicates", 1997).
+/// Returns the triangle normal, with twice the area as length. The normal is zero only if the exact area is zero
+/// (Shewchuk, "Adaptive Precision Floating-Point Arithmetic and Fast Robust Geometric Predicates", 1997).
 fn area([a, b, c]: [Vec3; 3]) -> DVec3 {
-    let along = |x: usize, y: usize| {
+    let projected_area = |x: usize, y: usize| {
         let [a, b, c] = [a, b, c].map(|p| Coord {
             x: f64::from(p[x]),
             y: f64::from(p[y]),
         });
         orient2d(a, b, c)
     };
-    DVec3::new(along(1, 2), along(2, 0), along(0, 1))
+    DVec3::new(projected_area(1, 2), projected_area(2, 0), projected_area(0, 1))
 }
 
 fn drop_degenerate(mesh: &mut Mesh) {
@@ -205,8 +206,8 @@ fn drop_degenerate(mesh: &mut Mesh) {
     mesh.positions = positions;
 }
 
-fn keep_triangles(mesh: &mut Mesh, condition: impl Fn(&[u32; 3]) -> bool + Send + Sync) {
-    let marks: Vec<bool> = mesh.triangles.par_iter().map(condition).collect();
+fn keep_triangles(mesh: &mut Mesh, predicate: impl Fn(&[u32; 3]) -> bool + Send + Sync) {
+    let marks: Vec<bool> = mesh.triangles.par_iter().map(predicate).collect();
     if marks.contains(&false) {
         keep(&mut mesh.triangles, &marks);
         keep(&mut mesh.group_of, &marks);
@@ -214,39 +215,40 @@ fn keep_triangles(mesh: &mut Mesh, condition: impl Fn(&[u32; 3]) -> bool + Send 
 }
 
 /// Removes duplicate triangles, which have no visible effect and which a BVH cannot separate.
-fn drop_repeated(mesh: &mut Mesh, repeated: &[u32]) {
+fn drop_duplicates(mesh: &mut Mesh, duplicates: &[u32]) {
     let mut marks = vec![true; mesh.triangles.len()];
-    for triangle in repeated {
+    for triangle in duplicates {
         marks[*triangle as usize] = false;
     }
     keep(&mut mesh.triangles, &marks);
     keep(&mut mesh.group_of, &marks);
     drop_unused(mesh);
-    let (one, several) = ("is a duplicate", "are duplicates");
-    mesh.notes.push(removed(repeated.len(), marks.len(), one, several));
+    let (singular, plural) = ("is a duplicate", "are duplicates");
+    mesh.notes
+        .push(removed(duplicates.len(), marks.len(), singular, plural));
 }
 
-fn removed(count: usize, all: usize, one: &str, several: &str) -> Note {
-    let (why, were) = match count {
-        1 => (one, "was"),
-        _ => (several, "were"),
+fn removed(count: usize, total: usize, singular: &str, plural: &str) -> Note {
+    let (reason, were) = match count {
+        1 => (singular, "was"),
+        _ => (plural, "were"),
     };
-    let triangles = if all == 1 { "triangle" } else { "triangles" };
-    format!("{count} of {all} {triangles} {why} and {were} removed").into()
+    let triangles = if total == 1 { "triangle" } else { "triangles" };
+    format!("{count} of {total} {triangles} {reason} and {were} removed").into()
 }
 
 /// Returns angle-weighted vertex normals (Thürmer and Wüthrich, "Computing Vertex Normals from Polygonal Facets",
 /// Journal of Graphics Tools 3(1), 1998); zero if the triangle normals cancel.
-fn smooth(mesh: &Mesh, neighbours: &Neighbours) -> Vec<Vec3> {
+fn smooth(mesh: &Mesh, adjacency: &Adjacency) -> Vec<Vec3> {
     let normal = |point: usize| {
-        let sum: DVec4 = neighbours
-            .around(point)
+        let sum: DVec4 = adjacency
+            .triangles_at(point)
             .iter()
             .map(|triangle| {
                 let triangle = mesh.triangles[*triangle as usize];
                 let corners = triangle.map(|vertex| mesh.positions[vertex as usize]);
                 let k = (0..3)
-                    .find(|k| neighbours.points[triangle[*k] as usize] as usize == point)
+                    .find(|k| adjacency.points[triangle[*k] as usize] as usize == point)
                     .unwrap_or_default();
                 let [p, next, previous] = [0, 1, 2].map(|i| corners[(k + i) % 3].as_dvec3());
                 let (to_next, to_previous) = (next - p, previous - p);
@@ -259,37 +261,37 @@ fn smooth(mesh: &Mesh, neighbours: &Neighbours) -> Vec<Vec3> {
             false => Vec3::ZERO,
         }
     };
-    let normals: Vec<Vec3> = (0..neighbours.count()).into_par_iter().map(normal).collect();
-    neighbours.points.iter().map(|point| normals[*point as usize]).collect()
+    let normals: Vec<Vec3> = (0..adjacency.point_count()).into_par_iter().map(normal).collect();
+    adjacency.points.iter().map(|point| normals[*point as usize]).collect()
 }
 
-/// Sets missing normals to triangle normals; splits vertices whose triangles have different normals.
+/// Replaces missing normals by triangle normals; splits vertices whose triangles have different normals.
 fn fill_normals(mesh: &mut Mesh) -> Result<(), MeshFault> {
-    let missing: Vec<bool> = mesh.normals.iter().map(|normal| *normal == Vec3::ZERO).collect();
-    if !missing.contains(&true) {
+    let is_missing: Vec<bool> = mesh.normals.iter().map(|normal| *normal == Vec3::ZERO).collect();
+    if !is_missing.contains(&true) {
         return Ok(());
     }
     for triangle in &mut mesh.triangles {
         let corners = triangle.map(|vertex| mesh.positions[vertex as usize]);
         for (vertex, position) in triangle.iter_mut().zip(corners) {
             let i = *vertex as usize;
-            if !missing[i] {
+            if !is_missing[i] {
                 continue;
             }
             let normal = area(corners).normalize().as_vec3();
             if mesh.normals[i] == Vec3::ZERO {
                 mesh.normals[i] = normal;
             } else if mesh.normals[i] != normal {
-                if mesh.positions.len() >= MOST {
-                    return Err(Location::File.fault(format!("there must be at most {MOST} vertices")));
+                if mesh.positions.len() >= MAX_ELEMENTS {
+                    return Err(Location::File.fault(format!("there must be at most {MAX_ELEMENTS} vertices")));
                 }
                 *vertex = mesh.positions.len() as u32;
                 mesh.positions.push(position);
                 mesh.normals.push(normal);
-                repeat(&mut mesh.uvs, i);
-                mesh.more_uvs.iter_mut().for_each(|uvs| repeat(uvs, i));
-                repeat(&mut mesh.colors, i);
-                repeat(&mut mesh.tangents, i);
+                push_copy(&mut mesh.uvs, i);
+                mesh.more_uvs.iter_mut().for_each(|uvs| push_copy(uvs, i));
+                push_copy(&mut mesh.colors, i);
+                push_copy(&mut mesh.tangents, i);
             }
         }
     }

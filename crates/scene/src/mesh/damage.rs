@@ -1,4 +1,4 @@
-//! Damage to mesh files for which a stand-in exists. The damage is reported, and the rest of the file is used.
+//! Damage to mesh files that has a stand-in: the damage is reported, and the rest of the file is used.
 
 use super::error::{Location, MeshFault};
 use crate::note::Note;
@@ -9,8 +9,8 @@ pub(super) const UV: &str = "the texture coordinates (0, 0) are used instead";
 pub(super) const NORMAL: &str = "the normal of the triangles is used instead";
 pub(super) const COLOR: &str = "white is used instead";
 pub(super) const LINE: &str = "the line was ignored";
-pub(super) const END: &str = "the facets up to there are used";
-pub(super) const REST: &str = "the other values were ignored";
+pub(super) const TRUNCATED: &str = "the facets before the end are used";
+pub(super) const EXTRA_VALUES: &str = "the extra values were ignored";
 
 #[derive(Default)]
 pub(super) struct Damages(Vec<Damage>);
@@ -22,7 +22,7 @@ struct Damage {
 }
 
 impl Damages {
-    /// The message is only created for the first fault of each kind.
+    /// Records a fault. `fault` is only called for the first fault of each kind.
     #[cold]
     pub fn add(&mut self, stand_in: &'static str, fault: impl FnOnce() -> MeshFault) {
         match self.0.iter_mut().find(|damage| damage.stand_in == stand_in) {
@@ -48,7 +48,7 @@ impl Damages {
 
 impl Damage {
     fn note(&self) -> Note {
-        let (line, place) = match self.first.place {
+        let (line, location) = match self.first.location {
             Location::File => (None, String::new()),
             Location::Line(line) => (Some(line), String::new()),
             Location::Byte(offset) => (None, format!("byte {offset}: ")),
@@ -59,7 +59,7 @@ impl Damage {
         };
         Note {
             line,
-            ..Note::from(format!("{place}{}; {}{more}", self.first.message, self.stand_in))
+            ..Note::from(format!("{location}{}; {}{more}", self.first.message, self.stand_in))
         }
     }
 }

@@ -3,8 +3,8 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// An error of a mesh file. Messages begin with its location: `bunny.obj:17: vertex 9 of the face does not exist;
-/// there are 8 so far`.
+/// An error of a mesh file. Messages begin with the location: `bunny.obj:17: vertex 9 of the face does not exist;
+/// defined so far: 8`.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum MeshError {
@@ -66,12 +66,12 @@ impl MeshError {
         }
     }
 
-    pub(crate) fn at(mut self, other: &Path) -> MeshError {
+    pub(crate) fn at(mut self, file: &Path) -> MeshError {
         match &mut self {
             MeshError::Read { path, .. }
             | MeshError::Line { path, .. }
             | MeshError::Byte { path, .. }
-            | MeshError::File { path, .. } => *path = other.to_owned(),
+            | MeshError::File { path, .. } => *path = file.to_owned(),
         }
         self
     }
@@ -80,9 +80,9 @@ impl MeshError {
 /// An error that does not contain the path of its file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct MeshFault {
-    pub place: Location,
+    pub location: Location,
     pub message: String,
-    /// No triangles to render.
+    /// True if the file has no triangles to render.
     pub is_empty: bool,
 }
 
@@ -98,7 +98,7 @@ pub(crate) enum Location {
 impl Location {
     pub fn fault(self, message: impl Into<String>) -> MeshFault {
         MeshFault {
-            place: self,
+            location: self,
             message: message.into(),
             is_empty: false,
         }
@@ -106,7 +106,7 @@ impl Location {
 }
 
 impl MeshFault {
-    /// Returns the error for a file without triangles; `reason` is appended.
+    /// Returns the error for a file without triangles; `reason` continues the message.
     pub fn empty(reason: &str) -> MeshFault {
         MeshFault {
             is_empty: true,
@@ -116,7 +116,7 @@ impl MeshFault {
 
     pub fn of(self, path: &Path) -> MeshError {
         let (path, message) = (path.to_owned(), self.message);
-        match self.place {
+        match self.location {
             Location::File => MeshError::File { path, message },
             Location::Line(line) => MeshError::Line { path, line, message },
             Location::Byte(offset) => MeshError::Byte { path, offset, message },
@@ -125,12 +125,12 @@ impl MeshFault {
 }
 
 /// Quotes a word for a message, with the middle elided if it is long.
-pub(super) fn shown(word: &[u8]) -> String {
-    const LONGEST: usize = 60;
-    if word.len() <= LONGEST {
+pub(super) fn quoted(word: &[u8]) -> String {
+    const MAX_LEN: usize = 60;
+    if word.len() <= MAX_LEN {
         return format!("{:?}", String::from_utf8_lossy(word));
     }
-    let (start, end) = (&word[..LONGEST * 2 / 3], &word[word.len() - LONGEST / 3..]);
+    let (start, end) = (&word[..MAX_LEN * 2 / 3], &word[word.len() - MAX_LEN / 3..]);
     format!(
         "{:?}",
         format!("{}...{}", String::from_utf8_lossy(start), String::from_utf8_lossy(end))
@@ -138,7 +138,7 @@ pub(super) fn shown(word: &[u8]) -> String {
 }
 
 /// Formats a number; very large and very small numbers in scientific notation.
-pub(super) fn shown_number(x: f64) -> String {
+pub(super) fn format_number(x: f64) -> String {
     match x == 0.0 || (1e-5..1e15).contains(&x.abs()) {
         true => format!("{x}"),
         false => format!("{x:e}"),

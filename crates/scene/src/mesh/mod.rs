@@ -37,9 +37,9 @@ use crate::note::Note;
 const MAX_FILE_BYTES: u64 = 8 << 30;
 /// Maximum size of an MTL file in bytes.
 const MAX_LIBRARY_BYTES: u64 = 16 << 20;
-/// Maximum number of triangles and of vertices; three times this number fits into 32-bit indices.
-const MOST: usize = 1 << 30;
-/// Maximum colour component of a vertex.
+/// Maximum number of triangles, and of vertices. Three times this number fits into 32-bit indices.
+const MAX_ELEMENTS: usize = 1 << 30;
+/// Maximum color component of a vertex.
 const MAX_COLOR: f32 = 1e6;
 /// Maximum magnitude of a coordinate.
 pub(crate) const MAX_COORDINATE: f64 = 1e9;
@@ -65,8 +65,8 @@ pub struct Mesh {
     pub more_uvs: Vec<Vec<Vec2>>,
     /// Linear RGB (0 to 1e6) and opacity (0 to 1), or empty.
     pub colors: Vec<Vec4>,
-    /// Unit tangents in the direction of u, or empty. `w` is 1 or -1: v increases along w (normal × tangent). Tangents
-    /// that are zero are derived from the texture coordinates.
+    /// Unit tangents in the direction of u, or empty. `w` is 1 or -1: v increases along w (normal × tangent). A tangent
+    /// of zero is replaced by a tangent from the texture coordinates.
     pub tangents: Vec<Vec4>,
     /// Vertices of the triangles, counter-clockwise as seen from outside.
     pub triangles: Vec<[u32; 3]>,
@@ -74,7 +74,7 @@ pub struct Mesh {
     pub groups: Vec<Group>,
     /// Group of each triangle; empty for a single group.
     pub group_of: Vec<u32>,
-    /// MTL files. Groups use their materials unless the scene overrides them.
+    /// MTL files. Groups use the materials of these files unless the scene overrides the materials.
     pub libraries: Vec<Library>,
     /// Warnings, with the action taken: `1 of 12 triangles is a duplicate and was removed`.
     pub notes: Vec<Note>,
@@ -184,22 +184,22 @@ pub enum Normals {
 impl Mesh {
     /// Reads a mesh from a `.obj`, `.ply` or `.stl` file.
     ///
-    /// By default, normals are the file's vertex normals (OBJ, PLY), otherwise flat.
+    /// By default, normals are the vertex normals of OBJ and PLY files; without vertex normals, shading is flat.
     ///
     /// - Polygons are triangulated. Degenerate triangles are removed.
     /// - OBJ files have a vertex for each combination of position, texture coordinates and normal, and a group for
     ///   each combination of the last `g` or `o` with `usemtl`. Files of `mtllib` are read if they are in the folder
-    ///   of the mesh or below. Vertex colours are sRGB. Smoothing groups (`s`), fourth coordinates, lines and curves
+    ///   of the mesh or below. Vertex colors are sRGB. Smoothing groups (`s`), fourth coordinates, lines and curves
     ///   are ignored.
-    /// - PLY files keep their vertices. Integer vertex colours are sRGB, floats linear.
+    /// - PLY files keep their vertices. Vertex colors are sRGB if they are integers, and linear if they are floats.
     /// - STL files have a vertex for each position, and a group for each `solid`. Facet normals are only used for
-    ///   [`Normals::File`], and each triangle then has separate vertices.
+    ///   [`Normals::File`]; facets with different normals then have separate vertices.
     ///
     /// Damaged parts are skipped. [`Mesh::notes`] has warnings about them and about other defects.
     pub fn load(path: &Path, normals: Option<Normals>) -> Result<Mesh, MeshError> {
         let _span = tracing::debug_span!("mesh", path = %path.display()).entered();
-        let ending = path.extension().unwrap_or_default().to_ascii_lowercase();
-        let format = match ending.to_str() {
+        let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
+        let format = match extension.to_str() {
             Some("obj") => Format::Obj,
             Some("ply") => Format::Ply,
             Some("stl") => Format::Stl,
@@ -249,7 +249,7 @@ impl Mesh {
             ..Library::default()
         };
         // Each file is read once, and the number of files is limited.
-        let is_known = self.libraries.iter().any(|known| known.file == library.file);
+        let is_known = self.libraries.iter().any(|existing| existing.file == library.file);
         if is_known || self.libraries.len() >= obj::MAX_LIBRARIES {
             return;
         }
@@ -262,15 +262,15 @@ impl Mesh {
             }) => {
                 library.materials = materials;
                 if let Some(problem) = problems.first() {
-                    let others = match problem_count - 1 {
+                    let more = match problem_count - 1 {
                         0 => String::new(),
                         1 => "; 1 more line cannot be read".to_owned(),
                         count => format!("; {count} more lines cannot be read"),
                     };
-                    self.notes.push(format!("{name}:{problem}{others}").into());
+                    self.notes.push(format!("{name}:{problem}{more}").into());
                 }
             }
-            Err(why) => library.problem = Some(why),
+            Err(reason) => library.problem = Some(reason),
         }
         self.libraries.push(library);
     }
@@ -282,7 +282,7 @@ impl Mesh {
         self.cache.get_or_init(self, || compute(self))
     }
 
-    /// Returns the first rule that the mesh violates. Meshes from files do not violate rules.
+    /// Returns the first rule that the mesh violates. Only meshes that are created in code can violate rules.
     pub(crate) fn broken_rule(self: &Arc<Self>) -> Option<String> {
         struct BrokenRule(Option<String>);
         self.cached(|mesh| BrokenRule(check::check(mesh).err())).0.clone()
@@ -314,7 +314,7 @@ enum Format {
     Stl,
 }
 
-/// Returns the mesh, its MTL files and the damage.
+/// Returns the mesh, the names of its MTL files and the damage.
 fn read(
     bytes: &[u8],
     format: Format,
@@ -323,21 +323,21 @@ fn read(
     if bytes.is_empty() {
         return Err(Location::File.fault("the file is empty"));
     }
-    let are_wanted = matches!(normals, None | Some(Normals::File));
-    let (mut draft, libraries) = match format {
+    let uses_normals = matches!(normals, None | Some(Normals::File));
+    let (mut raw, libraries) = match format {
         Format::Obj => {
-            let obj = obj::read(&tokens::utf8(bytes), are_wanted)?;
-            (obj.draft, obj.libraries)
+            let obj = obj::read(&tokens::utf8(bytes), uses_normals)?;
+            (obj.raw, obj.libraries)
         }
-        Format::Ply => (ply::read(bytes, are_wanted)?, Vec::new()),
+        Format::Ply => (ply::read(bytes, uses_normals)?, Vec::new()),
         Format::Stl => (stl::read(bytes, normals == Some(Normals::File))?, Vec::new()),
     };
-    if let (true, Some(fault)) = (draft.triangles.is_empty(), draft.damages.first()) {
+    if let (true, Some(fault)) = (raw.triangles.is_empty(), raw.damages.first()) {
         return Err(fault.clone());
     }
-    let (damage, notes) = std::mem::take(&mut draft.damages).into_parts();
-    draft.notes.splice(0..0, notes);
-    let mesh = build::build_mesh(draft, normals).map_err(|fault| match damage.first() {
+    let (damage, notes) = std::mem::take(&mut raw.damages).into_parts();
+    raw.notes.splice(0..0, notes);
+    let mesh = build::build_mesh(raw, normals).map_err(|fault| match damage.first() {
         Some(first) if fault.is_empty => first.clone(),
         _ => fault,
     })?;
@@ -345,18 +345,18 @@ fn read(
 }
 
 /// Reads a file; `None` if it is too large.
-fn read_file(path: &Path, largest: u64) -> io::Result<Option<Vec<u8>>> {
+fn read_file(path: &Path, max_bytes: u64) -> io::Result<Option<Vec<u8>>> {
     // Checked before opening, because opening a pipe blocks until it has a writer.
-    let data = fs::metadata(path)?;
-    if !data.is_file() {
+    let metadata = fs::metadata(path)?;
+    if !metadata.is_file() {
         return Err(io::Error::other("it must be a file"));
     }
-    if data.len() > largest {
+    if metadata.len() > max_bytes {
         return Ok(None);
     }
-    let mut bytes = Vec::with_capacity(data.len() as usize);
-    fs::File::open(path)?.take(largest + 1).read_to_end(&mut bytes)?;
-    Ok(Some(bytes).filter(|bytes| bytes.len() as u64 <= largest))
+    let mut bytes = Vec::with_capacity(metadata.len() as usize);
+    fs::File::open(path)?.take(max_bytes + 1).read_to_end(&mut bytes)?;
+    Ok(Some(bytes).filter(|bytes| bytes.len() as u64 <= max_bytes))
 }
 
 /// Reads an MTL file in the folder of the mesh.
@@ -373,20 +373,20 @@ fn read_library(folder: &Path, file: &Path) -> Result<Vec<u8>, String> {
 }
 
 /// Resolves a file name in a folder. If the file does not exist (for example, because the path is from another
-/// machine), tries the last path component, then a case-insensitive match.
+/// machine), tries the last path component, and then a case-insensitive match.
 pub(crate) fn file_beside(folder: &Path, name: &str) -> PathBuf {
     let slashes = name.replace('\\', "/"); // Windows paths
     let last = slashes.rsplit('/').next().unwrap_or(&slashes);
-    let tried = [name, &slashes, last].map(|name| folder.join(name));
-    let [_, plain, _] = &tried;
-    let found = tried.iter().find(|path| path.is_file()).cloned();
+    let candidates = [name, &slashes, last].map(|name| folder.join(name));
+    let [_, with_slashes, _] = &candidates;
+    let found = candidates.iter().find(|path| path.is_file()).cloned();
     let found = found.or_else(|| in_other_case(folder, &slashes));
     found
         .or_else(|| in_other_case(folder, last))
-        .unwrap_or_else(|| plain.clone())
+        .unwrap_or_else(|| with_slashes.clone())
 }
 
-/// Returns an existing file whose name matches, ignoring case.
+/// Returns an existing file whose path matches, ignoring case.
 pub(crate) fn in_other_case(folder: &Path, path: &str) -> Option<PathBuf> {
     let (parents, name) = path.rsplit_once('/').unwrap_or(("", path));
     let mut folder = folder.to_owned();
@@ -400,7 +400,7 @@ pub(crate) fn in_other_case(folder: &Path, path: &str) -> Option<PathBuf> {
     entry_in_other_case(&folder, name, Path::is_file)
 }
 
-fn entry_in_other_case(folder: &Path, name: &str, is_wanted: fn(&Path) -> bool) -> Option<PathBuf> {
+fn entry_in_other_case(folder: &Path, name: &str, accepts: fn(&Path) -> bool) -> Option<PathBuf> {
     let folder = if folder.as_os_str().is_empty() {
         Path::new(".")
     } else {
@@ -408,8 +408,9 @@ fn entry_in_other_case(folder: &Path, name: &str, is_wanted: fn(&Path) -> bool) 
     };
     let name = name.to_lowercase();
     let entries = fs::read_dir(folder).ok()?.filter_map(Result::ok);
-    let same = entries.filter(|entry| entry.file_name().to_string_lossy().to_lowercase() == name);
-    same.map(|entry| folder.join(entry.file_name()))
-        .filter(|path| is_wanted(path))
+    let matches = entries.filter(|entry| entry.file_name().to_string_lossy().to_lowercase() == name);
+    matches
+        .map(|entry| folder.join(entry.file_name()))
+        .filter(|path| accepts(path))
         .min()
 }

@@ -2,7 +2,7 @@
 //! Invalid lines are reported and ignored. Keywords are case-insensitive, as exporters differ.
 
 use super::MtlMaterial;
-use super::error::{MeshFault, shown};
+use super::error::{MeshFault, quoted};
 use super::tokens::{Tokens, number};
 
 /// Maximum number of materials of a file. A material takes hundreds of bytes in memory, but may take only nine bytes in
@@ -22,12 +22,12 @@ pub(super) struct Mtl {
     pub problem_count: usize,
 }
 
-/// Parses a file. Problems begin with the line number; the error concerns the whole file.
+/// Parses a file. Problems begin with the line number; the error applies to the file as a whole.
 pub(super) fn read(bytes: &[u8]) -> Result<Mtl, String> {
     let mut words = Tokens::new(bytes);
     let mut materials: Vec<MtlMaterial> = Vec::new();
     let (mut problems, mut problem_count) = (Vec::new(), 0);
-    while let Some(keyword) = words.anywhere() {
+    while let Some(keyword) = words.next_word() {
         let line = words.line();
         if keyword.eq_ignore_ascii_case(b"newmtl") {
             if materials.len() >= MAX_MATERIALS {
@@ -98,10 +98,10 @@ fn set(material: &mut MtlMaterial, keyword: &[u8], words: &mut Tokens) -> Result
             false => Err(format!("{line}: {keyword}: {x} must be finite")),
         }
     };
-    // A single number is a grey value.
+    // A single number is a gray value.
     let color = |words: &mut Tokens| -> Result<[f64; 3], String> {
         let red = finite(words)?;
-        match words.on_line() {
+        match words.next_on_line() {
             None => Ok([red; 3]),
             Some(word) => match number(word).filter(|green| green.is_finite()) {
                 Some(green) => Ok([red, green, finite(words)?]),
@@ -147,7 +147,7 @@ fn map(material: &mut MtlMaterial, words: &mut Tokens, keyword: &str) -> Option<
     for option in options {
         ignore(
             material,
-            format!("option {} of {keyword}", shown(option.as_bytes())),
+            format!("option {} of {keyword}", quoted(option.as_bytes())),
             line,
         );
     }
@@ -155,10 +155,10 @@ fn map(material: &mut MtlMaterial, words: &mut Tokens, keyword: &str) -> Option<
 }
 
 /// Records a statement without effect, up to a limit.
-fn ignore(material: &mut MtlMaterial, what: String, line: usize) {
-    if material.others.len() < MAX_IGNORED && !material.others.contains(&what) {
-        material.lines.insert(what.clone(), line);
-        material.others.push(what);
+fn ignore(material: &mut MtlMaterial, statement: String, line: usize) {
+    if material.others.len() < MAX_IGNORED && !material.others.contains(&statement) {
+        material.lines.insert(statement.clone(), line);
+        material.others.push(statement);
     }
 }
 
@@ -190,7 +190,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn materials_have_their_values() {
+    fn all_values_of_materials_are_read() {
         let text = "# two\nKd 9 9 9\nnewmtl dark red\nKd 0.5 0.1 0.2\nKs 0.25\nNs 10\nKe 1 2 3\nd 0.5\nNi 1.5\nillum 2\n\
                     map_Kd -s 2 2 -clamp on my wood.png\nmap_Bump b.png\nMAP_BUMP b.png\nmap_Ka a.png\n\nNewMtl glass\r\ntr 0.75\r\n\
                     map_kd \"a.png\"\r\n";
@@ -242,7 +242,7 @@ mod tests {
     }
 
     #[test]
-    fn lines_that_cannot_be_read_are_reported() {
+    fn invalid_lines_are_reported() {
         let Mtl {
             materials, problems, ..
         } = read(b"newmtl a\nKd spectral a.rfl\nNs inf\nKd 1 b\nd 0.5").unwrap();
@@ -259,17 +259,17 @@ mod tests {
 
     #[test]
     fn files_of_lines_alone_take_little() {
-        let bad = format!("newmtl a\n{}", "Kd x\n".repeat(100_000));
+        let invalid = format!("newmtl a\n{}", "Kd x\n".repeat(100_000));
         let Mtl {
             problems,
             problem_count,
             ..
-        } = read(bad.as_bytes()).unwrap();
+        } = read(invalid.as_bytes()).unwrap();
         assert_eq!((problems.len(), problem_count), (MAX_PROBLEMS, 100_000));
-        let many = |count: usize| read("newmtl a\n".repeat(count).as_bytes());
-        assert_eq!(many(MAX_MATERIALS).unwrap().materials.len(), MAX_MATERIALS);
+        let read_materials = |count: usize| read("newmtl a\n".repeat(count).as_bytes());
+        assert_eq!(read_materials(MAX_MATERIALS).unwrap().materials.len(), MAX_MATERIALS);
         assert_eq!(
-            many(MAX_MATERIALS + 1).unwrap_err(),
+            read_materials(MAX_MATERIALS + 1).unwrap_err(),
             "it must have at most 65536 materials"
         );
     }

@@ -7,17 +7,18 @@ use glam::Vec3;
 use hashbrown::{DefaultHashBuilder, HashTable};
 use rayon::prelude::*;
 
-pub(super) struct Neighbours {
+pub(super) struct Adjacency {
     /// Point of each vertex.
     pub points: Vec<u32>,
-    /// Ranges of the points in `around`.
+    /// For each point, the start of its triangles in `triangles`.
     starts: Vec<u32>,
-    around: Vec<u32>,
+    /// The triangles of each point, in ascending order.
+    triangles: Vec<u32>,
 }
 
-impl Neighbours {
+impl Adjacency {
     /// Groups vertices into points. Positions must not contain -0.
-    pub fn of(positions: &[Vec3], triangles: &[[u32; 3]]) -> Neighbours {
+    pub fn of(positions: &[Vec3], triangles: &[[u32; 3]]) -> Adjacency {
         let (points, count) = points(positions);
         // Stable counting sort of corners by point.
         let mut starts = vec![0u32; count + 1];
@@ -29,115 +30,122 @@ impl Neighbours {
             sum += *start;
             *start = sum;
         }
-        let mut around = vec![0; sum as usize];
+        let mut sorted = vec![0; sum as usize];
         for (i, triangle) in triangles.iter().enumerate().rev() {
             for vertex in triangle {
                 let start = &mut starts[points[*vertex as usize] as usize];
                 *start -= 1;
-                around[*start as usize] = i as u32;
+                sorted[*start as usize] = i as u32;
             }
         }
-        Neighbours { points, starts, around }
+        Adjacency {
+            points,
+            starts,
+            triangles: sorted,
+        }
     }
 
-    pub fn count(&self) -> usize {
+    pub fn point_count(&self) -> usize {
         self.starts.len() - 1
     }
 
     /// Returns the triangles at a point, in ascending order.
-    pub fn around(&self, point: usize) -> &[u32] {
-        &self.around[self.starts[point] as usize..self.starts[point + 1] as usize]
+    pub fn triangles_at(&self, point: usize) -> &[u32] {
+        &self.triangles[self.starts[point] as usize..self.starts[point + 1] as usize]
     }
 
     /// Finds non-manifold edges, inconsistent winding and duplicate triangles. If `group_of` is empty, all triangles
     /// are in one group.
     pub fn edges(&self, triangles: &[[u32; 3]], group_of: &[u32]) -> Edges {
-        (0..self.count())
+        (0..self.point_count())
             .into_par_iter()
             .with_min_len(1024)
             .fold(
                 || (Edges::default(), Vec::new()),
-                |(mut edges, mut others), point| {
-                    let (mut crowded, mut turned) = self.odd(triangles, point, &[], &mut others);
+                |(mut edges, mut other_ends), point| {
+                    let (mut non_manifold, mut inconsistent) =
+                        self.irregular_edges(triangles, point, &[], &mut other_ends);
                     // Edges are counted without duplicate triangles, which would make edges irregular.
-                    if crowded + turned > 0 {
-                        let repeated = self.repeated(triangles, group_of, point);
-                        if !repeated.is_empty() {
-                            (crowded, turned) = self.odd(triangles, point, &repeated, &mut others);
-                            let lowest = |triangle: &u32| self.points_of(triangles, *triangle).iter().min().copied();
+                    if non_manifold + inconsistent > 0 {
+                        let duplicates = self.duplicates(triangles, group_of, point);
+                        if !duplicates.is_empty() {
+                            (non_manifold, inconsistent) =
+                                self.irregular_edges(triangles, point, &duplicates, &mut other_ends);
+                            let lowest_point =
+                                |triangle: &u32| self.points_of(triangles, *triangle).iter().min().copied();
                             edges
-                                .repeated
-                                .extend(repeated.iter().filter(|t| lowest(t) == Some(point as u32)));
+                                .duplicates
+                                .extend(duplicates.iter().filter(|t| lowest_point(t) == Some(point as u32)));
                         }
                     }
-                    edges.crowded += crowded;
-                    edges.turned += turned;
-                    (edges, others)
+                    edges.non_manifold += non_manifold;
+                    edges.inconsistent += inconsistent;
+                    (edges, other_ends)
                 },
             )
             .map(|(edges, _)| edges)
             .reduce(Edges::default, |mut a, b| {
-                a.crowded += b.crowded;
-                a.turned += b.turned;
-                a.repeated.extend(b.repeated);
+                a.non_manifold += b.non_manifold;
+                a.inconsistent += b.inconsistent;
+                a.duplicates.extend(b.duplicates);
                 a
             })
     }
 
-    /// Counts crowded and turned edges whose point with the lower index is `point`. Ignores the triangles of a sorted
-    /// list.
+    /// Counts the non-manifold edges and the edges with inconsistent winding whose point with the lower index is
+    /// `point`. Skips the triangles in `skipped`, which is sorted. `other_ends` is scratch memory.
     #[inline]
-    fn odd(
+    fn irregular_edges(
         &self,
         triangles: &[[u32; 3]],
         point: usize,
-        without: &[u32],
-        others: &mut Vec<(u32, bool)>,
+        skipped: &[u32],
+        other_ends: &mut Vec<(u32, bool)>,
     ) -> (usize, usize) {
-        others.clear();
-        for triangle in self.around(point) {
-            if !without.is_empty() && without.binary_search(triangle).is_ok() {
+        other_ends.clear();
+        for triangle in self.triangles_at(point) {
+            if !skipped.is_empty() && skipped.binary_search(triangle).is_ok() {
                 continue;
             }
             let corners = self.points_of(triangles, *triangle);
             for k in 0..3 {
-                let (from, to) = (corners[k], corners[(k + 1) % 3]);
-                if from as usize == point && to as usize > point {
-                    others.push((to, true));
-                } else if to as usize == point && from as usize > point {
-                    others.push((from, false));
+                let (start, end) = (corners[k], corners[(k + 1) % 3]);
+                if start as usize == point && end as usize > point {
+                    other_ends.push((end, true));
+                } else if end as usize == point && start as usize > point {
+                    other_ends.push((start, false));
                 }
             }
         }
-        others.sort_unstable();
-        let edges = others.chunk_by(|a, b| a.0 == b.0);
-        edges.fold((0, 0), |(crowded, turned), edge| match edge {
-            [a, b] if a.1 == b.1 => (crowded, turned + 1),
-            [_, _, _, ..] => (crowded + 1, turned),
-            _ => (crowded, turned),
+        other_ends.sort_unstable();
+        let edges = other_ends.chunk_by(|a, b| a.0 == b.0);
+        edges.fold((0, 0), |(non_manifold, inconsistent), edge| match edge {
+            [a, b] if a.1 == b.1 => (non_manifold, inconsistent + 1),
+            [_, _, _, ..] => (non_manifold + 1, inconsistent),
+            _ => (non_manifold, inconsistent),
         })
     }
 
     /// Returns the triangles at a point that have the same points, winding and group as an earlier triangle.
-    fn repeated(&self, triangles: &[[u32; 3]], group_of: &[u32], point: usize) -> Vec<u32> {
-        let mut all: Vec<_> = (self.around(point).iter())
+    fn duplicates(&self, triangles: &[[u32; 3]], group_of: &[u32], point: usize) -> Vec<u32> {
+        let mut keyed: Vec<_> = (self.triangles_at(point).iter())
             .map(|triangle| {
                 let [a, b, c] = self.points_of(triangles, *triangle);
-                let others = match point as u32 {
+                let other_points = match point as u32 {
                     p if p == a => [b, c],
                     p if p == b => [c, a],
                     _ => [a, b],
                 };
                 let group = group_of.get(*triangle as usize).copied().unwrap_or(0);
-                (others, group, *triangle)
+                (other_points, group, *triangle)
             })
             .collect();
-        all.sort_unstable();
-        let pairs = all.windows(2);
+        keyed.sort_unstable();
+        let pairs = keyed.windows(2);
         let pairs = pairs.filter(|pair| (pair[0].0, pair[0].1) == (pair[1].0, pair[1].1));
-        let mut repeated: Vec<u32> = pairs.map(|pair| pair[1].2).collect();
-        repeated.sort_unstable();
-        repeated
+        let mut duplicates: Vec<u32> = pairs.map(|pair| pair[1].2).collect();
+        duplicates.sort_unstable();
+        duplicates
     }
 
     fn points_of(&self, triangles: &[[u32; 3]], triangle: u32) -> [u32; 3] {
@@ -148,12 +156,13 @@ impl Neighbours {
 /// Irregular edges and duplicate triangles.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct Edges {
-    /// Edges of more than two triangles.
-    pub crowded: usize,
-    /// Edges that have the same direction in both triangles.
-    pub turned: usize,
-    /// Triangles with the same points, winding and group as an earlier triangle. Unsorted; ignored when counting edges.
-    pub repeated: Vec<u32>,
+    /// Number of edges with more than two triangles.
+    pub non_manifold: usize,
+    /// Number of edges that have the same direction in both triangles.
+    pub inconsistent: usize,
+    /// Triangles with the same points, winding and group as an earlier triangle, unsorted. They do not count as
+    /// triangles of edges.
+    pub duplicates: Vec<u32>,
 }
 
 /// Returns the point of each vertex, and the number of points.
@@ -199,35 +208,35 @@ mod tests {
     #[test]
     fn equal_positions_are_one_point() {
         let triangles = [[0, 1, 2], [4, 2, 3]];
-        let neighbours = Neighbours::of(&square(), &triangles);
-        assert_eq!(neighbours.points, [0, 1, 2, 3, 0]);
-        assert_eq!(neighbours.around(0), [0, 1]);
-        assert_eq!(neighbours.around(1), [0]);
-        assert_eq!(neighbours.around(3), [1]);
-        assert_eq!(neighbours.edges(&triangles, &[]), Edges::default());
+        let adjacency = Adjacency::of(&square(), &triangles);
+        assert_eq!(adjacency.points, [0, 1, 2, 3, 0]);
+        assert_eq!(adjacency.triangles_at(0), [0, 1]);
+        assert_eq!(adjacency.triangles_at(1), [0]);
+        assert_eq!(adjacency.triangles_at(3), [1]);
+        assert_eq!(adjacency.edges(&triangles, &[]), Edges::default());
     }
 
-    fn odd(triangles: &[[u32; 3]], groups: &[u32]) -> (usize, usize, Vec<u32>) {
-        let mut edges = Neighbours::of(&square(), triangles).edges(triangles, groups);
-        edges.repeated.sort_unstable();
-        (edges.crowded, edges.turned, edges.repeated)
+    fn irregularities(triangles: &[[u32; 3]], groups: &[u32]) -> (usize, usize, Vec<u32>) {
+        let mut edges = Adjacency::of(&square(), triangles).edges(triangles, groups);
+        edges.duplicates.sort_unstable();
+        (edges.non_manifold, edges.inconsistent, edges.duplicates)
     }
 
     #[test]
-    fn repeated_triangles_are_found() {
+    fn duplicate_triangles_are_found() {
         // Vertex 4 has the position of vertex 0.
         let triangles = [[0, 1, 2], [0, 2, 3], [1, 2, 4], [2, 0, 1], [3, 0, 2]];
-        assert_eq!(odd(&triangles, &[]), (0, 0, vec![2, 3, 4]));
+        assert_eq!(irregularities(&triangles, &[]), (0, 0, vec![2, 3, 4]));
         // Triangles in different groups are not duplicates: two edges with three triangles, and one with four.
-        assert_eq!(odd(&triangles, &[0, 1, 1, 0, 1]), (1, 2, vec![3, 4]));
+        assert_eq!(irregularities(&triangles, &[0, 1, 1, 0, 1]), (1, 2, vec![3, 4]));
         // Triangles with opposite winding are not duplicates.
-        assert_eq!(odd(&[[0, 1, 2], [2, 1, 0], [1, 2, 0]], &[]), (0, 0, vec![2]));
+        assert_eq!(irregularities(&[[0, 1, 2], [2, 1, 0], [1, 2, 0]], &[]), (0, 0, vec![2]));
     }
 
     #[test]
-    fn edges_are_counted() {
-        assert_eq!(odd(&[[0, 1, 2], [4, 3, 2]], &[]), (0, 1, vec![]));
-        assert_eq!(odd(&[[0, 1, 2], [4, 2, 3], [2, 1, 0]], &[]), (1, 0, vec![]));
-        assert_eq!(odd(&[[0, 1, 2], [0, 1, 2]], &[0, 1]), (0, 3, vec![]));
+    fn irregular_edges_are_counted() {
+        assert_eq!(irregularities(&[[0, 1, 2], [4, 3, 2]], &[]), (0, 1, vec![]));
+        assert_eq!(irregularities(&[[0, 1, 2], [4, 2, 3], [2, 1, 0]], &[]), (1, 0, vec![]));
+        assert_eq!(irregularities(&[[0, 1, 2], [0, 1, 2]], &[0, 1]), (0, 3, vec![]));
     }
 }

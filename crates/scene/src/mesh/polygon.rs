@@ -10,17 +10,16 @@ use rayon::prelude::*;
 
 use super::raw_mesh::{RawMesh, counted};
 
-/// Maximum area by which a fan that is kept extends outside of the polygon, relative to the polygon's area.
+/// Maximum area of a kept fan outside of its polygon, relative to the polygon's area.
 const AREA_TOLERANCE: f64 = 1e-6;
 /// Maximum deviation of a planar polygon's corners from the plane, relative to the distance of the farthest corner.
 const PLANE_TOLERANCE: f64 = 0.05;
-/// Maximum length of Newell's normal, relative to the fan's cross products, at which the parts of a polygon are said to
-/// cancel.
+/// Maximum length of Newell's normal, relative to the fan's cross products, of a polygon whose parts cancel.
 const CANCELLATION: f64 = 1e-6;
 /// Maximum number of corners for ear clipping, which takes quadratic time at worst.
 const MAX_CORNERS: usize = 1 << 14;
 
-/// A polygon of four corners or more, as a fan among the triangles of a draft.
+/// A polygon of four corners or more, as a fan among the triangles of a [`RawMesh`].
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Polygon {
     /// The fan's first triangle.
@@ -28,7 +27,7 @@ pub(super) struct Polygon {
     pub count: u32,
 }
 
-/// Properties that decide on the triangulation.
+/// Properties of a polygon that determine the triangulation.
 struct Form {
     normal: DVec3,
     /// A corner has no position.
@@ -40,48 +39,47 @@ struct Form {
     is_planar: bool,
 }
 
-/// Replaces the fans of concave polygons, and notes polygons without a unique triangulation.
-pub(super) fn triangulate(draft: &mut RawMesh) {
-    let forms: Vec<Form> = (draft.polygons.par_iter())
-        .map(|polygon| form(fan(&draft.triangles, polygon), &draft.positions))
+/// Replaces the fans of concave polygons, and adds notes about polygons without a unique triangulation.
+pub(super) fn triangulate(raw: &mut RawMesh) {
+    let forms: Vec<Form> = (raw.polygons.par_iter())
+        .map(|polygon| form(fan(&raw.triangles, polygon), &raw.positions))
         .collect();
     let mut clipper = Clipper::default();
-    let (mut bent, mut crossing, mut large) = (0, 0, 0);
-    for (polygon, form) in draft.polygons.iter().zip(&forms) {
+    let (mut non_planar, mut self_intersecting, mut too_large) = (0, 0, 0);
+    for (polygon, form) in raw.polygons.iter().zip(&forms) {
         let (first, count) = (polygon.first as usize, polygon.count as usize);
-        let fan = &mut draft.triangles[first..first + count];
-        bent += usize::from(!form.is_planar);
+        let fan = &mut raw.triangles[first..first + count];
+        non_planar += usize::from(!form.is_planar);
         if form.is_damaged {
-            mark_damaged(fan, &draft.positions);
+            mark_damaged(fan, &raw.positions);
         } else if form.cancels {
-            crossing += 1;
+            self_intersecting += 1;
         } else if form.is_concave && count + 2 > MAX_CORNERS {
-            large += 1;
-        } else if form.is_concave && !clipper.clip(fan, form.normal, &draft.positions) {
-            crossing += 1;
+            too_large += 1;
+        } else if form.is_concave && !clipper.clip(fan, form.normal, &raw.positions) {
+            self_intersecting += 1;
         }
     }
     let notes = [
         (
-            bent,
+            non_planar,
             "polygon is not planar; split into triangles",
             "polygons are not planar; split into triangles",
         ),
         (
-            crossing,
+            self_intersecting,
             "polygon intersects itself; split into a triangle fan",
             "polygons intersect themselves; split into triangle fans",
         ),
         (
-            large,
+            too_large,
             "concave polygon has more than 16384 corners; split into a triangle fan",
             "concave polygons have more than 16384 corners; split into triangle fans",
         ),
     ];
     let notes = notes.into_iter().filter(|(count, ..)| *count > 0);
-    draft
-        .notes
-        .extend(notes.map(|(count, one, several)| counted(count, one, several)));
+    raw.notes
+        .extend(notes.map(|(count, singular, plural)| counted(count, singular, plural)));
 }
 
 fn fan<'a>(triangles: &'a [[u32; 3]], polygon: &Polygon) -> &'a [[u32; 3]] {
@@ -112,11 +110,11 @@ fn form(fan: &[[u32; 3]], positions: &[DVec3]) -> Form {
     }
 }
 
-/// Makes all triangles of a fan refer to the corner that has no position, so that the whole face is removed.
+/// Makes all triangles of a fan refer to the corner without a position, so that the entire face is removed.
 fn mark_damaged(fan: &mut [[u32; 3]], positions: &[DVec3]) {
-    let is_bad = |vertex: &u32| !positions[*vertex as usize].is_finite();
-    if let Some(bad) = fan.iter().flatten().copied().find(is_bad) {
-        fan.fill([bad; 3]);
+    let is_invalid = |vertex: &u32| !positions[*vertex as usize].is_finite();
+    if let Some(invalid) = fan.iter().flatten().copied().find(is_invalid) {
+        fan.fill([invalid; 3]);
     }
 }
 
@@ -124,13 +122,13 @@ fn mark_damaged(fan: &mut [[u32; 3]], positions: &[DVec3]) {
 struct Clipper {
     earcut: Earcut<f64>,
     corners: Vec<u32>,
-    flat: Vec<[f64; 2]>,
+    points: Vec<[f64; 2]>,
     indices: Vec<u32>,
 }
 
 impl Clipper {
     /// Replaces a fan by the triangles of the polygon. Returns false if the polygon intersects itself; the triangles
-    /// then do not cover exactly its area.
+    /// then do not cover its area exactly.
     fn clip(&mut self, fan: &mut [[u32; 3]], normal: DVec3, positions: &[DVec3]) -> bool {
         self.corners.clear();
         self.corners.extend([fan[0][0], fan[0][1]]);
@@ -139,19 +137,19 @@ impl Clipper {
         let u = normal.any_orthonormal_vector();
         let v = normal.cross(u);
         let first = positions[fan[0][0] as usize];
-        self.flat.clear();
-        self.flat.extend(self.corners.iter().map(|corner| {
+        self.points.clear();
+        self.points.extend(self.corners.iter().map(|corner| {
             let p = positions[*corner as usize] - first;
             [p.dot(u), p.dot(v)]
         }));
-        self.earcut.earcut_slice(&self.flat, &[], &mut self.indices);
+        self.earcut.earcut_slice(&self.points, &[], &mut self.indices);
         if self.indices.is_empty() {
             return false;
         }
-        let point = |i: u32| self.flat[i as usize];
+        let point = |i: u32| self.points[i as usize];
         let mut covered = 0.0;
-        let mut clipped = self.indices.chunks_exact(3).map(|of| {
-            let [a, b, c] = [of[0], of[1], of[2]];
+        let mut clipped = self.indices.chunks_exact(3).map(|triangle| {
+            let [a, b, c] = [triangle[0], triangle[1], triangle[2]];
             let area = area(point(a), point(b), point(c));
             covered += area.abs();
             // Counter-clockwise, like the polygon.
@@ -162,10 +160,10 @@ impl Clipper {
         for triangle in fan.iter_mut() {
             *triangle = clipped.next().unwrap_or(unused);
         }
-        let whole: f64 = (1..self.flat.len() - 1)
-            .map(|i| area(self.flat[0], self.flat[i], self.flat[i + 1]))
+        let total: f64 = (1..self.points.len() - 1)
+            .map(|i| area(self.points[0], self.points[i], self.points[i + 1]))
             .sum();
-        (covered - whole).abs() <= AREA_TOLERANCE * whole
+        (covered - total).abs() <= AREA_TOLERANCE * total
     }
 }
 

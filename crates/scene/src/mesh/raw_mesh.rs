@@ -1,12 +1,12 @@
-//! Raw mesh data, as read from a file of any format.
+//! Mesh data as read from a file of any format, before it is checked and triangulated.
 
 use crate::note::Note;
 use glam::{DVec3, Vec2, Vec3, Vec4};
 
 use super::damage::Damages;
-use super::error::{Location, MeshFault, shown_number};
+use super::error::{Location, MeshFault, format_number};
 use super::polygon::Polygon;
-use super::{Group, MAX_COORDINATE, MOST, Mesh, build};
+use super::{Group, MAX_COORDINATE, MAX_ELEMENTS, Mesh, build};
 
 /// A mesh in file coordinates.
 #[derive(Default)]
@@ -28,14 +28,14 @@ pub(crate) struct RawMesh {
     /// The first triangle and the group of each run of triangles.
     pub runs: Vec<(usize, u32)>,
     pub notes: Vec<Note>,
-    /// The reason if the file has no triangles.
-    pub(super) without_triangles: Option<&'static str>,
+    /// The reason why the file has no triangles, if known.
+    pub(super) no_triangles_reason: Option<&'static str>,
     pub(super) damages: Damages,
 }
 
 impl RawMesh {
     /// Assigns the following triangles to a group.
-    pub fn begin(&mut self, group: u32) {
+    pub fn begin_group(&mut self, group: u32) {
         if self.runs.last().is_none_or(|(_, last)| *last != group) {
             self.runs.push((self.triangles.len(), group));
         }
@@ -53,13 +53,13 @@ impl RawMesh {
 
     /// Adds a face as a triangle fan.
     #[inline]
-    pub(super) fn face(&mut self, corners: &[u32], place: Location) -> Result<(), MeshFault> {
-        let &[first, ref others @ ..] = corners else {
+    pub(super) fn face(&mut self, corners: &[u32], location: Location) -> Result<(), MeshFault> {
+        let &[first, ref rest @ ..] = corners else {
             return Ok(());
         };
-        let count = others.len().saturating_sub(1);
-        if self.triangles.len() + count > MOST {
-            return Err(place.fault(format!("there must be at most {MOST} triangles")));
+        let count = rest.len().saturating_sub(1);
+        if self.triangles.len() + count > MAX_ELEMENTS {
+            return Err(location.fault(format!("there must be at most {MAX_ELEMENTS} triangles")));
         }
         if count > 1 {
             self.polygons.push(Polygon {
@@ -67,14 +67,14 @@ impl RawMesh {
                 count: count as u32,
             });
         }
-        let triangles = others.windows(2).map(|pair| [first, pair[0], pair[1]]);
+        let triangles = rest.windows(2).map(|pair| [first, pair[0], pair[1]]);
         self.triangles.extend(triangles);
         Ok(())
     }
 }
 
-pub(super) fn counted(count: usize, one: &str, several: &str) -> Note {
-    format!("{count} {}", if count == 1 { one } else { several }).into()
+pub(super) fn counted(count: usize, singular: &str, plural: &str) -> Note {
+    format!("{count} {}", if count == 1 { singular } else { plural }).into()
 }
 
 /// Checks a coordinate. -0 becomes +0, so that equal coordinates have equal bits. The error is the value and the rule.
@@ -83,7 +83,7 @@ pub(super) fn coordinate(x: f64) -> Result<f64, String> {
     if x.abs() <= MAX_COORDINATE {
         Ok(x + 0.0)
     } else {
-        Err(format!("{} must be from -1e9 to 1e9", shown_number(x)))
+        Err(format!("{} must be from -1e9 to 1e9", format_number(x)))
     }
 }
 
@@ -92,11 +92,11 @@ pub(super) fn texture_coordinate(x: f64) -> Result<f32, String> {
     if (x as f32).is_finite() {
         Ok(x as f32)
     } else {
-        Err(format!("{} must be finite as a 32-bit float", shown_number(x)))
+        Err(format!("{} must be finite as a 32-bit float", format_number(x)))
     }
 }
 
-/// Normalizes a vector; invalid vectors become zero.
+/// Normalizes a vector. A vector that is zero or not finite becomes zero.
 pub(crate) fn unit(normal: DVec3) -> Vec3 {
     let largest = normal.abs().max_element();
     if !(largest > 0.0 && normal.is_finite()) {

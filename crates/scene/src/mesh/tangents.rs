@@ -10,16 +10,16 @@ use glam::{DVec2, DVec3, Vec3, Vec4};
 use rayon::prelude::*;
 
 use super::Mesh;
-use super::neighbours::Neighbours;
+use super::neighbours::Adjacency;
 
-/// Maximum number of vertices at a point that are joined; joining compares all pairs.
+/// Maximum number of vertices at a point that are joined. The number is limited because joining compares all pairs.
 const MAX_JOINED: usize = 64;
-/// Cosine of the maximum angle between normals that count as equal: 1 degree.
-const ONE_NORMAL: f64 = 0.9998;
-/// Cosine of the maximum angle between joined tangents: 60 degrees.
-const ONE_DIRECTION: f64 = 0.5;
+/// Minimum cosine of the angle between normals that count as equal: 1 degree.
+const MIN_NORMAL_COSINE: f64 = 0.9998;
+/// Minimum cosine of the angle between joined tangents: 60 degrees.
+const MIN_TANGENT_COSINE: f64 = 0.5;
 /// Tolerance for integer offsets between texture coordinates, because files contain rounded coordinates.
-const WHOLE: f64 = 1e-4;
+const INTEGER_TOLERANCE: f64 = 1e-4;
 
 /// Tangents of a mesh; vertices that are shared by plain and mirrored triangles are split.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -42,25 +42,29 @@ pub struct Tangents {
 }
 
 impl VertexTangents {
-    /// Returns `None` if the mesh is flat or lacks texture coordinates.
+    /// Returns the tangents; `None` if the mesh is flat or lacks texture coordinates.
     pub fn of(mesh: &Mesh) -> Option<VertexTangents> {
         if mesh.uvs.is_empty() || mesh.normals.is_empty() {
             return None;
         }
-        let with_mesh = |vertex: usize| mesh.tangents.get(vertex).and_then(|t| given(*t, mesh.normals[vertex]));
-        let (triangles, copies) = parted(mesh);
-        let neighbours = Neighbours::of(&mesh.positions, &mesh.triangles);
+        let from_mesh = |vertex: usize| {
+            mesh.tangents
+                .get(vertex)
+                .and_then(|t| from_gltf(*t, mesh.normals[vertex]))
+        };
+        let (triangles, copies) = split_mirrored(mesh);
+        let adjacency = Adjacency::of(&mesh.positions, &mesh.triangles);
         let mut tangents = vec![Tangents::default(); mesh.positions.len() + copies.len()];
-        let found: Vec<(u32, Tangents)> = (0..neighbours.count())
+        let found: Vec<(u32, Tangents)> = (0..adjacency.point_count())
             .into_par_iter()
             .with_min_len(1024)
-            .flat_map_iter(|point| at_point(mesh, &triangles, &neighbours, point))
+            .flat_map_iter(|point| tangents_at_point(mesh, &triangles, &adjacency, point))
             .collect();
         for (vertex, found) in found {
             tangents[vertex as usize] = found;
         }
-        for (vertex, own) in tangents.iter_mut().enumerate().take(mesh.positions.len()) {
-            *own = with_mesh(vertex).unwrap_or(*own);
+        for (vertex, vertex_tangents) in tangents.iter_mut().enumerate().take(mesh.positions.len()) {
+            *vertex_tangents = from_mesh(vertex).unwrap_or(*vertex_tangents);
         }
         Some(VertexTangents {
             triangles,
@@ -71,7 +75,7 @@ impl VertexTangents {
 }
 
 /// Converts a glTF tangent (glTF 2.0, 3.7.2.1); `None` if the tangent is zero.
-fn given(tangent: Vec4, normal: Vec3) -> Option<Tangents> {
+fn from_gltf(tangent: Vec4, normal: Vec3) -> Option<Tangents> {
     let u = tangent.truncate().as_dvec3().try_normalize()?;
     let side = if tangent.w < 0.0 { -1.0 } else { 1.0 };
     let v = normal.as_dvec3().cross(u).try_normalize()? * side;
@@ -89,32 +93,35 @@ fn texture_area([a, b, c]: [DVec2; 3]) -> f64 {
 
 /// Splits vertices that are shared by plain and mirrored triangles. Returns the triangles, and the original vertex of
 /// each copy.
-fn parted(mesh: &Mesh) -> (Vec<[u32; 3]>, Vec<u32>) {
+fn split_mirrored(mesh: &Mesh) -> (Vec<[u32; 3]>, Vec<u32>) {
     const PLAIN: u8 = 1;
     const MIRRORED: u8 = 2;
-    let hand = |triangle: &[u32; 3]| match texture_area(triangle.map(|vertex| mesh.uvs[vertex as usize].as_dvec2())) {
-        area if area > 0.0 => PLAIN,
-        area if area < 0.0 => MIRRORED,
-        _ => 0,
-    };
-    let hands: Vec<u8> = mesh.triangles.par_iter().map(hand).collect();
-    let mut hands_at = vec![0; mesh.positions.len()];
-    for (triangle, hand) in mesh.triangles.iter().zip(&hands) {
-        triangle.iter().for_each(|vertex| hands_at[*vertex as usize] |= hand);
+    let handedness =
+        |triangle: &[u32; 3]| match texture_area(triangle.map(|vertex| mesh.uvs[vertex as usize].as_dvec2())) {
+            area if area > 0.0 => PLAIN,
+            area if area < 0.0 => MIRRORED,
+            _ => 0,
+        };
+    let triangle_handedness: Vec<u8> = mesh.triangles.par_iter().map(handedness).collect();
+    let mut vertex_handedness = vec![0; mesh.positions.len()];
+    for (triangle, handedness) in mesh.triangles.iter().zip(&triangle_handedness) {
+        triangle
+            .iter()
+            .for_each(|vertex| vertex_handedness[*vertex as usize] |= handedness);
     }
     let mut copies = Vec::new();
-    let mut copy_of = vec![0; hands_at.len()];
-    for (vertex, hands) in hands_at.iter().enumerate() {
-        let has_own = (mesh.tangents.get(vertex)).is_some_and(|t| given(*t, mesh.normals[vertex]).is_some());
-        if *hands == PLAIN | MIRRORED && !has_own {
-            copy_of[vertex] = (hands_at.len() + copies.len()) as u32;
+    let mut copy_of = vec![0; vertex_handedness.len()];
+    for (vertex, handedness) in vertex_handedness.iter().enumerate() {
+        let has_tangent = (mesh.tangents.get(vertex)).is_some_and(|t| from_gltf(*t, mesh.normals[vertex]).is_some());
+        if *handedness == PLAIN | MIRRORED && !has_tangent {
+            copy_of[vertex] = (vertex_handedness.len() + copies.len()) as u32;
             copies.push(vertex as u32);
         }
     }
     let mut triangles = mesh.triangles.clone();
-    for (triangle, hand) in triangles.iter_mut().zip(&hands) {
+    for (triangle, handedness) in triangles.iter_mut().zip(&triangle_handedness) {
         for vertex in triangle {
-            if *hand == MIRRORED && copy_of[*vertex as usize] != 0 {
+            if *handedness == MIRRORED && copy_of[*vertex as usize] != 0 {
                 *vertex = copy_of[*vertex as usize];
             }
         }
@@ -130,12 +137,12 @@ struct Sum {
     normal: DVec3,
     u: DVec3,
     v: DVec3,
-    /// Sums of the lengths added to `u` and `v`.
+    /// Sums of the lengths of the vectors added to `u` and `v`.
     lengths: DVec2,
 }
 
 impl Sum {
-    fn with(self, other: &Sum) -> Sum {
+    fn plus(self, other: &Sum) -> Sum {
         Sum {
             u: self.u + other.u,
             v: self.v + other.v,
@@ -146,11 +153,14 @@ impl Sum {
 
     /// Returns true if a repeating texture is continuous between two vertices at a point, for example where u jumps
     /// from 1 to 0 on a sphere. Charts of an atlas keep separate tangents, as in MikkTSpace.
-    fn goes_on_in(&self, other: &Sum) -> bool {
-        let apart = self.uv - other.uv;
-        let repeats = (apart - apart.round()).abs().max_element() < WHOLE;
-        let agree = |a: DVec3, b: DVec3| a.dot(b) > ONE_DIRECTION * a.length() * b.length();
-        repeats && self.normal.dot(other.normal) > ONE_NORMAL && agree(self.u, other.u) && agree(self.v, other.v)
+    fn is_continuous_with(&self, other: &Sum) -> bool {
+        let difference = self.uv - other.uv;
+        let is_integer_offset = (difference - difference.round()).abs().max_element() < INTEGER_TOLERANCE;
+        let agree = |a: DVec3, b: DVec3| a.dot(b) > MIN_TANGENT_COSINE * a.length() * b.length();
+        is_integer_offset
+            && self.normal.dot(other.normal) > MIN_NORMAL_COSINE
+            && agree(self.u, other.u)
+            && agree(self.v, other.v)
     }
 
     fn tangents(&self) -> Tangents {
@@ -168,7 +178,7 @@ impl Sum {
 }
 
 /// Returns the contribution of corner k; `None` if the triangle has no area in texture space.
-fn at_corner(mesh: &Mesh, triangle: [u32; 3], k: usize, vertex: u32) -> Option<Sum> {
+fn corner_contribution(mesh: &Mesh, triangle: [u32; 3], k: usize, vertex: u32) -> Option<Sum> {
     let corners = [0, 1, 2].map(|i| triangle[(k + i) % 3] as usize);
     let [p, next, previous] = corners.map(|corner| mesh.positions[corner].as_dvec3());
     let uvs = corners.map(|corner| mesh.uvs[corner].as_dvec2());
@@ -191,23 +201,23 @@ fn at_corner(mesh: &Mesh, triangle: [u32; 3], k: usize, vertex: u32) -> Option<S
     })
 }
 
-fn at_point(mesh: &Mesh, triangles: &[[u32; 3]], neighbours: &Neighbours, point: usize) -> Vec<(u32, Tangents)> {
+fn tangents_at_point(mesh: &Mesh, triangles: &[[u32; 3]], adjacency: &Adjacency, point: usize) -> Vec<(u32, Tangents)> {
     let at_triangle = |i: &u32| {
         let triangle = mesh.triangles[*i as usize];
-        let k = (0..3).find(|k| neighbours.points[triangle[*k] as usize] as usize == point)?;
-        at_corner(mesh, triangle, k, triangles[*i as usize][k])
+        let k = (0..3).find(|k| adjacency.points[triangle[*k] as usize] as usize == point)?;
+        corner_contribution(mesh, triangle, k, triangles[*i as usize][k])
     };
-    let mut corners: Vec<Sum> = neighbours.around(point).iter().filter_map(at_triangle).collect();
+    let mut corners: Vec<Sum> = adjacency.triangles_at(point).iter().filter_map(at_triangle).collect();
     corners.sort_by_key(|corner| corner.vertex);
     let sums: Vec<Sum> = corners
         .chunk_by(|a, b| a.vertex == b.vertex)
-        .filter_map(|corners| corners.iter().copied().reduce(|sum, corner| sum.with(&corner)))
+        .filter_map(|corners| corners.iter().copied().reduce(|sum, corner| sum.plus(&corner)))
         .collect();
     let joined = |sum: &Sum| {
-        let others = sums
+        let partners = sums
             .iter()
-            .filter(|other| other.vertex != sum.vertex && sums.len() <= MAX_JOINED && sum.goes_on_in(other));
-        (sum.vertex, others.fold(*sum, Sum::with).tangents())
+            .filter(|other| other.vertex != sum.vertex && sums.len() <= MAX_JOINED && sum.is_continuous_with(other));
+        (sum.vertex, partners.fold(*sum, Sum::plus).tangents())
     };
     sums.iter().map(joined).collect()
 }
@@ -236,7 +246,7 @@ mod tests {
     }
 
     #[test]
-    fn tangents_have_the_texture_s_directions_and_proportions() {
+    fn tangents_have_the_directions_and_proportions_of_the_texture() {
         let mesh = bow(|p| Vec2::new(p.x / 4.0, p.x / 3.0 + p.y / 3.0));
         let found = VertexTangents::of(&mesh).unwrap();
         assert_eq!((&found.triangles, found.copies.len()), (&mesh.triangles, 0));
@@ -249,15 +259,15 @@ mod tests {
     #[test]
     fn tangents_do_not_depend_on_triangle_size_or_number() {
         // The texture direction changes at x = 0.
-        let at_origin = |rim: &[Vec3]| {
+        let u_at_origin = |rim: &[Vec3]| {
             let positions: Vec<Vec3> = [Vec3::ZERO].iter().chain(rim).copied().collect();
             let triangles = (1..rim.len() as u32).map(|i| [0, i, i + 1]).collect();
             let mesh = plane(positions, triangles, |p| Vec2::new(p.x, p.y - p.x.min(0.0)));
             VertexTangents::of(&mesh).unwrap().tangents[0].u
         };
         let left = Vec3::new(-0.3, 0.3, 0.0);
-        let found = at_origin(&[Vec3::X, Vec3::Y, -Vec3::X]);
-        assert!(found.y > 0.1 && found.abs_diff_eq(at_origin(&[Vec3::X * 9.0, Vec3::Y, left, -Vec3::X]), 1e-6));
+        let found = u_at_origin(&[Vec3::X, Vec3::Y, -Vec3::X]);
+        assert!(found.y > 0.1 && found.abs_diff_eq(u_at_origin(&[Vec3::X * 9.0, Vec3::Y, left, -Vec3::X]), 1e-6));
     }
 
     #[test]
@@ -294,8 +304,8 @@ mod tests {
 
     #[test]
     fn too_many_vertices_at_a_point_are_not_joined() {
-        // A disk of triangles with separate centre vertices.
-        let at_middle = |count: u32| {
+        // A disk of triangles with separate center vertices.
+        let u_at_center = |count: u32| {
             let rim = |i: u32| Vec2::from_angle(std::f32::consts::TAU * i as f32 / count as f32).extend(0.0);
             let positions = (0..2 * count).map(|i| if i < count { rim(i) } else { Vec3::ZERO });
             let triangles = (0..count).map(|i| [count + i, i, (i + 1) % count]);
@@ -307,19 +317,19 @@ mod tests {
                 .normalize()
         };
         // A bent texture: the first triangle's direction is not the mean.
-        assert!(at_middle(64).y.abs() < 0.01);
-        assert!(at_middle(65).y.abs() > 0.05);
+        assert!(u_at_center(64).y.abs() < 0.01);
+        assert!(u_at_center(65).y.abs() > 0.05);
     }
 
     #[test]
     fn flat_or_unmapped_meshes_have_no_tangents() {
         let mesh = bow(|p| p.truncate());
-        let without = |uvs: bool| Mesh {
-            uvs: if uvs { vec![] } else { mesh.uvs.clone() },
-            normals: if uvs { mesh.normals.clone() } else { vec![] },
+        let incomplete = |lacks_uvs: bool| Mesh {
+            uvs: if lacks_uvs { vec![] } else { mesh.uvs.clone() },
+            normals: if lacks_uvs { mesh.normals.clone() } else { vec![] },
             ..mesh.clone()
         };
-        assert_eq!(VertexTangents::of(&without(true)), None);
-        assert_eq!(VertexTangents::of(&without(false)), None);
+        assert_eq!(VertexTangents::of(&incomplete(true)), None);
+        assert_eq!(VertexTangents::of(&incomplete(false)), None);
     }
 }

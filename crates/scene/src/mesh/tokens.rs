@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use super::error::{Location, MeshFault, shown};
+use super::error::{Location, MeshFault, quoted};
 
 /// Returns the text as UTF-8; UTF-16 with a byte order mark is converted.
 pub(super) fn utf8(bytes: &[u8]) -> Cow<'_, [u8]> {
@@ -17,50 +17,50 @@ pub(super) fn utf8(bytes: &[u8]) -> Cow<'_, [u8]> {
     Cow::Owned(text.into_bytes())
 }
 
-/// Words between blanks. `#` at the start of a word begins a comment; a backslash at the end of a line joins the next
-/// line.
+/// A text of words between blanks. `#` at the start of a word begins a comment. A backslash at the end of a line joins
+/// the next line.
 pub(super) struct Tokens<'a> {
     bytes: &'a [u8],
-    at: usize,
+    offset: usize,
     line: usize,
     /// Line terminator.
-    end: u8,
+    terminator: u8,
 }
 
 impl<'a> Tokens<'a> {
     pub fn new(bytes: &'a [u8]) -> Tokens<'a> {
-        let at = if bytes.starts_with(b"\xef\xbb\xbf") { 3 } else { 0 }; // UTF-8 byte order mark
-        // Old Mac text has carriage returns only.
-        let end = if bytes.contains(&b'\n') { b'\n' } else { b'\r' };
+        let offset = if bytes.starts_with(b"\xef\xbb\xbf") { 3 } else { 0 }; // UTF-8 byte order mark
+        // Old Mac texts only have carriage returns.
+        let terminator = if bytes.contains(&b'\n') { b'\n' } else { b'\r' };
         Tokens {
             bytes,
-            at,
+            offset,
             line: 1,
-            end,
+            terminator,
         }
     }
 
     #[inline]
-    pub fn on_line(&mut self) -> Option<&'a [u8]> {
-        self.find_word().then(|| self.take_word())
+    pub fn next_on_line(&mut self) -> Option<&'a [u8]> {
+        self.find_on_line().then(|| self.take_word())
     }
 
     /// Advances to the next word of the line; false if none.
     #[inline]
-    fn find_word(&mut self) -> bool {
+    fn find_on_line(&mut self) -> bool {
         loop {
-            match self.bytes.get(self.at) {
+            match self.bytes.get(self.offset) {
                 None | Some(b'#') => return false,
                 Some(byte) if *byte <= b' ' => {
-                    if *byte == self.end {
+                    if *byte == self.terminator {
                         return false;
                     }
-                    self.at += 1;
+                    self.offset += 1;
                 }
-                Some(b'\\') => match self.joined(self.at) {
+                Some(b'\\') => match self.continuation(self.offset) {
                     Some(next) => {
-                        self.line += usize::from(self.bytes[next - 1] == self.end);
-                        self.at = next;
+                        self.line += usize::from(self.bytes[next - 1] == self.terminator);
+                        self.offset = next;
                     }
                     None => return true,
                 },
@@ -70,35 +70,35 @@ impl<'a> Tokens<'a> {
     }
 
     fn take_word(&mut self) -> &'a [u8] {
-        let start = self.at;
-        while let Some(byte) = self.bytes.get(self.at) {
-            if *byte <= b' ' || (*byte == b'\\' && self.joined(self.at).is_some()) {
+        let start = self.offset;
+        while let Some(byte) = self.bytes.get(self.offset) {
+            if *byte <= b' ' || (*byte == b'\\' && self.continuation(self.offset).is_some()) {
                 break;
             }
-            self.at += 1;
+            self.offset += 1;
         }
-        &self.bytes[start..self.at]
+        &self.bytes[start..self.offset]
     }
 
-    /// Returns the start of the next line if this backslash joins it.
-    fn joined(&self, backslash: usize) -> Option<usize> {
+    /// Returns the start of the next line if the backslash joins that line.
+    fn continuation(&self, backslash: usize) -> Option<usize> {
         match self.bytes[backslash + 1..] {
             [] => Some(backslash + 1),
-            [byte, ..] if byte == self.end => Some(backslash + 2),
+            [byte, ..] if byte == self.terminator => Some(backslash + 2),
             [b'\r', b'\n', ..] => Some(backslash + 3),
             _ => None,
         }
     }
 
     #[inline]
-    pub fn anywhere(&mut self) -> Option<&'a [u8]> {
-        self.find_word_anywhere().then(|| self.take_word())
+    pub fn next_word(&mut self) -> Option<&'a [u8]> {
+        self.find_next_word().then(|| self.take_word())
     }
 
     /// Advances to the next word; false at the end.
     #[inline]
-    pub fn find_word_anywhere(&mut self) -> bool {
-        while !self.find_word() {
+    pub fn find_next_word(&mut self) -> bool {
+        while !self.find_on_line() {
             if !self.skip_line() {
                 return false;
             }
@@ -110,9 +110,9 @@ impl<'a> Tokens<'a> {
     pub fn name(&mut self) -> String {
         let mut name = String::new();
         loop {
-            let word = match self.on_line() {
+            let word = match self.next_on_line() {
                 Some(word) => word,
-                None if self.bytes.get(self.at) == Some(&b'#') => self.take_word(),
+                None if self.bytes.get(self.offset) == Some(&b'#') => self.take_word(),
                 None => return name,
             };
             if !name.is_empty() {
@@ -125,58 +125,58 @@ impl<'a> Tokens<'a> {
     /// Advances to the next line; false at the end of the file.
     #[inline]
     pub fn next_line(&mut self) -> bool {
-        while self.on_line().is_some() {}
+        while self.next_on_line().is_some() {}
         self.skip_line()
     }
 
     /// Advances to the next line, even if the line ends with a backslash.
     pub fn skip_line(&mut self) -> bool {
-        let rest = &self.bytes[self.at..];
-        match rest.iter().position(|byte| *byte == self.end) {
+        let rest = &self.bytes[self.offset..];
+        match rest.iter().position(|byte| *byte == self.terminator) {
             Some(end) => {
-                self.at += end + 1;
+                self.offset += end + 1;
                 self.line += 1;
-                self.at < self.bytes.len()
+                self.offset < self.bytes.len()
             }
             None => {
-                self.at = self.bytes.len();
+                self.offset = self.bytes.len();
                 false
             }
         }
     }
 
-    /// Advances to the end of the line; returns true if words were skipped.
+    /// Advances to the end of the line. Returns true if words were skipped.
     pub fn skip_rest(&mut self) -> bool {
-        let has_more = self.on_line().is_some();
-        while self.on_line().is_some() {}
+        let has_more = self.next_on_line().is_some();
+        while self.next_on_line().is_some() {}
         has_more
     }
 
     /// Returns the number of non-blank lines left.
     pub fn lines_left(&self) -> usize {
-        let lines = self.bytes[self.at..].split(|byte| *byte == self.end);
+        let lines = self.bytes[self.offset..].split(|byte| *byte == self.terminator);
         lines.filter(|line| line.iter().any(|byte| *byte > b' ')).count()
     }
 
-    /// Reads a number. `what` is the name of the number in errors.
+    /// Reads a number from the line. `name` is the name of the number in errors.
     #[inline]
-    pub fn number(&mut self, what: &str) -> Result<f64, MeshFault> {
-        match self.on_line() {
-            Some(word) => number(word).ok_or_else(|| self.fault(format!("{what}: {} must be a number", shown(word)))),
-            None => Err(self.fault(format!("{what} is missing"))),
+    pub fn number(&mut self, name: &str) -> Result<f64, MeshFault> {
+        match self.next_on_line() {
+            Some(word) => number(word).ok_or_else(|| self.fault(format!("{name}: {} must be a number", quoted(word)))),
+            None => Err(self.fault(format!("{name} is missing"))),
         }
     }
 
     pub fn offset(&self) -> usize {
-        self.at
+        self.offset
     }
 
     /// Returns the number of bytes left.
-    pub fn left(&self) -> usize {
-        self.bytes.len() - self.at
+    pub fn bytes_left(&self) -> usize {
+        self.bytes.len() - self.offset
     }
 
-    pub fn place(&self) -> Location {
+    pub fn location(&self) -> Location {
         Location::Line(self.line)
     }
 
@@ -185,7 +185,7 @@ impl<'a> Tokens<'a> {
     }
 
     pub fn fault(&self, message: impl Into<String>) -> MeshFault {
-        self.place().fault(message)
+        self.location().fault(message)
     }
 }
 
@@ -203,10 +203,10 @@ mod tests {
         let mut lines = Vec::new();
         loop {
             let mut line = Vec::new();
-            while let Some(word) = words.on_line() {
+            while let Some(word) = words.next_on_line() {
                 line.push(String::from_utf8_lossy(word).into_owned());
             }
-            let Location::Line(number) = words.place() else {
+            let Location::Line(number) = words.location() else {
                 unreachable!("a text has lines")
             };
             if !line.is_empty() {
@@ -223,7 +223,7 @@ mod tests {
     }
 
     #[test]
-    fn lines_have_words() {
+    fn lines_are_split_into_words() {
         assert_eq!(lines("a  b\t\r\n\n c"), [line(1, "a b"), line(3, "c")]);
         assert_eq!(lines("\u{feff}a\n"), [line(1, "a")]);
         assert_eq!(lines("\n\n"), []);
@@ -245,12 +245,12 @@ mod tests {
     }
 
     #[test]
-    fn names_have_blanks() {
+    fn names_may_contain_blanks_and_number_signs() {
         let mut words = Tokens::new(b"usemtl  dark   red #2 \r\nusemtl #3");
-        assert_eq!(words.on_line(), Some(&b"usemtl"[..]));
+        assert_eq!(words.next_on_line(), Some(&b"usemtl"[..]));
         assert_eq!(words.name(), "dark red #2");
-        assert_eq!(words.anywhere(), Some(&b"usemtl"[..]));
+        assert_eq!(words.next_word(), Some(&b"usemtl"[..]));
         assert_eq!(words.name(), "#3");
-        assert_eq!(words.anywhere(), None);
+        assert_eq!(words.next_word(), None);
     }
 }

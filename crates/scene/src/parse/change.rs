@@ -1,4 +1,4 @@
-//! Incremental parsing after a small change of a scene file, such as one of 100,000 shapes.
+//! Incremental parsing after a small change of a scene file, such as a change of one of 100,000 shapes.
 
 use std::borrow::Cow;
 use std::path::Path;
@@ -21,26 +21,26 @@ impl Description {
         origin: &str,
         defines: &mut Defines,
         before: &Description,
-        at: &KeyPath,
+        path: &KeyPath,
     ) -> Result<Option<Change>, SceneError> {
         if is_course(Path::new(origin)) {
             return Ok(None);
         }
-        let broken = |broken: SyntaxFault| broken.into_error(text, origin);
+        let to_error = |fault: SyntaxFault| fault.into_error(text, origin);
         let parts = Parts::of(text);
-        if let Some(large) = parts.too_large() {
-            return Err(broken(large));
+        if let Some(fault) = parts.too_large() {
+            return Err(to_error(fault));
         }
-        let part = parts.find(at).map(|(part, _)| part);
-        let is_rest = part.is_none();
+        let part = parts.find(path).map(|(part, _)| part);
+        let parsed_rest = part.is_none();
         let read = match part {
-            Some(part) => read_changed_part(&parts, part, at, defines, before).map_err(broken)?,
-            None => read_changed_rest(&parts, defines, before).map_err(broken)?,
+            Some(part) => read_changed_part(&parts, part, path, defines, before).map_err(to_error)?,
+            None => read_changed_rest(&parts, defines, before).map_err(to_error)?,
         };
         match read {
             Some(Ok(description)) => Ok(Some(Change {
                 description,
-                is_rest,
+                parsed_rest,
                 places: Places(parts.parts.into_owned()),
             })),
             Some(Err(problems)) => Err(invalid(text, origin, problems, defines)),
@@ -51,7 +51,7 @@ impl Description {
     /// Parses only the camera of a text, without overrides.
     pub fn parse_camera(text: &str, origin: &str) -> Result<CameraDescription, SceneError> {
         let parts = Parts::of(text);
-        let rest = parts.read_rest().map_err(|broken| broken.into_error(text, origin))?;
+        let rest = parts.read_rest().map_err(|fault| fault.into_error(text, origin))?;
         let camera = rest
             .get("camera")
             .and_then(Value::as_table)
@@ -65,7 +65,7 @@ impl Description {
 pub struct Change {
     pub description: Description,
     /// True if the text outside of the parts was parsed again.
-    pub is_rest: bool,
+    pub parsed_rest: bool,
     pub places: Places,
 }
 
@@ -84,19 +84,19 @@ impl Places {
 fn read_changed_part(
     parts: &Parts,
     part: &Part,
-    at: &KeyPath,
+    path: &KeyPath,
     defines: &mut Defines,
     before: &Description,
 ) -> Result<Option<Result<Description, Problems>>, SyntaxFault> {
-    let (Some((_, mut table)), Some(step)) = (parts.read(part)?, at.0.get(1)) else {
+    let (Some((_, mut table)), Some(name)) = (parts.read(part)?, path.0.get(1)) else {
         return Ok(None);
     };
-    let place = [Segment::from(part.kind.name()), step.clone()];
-    if let Err(problem) = defines.put(&place, &mut table, |_| false) {
+    let table_path = [Segment::from(part.kind.name()), name.clone()];
+    if let Err(problem) = defines.apply(&table_path, &mut table, |_| false) {
         return Ok(Some(Err(problem.into())));
     }
     let mut after = before.clone();
-    let replaced = match (part.kind, step) {
+    let replaced = match (part.kind, name) {
         (Kind::Textures, Segment::Key(name)) => replace(after.textures.get_mut(name), table, tagged),
         (Kind::Materials, Segment::Key(name)) => replace(after.materials.get_mut(name), table, tagged),
         (Kind::Meshes, Segment::Key(name)) => replace(after.meshes.get_mut(name), table, read),
@@ -105,18 +105,18 @@ fn read_changed_part(
         (Kind::Instances, Segment::Index(i)) => replace(after.instances.get_mut(*i), table, read),
         _ => None,
     };
-    let done = replaced.map(|read| {
-        read.map_err(|problem| problem.at(step.clone()).at(part.kind.name()))
+    let result = replaced.map(|read| {
+        read.map_err(|problem| problem.at(name.clone()).at(part.kind.name()))
             .map(|()| after)
     });
-    Ok(done)
+    Ok(result)
 }
 
-fn replace<T>(place: Option<&mut T>, table: Table, read: fn(Table) -> Read<T>) -> Option<Read<()>> {
-    place.map(|place| read(table).map(|new| *place = new))
+fn replace<T>(target: Option<&mut T>, table: Table, read: fn(Table) -> Read<T>) -> Option<Read<()>> {
+    target.map(|target| read(table).map(|new| *target = new))
 }
 
-/// Parses a change outside of the parts; `None` if this text contains elements of sections that are split into parts.
+/// Parses the text outside of the parts; `None` if this text contains elements of sections that are split into parts.
 fn read_changed_rest(
     parts: &Parts,
     defines: &mut Defines,
@@ -127,8 +127,8 @@ fn read_changed_rest(
         return Ok(None);
     }
     let is_in_parts = |key: &str| Kind::ALL.into_iter().any(|kind| kind.name() == key);
-    let put = defines.put(&[], &mut rest, is_in_parts);
-    let read = put.map_err(Problems::from).and_then(|()| read_file(rest));
+    let applied = defines.apply(&[], &mut rest, is_in_parts);
+    let read = applied.map_err(Problems::from).and_then(|()| read_file(rest));
     Ok(Some(read.map(|rest| Description {
         image: rest.image,
         camera: rest.camera,
@@ -143,15 +143,16 @@ pub struct Piece<'a> {
     pub text: Cow<'a, str>,
     /// Path of the requested value within the piece.
     pub path: KeyPath,
-    place: Result<usize, Rest>,
+    /// The start of the part in the text, or the text outside of the parts.
+    origin: Result<usize, Rest>,
 }
 
 impl Piece<'_> {
-    /// Returns the offset of a byte in the whole text.
-    pub fn place(&self, at: usize) -> usize {
-        match &self.place {
-            Ok(start) => start + at,
-            Err(rest) => rest.place(at),
+    /// Converts a byte offset in the piece to a byte offset in the file.
+    pub fn place(&self, offset: usize) -> usize {
+        match &self.origin {
+            Ok(start) => start + offset,
+            Err(rest) => rest.file_offset(offset),
         }
     }
 }
@@ -171,7 +172,7 @@ impl<'a> Pieces<'a> {
         Pieces(Parts { text, parts })
     }
 
-    /// Returns the whole text.
+    /// Returns the complete text.
     pub fn whole(&self) -> &'a str {
         self.0.text
     }
@@ -182,14 +183,14 @@ impl<'a> Pieces<'a> {
             Some((part, path)) => Piece {
                 text: self.0.text(part).into(),
                 path,
-                place: Ok(part.place.start),
+                origin: Ok(part.range.start),
             },
             None => {
                 let rest = self.0.rest();
                 Piece {
                     text: rest.text.clone().into(),
                     path: path.clone(),
-                    place: Err(rest),
+                    origin: Err(rest),
                 }
             }
         }

@@ -14,7 +14,7 @@ use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use toml::{Table, Value};
 
-use self::parts::{Kind, LARGEST, Parts, SyntaxFault};
+use self::parts::{Kind, MAX_PART_BYTES, Parts, SyntaxFault};
 use self::table::{Read, read, read_tagged, remove, tagged};
 use super::defines::Defines;
 use super::description::tables;
@@ -34,29 +34,29 @@ pub use table::{read_for, segments};
 
 impl Description {
     /// Returns the description with the defines applied.
-    pub(crate) fn defined(&self, defines: &mut Defines) -> Result<Description, Problem> {
+    pub(crate) fn with_defines(&self, defines: &mut Defines) -> Result<Description, Problem> {
         let mut file = Table::try_from(self).map_err(|error| Problem::new(error.to_string()))?;
-        defines.put(&[], &mut file, |_| false).at("define")?;
+        defines.apply(&[], &mut file, |_| false).at("define")?;
         read_file(file).map_err(|problems| problems.first.at("define"))
     }
 
     pub(crate) fn parse_toml(text: &str, origin: &str, defines: &mut Defines) -> Result<Self, SceneError> {
-        let broken = |broken: SyntaxFault| broken.into_error(text, origin);
+        let to_error = |fault: SyntaxFault| fault.into_error(text, origin);
         let parts = Parts::of(text);
-        if let Some(large) = parts.too_large() {
-            return Err(broken(large));
+        if let Some(fault) = parts.too_large() {
+            return Err(to_error(fault));
         }
-        let read = match read_parts(&parts, defines).map_err(broken)? {
+        let read = match read_parts(&parts, defines).map_err(to_error)? {
             Some(read) => read,
-            None if text.len() > LARGEST => match defines.left() {
-                Some(key) => Err(defines.not_there(key).into()),
-                None => return Err(broken(SyntaxFault::whole(text))),
+            None if text.len() > MAX_PART_BYTES => match defines.unapplied() {
+                Some(key) => Err(defines.missing_key(key).into()),
+                None => return Err(to_error(SyntaxFault::file_too_large(text))),
             },
             None => {
-                let mut file = toml::from_str(text).map_err(|error| broken(SyntaxFault::of(0, &error)))?;
+                let mut file = toml::from_str(text).map_err(|error| to_error(SyntaxFault::of(0, &error)))?;
                 defines.restart();
-                let put = defines.put(&[], &mut file, |_| false);
-                put.map_err(Problems::from).and_then(|()| read_file(file))
+                let applied = defines.apply(&[], &mut file, |_| false);
+                applied.map_err(Problems::from).and_then(|()| read_file(file))
             }
         };
         read.map_err(|problems| invalid(text, origin, problems, defines))
@@ -92,7 +92,7 @@ struct Sections {
 }
 
 fn read_file(file: Table) -> Result<Description, Problems> {
-    let (sections, outside) = read_sections(file)?;
+    let (sections, other_keys) = read_sections(file)?;
     let view = both(
         read(sections.image).at("image"),
         read_camera(sections.camera).at("camera"),
@@ -114,7 +114,7 @@ fn read_file(file: Table) -> Result<Description, Problems> {
         read_list(sections.instances, read).at("instances"),
     );
     let sections = both(both(view, settings), both(appearance, both(objects, meshes)));
-    let (((view, settings), (appearance, (objects, meshes))), ()) = both(sections, outside)?;
+    let (((view, settings), (appearance, (objects, meshes))), ()) = both(sections, other_keys)?;
     let ((image, camera), (render, environment)) = (view, settings);
     let ((textures, materials), (lights, shapes), (meshes, instances)) = (appearance, objects, meshes);
     Ok(Description {
@@ -131,7 +131,7 @@ fn read_file(file: Table) -> Result<Description, Problems> {
     })
 }
 
-/// Returns the sections of a file, and the problems of its other keys.
+/// Returns the sections of a file, and the problems of keys outside of sections.
 fn read_sections(file: Table) -> Result<(Sections, Result<(), Problems>), Problems> {
     let problems = match read(file.clone()) {
         Ok(sections) => return Ok((sections, Ok(()))),
@@ -147,12 +147,12 @@ fn read_sections(file: Table) -> Result<(Sections, Result<(), Problems>), Proble
     }
 }
 
-/// Adds a section's name to the problem of a key outside of sections.
+/// Suggests a section in the problem of an unknown key outside of sections.
 fn with_section(problem: Problem) -> Problem {
     let [Segment::Key(key)] = problem.key.0.as_slice() else {
         return problem;
     };
-    // Suggests keys for names of options and for names that other renderers use.
+    // Names of options, and names that other renderers use.
     let name = match key.as_str() {
         "spp" | "samples" => "pixel_samples",
         "bounces" | "depth" => "max_depth",
@@ -180,19 +180,21 @@ fn has_key<T: DeserializeOwned>(name: &str) -> bool {
     !error.is_some_and(|error| error.inner().message().starts_with("unknown field"))
 }
 
-/// Parses a camera. A missing value is taken from the first key of the path that has it.
+/// Parses a camera. A missing value is taken from the first key of the path that sets the value.
 fn read_camera(mut camera: Table) -> Read<CameraDescription> {
     if let Some(Value::Table(path)) = camera.get("path") {
         // The path is parsed first, so that errors in keys are reported at the keys.
         let path: CameraPathDescription = read(path.clone()).at("path")?;
         let point = |point: DVec3| Value::from(point.to_array().to_vec());
-        let first = |of: fn(&CameraKeyDescription) -> Option<DVec3>| path.keys.iter().find_map(of).map(point);
+        let first =
+            |value_of: fn(&CameraKeyDescription) -> Option<DVec3>| path.keys.iter().find_map(value_of).map(point);
         let points = [
             ("position", first(|key| key.position)),
             ("look_at", first(|key| key.look_at)),
             ("up", first(|key| key.up)),
         ];
-        let number = |of: fn(&CameraKeyDescription) -> Option<f64>| path.keys.iter().find_map(of).map(Value::from);
+        let number =
+            |value_of: fn(&CameraKeyDescription) -> Option<f64>| path.keys.iter().find_map(value_of).map(Value::from);
         let mut numbers = match camera.get("type").and_then(Value::as_str) {
             Some("orthographic") => vec![("height", number(|key| key.height))],
             Some("panorama") => vec![],
@@ -219,7 +221,7 @@ fn read_parts(parts: &Parts, defines: &mut Defines) -> Result<Option<Result<Desc
     let rest = parts.read_rest();
     let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
     let mut names = BTreeSet::new();
-    let mut found = Collector::default();
+    let mut problems = Collector::default();
     let mut textures: BTreeMap<String, TextureDescription> = BTreeMap::new();
     let mut materials: BTreeMap<String, MaterialDescription> = BTreeMap::new();
     let mut lights: Vec<LightDescription> = Vec::new();
@@ -229,7 +231,7 @@ fn read_parts(parts: &Parts, defines: &mut Defines) -> Result<Option<Result<Desc
     for part in parts.parts.iter() {
         match &rest {
             // Errors are reported in the order of the text.
-            Err(broken) if broken.at < part.place.start => break,
+            Err(fault) if fault.offset < part.range.start => break,
             Ok(rest) if rest.contains_key(part.kind.name()) => return Ok(None),
             _ => {}
         }
@@ -237,16 +239,16 @@ fn read_parts(parts: &Parts, defines: &mut Defines) -> Result<Option<Result<Desc
             return Ok(None);
         };
         let count = counts.entry(part.kind.name()).or_default();
-        let step = name.as_deref().map_or(Segment::Index(*count), Segment::from);
+        let name_or_index = name.as_deref().map_or(Segment::Index(*count), Segment::from);
         *count += 1;
-        let path = [Segment::from(part.kind.name()), step];
-        if let Err(problem) = defines.put(&path, &mut table, |_| false) {
+        let path = [Segment::from(part.kind.name()), name_or_index];
+        if let Err(problem) = defines.apply(&path, &mut table, |_| false) {
             return Ok(Some(Err(problem.into())));
         }
         if let Some(name) = &name
             && !names.insert((part.kind.name(), name.clone()))
         {
-            return parts.twice(name, part).map_or(Ok(None), Err);
+            return parts.duplicate_name(name, part).map_or(Ok(None), Err);
         }
         let read = match (part.kind, name) {
             (Kind::Textures, Some(name)) => tagged(table).map(|value| drop(textures.insert(name, value))),
@@ -257,60 +259,60 @@ fn read_parts(parts: &Parts, defines: &mut Defines) -> Result<Option<Result<Desc
             (Kind::Instances, None) => read(table).map(|value| instances.push(value)),
             _ => return Ok(None),
         };
-        let [kind, step] = path;
-        found.values(read.at(step).at(kind));
+        let [kind, name_or_index] = path;
+        problems.values(read.at(name_or_index).at(kind));
     }
     let has = |kind: Kind| parts.parts.iter().any(|part| part.kind == kind);
     let mut rest = rest?;
     let is_in_parts = |key: &str| Kind::ALL.into_iter().any(|kind| kind.name() == key && has(kind));
-    if let Err(problem) = defines.put(&[], &mut rest, is_in_parts) {
+    if let Err(problem) = defines.apply(&[], &mut rest, is_in_parts) {
         return Ok(Some(Err(problem.into())));
     }
-    if defines.left().is_some() {
-        return Ok(None); // a whole list, or a name or index that does not exist
+    if defines.unapplied().is_some() {
+        return Ok(None); // an override of an entire list, or of a name or index that does not exist
     }
-    let read = both(found.end(()), read_file(rest)).map(|((), mut all)| {
-        // Each section is either in the parts or in the rest.
+    let read = both(problems.end(()), read_file(rest)).map(|((), mut description)| {
+        // The elements of a section are either all in the parts or all in the rest.
         if has(Kind::Textures) {
-            all.textures = textures;
+            description.textures = textures;
         }
         if has(Kind::Materials) {
-            all.materials = materials;
+            description.materials = materials;
         }
         if has(Kind::Lights) {
-            all.lights = lights;
+            description.lights = lights;
         }
         if has(Kind::Shapes) {
-            all.shapes = shapes;
+            description.shapes = shapes;
         }
         if has(Kind::Meshes) {
-            all.meshes = meshes;
+            description.meshes = meshes;
         }
         if has(Kind::Instances) {
-            all.instances = instances;
+            description.instances = instances;
         }
-        all
+        description
     });
     Ok(Some(read))
 }
 
 fn read_map<T>(tables: BTreeMap<String, Table>, read: fn(Table) -> Read<T>) -> Result<BTreeMap<String, T>, Problems> {
-    let mut found = Collector::default();
+    let mut problems = Collector::default();
     let read = |(name, table): (String, Table)| {
-        let value = found.values(read(table).at(name.as_str()))?;
+        let value = problems.values(read(table).at(name.as_str()))?;
         Some((name, value))
     };
     let all = tables.into_iter().filter_map(read).collect();
-    found.end(all)
+    problems.end(all)
 }
 
 fn read_list<T>(tables: Vec<Table>, read: fn(Table) -> Read<T>) -> Result<Vec<T>, Problems> {
-    let mut found = Collector::default();
+    let mut problems = Collector::default();
     let tables = tables.into_iter().enumerate();
     let all = tables
-        .filter_map(|(i, table)| found.values(read(table).at(i)))
+        .filter_map(|(i, table)| problems.values(read(table).at(i)))
         .collect();
-    found.end(all)
+    problems.end(all)
 }
 
 #[cfg(test)]

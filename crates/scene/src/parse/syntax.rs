@@ -16,50 +16,54 @@ pub fn encoding(bytes: &[u8]) -> Option<String> {
     Some(format!("the file is encoded in {name}; save it as UTF-8"))
 }
 
-pub fn syntax_error(text: &str, origin: &str, at: usize, message: &str) -> SceneError {
-    let at = text.floor_char_boundary(at);
+pub fn syntax_error(text: &str, origin: &str, offset: usize, message: &str) -> SceneError {
+    let offset = text.floor_char_boundary(offset);
     SceneError::Syntax {
         origin: origin.to_owned(),
-        line: line_number(text, at),
-        column: text[line_start(text, at)..at].chars().count() + 1,
+        line: line_number(text, offset),
+        column: text[line_start(text, offset)..offset].chars().count() + 1,
         message: escape_control(message).into_owned(),
     }
 }
 
-/// Returns the parser's message about the byte `at`, with a hint for common mistakes, and the line.
-pub fn explained(text: &str, at: usize, message: &str) -> String {
-    let at = text.floor_char_boundary(at);
-    let line = text[line_start(text, at)..].lines().next().unwrap_or_default().trim();
+/// Returns the parser's message about the byte at `offset`, with a hint for common mistakes, and the line.
+pub fn explain(text: &str, offset: usize, message: &str) -> String {
+    let offset = text.floor_char_boundary(offset);
+    let line = text[line_start(text, offset)..]
+        .lines()
+        .next()
+        .unwrap_or_default()
+        .trim();
     let message = message.trim_end_matches(", expected nothing").replace('`', "'");
-    let hint = hint(line, &text[..at], &text[at..]);
+    let hint = hint(line, &text[..offset], &text[offset..]);
     match line.is_empty() {
         true => format!("{message}{hint}"),
         false => format!("{message}{hint}: {}", cut(line)),
     }
 }
 
-fn hint(line: &str, before: &str, rest: &str) -> &'static str {
+fn hint(line: &str, before: &str, after: &str) -> &'static str {
     let follows_digit = before.ends_with(|c: char| c.is_ascii_digit());
     if line.starts_with("//") {
         "; comments start with #"
     } else if before.ends_with('\\') {
         "; write \\\\ for a backslash, use / in paths, or put the string in ' '"
-    } else if before.ends_with('.') || rest.trim_start_matches(['-', '+']).starts_with('.') {
+    } else if before.ends_with('.') || after.trim_start_matches(['-', '+']).starts_with('.') {
         "; a number has digits on both sides of the decimal point"
-    } else if follows_digit && rest.starts_with(',') {
+    } else if follows_digit && after.starts_with(',') {
         "; the decimal separator is a point"
     } else {
         ""
     }
 }
 
-fn line_start(text: &str, at: usize) -> usize {
-    text[..at].rfind('\n').map_or(0, |newline| newline + 1)
+fn line_start(text: &str, offset: usize) -> usize {
+    text[..offset].rfind('\n').map_or(0, |newline| newline + 1)
 }
 
 /// Returns the line of a byte offset, counted from 1.
-pub(super) fn line_number(text: &str, at: usize) -> usize {
-    let newlines = text.bytes().take(at).filter(|&byte| byte == b'\n');
+pub(super) fn line_number(text: &str, offset: usize) -> usize {
+    let newlines = text.bytes().take(offset).filter(|&byte| byte == b'\n');
     1 + newlines.count()
 }
 

@@ -19,8 +19,8 @@ pub(super) fn tagged<T: Tagged>(table: Table) -> Read<T> {
 
 pub(super) fn read<T: DeserializeOwned>(table: Table) -> Read<T> {
     let is_named = |integrator: &Integrator| table.get("integrator").and_then(Value::as_str) == Some(integrator.name());
-    let named = Integrator::ALL.into_iter().find(is_named);
-    read_for(table, named.unwrap_or(Integrator::Phong))
+    let integrator = Integrator::ALL.into_iter().find(is_named);
+    read_for(table, integrator.unwrap_or(Integrator::Phong))
 }
 
 /// Parses a table. The ranges in messages depend on the integrator.
@@ -50,11 +50,11 @@ pub(super) fn read_tagged<T: Tagged>(mut table: Table, default: Option<&str>) ->
     }
 }
 
-/// Parses a table; if it is `tagged`, its key `type` was removed. serde stops at the first error, so the invalid value
-/// is removed and the table is parsed again.
+/// Parses a table. If `is_tagged` is true, the key `type` of the table was removed. serde stops at the first error, so
+/// the invalid value is removed and the table is parsed again.
 fn read_keys<T>(
     mut table: Table,
-    tagged: bool,
+    is_tagged: bool,
     integrator: Integrator,
     read: impl Fn(Table) -> Result<T, ReadError>,
 ) -> Read<T> {
@@ -68,13 +68,13 @@ fn read_keys<T>(
                 error
             }
         };
-        let error = with_names(error, &table, |table| read(table).err());
-        let problem = explain(error, &table, tagged, integrator);
+        let error = list_names(error, &table, |table| read(table).err());
+        let problem = explain(error, &table, is_tagged, integrator);
         let path = problem.key.0.clone();
         let is_missing = find(&table, &path).is_none();
         let is_removed = !is_missing && remove(&mut table, &path) || remove(&mut table, &path[..path.len().min(1)]);
         let found = match problems {
-            Some(found) if is_missing && found.iter().any(|other| explains(&other.key.0, &path)) => found,
+            Some(found) if is_missing && found.iter().any(|problem| explains_missing(&problem.key.0, &path)) => found,
             Some(mut found) => {
                 found.add(problem);
                 found
@@ -88,10 +88,11 @@ fn read_keys<T>(
     }
 }
 
-/// Returns true if a key may be missing because of a different error: its value was removed, or its name is misspelled.
-fn explains(other: &[Segment], missing: &[Segment]) -> bool {
+/// Returns true if a key may be missing because of the error at a different key: the value was removed, or the name is
+/// misspelled.
+fn explains_missing(error_path: &[Segment], missing: &[Segment]) -> bool {
     let table = &missing[..missing.len().saturating_sub(1)];
-    other.starts_with(missing) || other.split_last().is_some_and(|(_, others)| others == table)
+    error_path.starts_with(missing) || error_path.split_last().is_some_and(|(_, parent)| parent == table)
 }
 
 fn find<'a>(table: &'a Table, path: &[Segment]) -> Option<&'a Value> {
@@ -127,8 +128,9 @@ fn show(value: &Value) -> String {
     cut(&value.to_string().replace('\n', " ")).into_owned()
 }
 
-/// Lists the allowed names. serde lists them only if the value is a string, so the value is replaced by a string.
-fn with_names(error: ReadError, table: &Table, read: impl Fn(Table) -> Option<ReadError>) -> ReadError {
+/// Adds the allowed names to an error. serde lists names only if the value is a string, so the value is replaced by a
+/// string.
+fn list_names(error: ReadError, table: &Table, read: impl Fn(Table) -> Option<ReadError>) -> ReadError {
     if !error.inner().message().ends_with(NAMES_EXPECTED) {
         return error;
     }
@@ -154,8 +156,8 @@ fn with_names(error: ReadError, table: &Table, read: impl Fn(Table) -> Option<Re
 /// End of serde's message about a value that must name a variant.
 const NAMES_EXPECTED: &str = ", expected string only";
 
-/// Converts serde's error about `table`; if it is `tagged`, its key `type` was removed.
-fn explain(error: ReadError, table: &Table, tagged: bool, integrator: Integrator) -> Problem {
+/// Converts serde's error about `table`. If `is_tagged` is true, the key `type` of the table was removed.
+fn explain(error: ReadError, table: &Table, is_tagged: bool, integrator: Integrator) -> Problem {
     let mut path = segments(error.path());
     let value = find(table, &path);
     let message = error.inner().message();
@@ -171,8 +173,8 @@ fn explain(error: ReadError, table: &Table, tagged: bool, integrator: Integrator
     let message = if is_unknown_key {
         // The first name is the key.
         let names = quoted(message).into_iter().skip(1);
-        let tag = (tagged && path.len() == 1).then(|| "type".to_owned());
-        let names: Vec<String> = tag.into_iter().chain(names).collect();
+        let type_key = (is_tagged && path.len() == 1).then(|| "type".to_owned());
+        let names: Vec<String> = type_key.into_iter().chain(names).collect();
         let hint = match path.last() {
             Some(Segment::Key(wrong)) => suggest::hint(wrong, names.iter().map(String::as_str)),
             _ => String::new(),
@@ -194,7 +196,7 @@ fn explain(error: ReadError, table: &Table, tagged: bool, integrator: Integrator
         let rule = match expected {
             "f64" => "a number",
             "a boolean" => "true or false",
-            "u32" => &whole(path.last(), integrator),
+            "u32" => &integer_rule(path.last(), integrator),
             "a sequence of 3 f64 values" => "a list of 3 numbers",
             "an array of length 2" => "a list of 2 numbers",
             "an array of length 3" => "a list of 3 points",
@@ -226,17 +228,17 @@ fn explain(error: ReadError, table: &Table, tagged: bool, integrator: Integrator
 }
 
 pub fn segments(path: &serde_path_to_error::Path) -> Vec<Segment> {
-    use serde_path_to_error::Segment as Step;
-    let steps = path.iter().filter_map(|segment| match segment {
-        Step::Map { key } => Some(Segment::Key(key.clone())),
-        Step::Seq { index } => Some(Segment::Index(*index)),
-        Step::Enum { .. } | Step::Unknown => None,
+    use serde_path_to_error::Segment as PathSegment;
+    let segments = path.iter().filter_map(|segment| match segment {
+        PathSegment::Map { key } => Some(Segment::Key(key.clone())),
+        PathSegment::Seq { index } => Some(Segment::Index(*index)),
+        PathSegment::Enum { .. } | PathSegment::Unknown => None,
     });
-    steps.collect()
+    segments.collect()
 }
 
 /// Returns the rule for an integer key, without limits that depend on other keys.
-fn whole(key: Option<&Segment>, integrator: Integrator) -> String {
+fn integer_rule(key: Option<&Segment>, integrator: Integrator) -> String {
     if key == Some(&Segment::from("blades")) {
         return format!("0 or a whole number from {} to {}", BLADES.0, BLADES.1);
     }

@@ -1,4 +1,4 @@
-//! Tests of the errors of invalid text, and of the page on the format.
+//! Tests of the errors of invalid text, and of the page `docs/scene-format.md`.
 
 use std::path::Path;
 
@@ -29,7 +29,7 @@ fn message(text: &str) -> String {
 #[test]
 fn invalid_text_is_reported_with_its_line() {
     Scene::parse(START, "s.toml").unwrap();
-    // The appended text, the line of the error in it, and the message.
+    // The appended text, the line of the error in the appended text, and the message.
     for (added, line, rule) in [
         (
             "far = 3",
@@ -289,9 +289,9 @@ fn invalid_toml_is_reported_with_line_and_column() {
 #[test]
 fn truncated_scenes_do_not_panic() {
     let text = include_str!("../../../../scenes/cornell.toml");
-    let good = |end: usize| Scene::parse(&text[..end], "s.toml").is_ok();
+    let is_valid = |end: usize| Scene::parse(&text[..end], "s.toml").is_ok();
     let count = (0..text.len())
-        .filter(|&end| text.is_char_boundary(end) && good(end))
+        .filter(|&end| text.is_char_boundary(end) && is_valid(end))
         .count();
     assert!(count > 0 && count < text.len());
 }
@@ -315,7 +315,11 @@ fn a_scene_written_and_read_back_is_the_same() {
             path.display()
         );
         description.validate_with(&Assets::beside(Path::new(folder))).unwrap();
-        assert!(text.starts_with("# "), "{} does not say what it shows", path.display());
+        assert!(
+            text.starts_with("# "),
+            "{}: the first line must describe the scene",
+            path.display()
+        );
         count += 1;
     }
     assert!(count >= 4);
@@ -343,8 +347,8 @@ fn rows(heading: &str) -> Vec<&'static str> {
     names.collect()
 }
 
-/// Checks that the rows of the page are the keys that are allowed at the end of the text. The allowed keys are taken
-/// from the error message for an unknown key.
+/// Checks that the rows of a section of the page are the keys that are allowed at the end of the text. The allowed keys
+/// are taken from the error message for an unknown key.
 fn check_keys(text: &str, heading: &str) {
     let message = message(&format!("{text}\n'?' = 1"));
     let (_, keys) = message
@@ -395,16 +399,16 @@ fn the_page_has_the_defaults_of_a_render() {
         .filter(|(_, default)| default != "none")
         .map(|(key, default)| format!("{key} = {default}\n"))
         .collect();
-    // In the default description, keys of the path integrator have no value.
-    let (text, of_paths) = text.split_at(text.find("rr_depth").unwrap());
+    // In the default description, keys of the path tracer have no value.
+    let (text, path_keys) = text.split_at(text.find("rr_depth").unwrap());
     let written: RenderDescription = toml::from_str(text).unwrap();
     assert_eq!(written, RenderDescription::default());
-    assert_eq!(of_paths.lines().count(), 2, "{of_paths}");
+    assert_eq!(path_keys.lines().count(), 2, "{path_keys}");
     let scene = |lines: &str| {
         let text = format!("{START}[render]\nintegrator = 'path'\n{lines}");
         Scene::parse(&text, "s.toml").unwrap()
     };
-    assert_eq!(scene(of_paths).render, scene("").render);
+    assert_eq!(scene(path_keys).render, scene("").render);
 }
 
 #[test]
@@ -422,7 +426,7 @@ fn the_page_has_every_pattern() {
 
 #[test]
 #[should_panic(expected = "under ## `[image]`")]
-fn a_key_that_is_not_in_the_page_is_noticed() {
+fn a_key_that_is_missing_in_the_page_is_noticed() {
     check_keys(&format!("{START}[render]"), "## `[image]`");
 }
 
@@ -522,14 +526,14 @@ fn default_tangents_are_along_x_or_y() {
 
 #[test]
 fn misspelled_names_get_suggestions() {
-    let error_of = |more: &str| {
+    let error_of = |extra: &str| {
         let text = format!(
             "image = {{ width = 4, height = 4 }}\ncamera = {{ position = [0, -3, 1], look_at = [0, 0, 1], fov = 45 }}\n\
-             materials.yellow = {{ type = 'mirror' }}\n{more}"
+             materials.yellow = {{ type = 'mirror' }}\n{extra}"
         );
         Scene::parse(&text, "s.toml").unwrap_err().to_string()
     };
-    for (more, message) in [
+    for (extra, message) in [
         (
             "materials.b = { type = 'mirror', tnt = [1, 1, 1] }",
             "s.toml:4: materials.b.tnt: unknown key; did you mean \"tint\"?",
@@ -540,7 +544,7 @@ fn misspelled_names_get_suggestions() {
             "s.toml:4: shapes[0].material: there is no material \"yellwo\"; did you mean \"yellow\"?",
         ),
     ] {
-        assert_eq!(error_of(more), message);
+        assert_eq!(error_of(extra), message);
     }
     let message = error_of("shapes = [{ type = 'spher' }]");
     assert!(message.ends_with("\"gltf\"; did you mean \"sphere\"?"), "{message}");

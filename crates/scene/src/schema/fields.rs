@@ -7,7 +7,7 @@ use serde_json::{Value as Json, json};
 use toml::{Table, Value};
 
 use super::range::{Slider, gap_of, range_of, slider};
-use super::{SPLIT, definition, of_files};
+use super::{TITLE_SEPARATOR, definition, file_schema};
 use crate::CameraDescription;
 use crate::key_path::{KeyPath, Segment, cut};
 
@@ -86,8 +86,9 @@ pub struct Names {
     pub meshes: Vec<String>,
 }
 
+/// Maximum number of names in [`Field::choices`].
 const MAX_CHOICES: usize = 200;
-/// In a list of lists or tables, maximum number of elements that get fields.
+/// Maximum number of elements with fields in a list of lists or tables.
 const MAX_ELEMENTS: usize = 32;
 
 impl Names {
@@ -97,11 +98,11 @@ impl Names {
             Segment::Key(key) => Some(key.clone()),
             Segment::Index(_) => None,
         };
-        let [.., around, last] = path.0.as_slice() else {
+        let [.., parent, last] = path.0.as_slice() else {
             return None;
         };
         // In a table `materials` of a shape, every value is the name of a material.
-        if path.0.len() > 2 && key(around).as_deref() == Some("materials") {
+        if path.0.len() > 2 && key(parent).as_deref() == Some("materials") {
             return Some("materials");
         }
         match key(last).as_deref() {
@@ -112,7 +113,8 @@ impl Names {
         }
     }
 
-    fn of(&self, path: &[Segment]) -> Option<&[String]> {
+    /// Returns the allowed names of a key.
+    fn allowed(&self, path: &[Segment]) -> Option<&[String]> {
         match Names::section(&KeyPath(path.to_vec()))? {
             "materials" => Some(&self.materials),
             "textures" => Some(&self.textures),
@@ -124,17 +126,17 @@ impl Names {
 /// Returns the fields of an object (`[shapes, 3]`, `[camera]`) with this table; no fields for other values.
 pub fn fields(object: &KeyPath, table: &Value, names: &Names) -> Vec<Field> {
     static SCHEMA: OnceLock<Json> = OnceLock::new();
-    let whole = SCHEMA.get_or_init(of_files);
-    let Some(schema) = schema_of(whole, object, table) else {
+    let root = SCHEMA.get_or_init(file_schema);
+    let Some(schema) = schema_of(root, object, table) else {
         return Vec::new();
     };
-    let mut found = FieldList {
+    let mut list = FieldList {
         names,
-        object: object.0.len(),
+        object_len: object.0.len(),
         fields: Vec::new(),
     };
     let mut path = object.0.clone();
-    found.look(
+    list.add_value(
         schema,
         &mut path,
         &FieldContext {
@@ -144,19 +146,19 @@ pub fn fields(object: &KeyPath, table: &Value, names: &Names) -> Vec<Field> {
             about: "",
         },
     );
-    found.fields
+    list.fields
 }
 
 /// Returns the schema of an object, according to its `type`.
-fn schema_of<'a>(whole: &'a Json, object: &KeyPath, table: &Value) -> Option<&'a Json> {
+fn schema_of<'a>(root: &'a Json, object: &KeyPath, table: &Value) -> Option<&'a Json> {
     let Segment::Key(section) = object.0.first()? else {
         return None;
     };
-    let of_section = whole.get("properties")?.get(section)?;
+    let section_schema = root.get("properties")?.get(section)?;
     let schema = match object.0.get(1) {
-        None => of_section,
-        Some(Segment::Index(_)) => of_section.get("items")?,
-        Some(Segment::Key(_)) => of_section.get("additionalProperties")?,
+        None => section_schema,
+        Some(Segment::Index(_)) => section_schema.get("items")?,
+        Some(Segment::Key(_)) => section_schema.get("additionalProperties")?,
     };
     if schema.get("allOf").is_none() {
         return Some(schema);
@@ -165,7 +167,7 @@ fn schema_of<'a>(whole: &'a Json, object: &KeyPath, table: &Value) -> Option<&'a
         Some(tag) => tag.as_str()?,
         None => CameraDescription::DEFAULT,
     };
-    whole.get("$defs")?.get(definition(section.trim_end_matches('s'), tag))
+    root.get("$defs")?.get(definition(section.trim_end_matches('s'), tag))
 }
 
 struct FieldContext<'a> {
@@ -178,29 +180,29 @@ struct FieldContext<'a> {
 struct FieldList<'a> {
     names: &'a Names,
     /// Length of the object's path.
-    object: usize,
+    object_len: usize,
     fields: Vec<Field>,
 }
 
 impl FieldList<'_> {
-    fn look(&mut self, schema: &Json, path: &mut Vec<Segment>, place: &FieldContext) {
+    fn add_value(&mut self, schema: &Json, path: &mut Vec<Segment>, context: &FieldContext) {
         let mut branches = Vec::new();
         alternatives(schema, &mut branches);
-        let Some(chosen) = choose(&branches, place) else {
+        let Some(chosen) = choose(&branches, context) else {
             return;
         };
         let about = match schema.get("description").and_then(Json::as_str) {
-            Some(own) => own,
-            None => place.about,
+            Some(description) => description,
+            None => context.about,
         };
-        let place = FieldContext { about, ..*place };
+        let context = FieldContext { about, ..*context };
         match chosen.get("type").and_then(Json::as_str) {
-            Some("object") => self.look_into(chosen, path, &place),
-            Some("array") => self.look_at_list(chosen, path, &place),
-            Some("number") => self.add(Kind::Number, chosen, path, &place),
-            Some("integer") => self.add(Kind::Whole, chosen, path, &place),
-            Some("boolean") => self.add(Kind::Switch, chosen, path, &place),
-            Some("string") => self.add(Kind::Text, chosen, path, &place),
+            Some("object") => self.add_table(chosen, path, &context),
+            Some("array") => self.add_list(chosen, path, &context),
+            Some("number") => self.add_field(Kind::Number, chosen, path, &context),
+            Some("integer") => self.add_field(Kind::Whole, chosen, path, &context),
+            Some("boolean") => self.add_field(Kind::Switch, chosen, path, &context),
+            Some("string") => self.add_field(Kind::Text, chosen, path, &context),
             _ => {}
         }
         // A number that may also be arbitrary text has no slider.
@@ -214,58 +216,61 @@ impl FieldList<'_> {
         }
     }
 
-    fn look_into(&mut self, schema: &Json, path: &mut Vec<Segment>, place: &FieldContext) {
-        let table = place.value.and_then(Value::as_table);
+    fn add_table(&mut self, schema: &Json, path: &mut Vec<Segment>, context: &FieldContext) {
+        let table = context.value.and_then(Value::as_table);
         let required = required_keys(schema, table);
-        for (key, of_key) in schema.get("properties").and_then(Json::as_object).into_iter().flatten() {
-            if of_key.get("const").is_some() {
+        for (key, key_schema) in schema.get("properties").and_then(Json::as_object).into_iter().flatten() {
+            if key_schema.get("const").is_some() {
                 continue; // `type`
             }
             // A missing table can only be created if a single key suffices.
             if table.is_none() && required.iter().any(|name| name != key) {
                 continue;
             }
-            let default = match (of_key.get("default"), place.default) {
-                (_, Some(whole)) if table.is_none() => whole.get(key).or(of_key.get("default")),
-                (own, _) => own,
+            let default = match (key_schema.get("default"), context.default) {
+                (_, Some(table_default)) if table.is_none() => table_default.get(key).or(key_schema.get("default")),
+                (key_default, _) => key_default,
             };
             path.push(Segment::from(key.as_str()));
-            let place = FieldContext {
+            let context = FieldContext {
                 value: table.and_then(|table| table.get(key)),
                 default,
                 required: table.is_some() && required.contains(&key.as_str()),
                 about: "",
             };
-            self.look(of_key, path, &place);
+            self.add_value(key_schema, path, &context);
             path.pop();
         }
-        if let Some(of_key) = schema.get("additionalProperties").filter(|of_key| of_key.is_object()) {
+        if let Some(key_schema) = schema
+            .get("additionalProperties")
+            .filter(|key_schema| key_schema.is_object())
+        {
             for (key, value) in table.into_iter().flatten().take(MAX_ELEMENTS) {
                 path.push(Segment::from(key.as_str()));
-                let place = FieldContext {
+                let context = FieldContext {
                     value: Some(value),
                     default: None,
                     required: false,
-                    about: place.about,
+                    about: context.about,
                 };
-                self.look(of_key, path, &place);
+                self.add_value(key_schema, path, &context);
                 path.pop();
             }
         }
     }
 
-    fn look_at_list(&mut self, schema: &Json, path: &mut Vec<Segment>, place: &FieldContext) {
+    fn add_list(&mut self, schema: &Json, path: &mut Vec<Segment>, context: &FieldContext) {
         let Some(items) = schema.get("items") else { return };
         if let Some("number" | "integer") = items.get("type").and_then(Json::as_str) {
-            let is_color = kind_of(schema).0.starts_with(COLOR);
+            let is_color = kind_of(schema).0.starts_with(COLOR_LABEL);
             let kind = if is_color { Kind::Color } else { Kind::Vector };
-            return self.add(kind, schema, path, place);
+            return self.add_field(kind, schema, path, context);
         }
-        let elements = place.value.and_then(Value::as_array);
+        let elements = context.value.and_then(Value::as_array);
         for (i, value) in elements.into_iter().flatten().enumerate().take(MAX_ELEMENTS) {
             path.push(Segment::from(i));
-            let about = place.about;
-            self.look(
+            let about = context.about;
+            self.add_value(
                 items,
                 path,
                 &FieldContext {
@@ -279,11 +284,11 @@ impl FieldList<'_> {
         }
     }
 
-    fn add(&mut self, kind: Kind, schema: &Json, path: &[Segment], place: &FieldContext) {
+    fn add_field(&mut self, kind: Kind, schema: &Json, path: &[Segment], context: &FieldContext) {
         let key = KeyPath(path.to_vec());
         let numbers = schema.get("items").unwrap_or(schema);
-        let value = place.value.map(json_of);
-        let length = match value.as_ref().or(place.default).and_then(Json::as_array) {
+        let value = context.value.map(json_of);
+        let length = match value.as_ref().or(context.default).and_then(Json::as_array) {
             Some(list) => list.len(),
             None => schema.get("minItems").and_then(Json::as_u64).unwrap_or(1) as usize,
         };
@@ -297,49 +302,49 @@ impl FieldList<'_> {
             ),
             None if kind == Kind::Text => self
                 .names
-                .of(path)
+                .allowed(path)
                 .map(|names| names.iter().take(MAX_CHOICES).cloned().collect()),
             None => None,
         };
         let is_choice = choices.is_some();
         if value.is_none() && choices.as_ref().is_some_and(Vec::is_empty) {
-            return; // no target exists
+            return; // no name exists to which the key could refer
         }
         let kind = if is_choice { Kind::Choice } else { kind };
         let mut choices = choices.unwrap_or_default();
-        if let (true, Some(Json::String(own))) = (is_choice, &value)
-            && !choices.contains(own)
+        if let (true, Some(Json::String(name))) = (is_choice, &value)
+            && !choices.contains(name)
         {
-            choices.insert(0, own.clone());
+            choices.insert(0, name.clone());
         }
         let unit = unit_of(schema);
         let is_number = matches!(kind, Kind::Number | Kind::Whole | Kind::Color | Kind::Vector);
         let range = is_number.then(|| range_of(numbers)).flatten();
         let gap = is_number.then(|| gap_of(numbers)).flatten();
-        let now = value.as_ref().or(place.default);
+        let current = value.as_ref().or(context.default);
         let slider = match kind {
-            Kind::Number | Kind::Whole => slider(numbers, kind == Kind::Whole, unit, now.and_then(Json::as_f64)),
+            Kind::Number | Kind::Whole => slider(numbers, kind == Kind::Whole, unit, current.and_then(Json::as_f64)),
             Kind::Color if is_emitter_color(path) => {
-                let list = now.and_then(Json::as_array).into_iter().flatten();
+                let list = current.and_then(Json::as_array).into_iter().flatten();
                 slider(numbers, false, unit, list.filter_map(Json::as_f64).reduce(f64::max))
             }
             _ => None,
         };
         self.fields.push(Field {
             path: key.exact(),
-            name: KeyPath(path[self.object..].to_vec()).exact(),
+            name: KeyPath(path[self.object_len..].to_vec()).exact(),
             kind,
             length,
             value,
-            default: place.default.cloned(),
+            default: context.default.cloned(),
             unit,
             range,
             gap,
             squares: false,
             slider,
             choices,
-            about: place.about.to_owned(),
-            required: place.required,
+            about: context.about.to_owned(),
+            required: context.required,
             fixed: (kind == Kind::Text).then(|| FREE_TEXT.to_owned()),
         });
     }
@@ -369,7 +374,7 @@ fn required_keys<'a>(schema: &'a Json, table: Option<&Table>) -> Vec<&'a str> {
     required
 }
 
-/// The reason why text cannot be edited: it may be a file name.
+/// The reason why text cannot be edited: the text may be a file name.
 const FREE_TEXT: &str = "names and files can only be changed in the scene file";
 
 impl Field {
@@ -378,57 +383,57 @@ impl Field {
     /// # Errors
     ///
     /// The value has the wrong kind. Ranges are validated together with the scene.
-    pub fn value_of(&self, given: &Json, names: &Names) -> Result<Value, String> {
-        if let Some(why) = &self.fixed {
-            return Err(why.clone());
+    pub fn value_of(&self, edited: &Json, names: &Names) -> Result<Value, String> {
+        if let Some(reason) = &self.fixed {
+            return Err(reason.clone());
         }
-        let number = |given: &Json| given.as_f64().filter(|x| x.is_finite()).map(Value::from);
+        let number = |edited: &Json| edited.as_f64().filter(|x| x.is_finite()).map(Value::from);
         let found = match self.kind {
-            Kind::Number => number(given).ok_or("a number".to_owned()),
+            Kind::Number => number(edited).ok_or("a number".to_owned()),
             Kind::Whole => {
-                let whole = given.as_i64().or(given
+                let integer = edited.as_i64().or(edited
                     .as_f64()
                     .filter(|x| x.fract() == 0.0 && x.abs() < 1e15)
                     .map(|x| x as i64));
-                whole.map(Value::from).ok_or("a whole number".to_owned())
+                integer.map(Value::from).ok_or("a whole number".to_owned())
             }
             Kind::Color | Kind::Vector => {
-                let list = given.as_array().filter(|list| list.len() == self.length);
+                let list = edited.as_array().filter(|list| list.len() == self.length);
                 let list = list.and_then(|list| list.iter().map(number).collect::<Option<Vec<Value>>>());
                 list.map(Value::from)
                     .ok_or(format!("a list of {} numbers", self.length))
             }
-            Kind::Switch => given.as_bool().map(Value::from).ok_or("true or false".to_owned()),
+            Kind::Switch => edited.as_bool().map(Value::from).ok_or("true or false".to_owned()),
             Kind::Choice | Kind::Text => {
                 let path = self.path.parse::<KeyPath>().map_err(|problem| problem.to_string())?;
                 let is_known = |text: &&str| {
                     let is_name = names
-                        .of(&path.0)
+                        .allowed(&path.0)
                         .is_some_and(|names| names.iter().any(|name| name == text));
                     is_name || self.choices.iter().any(|choice| choice == text)
                 };
-                let text = given.as_str().filter(is_known);
+                let text = edited.as_str().filter(is_known);
                 text.map(Value::from).ok_or("one of the allowed names".to_owned())
             }
         };
-        found.map_err(|rule| format!("{} must be {rule}", cut(&given.to_string())))
+        found.map_err(|rule| format!("{} must be {rule}", cut(&edited.to_string())))
     }
 }
 
 fn alternatives<'a>(schema: &'a Json, found: &mut Vec<&'a Json>) {
     match (schema.get("type"), schema.get("anyOf").and_then(Json::as_array)) {
-        (None, Some(all)) => all.iter().for_each(|one| alternatives(one, found)),
+        (None, Some(all)) => all.iter().for_each(|alternative| alternatives(alternative, found)),
         _ => found.push(schema),
     }
 }
 
 /// Returns the alternative that matches the value or its default; otherwise, the first alternative.
-fn choose<'a>(branches: &[&'a Json], place: &FieldContext) -> Option<&'a Json> {
-    let named = |branch: &Json, names: &[&str]| {
+fn choose<'a>(branches: &[&'a Json], context: &FieldContext) -> Option<&'a Json> {
+    let has_type = |branch: &Json, names: &[&str]| {
         let name = branch.get("type").and_then(Json::as_str);
         name.is_some_and(|name| names.contains(&name))
     };
-    let types: &[&str] = match (place.value, place.default) {
+    let types: &[&str] = match (context.value, context.default) {
         (Some(Value::Table(_)), _) => &["object"],
         (Some(Value::Array(_)), _) => &["array"],
         (Some(Value::Integer(_)), _) => &["number", "integer"],
@@ -442,20 +447,20 @@ fn choose<'a>(branches: &[&'a Json], place: &FieldContext) -> Option<&'a Json> {
         (None, Some(Json::Bool(_))) => &["boolean"],
         (None, _) => return branches.first().copied(),
     };
-    branches.iter().find(|branch| named(branch, types)).copied()
+    branches.iter().find(|branch| has_type(branch, types)).copied()
 }
 
-/// Start of the description of a color kind.
-const COLOR: &str = "linear red";
+/// Start of the label of a color kind.
+const COLOR_LABEL: &str = "linear red";
 
-/// Returns the description of a kind, and its range.
+/// Returns the label and the range of a kind.
 fn kind_of(schema: &Json) -> (&str, &str) {
     let title = schema.get("title").and_then(Json::as_str).unwrap_or_default();
-    title.split_once(SPLIT).unwrap_or((title, ""))
+    title.split_once(TITLE_SEPARATOR).unwrap_or((title, ""))
 }
 
 fn unit_of(schema: &Json) -> Option<&'static str> {
-    let (words, _) = kind_of(schema);
+    let (label, _) = kind_of(schema);
     let units = [
         ("degrees", "°"),
         ("pixels", "px"),
@@ -467,11 +472,11 @@ fn unit_of(schema: &Json) -> Option<&'static str> {
     ];
     units
         .into_iter()
-        .find(|(word, _)| words.contains(word))
+        .find(|(word, _)| label.contains(word))
         .map(|(_, unit)| unit)
 }
 
-/// Returns true for colors of emitters, which are not limited to 1.
+/// Returns true for colors of emitters, whose components may exceed 1.
 fn is_emitter_color(path: &[Segment]) -> bool {
     let is_any = |segment: Option<&Segment>, names: &[&str]| match segment {
         Some(Segment::Key(key)) => names.contains(&key.as_str()),

@@ -13,16 +13,16 @@ pub struct Slider {
     pub logarithmic: bool,
 }
 
-/// Distance between displayed ends and excluded ends of a range, relative to the width of the range.
-const INSIDE: f64 = 1e-3;
+/// Distance between the excluded end and the displayed end of a range, relative to the width of the range.
+const END_GAP: f64 = 1e-3;
 
 fn ends(schema: &Json) -> Option<(f64, f64)> {
-    if let Some(only) = schema.get("const").and_then(Json::as_f64) {
-        return Some((only, only));
+    if let Some(constant) = schema.get("const").and_then(Json::as_f64) {
+        return Some((constant, constant));
     }
     let end = |name: &str| schema.get(name).and_then(Json::as_f64);
     match (end("exclusiveMinimum"), end("exclusiveMaximum")) {
-        (Some(low), Some(high)) => Some((low + INSIDE * (high - low), high - INSIDE * (high - low))),
+        (Some(low), Some(high)) => Some((low + END_GAP * (high - low), high - END_GAP * (high - low))),
         _ => Some((end("minimum")?, end("maximum")?)),
     }
 }
@@ -46,22 +46,22 @@ pub(super) fn gap_of(schema: &Json) -> Option<(f64, f64)> {
 }
 
 /// Maximum width of a range for a linear slider.
-const WIDE: f64 = 1000.0;
+const MAX_LINEAR_WIDTH: f64 = 1000.0;
 /// Minimum ratio of the ends of a range for a logarithmic slider.
-const RATIO: f64 = 50.0;
+const MIN_LOGARITHMIC_RATIO: f64 = 50.0;
 /// Maximum factor between the value and an end of the range.
-const FACTOR: f64 = 100.0;
+const MAX_FACTOR: f64 = 100.0;
 
-pub(super) fn slider(schema: &Json, is_whole: bool, unit: Option<&str>, now: Option<f64>) -> Option<Slider> {
-    let at = now.unwrap_or(0.0);
+pub(super) fn slider(schema: &Json, is_integer: bool, unit: Option<&str>, current: Option<f64>) -> Option<Slider> {
+    let value = current.unwrap_or(0.0);
     let ranges = ranges(schema);
-    let (low, high) = match ranges.iter().find(|(low, high)| (*low..=*high).contains(&at)) {
+    let (low, high) = match ranges.iter().find(|(low, high)| (*low..=*high).contains(&value)) {
         Some(range) if range.0 < range.1 => *range,
         _ => range_of(schema)?,
     };
     let linear = |from: f64, to: f64| {
         let step = 10f64.powf(((to - from) / 100.0).log10().floor());
-        let step = if is_whole { step.max(1.0) } else { step };
+        let step = if is_integer { step.max(1.0) } else { step };
         Some(Slider {
             from,
             to,
@@ -69,9 +69,9 @@ pub(super) fn slider(schema: &Json, is_whole: bool, unit: Option<&str>, now: Opt
             logarithmic: false,
         })
     };
-    if low > 0.0 && high / low >= RATIO && unit != Some("°") {
-        let around = if at > 0.0 { at } else { 1.0 };
-        let (from, to) = ((around / FACTOR).max(low), (around * FACTOR).min(high));
+    if low > 0.0 && high / low >= MIN_LOGARITHMIC_RATIO && unit != Some("°") {
+        let center = if value > 0.0 { value } else { 1.0 };
+        let (from, to) = ((center / MAX_FACTOR).max(low), (center * MAX_FACTOR).min(high));
         return Some(Slider {
             from,
             to,
@@ -79,12 +79,12 @@ pub(super) fn slider(schema: &Json, is_whole: bool, unit: Option<&str>, now: Opt
             logarithmic: true,
         });
     }
-    if high - low <= WIDE {
+    if high - low <= MAX_LINEAR_WIDTH {
         return linear(low, high);
     }
-    let least = if is_whole { 10.0 } else { 1.0 };
-    let reach = round_up((4.0 * at.abs()).max(least));
-    linear(low.max(-reach), high.min(reach))
+    let min_end = if is_integer { 10.0 } else { 1.0 };
+    let end = round_up((4.0 * value.abs()).max(min_end));
+    linear(low.max(-end), high.min(end))
 }
 
 /// Rounds up to 1, 2 or 5 times a power of ten.

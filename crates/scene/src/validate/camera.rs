@@ -2,14 +2,14 @@
 
 use glam::DVec3;
 
-use super::{Checked, FLATTEST, between, check, length, number, point, show, unit};
+use super::{Checked, MIN_SINE, between, check, length, number, point, show, unit};
 use crate::camera_path::CameraPath;
 use crate::limits::{APERTURES, BLADES, F_NUMBERS, FOVS, FRAMES, LENGTHS, TURNS};
 use crate::problem::{At, Collector, Problem, Problems, both};
 use crate::{Camera, CameraDescription, CameraKeyDescription, Lens, PerspectiveDescription, Projection};
 
-/// Minimum distance between keys in frames; keeps slopes finite.
-const CLOSEST: f64 = 1e-6;
+/// Minimum distance between keys in frames, which keeps slopes finite.
+const MIN_KEY_DISTANCE: f64 = 1e-6;
 /// Up vector of a vertical view along the default `up`.
 const VERTICAL_UP: DVec3 = DVec3::Y;
 
@@ -46,9 +46,9 @@ fn camera(description: &CameraDescription, vertical_up: DVec3) -> Result<Camera,
         .at("look_at")?;
         let distance = forward.length();
         let forward = forward.normalize();
-        let is_vertical = up == DVec3::Z && forward.cross(up).length() <= FLATTEST;
+        let is_vertical = up == DVec3::Z && forward.cross(up).length() <= MIN_SINE;
         let right = forward.cross(if is_vertical { vertical_up } else { up });
-        check(right.length() > FLATTEST, || {
+        check(right.length() > MIN_SINE, || {
             let (look_at, up) = (show(look_at), show(up));
             format!("{look_at} makes the view parallel to up, {up}; choose another up")
         })
@@ -82,27 +82,27 @@ fn camera(description: &CameraDescription, vertical_up: DVec3) -> Result<Camera,
     })
 }
 
-/// Returns the lens of a camera, not yet focused.
+/// Returns the lens of a camera. The caller sets the focus distance.
 fn lens_of(camera: &PerspectiveDescription) -> Result<Option<Lens>, Problems> {
-    let mut found = Collector::default();
-    let focal_length = found.or_default(length(camera.focal_length).at("focal_length"));
+    let mut problems = Collector::default();
+    let focal_length = problems.or_default(length(camera.focal_length).at("focal_length"));
     let f_number = camera.f_number.map(|f_number| {
         check(camera.aperture.is_none(), || {
             "cannot be combined with aperture: both set the diameter of the lens".to_owned()
         })?;
         between(f_number, F_NUMBERS)
     });
-    let f_number = found.or_default(f_number.transpose().at("f_number"));
-    let aperture = found.or_default(camera.aperture.map(aperture).transpose().at("aperture"));
-    found.value(camera.focus_distance.map(length).transpose().at("focus_distance"));
+    let f_number = problems.or_default(f_number.transpose().at("f_number"));
+    let aperture = problems.or_default(camera.aperture.map(aperture).transpose().at("aperture"));
+    problems.value(camera.focus_distance.map(length).transpose().at("focus_distance"));
     let blades = camera.blades;
-    let valid = check(blades == 0 || (BLADES.0..=BLADES.1).contains(&blades), || {
+    let checked = check(blades == 0 || (BLADES.0..=BLADES.1).contains(&blades), || {
         format!("{blades} must be 0 or a whole number from {} to {}", BLADES.0, BLADES.1)
     });
-    found.value(valid.at("blades"));
-    let rotation = found.or_default(between(camera.blade_rotation, TURNS).at("blade_rotation"));
+    problems.value(checked.at("blades"));
+    let rotation = problems.or_default(between(camera.blade_rotation, TURNS).at("blade_rotation"));
     let diameter = aperture.or(f_number.map(|n| focal_length / n)).unwrap_or(0.0);
-    found.end((diameter > 0.0).then(|| Lens {
+    problems.end((diameter > 0.0).then(|| Lens {
         radius: diameter / 2.0,
         focus: 1.0,
         blades,
@@ -119,29 +119,29 @@ pub(super) fn with_path(description: &CameraDescription) -> Result<(Camera, Opti
     let Some(path) = description.path() else {
         return Ok((camera(description, VERTICAL_UP)?, None));
     };
-    let mut found = Collector::default();
-    found.value(check(!path.keys.is_empty(), || {
+    let mut problems = Collector::default();
+    problems.value(check(!path.keys.is_empty(), || {
         "[] must have at least one key".to_owned()
     }));
-    let mut before = None;
-    for (i, each) in path.keys.iter().enumerate() {
-        found.value(key(each, description, before).at(i));
-        before = Some(each.frame);
+    let mut frame_before = None;
+    for (i, key) in path.keys.iter().enumerate() {
+        problems.value(check_key(key, description, frame_before).at(i));
+        frame_before = Some(key.frame);
     }
     // Errors in keys are returned first, because the camera may use the values of keys.
-    found.end(()).at("keys").at("path")?;
-    let still = camera(description, VERTICAL_UP)?;
-    let moving = CameraPath::of(description);
-    if let Some(moving) = &moving {
+    problems.end(()).at("keys").at("path")?;
+    let camera = camera(description, VERTICAL_UP)?;
+    let camera_path = CameraPath::of(description);
+    if let Some(camera_path) = &camera_path {
         for key in &path.keys {
-            moving.at(key.frame)?;
+            camera_path.at(key.frame)?;
         }
     }
-    Ok((still, moving))
+    Ok((camera, camera_path))
 }
 
-/// Validates a key; its frame must be greater than the frame of the previous key.
-fn key(key: &CameraKeyDescription, camera: &CameraDescription, before: Option<f64>) -> Checked<()> {
+/// Validates a key. The frame of the key must be greater than the frame of the previous key.
+fn check_key(key: &CameraKeyDescription, camera: &CameraDescription, frame_before: Option<f64>) -> Checked<()> {
     let CameraKeyDescription {
         frame,
         position,
@@ -153,29 +153,29 @@ fn key(key: &CameraKeyDescription, camera: &CameraDescription, before: Option<f6
         focus_distance,
     } = *key;
     between(frame, FRAMES).at("frame")?;
-    if let Some(before) = before {
-        check(frame - before >= CLOSEST, || {
-            let (frame, before, least) = (number(frame), number(before), number(CLOSEST));
-            format!("{frame} must be greater than the frame of the previous key, {before}, by at least {least}")
+    if let Some(frame_before) = frame_before {
+        check(frame - frame_before >= MIN_KEY_DISTANCE, || {
+            let (frame, frame_before, min) = (number(frame), number(frame_before), number(MIN_KEY_DISTANCE));
+            format!("{frame} must be greater than the frame of the previous key, {frame_before}, by at least {min}")
         })
         .at("frame")?;
     }
-    let own: &[&str] = match camera {
+    let type_keys: &[&str] = match camera {
         CameraDescription::Perspective(_) => &["fov", "aperture", "focus_distance"],
         CameraDescription::Orthographic(_) => &["height"],
         CameraDescription::Panorama(_) => &[],
     };
-    for (name, is_there) in [
+    for (name, is_set) in [
         ("fov", fov.is_some()),
         ("height", height.is_some()),
         ("aperture", diameter.is_some()),
         ("focus_distance", focus_distance.is_some()),
     ] {
-        check(!is_there || own.contains(&name), || match own {
+        check(!is_set || type_keys.contains(&name), || match type_keys {
             [] => "does not apply to a camera of this type".to_owned(),
-            own => format!(
+            type_keys => format!(
                 "does not apply to a camera of this type, which has {}",
-                all_of(own, "and")
+                join_names(type_keys, "and")
             ),
         })
         .at(name)?;
@@ -194,18 +194,18 @@ fn key(key: &CameraKeyDescription, camera: &CameraDescription, before: Option<f6
         || {
             format!(
                 "must have {}",
-                all_of(&[&["position", "look_at", "up"], own].concat(), "or")
+                join_names(&[&["position", "look_at", "up"], type_keys].concat(), "or")
             )
         },
     )
 }
 
-/// Joins names, with `word` before the last name: "a", "b" or "c".
-fn all_of(names: &[&str], word: &str) -> String {
+/// Joins names, with a conjunction before the last name: "a", "b" or "c".
+fn join_names(names: &[&str], conjunction: &str) -> String {
     let quoted: Vec<String> = names.iter().map(|name| format!("{name:?}")).collect();
     match quoted.split_last() {
         Some((last, [])) => last.clone(),
-        Some((last, before)) => format!("{} {word} {last}", before.join(", ")),
+        Some((last, before)) => format!("{} {conjunction} {last}", before.join(", ")),
         None => String::new(),
     }
 }
@@ -219,25 +219,25 @@ mod tests {
         Projection, Scene, SceneError,
     };
 
-    /// The camera begins in line 2.
+    /// Parses a scene whose camera begins in line 2.
     fn scene(camera: &str) -> Result<Scene, SceneError> {
         let text = format!("image = {{ width = 4, height = 4 }}\n{camera}");
         Scene::parse(&text, "s.toml")
     }
 
-    const STILL: &str = "[camera]\nposition = [0, -4, 0]\nlook_at = [0, 0, 0]\nfov = 40\n";
+    const STATIC_CAMERA: &str = "[camera]\nposition = [0, -4, 0]\nlook_at = [0, 0, 0]\nfov = 40\n";
 
     #[test]
     fn each_value_is_interpolated_between_the_keys_that_have_it() {
         let scene = scene(&format!(
-            "{STILL}[camera.path]\nkeys = [{{ frame = 1, position = [2, -4, 0] }}, {{ frame = 2, fov = 20 }}, \
+            "{STATIC_CAMERA}[camera.path]\nkeys = [{{ frame = 1, position = [2, -4, 0] }}, {{ frame = 2, fov = 20 }}, \
              {{ frame = 5, position = [4, -8, 4], fov = 50 }}, {{ frame = 6, up = [1, 0, 0] }}]"
         ))
         .unwrap();
         assert_eq!(
             scene.camera.position,
             DVec3::new(0.0, -4.0, 0.0),
-            "what it says itself stays"
+            "the path must not change the position that the camera sets"
         );
         assert_eq!(scene.camera_path.as_ref().unwrap().frames(), (1.0, 6.0));
         for (frame, position, fov) in [
@@ -252,7 +252,7 @@ mod tests {
             assert_eq!(camera.position, DVec3::from(position), "{frame}");
             assert_eq!(camera.look_at, DVec3::ZERO);
             let Projection::Perspective { fov: found } = camera.projection else {
-                panic!("another projection");
+                panic!("the camera is not perspective");
             };
             assert!((found - fov.to_radians()).abs() < 1e-14, "{frame}: {found}");
             // A value of one key applies to all frames.
@@ -261,7 +261,7 @@ mod tests {
     }
 
     #[test]
-    fn a_vertical_camera_has_another_up() {
+    fn a_vertical_camera_has_a_different_up() {
         let camera = |position: [f64; 3], up: [f64; 3]| {
             let mut camera = PerspectiveDescription::new(position, [0.0; 3], 40.0);
             camera.up = up.into();
@@ -282,57 +282,57 @@ mod tests {
     fn without_a_frame_the_first_keys_provide_missing_values() {
         let path = "[camera.path]\ninterpolation = 'smooth'\nkeys = [{ frame = 3, look_at = [1, 0, 0] }, \
                     { frame = 4, position = [0, -4, 2], fov = 30, look_at = [2, 0, 0] }]\n";
-        let standalone_prim = scene(path).unwrap();
-        assert_eq!(standalone_prim.camera, standalone_prim.camera_at(3.0).unwrap());
-        assert_eq!(standalone_prim.camera.look_at, DVec3::X);
-        let partly = scene(&format!("[camera]\nfov = 60\n{path}")).unwrap();
+        let path_only = scene(path).unwrap();
+        assert_eq!(path_only.camera, path_only.camera_at(3.0).unwrap());
+        assert_eq!(path_only.camera.look_at, DVec3::X);
+        let with_fov = scene(&format!("[camera]\nfov = 60\n{path}")).unwrap();
         assert_eq!(
-            partly.camera.projection,
+            with_fov.camera.projection,
             Projection::Perspective {
                 fov: 60_f64.to_radians()
             }
         );
-        assert_eq!(partly.camera_at(0.0).unwrap(), standalone_prim.camera);
-        let parallel = "[camera]\ntype = 'orthographic'\n[[camera.path.keys]]\nframe = 0\nposition = [0, -1, 0]\n\
+        assert_eq!(with_fov.camera_at(0.0).unwrap(), path_only.camera);
+        let orthographic = "[camera]\ntype = 'orthographic'\n[[camera.path.keys]]\nframe = 0\nposition = [0, -1, 0]\n\
                         look_at = [0, 0, 0]\nheight = 2\n[[camera.path.keys]]\nframe = 1\nheight = 4\n";
-        let parallel = scene(parallel).unwrap();
-        assert_eq!(parallel.camera.projection, Projection::Orthographic { height: 2.0 });
-        let half = parallel.camera_at(0.5).unwrap();
-        assert_eq!(half.projection, Projection::Orthographic { height: 3.0 });
+        let orthographic = scene(orthographic).unwrap();
+        assert_eq!(orthographic.camera.projection, Projection::Orthographic { height: 2.0 });
+        let between = orthographic.camera_at(0.5).unwrap();
+        assert_eq!(between.projection, Projection::Orthographic { height: 3.0 });
     }
 
     #[test]
     fn an_override_chooses_the_frame() {
         let text = format!(
-            "image = {{ width = 4, height = 4 }}\n{STILL}path.keys = [{{ frame = 1, position = [0, -4, 0] }}, {{ frame = 3, \
+            "image = {{ width = 4, height = 4 }}\n{STATIC_CAMERA}path.keys = [{{ frame = 1, position = [0, -4, 0] }}, {{ frame = 3, \
              position = [0, 4, 0] }}]"
         );
-        let at = |frame| {
+        let load_at = |frame| {
             let overrides = Overrides {
                 frame,
                 ..Overrides::default()
             };
             Scene::parse_with(&text, "s.toml", &overrides)
         };
-        assert_eq!(at(Some(1.5)).unwrap().camera.position, DVec3::new(0.0, -2.0, 0.0));
-        assert_eq!(at(None).unwrap().camera.position, DVec3::new(0.0, -4.0, 0.0));
+        assert_eq!(load_at(Some(1.5)).unwrap().camera.position, DVec3::new(0.0, -2.0, 0.0));
+        assert_eq!(load_at(None).unwrap().camera.position, DVec3::new(0.0, -4.0, 0.0));
         let expected = "s.toml:6: camera.path: at frame 2, look_at: [0, 0, 0] must differ from the camera's position";
-        assert_eq!(at(Some(2.0)).unwrap_err().to_string(), expected);
+        assert_eq!(load_at(Some(2.0)).unwrap_err().to_string(), expected);
         for frame in [f64::NAN, f64::INFINITY] {
-            let message = at(Some(frame)).unwrap_err().to_string();
+            let message = load_at(Some(frame)).unwrap_err().to_string();
             assert_eq!(message, format!("frame: {frame} must be finite"));
         }
-        // A camera that was created in code has no line.
+        // A camera that was created in code has no line number.
         let keys = [[0.0, -4.0, 0.0], [0.0, 4.0, 0.0]].map(|position| CameraKeyDescription {
             position: Some(position.into()),
             ..CameraKeyDescription::new(position[1])
         });
         let mut camera = PerspectiveDescription::new([1.0, 0.0, 0.0], [0.0, 0.0, 0.0], 40.0);
         camera.path = Some(CameraPathDescription::new(Interpolation::Linear, keys));
-        let built = Description::new(4, 4, camera).validate().unwrap();
-        assert_eq!(built.camera.position, DVec3::X);
-        assert_eq!(built.camera_at(-1.0).unwrap().position, DVec3::NEG_Y);
-        let message = built.camera_at(0.0).unwrap_err().to_string();
+        let scene = Description::new(4, 4, camera).validate().unwrap();
+        assert_eq!(scene.camera.position, DVec3::X);
+        assert_eq!(scene.camera_at(-1.0).unwrap().position, DVec3::NEG_Y);
+        let message = scene.camera_at(0.0).unwrap_err().to_string();
         assert!(
             message.starts_with("frame.camera.path: at frame 0, look_at: "),
             "{message}"
@@ -391,7 +391,7 @@ mod tests {
             ),
             (
                 format!("{start}{{ frame = 2, position = [0, 2e9, 0] }}]"),
-                "9: camera.path.keys[1].position: 2e9 must be finite",
+                "9: camera.path.keys[1].position: 2e9 must be from -1e9 to 1e9",
             ),
             (
                 format!("{start}{{ frame = 2, up = [0, 0, 0] }}]"),
@@ -410,25 +410,25 @@ mod tests {
                 "6: camera.path: at frame 2, look_at: [0, 0, 0] makes the view parallel to up",
             ),
         ] {
-            let message = scene(&format!("{STILL}{path}")).unwrap_err().to_string();
+            let message = scene(&format!("{STATIC_CAMERA}{path}")).unwrap_err().to_string();
             assert!(
                 message.starts_with(&format!("s.toml:{expected}")),
                 "{message}\n{expected}"
             );
         }
-        let parallel = "[camera]\ntype = 'orthographic'\nposition = [0, -4, 0]\nlook_at = [0, 0, 0]\nheight = 1\n\
+        let orthographic = "[camera]\ntype = 'orthographic'\nposition = [0, -4, 0]\nlook_at = [0, 0, 0]\nheight = 1\n\
                         path.keys = [{ frame = 1, fov = 40 }]";
         let expected =
             "s.toml:7: camera.path.keys[0].fov: does not apply to a camera of this type, which has \"height\"";
-        assert_eq!(scene(parallel).unwrap_err().to_string(), expected);
+        assert_eq!(scene(orthographic).unwrap_err().to_string(), expected);
         let closest = format!("{start}{{ frame = 1.000002, fov = 4 }}]");
-        scene(&format!("{STILL}{closest}")).unwrap();
+        scene(&format!("{STATIC_CAMERA}{closest}")).unwrap();
     }
 
     #[test]
     fn a_description_with_a_path_reads_back() {
         let path = "[[camera.path.keys]]\nframe = 1.5\nup = [0, 1, 1]\n[[camera.path.keys]]\nframe = 3\nfov = 7.5\n";
-        let text = format!("image = {{ width = 4, height = 4 }}\n{STILL}path.interpolation = 'smooth'\n{path}");
+        let text = format!("image = {{ width = 4, height = 4 }}\n{STATIC_CAMERA}path.interpolation = 'smooth'\n{path}");
         let description = Description::parse(&text, "s.toml").unwrap();
         let written = toml::to_string(&description).unwrap();
         assert_eq!(

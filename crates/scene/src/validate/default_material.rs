@@ -5,11 +5,11 @@ use glam::DVec3;
 use super::super::{Color, Integrator, Material, Principled, Reflection, VertexColors};
 use super::principled::dielectric;
 
-/// Albedo.
+/// Albedo of meshes without vertex colors.
 const GRAY: f64 = 0.8;
-/// Phong exponent. It has no effect with `phong`, because the specular factor is black; with `path` it determines the
-/// roughness.
+/// Phong exponent, which has no effect because the specular factor is black.
 const SHININESS: f64 = 16.0;
+/// Roughness with the path tracer.
 const ROUGHNESS: f64 = 0.5;
 
 /// Returns the default materials of meshes without and with vertex colors; `phong` ignores the colors.

@@ -9,7 +9,7 @@ use super::super::sky::{Sky, sky};
 use super::super::studio::studio;
 use super::super::{EnvironmentDescription, EnvironmentImage, EnvironmentName, EnvironmentRotation, Image, Rotation};
 use super::images::Images;
-use super::mesh::turn;
+use super::mesh::rotation_matrix;
 use super::path::needs_path;
 use super::{At, Checked, Description, Environment, Integrator, Problem, between, check, color, show};
 
@@ -17,7 +17,8 @@ use super::{At, Checked, Description, Environment, Integrator, Problem, between,
 const ELEVATION: f64 = 40.0;
 const TURBIDITY: f64 = 2.0;
 
-/// Returns the environment of its section or of the background, if it emits light or is visible.
+/// Returns the environment of `[environment]` or of the background; `None` if the environment neither emits light nor
+/// has a background.
 pub(super) fn environment(
     description: &Description,
     integrator: Integrator,
@@ -26,24 +27,25 @@ pub(super) fn environment(
     let background = description.render.background;
     let environment = match &description.environment {
         None if !integrator.needs_emitters() => return Ok(None),
-        None => plain(background),
+        None => constant(background),
         Some(environment) => {
             needs_path(integrator)?;
             check(background == DVec3::ZERO, || {
                 let background = show(background);
                 format!("cannot be combined with render.background, {background}; remove one")
             })?;
-            described(environment, images)?
+            from_description(environment, images)?
         }
     };
-    let shines = environment.color != DVec3::ZERO || environment.image.as_ref().is_some_and(|image| image.scale > 0.0);
-    let is_seen = environment
+    let is_emissive =
+        environment.color != DVec3::ZERO || environment.image.as_ref().is_some_and(|image| image.scale > 0.0);
+    let has_background = environment
         .background
         .is_some_and(|background| background != DVec3::ZERO);
-    Ok((shines || is_seen).then_some(environment))
+    Ok((is_emissive || has_background).then_some(environment))
 }
 
-fn plain(color: DVec3) -> Environment {
+fn constant(color: DVec3) -> Environment {
     Environment {
         color,
         image: None,
@@ -52,50 +54,50 @@ fn plain(color: DVec3) -> Environment {
     }
 }
 
-fn described(description: &EnvironmentDescription, images: &mut Images) -> Checked<Environment> {
+fn from_description(description: &EnvironmentDescription, images: &mut Images) -> Checked<Environment> {
     let scale = between(description.scale, ENVIRONMENT_SCALES).at("scale")?;
     let to_world = match &description.rotate {
         None => DMat3::IDENTITY,
         Some(EnvironmentRotation::Degrees(degrees)) => {
-            turn(&Rotation::Angles(DVec3::new(0.0, 0.0, *degrees))).at("rotate")?
+            rotation_matrix(&Rotation::Angles(DVec3::new(0.0, 0.0, *degrees))).at("rotate")?
         }
-        Some(EnvironmentRotation::Any(rotation)) => turn(rotation).at("rotate")?,
+        Some(EnvironmentRotation::Any(rotation)) => rotation_matrix(rotation).at("rotate")?,
     };
     let background = description.background.map(|background| {
         check(description.visible, || {
-            "cannot be combined with visible = false, where the camera sees black".to_owned()
+            "cannot be combined with visible = false, because the camera then sees black".to_owned()
         })?;
         color(background)
     });
     let background = background.transpose().at("background")?;
     let sky = sky_of(description)?;
-    let with = |image: Arc<Image>| Environment {
+    let with_image = |image: Arc<Image>| Environment {
         color: DVec3::ZERO,
         image: Some(EnvironmentImage { image, scale, to_world }),
         visible: description.visible,
         background,
     };
-    let own = |name: &str, image: Image, images: &mut Images| {
-        let kept = images.own(name, &image).map_err(Problem::new).at("name");
-        kept.map(|()| with(Arc::new(image)))
+    let builtin = |name: &str, image: Image, images: &mut Images| {
+        let counted = images.count_builtin(name, &image).map_err(Problem::new).at("name");
+        counted.map(|()| with_image(Arc::new(image)))
     };
     match (description.color, &description.file, description.name) {
-        (Some(plain), None, None) => Ok(Environment {
-            color: color(plain).at("color")? * scale,
+        (Some(radiance), None, None) => Ok(Environment {
+            color: color(radiance).at("color")? * scale,
             image: None,
             visible: description.visible,
             background,
         }),
-        (None, Some(file), None) => Ok(with(images.around(file).at("file")?)),
-        (None, None, Some(EnvironmentName::Studio)) => own("studio", studio(), images),
-        (None, None, Some(EnvironmentName::Sky)) => own("sky", self::sky(&sky), images),
+        (None, Some(file), None) => Ok(with_image(images.environment_map(file).at("file")?)),
+        (None, None, Some(EnvironmentName::Studio)) => builtin("studio", studio(), images),
+        (None, None, Some(EnvironmentName::Sky)) => builtin("sky", self::sky(&sky), images),
         _ => Err(Problem::new(
             "must have exactly one of \"color\", \"file\" and \"name\"",
         )),
     }
 }
 
-/// Returns the parameters of the sky; its keys are errors for other environments.
+/// Returns the parameters of the sky; the keys of the sky are errors for other environments.
 fn sky_of(description: &EnvironmentDescription) -> Checked<Sky> {
     let is_sky = description.name == Some(EnvironmentName::Sky);
     let value = |key: &str, value: Option<f64>, default: f64, limits: (f64, f64)| {
@@ -110,10 +112,10 @@ fn sky_of(description: &EnvironmentDescription) -> Checked<Sky> {
     })
 }
 
-/// Warns of an image with the wrong aspect ratio.
-pub(super) fn note(description: &Description, environment: Option<&Environment>) -> Option<String> {
+/// Returns a warning about an image with the wrong aspect ratio.
+pub(super) fn aspect_note(description: &Description, environment: Option<&Environment>) -> Option<String> {
     let file = description.environment.as_ref()?.file.as_ref()?;
     let Image { width, height, .. } = *environment?.image.as_ref()?.image;
-    let rule = "equirectangular images are twice as wide as high, so it is stretched";
+    let rule = "equirectangular images are twice as wide as high, so this image is stretched";
     (width != 2 * height).then(|| format!("environment.file: {file:?} has {width} x {height} texels; {rule}"))
 }

@@ -1,14 +1,14 @@
-//! The integrator of a scene that does not specify one: `path` if the scene uses a key that needs it, otherwise
-//! `phong`.
+//! The default integrator of a scene: `path` if the scene uses a key that needs the path tracer, otherwise `phong`.
 
 use super::super::key_path::{KeyPath, Segment};
 use super::super::{Description, Integrator, MaterialDescription, ShapeDescription};
 
 impl Description {
-    /// Returns the integrator of `[render]`. If it is not specified, returns [`Integrator::Path`] if any key needs it.
+    /// Returns the integrator of `[render]`. If it is not specified, returns [`Integrator::Path`] if any key needs the
+    /// path tracer, and otherwise [`Integrator::Phong`].
     pub fn integrator(&self) -> Integrator {
-        let needed = || needs_path(self).map_or(Integrator::Phong, |_| Integrator::Path);
-        self.render.integrator.unwrap_or_else(needed)
+        let default = || path_tracer_key(self).map_or(Integrator::Phong, |_| Integrator::Path);
+        self.render.integrator.unwrap_or_else(default)
     }
 }
 
@@ -17,28 +17,28 @@ pub(crate) fn note(description: &Description) -> Option<String> {
     if description.render.integrator.is_some() {
         return None;
     }
-    let key = needs_path(description)?;
+    let key = path_tracer_key(description)?;
     Some(format!(
         "render.integrator is not set; using \"path\", which {key} requires. Set it in the scene to silence this warning"
     ))
 }
 
 /// Returns the first key that only the path tracer supports.
-fn needs_path(description: &Description) -> Option<KeyPath> {
+fn path_tracer_key(description: &Description) -> Option<KeyPath> {
     let render = &description.render;
     let settings = [
         ("rr_depth", render.rr_depth.is_some()),
         ("clamp", render.clamp.is_some()),
         ("alpha", render.alpha.is_some()),
     ];
-    if let Some((name, _)) = settings.into_iter().find(|(_, is_given)| *is_given) {
+    if let Some((name, _)) = settings.into_iter().find(|(_, is_set)| *is_set) {
         return Some(path([Segment::from("render"), name.into()]));
     }
     if description.environment.is_some() {
         return Some(path([Segment::from("environment")]));
     }
     let materials = description.materials.iter();
-    let mut needed = materials.filter_map(|(name, material)| {
+    let mut material_keys = materials.filter_map(|(name, material)| {
         let key = key_of_material(material)?;
         Some(path([Segment::from("materials"), name.as_str().into(), key.into()]))
     });
@@ -47,13 +47,14 @@ fn needs_path(description: &Description) -> Option<KeyPath> {
         let shape = description.shapes.iter().position(is_gltf)?;
         Some(path([Segment::from("shapes"), shape.into(), "type".into()]))
     };
-    needed.next().or_else(gltf)
+    material_keys.next().or_else(gltf)
 }
 
-fn path<const N: usize>(steps: [Segment; N]) -> KeyPath {
-    KeyPath(steps.to_vec())
+fn path<const N: usize>(segments: [Segment; N]) -> KeyPath {
+    KeyPath(segments.to_vec())
 }
 
+/// Returns the key of a material that only the path tracer supports.
 fn key_of_material(material: &MaterialDescription) -> Option<&'static str> {
     let emission = match material {
         MaterialDescription::Phong(phong) => &phong.emission,
@@ -77,8 +78,8 @@ camera = { position = [0, 1, 0], look_at = [1, 0, 0], fov = 40 }
 materials.red = { type = 'phong', color = [1, 0, 0] }
 ";
 
-    fn load(more: &str, overrides: &Overrides) -> Scene {
-        Scene::parse_with(&format!("{SCENE}{more}"), "s.toml", overrides).unwrap()
+    fn load(extra: &str, overrides: &Overrides) -> Scene {
+        Scene::parse_with(&format!("{SCENE}{extra}"), "s.toml", overrides).unwrap()
     }
 
     #[test]
@@ -87,9 +88,9 @@ materials.red = { type = 'phong', color = [1, 0, 0] }
         assert_eq!((scene.render.integrator, scene.notes), (Integrator::Phong, vec![]));
     }
 
-    /// The integrator determines the valid values of other settings.
+    /// Tests settings whose valid values depend on the integrator.
     #[test]
-    fn the_settings_are_those_of_the_chosen_integrator() {
+    fn the_chosen_integrator_determines_the_settings() {
         let scene = load(
             "environment.color = [1, 1, 1]\nrender = { max_depth = 0, pixel_samples = 5 }\n",
             &Overrides::default(),
@@ -112,7 +113,7 @@ materials.red = { type = 'phong', color = [1, 0, 0] }
     }
 
     #[test]
-    fn overrides_and_defines_decide_too() {
+    fn overrides_and_defines_also_determine_the_integrator() {
         let clear = Overrides {
             background: Some(Background::Transparent),
             ..Overrides::default()
@@ -130,11 +131,11 @@ materials.red = { type = 'phong', color = [1, 0, 0] }
                 .starts_with("render.integrator is not set; using \"path\", which materials.red.emission requires")
         );
         // A specified integrator is kept without a note.
-        let named = load("environment.color = [1, 1, 1]\n", &define("render.integrator=path"));
+        let specified = load("environment.color = [1, 1, 1]\n", &define("render.integrator=path"));
         assert!(
-            !named.notes.iter().any(|note| note.message.contains("integrator: ")),
+            !specified.notes.iter().any(|note| note.message.contains("integrator: ")),
             "{:?}",
-            named.notes
+            specified.notes
         );
     }
 

@@ -52,14 +52,14 @@ fn direction(light: &SpotLightDescription, position: DVec3) -> Checked<DVec3> {
         (None, Some(target)) => {
             let axis = point(target).at("look_at")? - position;
             check(axis.length() >= LENGTHS.0, || {
-                let (target, least) = (show(target), number(LENGTHS.0));
-                format!("{target} must be at least {least} away from the light")
+                let (target, min) = (show(target), number(LENGTHS.0));
+                format!("{target} must be at least {min} away from the light")
             })
             .at("look_at")?;
             Ok(axis.normalize())
         }
         (Some(_), Some(_)) => Err(Problem::new("cannot be combined with look_at; remove one")).at("direction"),
-        (None, None) => Err(Problem::predicate("is missing; set it or look_at")).at("direction"),
+        (None, None) => Err(Problem::predicate("is missing; set direction or look_at")).at("direction"),
     }
 }
 

@@ -18,21 +18,21 @@ impl Textures<'_> {
         };
         needs_path(self.integrator)?;
         let color = self.color(emission)?;
-        // If the texture were ignored, the factor would make the whole surface an emitter.
+        // The factor of a replaced texture would make the entire surface an emitter.
         let is_replaced = matches!(color, Color::Texture(texture) if self.replaced.contains(&texture));
         Ok(if is_replaced { Color::BLACK } else { color })
     }
 
-    fn of_path(&self, tag: &str) -> Checked<()> {
-        let named = |problem: Problem| Problem::new(format!("{tag:?} {}", problem.message));
-        needs_path(self.integrator).map_err(named).at("type")
+    fn check_path_type(&self, tag: &str) -> Checked<()> {
+        let with_type = |problem: Problem| Problem::new(format!("{tag:?} {}", problem.message));
+        needs_path(self.integrator).map_err(with_type).at("type")
     }
 
     pub(super) fn material(&self, description: &MaterialDescription) -> Checked<Material> {
         let (reflection, normal_map, emission) = match description {
             MaterialDescription::Phong(phong) => {
-                if let Some(all) = &phong.color {
-                    self.color(all).at("color")?;
+                if let Some(color) = &phong.color {
+                    self.color(color).at("color")?;
                 }
                 let reflection = Reflection::Phong {
                     ambient: self.factor(phong, &phong.ambient, "ambient")?,
@@ -54,7 +54,7 @@ impl Textures<'_> {
                 (reflection, &glass.normal_map, &glass.emission)
             }
             MaterialDescription::Diffuse(diffuse) => {
-                self.of_path("diffuse")?;
+                self.check_path_type("diffuse")?;
                 let reflection = Reflection::Diffuse {
                     color: self.tint(&diffuse.color).at("color")?,
                     roughness: self.value(&diffuse.roughness).at("roughness")?,
@@ -62,7 +62,7 @@ impl Textures<'_> {
                 (reflection, &diffuse.normal_map, &diffuse.emission)
             }
             MaterialDescription::Conductor(conductor) => {
-                self.of_path("conductor")?;
+                self.check_path_type("conductor")?;
                 let white = ColorDescription::default();
                 let reflection = Reflection::Conductor {
                     color: self.tint(conductor.color.as_ref().unwrap_or(&white)).at("color")?,
@@ -77,7 +77,7 @@ impl Textures<'_> {
                 (reflection, &conductor.normal_map, &conductor.emission)
             }
             MaterialDescription::Dielectric(dielectric) => {
-                self.of_path("dielectric")?;
+                self.check_path_type("dielectric")?;
                 let reflection = Reflection::Dielectric {
                     ior: ior(dielectric.ior).at("ior")?,
                     color: self.tint(&dielectric.color).at("color")?,
@@ -97,7 +97,7 @@ impl Textures<'_> {
                 (reflection, &dielectric.normal_map, &dielectric.emission)
             }
             MaterialDescription::Principled(principled) => {
-                self.of_path("principled")?;
+                self.check_path_type("principled")?;
                 let reflection = Reflection::Principled(Box::new(self.principled(principled)?));
                 (reflection, &principled.normal_map, &principled.emission)
             }
@@ -125,9 +125,9 @@ impl Textures<'_> {
         })
     }
 
-    fn factor(&self, phong: &PhongDescription, own: &Option<ColorDescription>, key: &str) -> Checked<Color> {
-        let missing = || Problem::predicate("is missing; set it or color");
-        let factor = own.as_ref().or(phong.color.as_ref()).ok_or_else(missing);
+    fn factor(&self, phong: &PhongDescription, color: &Option<ColorDescription>, key: &str) -> Checked<Color> {
+        let missing = || Problem::predicate(format!("is missing; set {key} or color"));
+        let factor = color.as_ref().or(phong.color.as_ref()).ok_or_else(missing);
         factor.and_then(|factor| self.color(factor)).at(key)
     }
 }
@@ -153,28 +153,30 @@ fn absorption(absorption: DVec3) -> Checked<DVec3> {
     for x in absorption.to_array() {
         let (low, high) = ABSORPTIONS;
         check((low..=high).contains(&x), || {
-            format!("{} must be finite, from {} to {}", number(x), number(low), number(high))
+            format!("{} must be from {} to {}", number(x), number(low), number(high))
         })?;
     }
     Ok(absorption)
 }
 
-/// Only one kind of key may set the reflectance.
+/// Returns the complex index of refraction, if it is set. Only one kind of key may set the reflectance.
 fn metal_index(conductor: &ConductorDescription) -> Checked<Option<MetalIndex>> {
-    let other = |own: &str| {
-        let given = [
+    let conflicting_key = |own_key: &str| {
+        let keys = [
             ("color", conductor.color.is_some()),
             ("metal", conductor.metal.is_some()),
             ("eta", conductor.eta.is_some()),
         ];
-        given
-            .into_iter()
-            .find(|(key, given)| *given && *key != own)
+        keys.into_iter()
+            .find(|(key, is_set)| *is_set && *key != own_key)
             .map(|(key, _)| key)
     };
     if let Some(name) = &conductor.metal {
-        check(other("metal").is_none(), || {
-            format!("cannot be combined with {}", other("metal").unwrap_or_default())
+        check(conflicting_key("metal").is_none(), || {
+            format!(
+                "cannot be combined with {}",
+                conflicting_key("metal").unwrap_or_default()
+            )
         })
         .at("metal")?;
         let index = MetalIndex::named(name).ok_or_else(|| {
@@ -189,8 +191,8 @@ fn metal_index(conductor: &ConductorDescription) -> Checked<Option<MetalIndex>> 
         (Some(_), None) => return Err(Problem::predicate("is missing; eta needs it")).at("k"),
         (None, Some(_)) => return Err(Problem::predicate("is missing; k needs it")).at("eta"),
     };
-    check(other("eta").is_none(), || {
-        format!("cannot be combined with {}", other("eta").unwrap_or_default())
+    check(conflicting_key("eta").is_none(), || {
+        format!("cannot be combined with {}", conflicting_key("eta").unwrap_or_default())
     })
     .at("eta")?;
     for x in eta.to_array() {

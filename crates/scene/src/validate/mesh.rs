@@ -17,7 +17,7 @@ use super::super::{
     Shape, ShapeDescription, Up,
 };
 use super::mtl::SceneMaterials;
-use super::{At, Checked, Collector, FLATTEST, Problem, between, check, list, number, point, show, unit};
+use super::{At, Checked, Collector, MIN_SINE, Problem, between, check, list, number, point, show, unit};
 use crate::mesh::{Group, Mesh, Normals};
 
 /// Maximum number of groups of all shapes.
@@ -26,7 +26,7 @@ const MAX_GROUPS: usize = 1 << 24;
 /// The materials and files that shapes refer to.
 pub(super) struct SceneLookup<'a> {
     pub names: &'a BTreeMap<&'a str, usize>,
-    pub looks: SceneMaterials<'a>,
+    pub scene_materials: SceneMaterials<'a>,
     pub assets: &'a Assets,
     /// False if the scene is invalid; meshes are then not needed.
     pub reads_files: bool,
@@ -40,8 +40,9 @@ impl SceneLookup<'_> {
     }
 }
 
+/// A mesh of `[meshes.NAME]`.
 pub(super) struct NamedMesh<'a> {
-    /// The mesh; `None` if it is invalid or not needed.
+    /// The mesh; `None` if the mesh is invalid or not needed.
     mesh: Option<Arc<Mesh>>,
     description: &'a MeshFileDescription,
 }
@@ -56,23 +57,23 @@ struct Placement<'a> {
 }
 
 impl<'a> NamedMesh<'a> {
-    /// Reads a mesh of `[meshes.NAME]`. Problems are added to `found`.
+    /// Reads a mesh of `[meshes.NAME]`. Adds problems to `problems`.
     pub fn read(
         description: &'a MeshFileDescription,
         name: &str,
-        known: &mut SceneLookup,
-        found: &mut Collector,
+        lookup: &mut SceneLookup,
+        problems: &mut Collector,
     ) -> Self {
-        let mesh = load(&description.file, description.normals, known).at(name);
+        let mesh = load(&description.file, description.normals, lookup).at(name);
         NamedMesh {
-            mesh: found.value(mesh).flatten(),
+            mesh: problems.value(mesh).flatten(),
             description,
         }
     }
 }
 
-pub(super) fn mesh(shape: &MeshDescription, known: &mut SceneLookup) -> Checked<Option<Shape>> {
-    let mesh = load(&shape.file, shape.normals, known)?;
+pub(super) fn mesh(shape: &MeshDescription, lookup: &mut SceneLookup) -> Checked<Option<Shape>> {
+    let mesh = load(&shape.file, shape.normals, lookup)?;
     let placement = Placement {
         material: shape.material.as_ref(),
         materials: &shape.materials,
@@ -81,16 +82,16 @@ pub(super) fn mesh(shape: &MeshDescription, known: &mut SceneLookup) -> Checked<
         scale: shape.scale,
         matrix: shape.matrix.as_ref(),
     };
-    placed(mesh, shape.up, &shape.file, &placement, known)
+    place_mesh(mesh, shape.up, &shape.file, &placement, lookup)
 }
 
 pub(super) fn instance(
     instance: &InstanceDescription,
     meshes: &BTreeMap<&str, NamedMesh<'_>>,
-    known: &mut SceneLookup,
+    lookup: &mut SceneLookup,
 ) -> Checked<Option<Shape>> {
     let name = &instance.mesh;
-    let unknown = || Problem::new(known.suggestions.unknown("mesh", name, meshes.keys().copied()));
+    let unknown = || Problem::new(lookup.suggestions.unknown("mesh", name, meshes.keys().copied()));
     let NamedMesh {
         mesh,
         description: file,
@@ -103,11 +104,11 @@ pub(super) fn instance(
         scale: instance.scale,
         matrix: instance.matrix.as_ref(),
     };
-    placed(mesh.clone(), file.up, &file.file, &placement, known)
+    place_mesh(mesh.clone(), file.up, &file.file, &placement, lookup)
 }
 
 /// Checks that 32-bit indices suffice for the data of groups.
-pub(super) fn few_groups(shapes: &[Shape]) -> Checked<()> {
+pub(super) fn check_group_count(shapes: &[Shape]) -> Checked<()> {
     let groups = shapes.iter().map(|shape| match &shape.geometry {
         Geometry::Mesh { materials, .. } => materials.len(),
         _ => 0,
@@ -143,70 +144,70 @@ pub(super) fn notes(
 }
 
 /// Returns a mesh; `None` if files are not read.
-fn load(file: &str, normals: Option<Normals>, known: &mut SceneLookup) -> Checked<Option<Arc<Mesh>>> {
-    if let Some(mesh) = known.assets.meshes.get(file) {
+fn load(file: &str, normals: Option<Normals>, lookup: &mut SceneLookup) -> Checked<Option<Arc<Mesh>>> {
+    if let Some(mesh) = lookup.assets.meshes.get(file) {
         return match mesh.broken_rule() {
             None => Ok(Some(Arc::clone(mesh))),
             Some(rule) => Err(Problem::new(format!("{file:?}: {rule}"))).at("file"),
         };
     }
-    let place = known.assets.find(file).at("file")?;
-    let AssetKey::File(path) = place else {
-        return Err(Problem::new(format!("{file:?} is an image in memory, and no mesh"))).at("file");
+    let asset = lookup.assets.find(file).at("file")?;
+    let AssetKey::File(path) = asset else {
+        return Err(Problem::new(format!("{file:?} is an image in memory, not a mesh"))).at("file");
     };
-    if !known.reads_files {
+    if !lookup.reads_files {
         return Ok(None);
     }
     let mesh = mesh_file::load(&path, normals)
         .map_err(|error| Problem::new(error.to_string()))
         .at("file")?;
-    if let (true, Some(damage)) = (known.assets.strict, mesh.damage.first()) {
+    if let (true, Some(damage)) = (lookup.assets.strict, mesh.damage.first()) {
         return Err(Problem::damage(damage.clone().of(Path::new(file)).to_string())).at("file");
     }
-    known.looks.know(&mesh);
+    lookup.scene_materials.register(&mesh);
     Ok(Some(mesh))
 }
 
-/// Returns the mesh with its placement. If there is no mesh, only validates the placement.
-fn placed(
+/// Returns a mesh as a shape with a placement. If there is no mesh, only validates the placement.
+fn place_mesh(
     mesh: Option<Arc<Mesh>>,
     up: Up,
     file: &str,
     placement: &Placement,
-    known: &mut SceneLookup,
+    lookup: &mut SceneLookup,
 ) -> Checked<Option<Shape>> {
-    let map = self::placement(placement.translate, placement.rotate, placement.scale, placement.matrix)?;
+    let transform = self::placement(placement.translate, placement.rotate, placement.scale, placement.matrix)?;
     let Some(mesh) = mesh else {
         placement
             .material
-            .map(|name| known.material(name))
+            .map(|name| lookup.material(name))
             .transpose()
             .at("material")?;
         for (group, name) in placement.materials {
-            known.material(name).at(group.as_str()).at("materials")?;
+            lookup.material(name).at(group.as_str()).at("materials")?;
         }
         return Ok(None);
     };
-    let to_world = map * turned_up(up);
+    let to_world = transform * to_z_up(up);
     let corners: Vec<DVec3> = mesh.corners().map(|corner| to_world.transform_point3(corner)).collect();
     let low = corners.iter().copied().fold(DVec3::INFINITY, DVec3::min);
     let high = corners.iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max);
     let farthest = low.abs().max(high.abs()).max_element();
     check(farthest <= FARTHEST, || {
         let (farthest, limit) = (number(farthest), number(FARTHEST));
-        format!("{file:?} reaches to {farthest} there; coordinates must be from -{limit} to {limit}")
+        format!("{file:?} reaches to {farthest} in world space; coordinates must be from -{limit} to {limit}")
     })
     .at("file")?;
     let size = (high - low).max_element();
     check(size >= LENGTHS.0, || {
         format!(
-            "{file:?} must be at least {} long there; it is {}",
+            "{file:?} must be at least {} long in world space; its length is {}",
             number(LENGTHS.0),
             number(size)
         )
     })
     .at("file")?;
-    let materials = materials(&mesh, file, placement, known)?;
+    let materials = materials(&mesh, file, placement, lookup)?;
     Ok(Some(Shape {
         material: materials.first().copied().unwrap_or(0),
         geometry: Geometry::Mesh {
@@ -218,50 +219,53 @@ fn placed(
 }
 
 /// Returns the material index of each group: from the scene, or else from the mesh's file.
-fn materials(mesh: &Arc<Mesh>, file: &str, placement: &Placement, known: &mut SceneLookup) -> Checked<Vec<usize>> {
-    let named = |name: &String| -> Checked<usize> {
-        let index = known.material(name)?;
+fn materials(mesh: &Arc<Mesh>, file: &str, placement: &Placement, lookup: &mut SceneLookup) -> Checked<Vec<usize>> {
+    let material_of = |name: &String| -> Checked<usize> {
+        let index = lookup.material(name)?;
         check(
-            !mesh.uvs.is_empty() || !has_textures(&known.looks.materials[index]),
-            || format!("{name:?} must have no texture here, as {file:?} has no texture coordinates"),
+            !mesh.uvs.is_empty() || !has_textures(&lookup.scene_materials.materials[index]),
+            || format!("{name:?} must have no texture here, because {file:?} has no texture coordinates"),
         )?;
         Ok(index)
     };
-    let whole = placement.material.map(named).transpose().at("material")?;
-    let mut of_names = BTreeMap::new();
+    let default = placement.material.map(material_of).transpose().at("material")?;
+    let mut by_name = BTreeMap::new();
     for (group, material) in placement.materials {
-        let is_there = mesh.groups.iter().any(|g| names(g).any(|name| name == group));
-        check(is_there, || {
+        let exists = mesh.groups.iter().any(|g| names(g).any(|name| name == group));
+        check(exists, || {
             let all = mesh.groups.iter().flat_map(names).filter(|name| !name.is_empty());
             let all: BTreeSet<&str> = all.collect();
             match all.is_empty() {
                 true => format!("{file:?} has no groups with names"),
-                false => format!("{file:?} has no such group or material; there are {}", list(all)),
+                false => format!("{file:?} has no such group or material; available: {}", list(all)),
             }
         })
         .at(group.as_str())
         .at("materials")?;
-        of_names.insert(group.as_str(), named(material).at(group.as_str()).at("materials")?);
+        by_name.insert(
+            group.as_str(),
+            material_of(material).at(group.as_str()).at("materials")?,
+        );
     }
     let mut indices = Vec::with_capacity(mesh.groups.len());
     let mut missing = BTreeSet::new();
     for (i, group) in mesh.groups.iter().enumerate() {
-        let named = names(group).find_map(|name| of_names.get(name).copied()).or(whole);
-        let index = named.or_else(|| known.looks.of_group(mesh, i));
+        let assigned = names(group).find_map(|name| by_name.get(name).copied()).or(default);
+        let index = assigned.or_else(|| lookup.scene_materials.group_material(mesh, i));
         if index.is_none() {
             missing.extend(group.material.as_deref());
         }
-        indices.push(index.unwrap_or_else(|| known.looks.default_material(!mesh.colors.is_empty())));
+        indices.push(index.unwrap_or_else(|| lookup.scene_materials.default_material(!mesh.colors.is_empty())));
     }
     if !missing.is_empty() {
-        let damage = Problem::damage(without_material(mesh, file, &missing));
-        known.looks.without_material(damage)?;
+        let damage = Problem::damage(missing_materials_note(mesh, file, &missing));
+        lookup.scene_materials.report_missing(damage)?;
     }
     Ok(indices)
 }
 
 /// Returns the warning about undefined materials.
-fn without_material(mesh: &Mesh, file: &str, missing: &BTreeSet<&str>) -> String {
+fn missing_materials_note(mesh: &Mesh, file: &str, missing: &BTreeSet<&str>) -> String {
     const MAX_NAMES: usize = 8;
     let shown = missing.iter().take(MAX_NAMES);
     let mut names = shown
@@ -271,7 +275,7 @@ fn without_material(mesh: &Mesh, file: &str, missing: &BTreeSet<&str>) -> String
     if missing.len() > MAX_NAMES {
         names += &format!(" and {} more", missing.len() - MAX_NAMES);
     }
-    let why = match mesh.libraries.as_slice() {
+    let reason = match mesh.libraries.as_slice() {
         [] => "the file names no MTL file".to_owned(),
         libraries => {
             let unread = libraries
@@ -286,7 +290,7 @@ fn without_material(mesh: &Mesh, file: &str, missing: &BTreeSet<&str>) -> String
             }
         }
     };
-    format!("{file}: no material {names}: {why}")
+    format!("{file}: no material {names}: {reason}")
 }
 
 /// Returns the names of a group: its own name, and the name of its material in the file.
@@ -296,14 +300,15 @@ fn names(group: &Group) -> impl Iterator<Item = &str> {
 
 /// Returns true if a material depends on texture coordinates.
 fn has_textures(material: &Material) -> bool {
-    let is_streaked = match &material.reflection {
+    let is_anisotropic = match &material.reflection {
         Reflection::Conductor { facets, .. } | Reflection::Dielectric { facets, .. } => facets.anisotropy > 0.0,
         _ => false,
     };
-    is_streaked || !material.textures().is_empty()
+    is_anisotropic || !material.textures().is_empty()
 }
 
-pub(crate) fn turned_up(up: Up) -> DAffine3 {
+/// Returns the rotation of an up axis to +z.
+pub(crate) fn to_z_up(up: Up) -> DAffine3 {
     DAffine3::from_mat3(match up {
         Up::X => DMat3::from_cols(DVec3::Z, DVec3::X, DVec3::Y),
         Up::Y => DMat3::from_cols(DVec3::X, DVec3::Z, DVec3::NEG_Y),
@@ -311,6 +316,7 @@ pub(crate) fn turned_up(up: Up) -> DAffine3 {
     })
 }
 
+/// Returns the transform of a placement.
 pub(crate) fn placement(
     translate: Option<DVec3>,
     rotate: Option<Rotation>,
@@ -318,9 +324,9 @@ pub(crate) fn placement(
     matrix: Option<&Vec<[f64; 4]>>,
 ) -> Checked<DAffine3> {
     if let Some(matrix) = matrix {
-        let others = translate.is_some() || rotate.is_some() || scale.is_some();
-        check(!others, || {
-            "cannot be combined with translate, rotate or scale, which it stands in for".to_owned()
+        let has_parts = translate.is_some() || rotate.is_some() || scale.is_some();
+        check(!has_parts, || {
+            "cannot be combined with translate, rotate or scale, which matrix replaces".to_owned()
         })
         .at("matrix")?;
         return self::matrix(matrix).at("matrix");
@@ -332,7 +338,7 @@ pub(crate) fn placement(
     };
     let rotation = match rotate {
         None => DMat3::IDENTITY,
-        Some(rotation) => turn(&rotation).at("rotate")?,
+        Some(rotation) => rotation_matrix(&rotation).at("rotate")?,
     };
     let translate = translate.map_or(Ok(DVec3::ZERO), point).at("translate")?;
     Ok(DAffine3::from_mat3_translation(
@@ -346,34 +352,38 @@ fn factors(factors: DVec3) -> Checked<DVec3> {
     for x in factors.to_array() {
         check((low..=high).contains(&x.abs()), || {
             let (x, low, high) = (number(x), number(low), number(high));
-            format!("{x} must not be 0, and be from {low} to {high}, or from -{high} to -{low}")
+            format!("{x} must be from {low} to {high}, or from -{high} to -{low}")
         })?;
     }
     Ok(factors)
 }
 
-pub(super) fn turn(rotation: &Rotation) -> Checked<DMat3> {
+pub(super) fn rotation_matrix(rotation: &Rotation) -> Checked<DMat3> {
     let angle = |degrees: f64| between(degrees, TURNS);
     Ok(match rotation {
         Rotation::Angles(angles) => {
             let [x, y, z] = [angle(angles.x)?, angle(angles.y)?, angle(angles.z)?];
-            turn_about(DVec3::Z, z) * turn_about(DVec3::Y, y) * turn_about(DVec3::X, x)
+            rotation_about(DVec3::Z, z) * rotation_about(DVec3::Y, y) * rotation_about(DVec3::X, x)
         }
         Rotation::About(about) => {
             let axis = unit(about.axis).at("axis")?;
-            turn_about(axis, angle(about.degrees).at("degrees")?)
+            rotation_about(axis, angle(about.degrees).at("degrees")?)
         }
     })
 }
 
 /// Returns a rotation, exact for quarter turns about coordinate axes.
-fn turn_about(axis: DVec3, degrees: f64) -> DMat3 {
+fn rotation_about(axis: DVec3, degrees: f64) -> DMat3 {
     let quarters = degrees / 90.0;
     let is_axis = DVec3::AXES.iter().any(|a| a.abs() == axis.abs());
-    let turn = DMat3::from_quat(DQuat::from_axis_angle(axis, degrees.to_radians()));
+    let rotation = DMat3::from_quat(DQuat::from_axis_angle(axis, degrees.to_radians()));
     match is_axis && quarters.fract() == 0.0 {
-        true => DMat3::from_cols(turn.x_axis.round(), turn.y_axis.round(), turn.z_axis.round()),
-        false => turn,
+        true => DMat3::from_cols(
+            rotation.x_axis.round(),
+            rotation.y_axis.round(),
+            rotation.z_axis.round(),
+        ),
+        false => rotation,
     }
 }
 
@@ -385,10 +395,10 @@ fn matrix(rows: &[[f64; 4]]) -> Checked<DAffine3> {
     .map_err(|_| match rows {
         [_, _, _, [x, y, z, w]] => {
             let row = [x, y, z, w].map(|x| number(*x)).join(", ");
-            Problem::new(format!("[{row}] must be [0, 0, 0, 1], or not be there")).at(3)
+            Problem::new(format!("[{row}] must be [0, 0, 0, 1], or absent")).at(3)
         }
         rows => Problem::new(format!(
-            "must be a list of 3 rows of 4 numbers; it has {}. There may be a fourth one, which is [0, 0, 0, 1]",
+            "must be a list of 3 rows of 4 numbers, optionally followed by the row [0, 0, 0, 1]; number of rows: {}",
             rows.len()
         )),
     })?;
@@ -402,12 +412,12 @@ fn matrix(rows: &[[f64; 4]]) -> Checked<DAffine3> {
         let (low, high) = SCALES;
         check((low..=high).contains(&c.length()), || {
             let (c, low, high) = (show(*c), number(low), number(high));
-            format!("its column {i}, {c}, must have a length from {low} to {high}")
+            format!("column {i}, {c}, must have a length from {low} to {high}")
         })?;
     }
     let [a, b, c] = columns.map(DVec3::normalize);
-    check(a.cross(b).dot(c).abs() > FLATTEST, || {
-        "its first three columns must not lie in one plane".to_owned()
+    check(a.cross(b).dot(c).abs() > MIN_SINE, || {
+        "the first three columns must not lie in one plane".to_owned()
     })?;
     Ok(DAffine3::from_mat3_translation(
         DMat3::from_cols(columns[0], columns[1], columns[2]),

@@ -43,14 +43,14 @@ use super::{
 
 pub(super) use self::images::TEXEL_MEMORY;
 pub(crate) use self::integrator::note as integrator_note;
-pub(super) use self::mesh::{placement, turned_up};
+pub(super) use self::mesh::{placement, to_z_up};
 pub(super) use self::path::LIGHT_SAMPLES;
 
 /// Default for the first bounce with Russian roulette.
 const RR_DEPTH: u32 = 5;
-/// Sine of the minimum angle between directions; minimum height of a triangle or tetrahedron relative to its longest
-/// edge.
-const FLATTEST: f64 = 1e-6;
+/// Sine of the minimum angle between directions, and minimum height of a triangle or tetrahedron, relative to the
+/// longest edge.
+const MIN_SINE: f64 = 1e-6;
 
 type Checked<T> = Result<T, Problem>;
 
@@ -62,7 +62,7 @@ impl Description {
             camera::with_path(&self.camera).at("camera"),
         );
         let render = render(&self.render, integrator).at("render");
-        let lights = each(&self.lights, |description| light(description).map(Some)).at("lights");
+        let lights = validate_each(&self.lights, |description| light(description).map(Some)).at("lights");
         let ((((width, height), view), (camera, camera_path)), (render, lights)) = both(image, both(render, lights))?;
         Ok(Settings {
             width,
@@ -89,12 +89,12 @@ impl Description {
         let indices: BTreeMap<_, _> = names.zip(0..).collect();
         let reads_files = settings.is_ok();
         let mut images = Images::new(assets, reads_files);
-        let (mut textures, replaced, of_textures) = texture::textures(&self.textures, &mut images);
-        let alphas = match reads_files && of_textures.is_ok() {
+        let (mut textures, replaced, texture_result) = texture::textures(&self.textures, &mut images);
+        let alphas = match reads_files && texture_result.is_ok() {
             true => texture::alphas(&self.materials, &self.textures, &mut images, &mut textures),
             false => BTreeMap::new(),
         };
-        let known = Textures {
+        let texture_lookup = Textures {
             names: self.textures.keys().map(String::as_str).collect(),
             textures: &textures,
             alphas,
@@ -103,51 +103,51 @@ impl Description {
             suggestions: Suggestions::default(),
         };
         let [stand_in, _] = default_material::default_materials(integrator);
-        let mut of_materials = Collector::default();
+        let mut material_problems = Collector::default();
         let materials = (self.materials.iter())
-            .map(|(name, description)| of_materials.value(known.material(description).at(name.as_str())))
+            .map(|(name, description)| material_problems.value(texture_lookup.material(description).at(name.as_str())))
             .map(|material| material.unwrap_or_else(|| stand_in.clone()))
             .collect();
-        let appearance = both(of_textures.at("textures"), of_materials.end(()).at("materials"));
+        let appearance = both(texture_result.at("textures"), material_problems.end(()).at("materials"));
         let environment = environment::environment(self, integrator, &mut images).at("environment");
-        let own = (self.materials.keys().cloned().collect(), materials);
-        let mut known = SceneLookup {
+        let named_materials = (self.materials.keys().cloned().collect(), materials);
+        let mut lookup = SceneLookup {
             names: &indices,
-            looks: SceneMaterials::new(own, textures, images, files, integrator),
+            scene_materials: SceneMaterials::new(named_materials, textures, images, files, integrator),
             assets,
             reads_files,
             suggestions: Suggestions::default(),
         };
-        let shapes = each(&self.shapes, |description| shape(description, &mut known)).at("shapes");
-        let mut of_meshes = Collector::default();
+        let shapes = validate_each(&self.shapes, |description| shape(description, &mut lookup)).at("shapes");
+        let mut mesh_problems = Collector::default();
         let meshes: BTreeMap<_, _> = (self.meshes.iter())
             .map(|(name, description)| {
-                let mesh = NamedMesh::read(description, name, &mut known, &mut of_meshes);
+                let mesh = NamedMesh::read(description, name, &mut lookup, &mut mesh_problems);
                 (name.as_str(), mesh)
             })
             .collect();
-        let of_meshes = of_meshes.end(()).at("meshes");
-        let instance = |description: &InstanceDescription| mesh::instance(description, &meshes, &mut known);
-        let instances = each(&self.instances, instance).at("instances");
+        let mesh_result = mesh_problems.end(()).at("meshes");
+        let instance = |description: &InstanceDescription| mesh::instance(description, &meshes, &mut lookup);
+        let instances = validate_each(&self.instances, instance).at("instances");
         let appearance = both(appearance, environment);
-        let objects = both(shapes, both(of_meshes, instances));
+        let objects = both(shapes, both(mesh_result, instances));
         let (settings, ((_, environment), (shapes, (_, instances)))) = both(settings, both(appearance, objects))?;
         let mut shapes: Vec<Shape> = shapes;
         shapes.extend(instances);
-        mesh::few_groups(&shapes).at("instances")?;
+        mesh::check_group_count(&shapes).at("instances")?;
         let mut notes = mesh::notes(&self.shapes, &shapes, &meshes);
-        let mut looks = known.looks;
-        if let Some(damage) = looks.damage() {
+        let mut scene_materials = lookup.scene_materials;
+        if let Some(damage) = scene_materials.damage() {
             return Err(damage.into());
         }
-        let material_names = std::mem::take(&mut looks.names);
-        let materials = std::mem::take(&mut looks.materials);
-        let textures = std::mem::take(&mut looks.textures);
-        let files = looks.files.iter().cloned().collect();
-        notes.extend(looks.notes().map(Note::from));
-        let of_paths = path::notes((&self.render, integrator), (&material_names, &materials), &textures);
-        notes.extend(of_paths.into_iter().map(Note::from));
-        notes.extend(environment::note(self, environment.as_ref()).map(Note::from));
+        let material_names = std::mem::take(&mut scene_materials.names);
+        let materials = std::mem::take(&mut scene_materials.materials);
+        let textures = std::mem::take(&mut scene_materials.textures);
+        let files = scene_materials.files.iter().cloned().collect();
+        notes.extend(scene_materials.notes().map(Note::from));
+        let path_notes = path::notes((&self.render, integrator), (&material_names, &materials), &textures);
+        notes.extend(path_notes.into_iter().map(Note::from));
+        notes.extend(environment::aspect_note(self, environment.as_ref()).map(Note::from));
         let Settings {
             width,
             height,
@@ -183,6 +183,7 @@ impl Description {
     }
 }
 
+/// The validated values that do not depend on files.
 pub(crate) struct Settings {
     width: u32,
     height: u32,
@@ -207,23 +208,26 @@ pub(super) fn view(image: &ImageDescription) -> Checked<ViewSettings> {
 }
 
 /// Validates all elements of a list. `check` returns `None` if files are not read.
-fn each<D, T>(descriptions: &[D], mut check: impl FnMut(&D) -> Checked<Option<T>>) -> Result<Vec<T>, Problems> {
-    let mut found = Collector::default();
+fn validate_each<D, T>(
+    descriptions: &[D],
+    mut check: impl FnMut(&D) -> Checked<Option<T>>,
+) -> Result<Vec<T>, Problems> {
+    let mut problems = Collector::default();
     let descriptions = descriptions.iter().enumerate();
     let all = descriptions
-        .filter_map(|(i, description)| found.value(check(description).at(i)).flatten())
+        .filter_map(|(i, description)| problems.value(check(description).at(i)).flatten())
         .collect();
-    found.end(all)
+    problems.end(all)
 }
 
 pub(super) fn side(pixels: u32) -> Checked<u32> {
-    count_to_most(pixels)
+    check_count(pixels)
 }
 
 pub(super) fn sample_count(pattern: Pattern, count: u32) -> Checked<u32> {
-    count_to_most(count)?;
-    let valid = !pattern.needs_square() || count.isqrt().pow(2) == count;
-    check(valid, || {
+    check_count(count)?;
+    let is_valid = !pattern.needs_square() || count.isqrt().pow(2) == count;
+    check(is_valid, || {
         let (name, root) = (pattern.name(), count.isqrt());
         let (below, above) = (root.pow(2), (root + 1).pow(2));
         format!(
@@ -234,9 +238,9 @@ pub(super) fn sample_count(pattern: Pattern, count: u32) -> Checked<u32> {
     Ok(count)
 }
 
-fn count_to_most(count: u32) -> Checked<u32> {
-    let valid = (1..=MOST).contains(&count);
-    check(valid, || format!("{count} must be from 1 to {MOST}"))?;
+fn check_count(count: u32) -> Checked<u32> {
+    let is_valid = (1..=MOST).contains(&count);
+    check(is_valid, || format!("{count} must be from 1 to {MOST}"))?;
     Ok(count)
 }
 
@@ -248,15 +252,15 @@ fn samples(description: &SamplesDescription, integrator: Integrator) -> Checked<
 
 fn render(description: &RenderDescription, integrator: Integrator) -> Result<Render, Problems> {
     let follows_paths = integrator.follows_paths();
-    let mut found = Collector::default();
-    let ambient = found.or_default(color(description.ambient).at("ambient"));
-    let background = found.or_default(color(description.background).at("background"));
+    let mut problems = Collector::default();
+    let ambient = problems.or_default(color(description.ambient).at("ambient"));
+    let background = problems.or_default(color(description.background).at("background"));
     let shadow_epsilon = between(description.shadow_epsilon, SHADOW_EPSILONS).at("shadow_epsilon");
-    let shadow_epsilon = found.or_default(shadow_epsilon);
-    let max_depth = found.or_default(max_depth(description.max_depth, integrator).at("max_depth"));
-    let rr_depth = found.or_default(of_path(integrator, description.rr_depth, rr_depth).at("rr_depth"));
-    let clamp = found.or_default(of_path(integrator, description.clamp, clamp).at("clamp"));
-    let alpha = found.or_default(of_path(integrator, description.alpha, Ok).at("alpha"));
+    let shadow_epsilon = problems.or_default(shadow_epsilon);
+    let max_depth = problems.or_default(max_depth(description.max_depth, integrator).at("max_depth"));
+    let rr_depth = problems.or_default(check_path_key(integrator, description.rr_depth, rr_depth).at("rr_depth"));
+    let clamp = problems.or_default(check_path_key(integrator, description.clamp, clamp).at("clamp"));
+    let alpha = problems.or_default(check_path_key(integrator, description.alpha, Ok).at("alpha"));
     // Adaptive sampling depends on `pixel_samples`.
     let pixel_samples = samples(&description.pixel_samples, integrator).at("pixel_samples");
     let pixels = pixel_samples.and_then(|samples| {
@@ -266,7 +270,7 @@ fn render(description: &RenderDescription, integrator: Integrator) -> Result<Ren
     });
     let light_samples = samples(&description.light_samples, integrator).at("light_samples");
     let samples = both(both(pixels, light_samples), filter(&description.filter).at("filter"));
-    let (_, (((pixel_samples, adaptive), light_samples), filter)) = both(found.end(()), samples)?;
+    let (_, (((pixel_samples, adaptive), light_samples), filter)) = both(problems.end(()), samples)?;
     Ok(Render {
         integrator,
         ambient: if follows_paths { DVec3::ZERO } else { ambient },
@@ -308,28 +312,26 @@ pub(super) fn adaptive(
     let (pattern, count) = (pixel_samples.pattern(integrator), pixel_samples.count);
     check(pattern.is_extensible(), || {
         let name = pattern.name();
-        let others: Vec<_> = Pattern::ALL
+        let extensible: Vec<_> = Pattern::ALL
             .into_iter()
             .filter(|pattern| pattern.is_extensible())
             .map(Pattern::name)
             .collect();
         format!(
             "the pattern of pixel_samples, {name:?}, cannot add samples; use one of {}",
-            list(others)
+            list(extensible)
         )
     })?;
     let error = adaptive_error(description.error).at("error")?;
-    let most = description.max_samples;
-    let most = most.unwrap_or(count.saturating_mul(16).min(MOST));
-    let least = count.max(MIN_ADAPTIVE_SAMPLES); // one sample gives no error estimate
-    check((least..=MOST).contains(&most), || {
-        format!("{most} must be from {least} to {MOST}, and at least the count of pixel_samples")
+    let default = count.saturating_mul(16).min(MOST);
+    let max_samples = description.max_samples.unwrap_or(default);
+    let min = count.max(MIN_ADAPTIVE_SAMPLES); // one sample gives no error estimate
+    check((min..=MOST).contains(&max_samples), || {
+        let reason = format!("the minimum is the greater of {MIN_ADAPTIVE_SAMPLES} and the count of pixel_samples");
+        format!("{max_samples} must be from {min} to {MOST}; {reason}")
     })
     .at("max_samples")?;
-    Ok(Adaptive {
-        error,
-        max_samples: most,
-    })
+    Ok(Adaptive { error, max_samples })
 }
 
 pub(super) fn max_depth(depth: u32, integrator: Integrator) -> Checked<u32> {
@@ -345,12 +347,12 @@ fn rr_depth(depth: u32) -> Checked<u32> {
     Ok(depth)
 }
 
-fn clamp(most: f64) -> Checked<f64> {
-    between(most, CLAMPS)
+fn clamp(limit: f64) -> Checked<f64> {
+    between(limit, CLAMPS)
 }
 
-/// Validates an optional key that only the path integrator supports.
-fn of_path<T>(integrator: Integrator, value: Option<T>, check: fn(T) -> Checked<T>) -> Checked<Option<T>> {
+/// Validates an optional key that only the path tracer supports.
+fn check_path_key<T>(integrator: Integrator, value: Option<T>, check: fn(T) -> Checked<T>) -> Checked<Option<T>> {
     let Some(value) = value else { return Ok(None) };
     path::needs_path(integrator)?;
     check(value).map(Some)
@@ -360,7 +362,7 @@ pub(super) fn point(p: DVec3) -> Checked<DVec3> {
     for x in p.to_array() {
         check(x.abs() <= FARTHEST, || {
             let (x, limit) = (number(x), number(FARTHEST));
-            format!("{x} must be finite, from -{limit} to {limit}")
+            format!("{x} must be from -{limit} to {limit}")
         })?;
     }
     Ok(p)
@@ -371,7 +373,7 @@ pub(super) fn color(c: DVec3) -> Checked<DVec3> {
         let (low, high) = COLORS;
         check((low..=high).contains(&x), || {
             let (x, low, high) = (number(x), number(low), number(high));
-            format!("{x} must be finite, from {low} to {high}")
+            format!("{x} must be from {low} to {high}")
         })?;
     }
     Ok(c)
@@ -390,7 +392,7 @@ fn length(x: f64) -> Checked<f64> {
     let (low, high) = LENGTHS;
     check((low..=high).contains(&x), || {
         let (x, low, high) = (number(x), number(low), number(high));
-        format!("{x} must be finite and greater than 0, from {low} to {high}")
+        format!("{x} must be from {low} to {high}")
     })?;
     Ok(x)
 }
@@ -402,8 +404,8 @@ fn between(x: f64, (low, high): (f64, f64)) -> Checked<f64> {
     Ok(x)
 }
 
-fn check(valid: bool, message: impl FnOnce() -> String) -> Checked<()> {
-    match valid {
+fn check(is_valid: bool, message: impl FnOnce() -> String) -> Checked<()> {
+    match is_valid {
         true => Ok(()),
         false => Err(Problem::new(message())),
     }
@@ -413,7 +415,7 @@ fn number(x: f64) -> String {
     if x == 0.0 || (1e-4..1e6).contains(&x.abs()) {
         x.to_string()
     } else {
-        format!("{x:e}").to_lowercase() // NaN among them, which TOML writes nan
+        format!("{x:e}").to_lowercase() // lower case, because NaN is nan in TOML
     }
 }
 

@@ -26,7 +26,7 @@ const NS: f64 = 16.0;
 /// Maximum length in characters of the reason why a map is not used.
 const MAX_MAP_MESSAGE: usize = 300;
 
-/// The scene's own materials, then the materials of meshes.
+/// The materials of the scene file, then the materials of meshes.
 pub(super) struct SceneMaterials<'a> {
     pub names: Vec<String>,
     pub materials: Vec<Material>,
@@ -39,12 +39,13 @@ pub(super) struct SceneMaterials<'a> {
     meshes: HashMap<usize, GroupMaterials>,
     integrator: Integrator,
     /// The indices of materials, by file, line and traits.
-    known: HashMap<(PathBuf, usize, Traits), usize>,
+    indices: HashMap<(PathBuf, usize, Traits), usize>,
     /// The textures of maps.
     maps: BTreeMap<(AssetKey, Part), usize>,
     /// For each keyword of a file, the first warning, and the number of materials with such a warning.
     warnings: BTreeMap<(PathBuf, String), (String, usize)>,
-    /// The default material for meshes without and with colors, and the index of this material once it is used.
+    /// The default material for meshes without colors and for meshes with colors, and the index of the material once it
+    /// is used.
     defaults: [(Material, Option<usize>); 2],
     /// Notes about materials that mesh files refer to, but no file defines.
     pub unmatched: BTreeSet<String>,
@@ -61,13 +62,13 @@ struct Traits {
 
 struct GroupMaterials {
     /// For each group, the index of the MTL file and of the material in this file, if any.
-    places: Vec<Option<(usize, usize)>>,
+    mtl_indices: Vec<Option<(usize, usize)>>,
     /// For each group, the index of the material in the scene, once requested.
     materials: Vec<Option<usize>>,
 }
 
 impl<'a> SceneMaterials<'a> {
-    /// Starts with the scene's own materials, textures and images.
+    /// Starts with the materials, textures and images of the scene file.
     pub fn new(
         (names, materials): (Vec<String>, Vec<Material>),
         textures: Vec<Texture>,
@@ -84,7 +85,7 @@ impl<'a> SceneMaterials<'a> {
             files,
             images,
             meshes: HashMap::new(),
-            known: HashMap::new(),
+            indices: HashMap::new(),
             maps: BTreeMap::new(),
             warnings: BTreeMap::new(),
             defaults: default_materials(integrator).map(|material| (material, None)),
@@ -104,7 +105,7 @@ impl<'a> SceneMaterials<'a> {
     }
 
     /// Registers a mesh and the files that it refers to, whether or not these files are used.
-    pub fn know(&mut self, mesh: &Arc<Mesh>) {
+    pub fn register(&mut self, mesh: &Arc<Mesh>) {
         let address = Arc::as_ptr(mesh).addr();
         if self.meshes.contains_key(&address) {
             return;
@@ -115,49 +116,49 @@ impl<'a> SceneMaterials<'a> {
             let maps: BTreeSet<&String> = maps.collect();
             let maps = maps.into_iter().map(|map| beside(&library.file, map));
             for path in maps.chain([library.file.clone()]) {
-                let path = self.images.assets.folder.join(self.shown(&path));
+                let path = self.images.assets.folder.join(self.display_path(&path));
                 self.files.insert(path);
             }
         }
     }
 
     /// Returns the material that the mesh's file assigns to a group.
-    pub fn of_group(&mut self, mesh: &Arc<Mesh>, group: usize) -> Option<usize> {
+    pub fn group_material(&mut self, mesh: &Arc<Mesh>, group: usize) -> Option<usize> {
         let address = Arc::as_ptr(mesh).addr();
-        let described = self.meshes.get(&address)?;
-        if let Some(material) = described.materials[group] {
+        let group_materials = self.meshes.get(&address)?;
+        if let Some(material) = group_materials.materials[group] {
             return Some(material);
         }
-        let (library, i) = described.places[group]?;
+        let (library, i) = group_materials.mtl_indices[group]?;
         let library = &mesh.libraries[library];
-        let own = &library.materials[i];
+        let mtl = &library.materials[i];
         let traits = Traits {
             has_uvs: !mesh.uvs.is_empty(),
             has_colors: !mesh.colors.is_empty(),
         };
-        let key = (library.file.clone(), own.line, traits);
-        let material = match self.known.get(&key) {
+        let key = (library.file.clone(), mtl.line, traits);
+        let material = match self.indices.get(&key) {
             Some(material) => *material,
             None => {
                 let material = match self.integrator.follows_paths() {
-                    false => self.phong(own, &library.file, traits.has_uvs),
-                    true => self.principled(own, &library.file, traits),
+                    false => self.phong(mtl, &library.file, traits.has_uvs),
+                    true => self.principled(mtl, &library.file, traits),
                 };
-                self.names.push(own.name.clone());
+                self.names.push(mtl.name.clone());
                 self.materials.push(material);
-                self.known.insert(key, self.materials.len() - 1);
+                self.indices.insert(key, self.materials.len() - 1);
                 self.materials.len() - 1
             }
         };
-        if let Some(described) = self.meshes.get_mut(&address) {
-            described.materials[group] = Some(material);
+        if let Some(group_materials) = self.meshes.get_mut(&address) {
+            group_materials.materials[group] = Some(material);
         }
         Some(material)
     }
 
-    /// Warns about a group without a material, or returns an error
+    /// Warns about undefined materials of groups, or returns an error
     /// ([`Assets::tolerate`](super::super::Assets::tolerate)).
-    pub fn without_material(&mut self, damage: Problem) -> Checked<()> {
+    pub fn report_missing(&mut self, damage: Problem) -> Checked<()> {
         let note = self.images.assets.tolerate(damage, "a gray material is used instead")?;
         self.unmatched.insert(note);
         Ok(())
@@ -173,57 +174,57 @@ impl<'a> SceneMaterials<'a> {
     }
 
     /// Returns a Phong material. Ambient light uses `Kd`, because exporters write arbitrary values for `Ka`.
-    fn phong(&mut self, own: &MtlMaterial, file: &Path, has_uvs: bool) -> Material {
+    fn phong(&mut self, mtl: &MtlMaterial, file: &Path, has_uvs: bool) -> Material {
         let mut warnings = Warnings::default();
         let mut color = |name: &'static str, color: Option<[f64; 3]>, default: f64| {
             let color = color.map_or(DVec3::splat(default), DVec3::from);
-            let inside = color.clamp(DVec3::ZERO, DVec3::splat(BRIGHTEST));
-            if inside != color {
-                let (color, limit, inside) = (show(color), number(BRIGHTEST), show(inside));
-                let rule = format!("each of {color} must be from 0 to {limit}; {inside} stands in");
+            let clamped = color.clamp(DVec3::ZERO, DVec3::splat(BRIGHTEST));
+            if clamped != color {
+                let (color, limit, clamped) = (show(color), number(BRIGHTEST), show(clamped));
+                let rule = format!("each of {color} must be from 0 to {limit}; {clamped} is used instead");
                 warnings.add(name, rule);
             } else if name == "Kd" && color.max_element() > 1.0 {
                 let rule = format!("{} is used, but colors of MTL files are from 0 to 1", show(color));
                 warnings.add(name, rule);
             }
-            inside
+            clamped
         };
-        let diffuse = color("Kd", own.diffuse, DIFFUSE);
+        let diffuse = color("Kd", mtl.diffuse, DIFFUSE);
         // The illumination models 0 and 1 have no highlights.
-        let specular = match own.illumination {
+        let specular = match mtl.illumination {
             Some(0 | 1) => DVec3::ZERO,
-            _ => color("Ks", own.specular, 0.0),
+            _ => color("Ks", mtl.specular, 0.0),
         };
-        let exponent = own.shininess.unwrap_or(NS);
+        let exponent = mtl.shininess.unwrap_or(NS);
         let shininess = exponent.clamp(SHININESS.0, SHININESS.1);
         if shininess != exponent && specular != DVec3::ZERO {
-            let [exponent, low, high, inside] = [exponent, SHININESS.0, SHININESS.1, shininess].map(number);
+            let [exponent, low, high, clamped] = [exponent, SHININESS.0, SHININESS.1, shininess].map(number);
             warnings.add(
                 "Ns",
-                format!("{exponent} must be from {low} to {high}; {inside} stands in"),
+                format!("{exponent} must be from {low} to {high}; {clamped} is used instead"),
             );
         }
         let needs_path = [
-            (own.emission.is_some_and(|emission| emission != [0.0; 3]), "Ke"),
-            (own.opacity.is_some_and(|opacity| opacity < 1.0), "d"),
-            (own.emission_map.is_some(), "map_Ke"),
-            (own.opacity_map.is_some(), "map_d"),
-            (own.bump_map.is_some(), "map_Bump"),
-            (own.normal_map.is_some(), "norm"),
-            (own.metallic_map.is_some(), "map_Pm"),
-            (own.roughness_map.is_some(), "map_Pr"),
+            (mtl.emission.is_some_and(|emission| emission != [0.0; 3]), "Ke"),
+            (mtl.opacity.is_some_and(|opacity| opacity < 1.0), "d"),
+            (mtl.emission_map.is_some(), "map_Ke"),
+            (mtl.opacity_map.is_some(), "map_d"),
+            (mtl.bump_map.is_some(), "map_Bump"),
+            (mtl.normal_map.is_some(), "norm"),
+            (mtl.metallic_map.is_some(), "map_Pm"),
+            (mtl.roughness_map.is_some(), "map_Pr"),
         ];
-        for (_, name) in needs_path.into_iter().filter(|(is_given, _)| *is_given) {
+        for (_, name) in needs_path.into_iter().filter(|(is_set, _)| *is_set) {
             warnings.add(name, "ignored: it needs integrator = \"path\"");
         }
-        warnings.ignored(own);
-        let map = own.diffuse_map.as_ref();
+        warnings.ignored(mtl);
+        let map = mtl.diffuse_map.as_ref();
         let texture = map.and_then(|map| {
-            let found = self.map(&beside(file, map), Part::Colors(None), has_uvs);
-            warnings.of_map("map_Kd", found, "Kd stands in")
+            let found = self.map_texture(&beside(file, map), Part::Colors(None), has_uvs);
+            warnings.texture_or_warning("map_Kd", found, "Kd is used instead")
         });
         let diffuse = texture.map_or(Color::Plain(diffuse), Color::Texture);
-        self.warn(own, file, warnings);
+        self.warn(mtl, file, warnings);
         Material {
             reflection: Reflection::Phong {
                 ambient: diffuse,
@@ -241,8 +242,8 @@ impl<'a> SceneMaterials<'a> {
         self.damage.take()
     }
 
-    /// Records warnings about a material; also records damage if damage is an error.
-    fn warn(&mut self, own: &MtlMaterial, file: &Path, warnings: Warnings) {
+    /// Records warnings about a material, and the first damage if damage is an error.
+    fn warn(&mut self, mtl: &MtlMaterial, file: &Path, warnings: Warnings) {
         let is_strict = self.images.assets.strict;
         for Warning {
             keyword,
@@ -251,42 +252,47 @@ impl<'a> SceneMaterials<'a> {
             is_damage,
         } in warnings.0
         {
-            let line = own.lines.get(&keyword).unwrap_or(&own.line);
-            let place = format!("{}:{line}: material {:?}", self.shown(file).display(), cut(&own.name));
-            let mut message = format!("{place}: {keyword}: {message}");
+            let line = mtl.lines.get(&keyword).unwrap_or(&mtl.line);
+            let location = format!(
+                "{}:{line}: material {:?}",
+                self.display_path(file).display(),
+                cut(&mtl.name)
+            );
+            let mut message = format!("{location}: {keyword}: {message}");
             if is_damage && is_strict {
                 self.damage.get_or_insert_with(|| Problem::damage(&*message));
             }
             if let Some(stand_in) = stand_in {
                 message = format!("{message}; {stand_in}");
             }
-            let known = self.warnings.entry((file.to_owned(), keyword));
-            known.or_insert((message, 0)).1 += 1;
+            let warning = self.warnings.entry((file.to_owned(), keyword));
+            warning.or_insert((message, 0)).1 += 1;
         }
     }
 
-    fn map(&mut self, path: &Path, part: Part, has_uvs: bool) -> Checked<usize> {
+    /// Returns the index of the texture of a map.
+    fn map_texture(&mut self, path: &Path, part: Part, has_uvs: bool) -> Checked<usize> {
         if !has_uvs {
             return Err(Problem::new("the mesh has no texture coordinates"));
         }
-        let file = self.shown(path).to_string_lossy().into_owned();
-        let damaged = |problem: Problem| Problem {
+        let file = self.display_path(path).to_string_lossy().into_owned();
+        let as_damage = |problem: Problem| Problem {
             is_damage: true,
             ..problem
         };
-        let place = self.images.assets.find(&file).map_err(damaged)?;
-        if let Some(texture) = self.maps.get(&(place.clone(), part)) {
+        let asset = self.images.assets.find(&file).map_err(as_damage)?;
+        if let Some(texture) = self.maps.get(&(asset.clone(), part)) {
             return Ok(*texture);
         }
         let image = ImageTextureDescription::new(file);
-        let texture = image_texture(&image, part, &mut self.images).map_err(damaged)?;
+        let texture = image_texture(&image, part, &mut self.images).map_err(as_damage)?;
         self.textures.push(texture);
-        self.maps.insert((place, part), self.textures.len() - 1);
+        self.maps.insert((asset, part), self.textures.len() - 1);
         Ok(self.textures.len() - 1)
     }
 
-    fn shown<'p>(&self, path: &'p Path) -> &'p Path {
-        shown(&self.folder, path)
+    fn display_path<'p>(&self, path: &'p Path) -> &'p Path {
+        display_path(&self.folder, path)
     }
 }
 
@@ -314,20 +320,20 @@ impl Warnings {
     }
 
     fn push(&mut self, warning: Warning) {
-        if !self.0.iter().any(|known| known.keyword == warning.keyword) {
+        if !self.0.iter().any(|added| added.keyword == warning.keyword) {
             self.0.push(warning);
         }
     }
 
     /// Adds the statements that have no effect.
-    fn ignored(&mut self, own: &MtlMaterial) {
-        for other in &own.others {
-            self.add(other.as_str(), "ignored");
+    fn ignored(&mut self, mtl: &MtlMaterial) {
+        for keyword in &mtl.others {
+            self.add(keyword.as_str(), "ignored");
         }
     }
 
-    /// Returns the texture of a map. A map that cannot be used is a warning.
-    fn of_map(&mut self, keyword: &str, found: Checked<usize>, stand_in: &'static str) -> Option<usize> {
+    /// Returns the texture of a map. A map that cannot be used causes a warning.
+    fn texture_or_warning(&mut self, keyword: &str, found: Checked<usize>, stand_in: &'static str) -> Option<usize> {
         found
             .map_err(|problem| {
                 self.push(Warning {
@@ -346,15 +352,15 @@ impl GroupMaterials {
         let mut by_name = HashMap::new();
         for (i, library) in mesh.libraries.iter().enumerate() {
             for (j, material) in library.materials.iter().enumerate() {
-                by_name.entry(material.name.as_str()).or_insert((i, j)); // the first one of a name
+                by_name.entry(material.name.as_str()).or_insert((i, j)); // the first material of a name
             }
         }
-        let place = |name: &String| by_name.get(name.as_str()).copied();
+        let mtl_index = |name: &String| by_name.get(name.as_str()).copied();
         GroupMaterials {
-            places: mesh
+            mtl_indices: mesh
                 .groups
                 .iter()
-                .map(|g| g.material.as_ref().and_then(place))
+                .map(|g| g.material.as_ref().and_then(mtl_index))
                 .collect(),
             materials: vec![None; mesh.groups.len()],
         }
@@ -366,8 +372,8 @@ fn beside(library: &Path, name: &str) -> PathBuf {
     file_beside(library.parent().unwrap_or(Path::new("")), name)
 }
 
-/// Returns a path for messages: relative to the scene's folder if it is inside.
-fn shown<'p>(folder: &Path, path: &'p Path) -> &'p Path {
+/// Returns a path for messages: relative to the scene's folder if the file is inside.
+fn display_path<'p>(folder: &Path, path: &'p Path) -> &'p Path {
     path.strip_prefix(folder).unwrap_or(path)
 }
 

@@ -18,8 +18,8 @@ pub(super) fn needs_path(integrator: Integrator) -> Checked<()> {
     check(integrator.follows_paths(), || "needs integrator = \"path\"".to_owned())
 }
 
-/// Returns the component-wise maximum of a color, or `None` for images.
-pub(super) fn most(color: &Color, textures: &[Texture]) -> Option<DVec3> {
+/// Returns the component-wise maximum of a color or texture; `None` for images.
+pub(super) fn max_color(color: &Color, textures: &[Texture]) -> Option<DVec3> {
     match *color {
         Color::Plain(color) => Some(color),
         Color::Texture(i) => match textures[i].kind {
@@ -31,7 +31,7 @@ pub(super) fn most(color: &Color, textures: &[Texture]) -> Option<DVec3> {
     }
 }
 
-/// Warnings about values that the path tracer ignores or changes.
+/// Returns warnings about values that the path tracer ignores or changes.
 pub(super) fn notes(
     (render, integrator): (&RenderDescription, Integrator),
     (names, materials): (&[String], &[Material]),
@@ -51,36 +51,36 @@ pub(super) fn notes(
     if render.light_samples != RenderDescription::default().light_samples {
         notes.push(LIGHT_SAMPLES.to_owned());
     }
-    notes.extend(too_bright(names, materials, textures));
-    notes.extend(unused_alpha(names, materials));
-    notes.extend(unused_cutoff(names, materials));
+    notes.extend(energy_note(names, materials, textures));
+    notes.extend(alpha_note(names, materials));
+    notes.extend(cutoff_note(names, materials));
     notes
 }
 
-/// Returns the Phong materials that do not conserve energy.
-fn too_bright(names: &[String], materials: &[Material], textures: &[Texture]) -> Option<String> {
-    let share = |material: &Material| {
+/// Returns a warning about Phong materials that do not conserve energy.
+fn energy_note(names: &[String], materials: &[Material], textures: &[Texture]) -> Option<String> {
+    let reflectance = |material: &Material| {
         let Reflection::Phong { diffuse, specular, .. } = &material.reflection else {
             return None;
         };
-        let share = (most(diffuse, textures)? + most(specular, textures)?).max_element();
-        (share > 1.0 + ROUNDING).then_some(share)
+        let reflectance = (max_color(diffuse, textures)? + max_color(specular, textures)?).max_element();
+        (reflectance > 1.0 + ROUNDING).then_some(reflectance)
     };
     let bright: Vec<(&String, f64)> = (names.iter().zip(materials))
-        .filter_map(|(name, material)| Some((name, share(material)?)))
+        .filter_map(|(name, material)| Some((name, reflectance(material)?)))
         .collect();
     // Rounded to hundredths, because sums such as 0.7 + 0.4 have many digits.
-    let shown = bright.iter().map(|(name, share)| {
-        let share = number(((share - ROUNDING) * 100.0).ceil() / 100.0);
-        format!("{:?} ({share})", cut(name))
+    let shown = bright.iter().map(|(name, reflectance)| {
+        let reflectance = number(((reflectance - ROUNDING) * 100.0).ceil() / 100.0);
+        format!("{:?} ({reflectance})", cut(name))
     });
-    let all = several(shown)?;
+    let list = join_limited(shown)?;
     Some(format!(
-        "materials: diffuse + specular are scaled down to 1 with integrator = \"path\", which conserves energy: {all}"
+        "materials: diffuse + specular are scaled down to 1 with integrator = \"path\", which conserves energy: {list}"
     ))
 }
 
-fn unused_alpha(names: &[String], materials: &[Material]) -> Option<String> {
+fn alpha_note(names: &[String], materials: &[Material]) -> Option<String> {
     let is_unused = |principled: &Principled| {
         principled.alpha_mode == AlphaMode::Opaque && !matches!(principled.alpha, Value::Plain(1.0))
     };
@@ -91,10 +91,10 @@ fn unused_alpha(names: &[String], materials: &[Material]) -> Option<String> {
     ))
 }
 
-fn unused_cutoff(names: &[String], materials: &[Material]) -> Option<String> {
-    let usual = PrincipledDescription::default().alpha_cutoff;
+fn cutoff_note(names: &[String], materials: &[Material]) -> Option<String> {
+    let default = PrincipledDescription::default().alpha_cutoff;
     let is_unused =
-        |principled: &Principled| principled.alpha_mode != AlphaMode::Mask && principled.alpha_cutoff != usual;
+        |principled: &Principled| principled.alpha_mode != AlphaMode::Mask && principled.alpha_cutoff != default;
     let rule = "has no effect without alpha_mode = \"mask\"";
     Some(format!(
         "materials: alpha_cutoff {rule}: {}",
@@ -108,13 +108,13 @@ fn matching_names(names: &[String], materials: &[Material], predicate: impl Fn(&
         Reflection::Principled(principled) => predicate(principled),
         _ => false,
     });
-    several(found.map(|(name, _)| format!("{:?}", cut(name))))
+    join_limited(found.map(|(name, _)| format!("{:?}", cut(name))))
 }
 
 /// Joins names as `a, b and c`, truncated if there are many; `None` if there are no names.
-fn several(mut all: impl Iterator<Item = String>) -> Option<String> {
-    let mut shown: Vec<String> = all.by_ref().take(MAX_NAMES).collect();
-    match all.count() {
+fn join_limited(mut names: impl Iterator<Item = String>) -> Option<String> {
+    let mut shown: Vec<String> = names.by_ref().take(MAX_NAMES).collect();
+    match names.count() {
         0 => {}
         more => shown.push(format!("{more} more")),
     }

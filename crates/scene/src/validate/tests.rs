@@ -10,7 +10,7 @@ use super::*;
 use crate::{Geometry, Parallelogram};
 
 /// A scene with all features. Each line is unique, so that tests can replace it.
-const GOOD: &str = r#"
+const VALID: &str = r#"
 [image]
 width = 8
 height = 4
@@ -90,15 +90,15 @@ fn parse(text: &str) -> Result<Scene, SceneError> {
     Scene::parse(text, "s.toml")
 }
 
-fn with(line: &str, changed: &str) -> String {
+fn with_line(line: &str, changed: &str) -> String {
     let line = format!("\n{line}\n");
-    assert_eq!(GOOD.matches(&line).count(), 1, "{line}");
-    GOOD.replace(&line, &format!("\n{changed}\n"))
+    assert_eq!(VALID.matches(&line).count(), 1, "{line}");
+    VALID.replace(&line, &format!("\n{changed}\n"))
 }
 
 #[test]
 fn a_valid_scene_has_the_values_of_its_file() {
-    let scene = parse(GOOD).unwrap();
+    let scene = parse(VALID).unwrap();
     assert_eq!((scene.width, scene.height), (8, 4));
     let camera = Camera {
         position: DVec3::new(0.0, -4.0, 1.0),
@@ -162,7 +162,7 @@ fn a_valid_scene_has_the_values_of_its_file() {
 fn tetrahedron_faces_point_outwards_for_any_vertex_order() {
     let line = "vertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]";
     let mirrored = "vertices = [[0, 0, 0], [0, 1, 0], [1, 0, 0], [0, 0, 1]]";
-    for text in [GOOD.to_owned(), with(line, mirrored)] {
+    for text in [VALID.to_owned(), with_line(line, mirrored)] {
         let scene = parse(&text).unwrap();
         let Geometry::Triangles(faces) = &scene.shapes[4].geometry else {
             panic!("{:?}", scene.shapes[4]);
@@ -176,7 +176,7 @@ fn tetrahedron_faces_point_outwards_for_any_vertex_order() {
 }
 
 /// Valid line, invalid replacement, error.
-const BAD: &[(&str, &str, &str)] = &[
+const INVALID: &[(&str, &str, &str)] = &[
     ("width = 8", "width = 0", "image.width: 0 must be from 1 to 65536"),
     (
         "height = 4",
@@ -186,7 +186,7 @@ const BAD: &[(&str, &str, &str)] = &[
     (
         "position = [0, -4, 1]",
         "position = [0, nan, 1]",
-        "camera.position: nan must be finite, from -1e9 to 1e9",
+        "camera.position: nan must be from -1e9 to 1e9",
     ),
     (
         "look_at = [0, 0, 1]",
@@ -196,7 +196,7 @@ const BAD: &[(&str, &str, &str)] = &[
     (
         "look_at = [0, 0, 1]",
         "look_at = [0, 0, -inf]",
-        "camera.look_at: -inf must be finite, from -1e9 to 1e9",
+        "camera.look_at: -inf must be from -1e9 to 1e9",
     ),
     (
         "look_at = [0, 0, 1]",
@@ -214,22 +214,22 @@ const BAD: &[(&str, &str, &str)] = &[
     (
         "focal_length = 2",
         "focal_length = 0",
-        "camera.focal_length: 0 must be finite and greater than 0, from 1e-9 to 1e9",
+        "camera.focal_length: 0 must be from 1e-9 to 1e9",
     ),
     (
         "fov = 90\nfocal_length = 2",
         "height = -2\ntype = 'orthographic'",
-        "camera.height: -2 must be finite and greater than 0, from 1e-9 to 1e9",
+        "camera.height: -2 must be from 1e-9 to 1e9",
     ),
     (
         "ambient = [0.1, 0.1, 0.1]",
         "ambient = [0, 0, -0.1]",
-        "render.ambient: -0.1 must be finite, from 0 to 1e6",
+        "render.ambient: -0.1 must be from 0 to 1e6",
     ),
     (
         "background = [0.2, 0.2, 0.2]",
         "background = [0, inf, 0]",
-        "render.background: inf must be finite, from 0 to 1e6",
+        "render.background: inf must be from 0 to 1e6",
     ),
     (
         "shadow_epsilon = 1e-4",
@@ -249,12 +249,12 @@ const BAD: &[(&str, &str, &str)] = &[
     (
         "color = [0.7, 0.7, 0.7]",
         "color = [-1, 0, 0]",
-        "materials.white.color: -1 must be finite, from 0 to 1e6",
+        "materials.white.color: -1 must be from 0 to 1e6",
     ),
     (
         "diffuse = [0.4, 0, 0]",
         "diffuse = [0, 2e6, 0]",
-        "materials.\"dark red\".diffuse: 2e6 must be finite, from 0 to 1e6",
+        "materials.\"dark red\".diffuse: 2e6 must be from 0 to 1e6",
     ),
     (
         "shininess = 20",
@@ -264,12 +264,12 @@ const BAD: &[(&str, &str, &str)] = &[
     (
         "center = [0, 0, 9]",
         "center = [2e9, 0, 0]",
-        "lights[0].center: 2e9 must be finite, from -1e9 to 1e9",
+        "lights[0].center: 2e9 must be from -1e9 to 1e9",
     ),
     (
         "size = [2, 4]",
         "size = [2, inf]",
-        "lights[0].size: inf must be finite and greater than 0, from 1e-9 to 1e9",
+        "lights[0].size: inf must be from 1e-9 to 1e9",
     ),
     (
         "tangent = [4, 0, 3]",
@@ -279,12 +279,12 @@ const BAD: &[(&str, &str, &str)] = &[
     (
         "color = [1, 0.5, 0]",
         "color = [nan, 0, 0]",
-        "lights[0].color: nan must be finite, from 0 to 1e6",
+        "lights[0].color: nan must be from 0 to 1e6",
     ),
     (
         "position = [0, 0, 8]",
         "position = [0, 0, inf]",
-        "lights[1].position: inf must be finite, from -1e9 to 1e9",
+        "lights[1].position: inf must be from -1e9 to 1e9",
     ),
     (
         "direction = [0, 3, -4]",
@@ -294,12 +294,12 @@ const BAD: &[(&str, &str, &str)] = &[
     (
         "size = [6, 2]",
         "size = [6, -1]",
-        "shapes[0].size: -1 must be finite and greater than 0, from 1e-9 to 1e9",
+        "shapes[0].size: -1 must be from 1e-9 to 1e9",
     ),
     (
         "size = [6, 2]",
         "size = [0, 2]",
-        "shapes[0].size: 0 must be finite and greater than 0, from 1e-9 to 1e9",
+        "shapes[0].size: 0 must be from 1e-9 to 1e9",
     ),
     (
         "normal = [0, 0, 1]",
@@ -329,12 +329,12 @@ const BAD: &[(&str, &str, &str)] = &[
     (
         "radius = 0.5",
         "radius = -0.5",
-        "shapes[2].radius: -0.5 must be finite and greater than 0, from 1e-9 to 1e9",
+        "shapes[2].radius: -0.5 must be from 1e-9 to 1e9",
     ),
     (
         "radius = 0.5",
         "radius = nan",
-        "shapes[2].radius: nan must be finite and greater than 0, from 1e-9 to 1e9",
+        "shapes[2].radius: nan must be from 1e-9 to 1e9",
     ),
     (
         "material = \"white\" # sphere",
@@ -354,7 +354,7 @@ const BAD: &[(&str, &str, &str)] = &[
     (
         "vertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]",
         "vertices = [[0, 0, 0], [1, nan, 0], [0, 1, 0]]",
-        "shapes[3].vertices[1]: nan must be finite, from -1e9 to 1e9",
+        "shapes[3].vertices[1]: nan must be from -1e9 to 1e9",
     ),
     (
         "vertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]",
@@ -370,17 +370,17 @@ const BAD: &[(&str, &str, &str)] = &[
 
 #[test]
 fn invalid_values_are_reported_with_line_key_value_and_rule() {
-    for &(line, bad, rule) in BAD {
-        let text = with(line, bad);
-        let place = text[..text.find(bad).unwrap()].lines().count() + 1;
+    for &(line, invalid, rule) in INVALID {
+        let text = with_line(line, invalid);
+        let line_number = text[..text.find(invalid).unwrap()].lines().count() + 1;
         let message = parse(&text).unwrap_err().to_string();
-        assert_eq!(message, format!("s.toml:{place}: {rule}"));
+        assert_eq!(message, format!("s.toml:{line_number}: {rule}"));
     }
 }
 
 #[test]
-fn values_at_the_limits_are_good() {
-    for (line, good) in [
+fn values_at_the_limits_are_valid() {
+    for (line, valid) in [
         ("width = 8", "width = 65536"),
         ("height = 4", "height = 1"),
         ("look_at = [0, 0, 1]", "look_at = [1e9, 0, -1e9]"),
@@ -400,19 +400,19 @@ fn values_at_the_limits_are_good() {
             "vertices = [[0, 0, 0], [1, 1e-5, 0], [2, 0, 0]]",
         ),
     ] {
-        parse(&with(line, good)).unwrap();
+        parse(&with_line(line, valid)).unwrap();
     }
 }
 
 #[test]
 fn a_factor_without_color_is_missing() {
-    let message = parse(&with("diffuse = [0.4, 0, 0]", "")).unwrap_err().to_string();
-    let line = GOOD
+    let message = parse(&with_line("diffuse = [0.4, 0, 0]", "")).unwrap_err().to_string();
+    let line = VALID
         .lines()
         .position(|line| line.starts_with("[materials.\"dark"))
         .unwrap()
         + 1;
-    let rule = "is missing; set it or color";
+    let rule = "is missing; set diffuse or color";
     assert_eq!(message, format!("s.toml:{line}: materials.\"dark red\".diffuse {rule}"));
 }
 
@@ -448,17 +448,17 @@ fn the_page_has_the_limits() {
             number(ABSORPTIONS.1)
         ),
         format!("| `count` | required | 1 to {MOST} |"),
-        format!("sine of their angle must be above {}", number(FLATTEST)),
-        format!("unit vectors span must be above {}", number(FLATTEST)),
-        format!("twice the area must be above {} times", number(FLATTEST)),
-        format!("six times the volume must be above {} times", number(FLATTEST)),
+        format!("sine of their angle must be above {}", number(MIN_SINE)),
+        format!("unit vectors span must be above {}", number(MIN_SINE)),
+        format!("twice the area must be above {} times", number(MIN_SINE)),
+        format!("six times the volume must be above {} times", number(MIN_SINE)),
     ] {
         assert!(page.contains(&limit), "{limit}");
     }
 }
 
 #[test]
-fn disks_accept_the_radii_of_the_range_of_lengths() {
+fn disks_accept_all_radii_in_the_range_of_lengths() {
     let scene = |radius: &str, normal: &str| {
         let text = format!(
             "image = {{ width = 1, height = 1 }}\ncamera = {{ position = [0, -4, 0], look_at = [0, 0, 0], fov = 40 }}\n\
@@ -471,7 +471,7 @@ fn disks_accept_the_radii_of_the_range_of_lengths() {
         for normal in ["[1, 0, 0]", "[-1, 0, 0]", "[0, 1, 0]", "[0, 0, -1]", "[0.9, 0.1, 0.42]"] {
             let scene = scene(radius, normal).unwrap();
             let Geometry::Disk(disk) = &scene.shapes[0].geometry else {
-                panic!("a disk");
+                panic!("shape 0 is not a disk");
             };
             let radius: f64 = radius.parse().unwrap();
             assert!((disk.u.length() / radius - 1.0).abs() < 1e-12 && (disk.v.length() / radius - 1.0).abs() < 1e-12);
@@ -482,13 +482,13 @@ fn disks_accept_the_radii_of_the_range_of_lengths() {
 }
 
 #[test]
-fn cylinders_accept_radii_and_heights_of_the_range_of_lengths() {
-    let scene = |start: f64, end: f64, rest: &str| {
+fn cylinders_accept_all_radii_and_heights_in_the_range_of_lengths() {
+    let scene = |start: f64, end: f64, more_keys: &str| {
         let [start, end] = [start, end].map(|x| format!("{x:?}").to_lowercase());
         let text = format!(
             "image = {{ width = 1, height = 1 }}\ncamera = {{ position = [0, -4, 0], look_at = [0, 0, 0], fov = 40 }}\n\
              materials.m = {{ type = 'mirror' }}\nshapes = [{{ type = 'cylinder', material = 'm', start = [0, 0, {start}], \
-             end = [0, 0, {end}], {rest} }}]\n"
+             end = [0, 0, {end}], {more_keys} }}]\n"
         );
         crate::Scene::parse(&text, "s.toml").map_err(|error| error.to_string())
     };
@@ -500,25 +500,20 @@ fn cylinders_accept_radii_and_heights_of_the_range_of_lengths() {
                 axes: [u, v, w],
             } = scene.shapes[0].geometry
             else {
-                panic!("a cylinder");
+                panic!("shape 0 is not a cylinder");
             };
             assert_eq!(w, DVec3::Z * height / 2.0);
             assert_eq!((center, u, v), (w, DVec3::X * radius, DVec3::Y * radius));
         }
     }
-    for (start, end, rest, error) in [
+    for (start, end, more_keys, error) in [
         (
             1.0,
             1.0,
             "radius = 1",
             "shapes[0].end: [0, 0, 1] must be at least 1e-9 from the start, [0, 0, 1]",
         ),
-        (
-            0.0,
-            1.0,
-            "radius = 0",
-            "shapes[0].radius: 0 must be finite and greater than 0",
-        ),
+        (0.0, 1.0, "radius = 0", "shapes[0].radius: 0 must be from 1e-9 to 1e9"),
         (
             0.0,
             1.0,
@@ -527,7 +522,7 @@ fn cylinders_accept_radii_and_heights_of_the_range_of_lengths() {
         ),
         (f64::NAN, 1.0, "radius = 1", "shapes[0].start: "),
     ] {
-        let message = scene(start, end, rest).unwrap_err();
+        let message = scene(start, end, more_keys).unwrap_err();
         assert!(message.contains(error), "{message}");
     }
 }

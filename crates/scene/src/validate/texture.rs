@@ -21,7 +21,7 @@ pub(super) fn textures(
     descriptions: &BTreeMap<String, TextureDescription>,
     images: &mut Images,
 ) -> (Vec<Texture>, BTreeSet<usize>, Result<(), Problems>) {
-    let mut found = Collector::default();
+    let mut problems = Collector::default();
     let mut replaced = BTreeSet::new();
     let mut textures = Vec::with_capacity(descriptions.len());
     for (name, description) in descriptions {
@@ -36,9 +36,9 @@ pub(super) fn textures(
         if texture.is_err() || (!images.reads_files && matches!(description, TextureDescription::Image(_))) {
             replaced.insert(textures.len());
         }
-        textures.push(found.value(texture).unwrap_or_else(|| constant(DVec3::ONE)));
+        textures.push(problems.value(texture).unwrap_or_else(|| constant(DVec3::ONE)));
     }
-    (textures, replaced, found.end(()))
+    (textures, replaced, problems.end(()))
 }
 
 fn constant(color: DVec3) -> Texture {
@@ -51,7 +51,7 @@ fn constant(color: DVec3) -> Texture {
 
 pub(super) fn texture(description: &TextureDescription, images: &mut Images) -> Checked<Texture> {
     Ok(match description {
-        TextureDescription::Constant(plain) => constant(color(plain.color).at("color")?),
+        TextureDescription::Constant(description) => constant(color(description.color).at("color")?),
         TextureDescription::Checker(checker) => Texture {
             kind: TextureKind::Checker {
                 even: color(checker.even).at("even")?,
@@ -110,20 +110,17 @@ pub(super) fn image_texture(texture: &ImageTextureDescription, part: Part, image
 
 /// Returns the transform of (u, v): first the scale, then the rotation, then the offset.
 fn transform(scale: [f64; 2], rotate: f64, offset: [f64; 2]) -> Checked<[DVec3; 2]> {
-    let valid = scale.iter().all(|s| (SCALES.0..=SCALES.1).contains(&s.abs()));
-    check(valid, || {
+    let is_valid = scale.iter().all(|s| (SCALES.0..=SCALES.1).contains(&s.abs()));
+    check(is_valid, || {
         let (low, high) = (number(SCALES.0), number(SCALES.1));
-        format!(
-            "{} must be nonzero, with magnitudes from {low} to {high}",
-            show_pair(scale)
-        )
+        format!("{} must have magnitudes from {low} to {high}", show_pair(scale))
     })
     .at("scale")?;
     let rotate = between(rotate, TURNS).at("rotate")?;
     let (low, high) = OFFSETS;
     check(offset.iter().all(|x| (low..=high).contains(x)), || {
         let (low, high) = (number(low), number(high));
-        format!("{} must be finite, from {low} to {high}", show_pair(offset))
+        format!("{} must be from {low} to {high}", show_pair(offset))
     })
     .at("offset")?;
     let (sin, cos) = rotate.to_radians().sin_cos();
@@ -137,7 +134,7 @@ fn transform(scale: [f64; 2], rotate: f64, offset: [f64; 2]) -> Checked<[DVec3; 
 pub(super) struct Textures<'a> {
     pub(super) names: Vec<&'a str>,
     pub(super) textures: &'a [Texture],
-    /// By name, the index of the alpha texture, which follows the other textures, or the error.
+    /// By name, the index of the alpha texture, or an error. Alpha textures follow the other textures.
     pub(super) alphas: BTreeMap<&'a str, Result<usize, String>>,
     pub(super) replaced: BTreeSet<usize>,
     /// The integrator, which determines the valid materials.
@@ -164,7 +161,7 @@ pub(super) fn alphas<'a>(
             TextureDescription::Image(image) => {
                 textures.push(match image_texture(image, Part::Alpha, images) {
                     Err(problem) if problem.is_damage => constant(DVec3::splat(image.factor[3])),
-                    added => added.map_err(|problem| problem.message)?,
+                    alpha => alpha.map_err(|problem| problem.message)?,
                 });
                 Ok(textures.len() - 1)
             }
@@ -268,10 +265,10 @@ impl Textures<'_> {
         Ok(match description {
             ValueDescription::Plain(plain) => Value::Plain(between(*plain, SHARES)?),
             ValueDescription::Texture(reference) => {
-                let found = self.find(&reference.texture)?;
+                let colors = self.find(&reference.texture)?;
                 let texture = match (reference.channel, self.alphas.get(reference.texture.as_str())) {
                     (Channel::A, Some(alpha)) => alpha.clone().map_err(Problem::new).at("channel")?,
-                    _ => found,
+                    _ => colors,
                 };
                 let factor = self.factor_of(texture);
                 bounded_factor(match reference.channel {
@@ -285,7 +282,7 @@ impl Textures<'_> {
     }
 }
 
-/// Checks the factor of an image whose products must be from 0 to 1.
+/// Checks the factor of an image whose values, multiplied by the factor, must be from 0 to 1.
 fn bounded_factor(factor: f64) -> Checked<()> {
     check(factor <= 1.0, || {
         format!("the texture's factor of {} must be from 0 to 1 here", number(factor))

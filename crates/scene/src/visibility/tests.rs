@@ -1,3 +1,5 @@
+//! Tests of the warnings about scenes in which nothing can be visible.
+
 use crate::Scene;
 
 const NO_LIGHT: &str = "the scene has no light, emission or environment; every surface renders black";
@@ -5,7 +7,7 @@ const NOT_IN_VIEW: &str = "no shape is in view of the camera; the image shows on
                            (check camera.position and camera.look_at)";
 const NO_SHAPES: &str = "the scene has no shapes; the image shows only the background";
 
-/// At (0, -10, 0), along +y, with a vertical field of view of 90 degrees, at 20 x 10 pixels.
+/// A camera at (0, -10, 0) along +y, with a vertical field of view of 90 degrees and 20 x 10 pixels.
 const CAMERA: &str = "[image]\nwidth = 20\nheight = 10\n\
     [camera]\nposition = [0, -10, 0]\nlook_at = [0, 0, 0]\nfov = 90\n";
 const LIGHT: &str = "[[lights]]\ntype = 'point'\nposition = [0, 0, 5]\ncolor = [1, 1, 1]\n";
@@ -50,9 +52,9 @@ fn any_source_of_light_suffices() {
     let unused = "[materials.lit]\ntype = 'diffuse'\ncolor = [0, 0, 0]\nemission = [1, 1, 1]\n";
     assert_eq!(warnings(&format!("{dark}{unused}")), [NO_LIGHT]);
     // The Phong integrator supports an ambient term instead of emission.
-    let phong = |ambient: &str, own: &str| {
+    let phong = |ambient: &str, factor: &str| {
         format!(
-            "{CAMERA}[render]\nambient = {ambient}\n[materials.gray]\ntype = 'phong'\ncolor = [1, 1, 1]\nambient = {own}\n{sphere}"
+            "{CAMERA}[render]\nambient = {ambient}\n[materials.gray]\ntype = 'phong'\ncolor = [1, 1, 1]\nambient = {factor}\n{sphere}"
         )
     };
     assert_eq!(warnings(&phong("[0, 0, 0]", "[1, 1, 1]")), [NO_LIGHT]);
@@ -62,9 +64,9 @@ fn any_source_of_light_suffices() {
 
 #[test]
 fn spheres_just_outside_of_the_view_are_reported_and_those_at_its_edge_are_not() {
-    // At depth 10, the view is 40 x 20, not including the filter's margin; a sphere at a slanted side is at most
-    // sqrt(3) away in the box test.
-    let seen = [
+    // At depth 10, the view is 40 x 20, not including the filter's margin. A corner of a sphere's bounding box is at
+    // most sqrt(3) closer to a slanted side than the center of the sphere.
+    let visible = [
         [0.0, 0.0, 0.0],
         [19.0, 0.0, 0.0],
         [-19.0, 0.0, 0.0],
@@ -72,7 +74,7 @@ fn spheres_just_outside_of_the_view_are_reported_and_those_at_its_edge_are_not()
         [0.0, 0.0, -10.9],
         [0.0, -10.5, 0.0],
     ];
-    let unseen = [
+    let invisible = [
         [28.0, 0.0, 0.0],
         [-28.0, 0.0, 0.0],
         [0.0, 0.0, 16.0],
@@ -81,16 +83,16 @@ fn spheres_just_outside_of_the_view_are_reported_and_those_at_its_edge_are_not()
         [0.0, -100.0, 0.0],
     ];
     let scene = |center| format!("{CAMERA}{PATH}{GRAY}{LIGHT}{}", sphere(center));
-    for center in seen {
+    for center in visible {
         assert_eq!(warnings(&scene(center)), [""; 0], "{center:?}");
     }
-    for center in unseen {
+    for center in invisible {
         assert_eq!(warnings(&scene(center)), [NOT_IN_VIEW], "{center:?}");
     }
     // A single shape in view suffices. A panorama sees all directions.
-    let two = format!("{}{}", scene(unseen[0]), sphere(seen[0]));
-    assert_eq!(warnings(&two), [""; 0]);
-    let panorama = scene(unseen[4]).replace("fov = 90", "type = 'panorama'");
+    let both = format!("{}{}", scene(invisible[0]), sphere(visible[0]));
+    assert_eq!(warnings(&both), [""; 0]);
+    let panorama = scene(invisible[4]).replace("fov = 90", "type = 'panorama'");
     assert_eq!(warnings(&panorama), [""; 0]);
 }
 
@@ -122,16 +124,15 @@ fn scenes_without_shapes_are_reported_unless_they_show_an_environment_map() {
     let plane =
         "[[shapes]]\ntype = 'plane'\nmaterial = 'gray'\npoint = [0, 0, -1]\nnormal = [0, 0, 1]\ntangent = [1, 0, 0]\n";
     assert_eq!(warnings(&format!("{CAMERA}{PATH}{GRAY}{LIGHT}{plane}")), [""; 0]);
-    let hidden = plane.to_owned() + "\n";
     let gray = GRAY.replace("[0.5, 0.5, 0.5]", "[0.5, 0.5, 0.5]\nvisible = false");
-    assert_eq!(warnings(&format!("{CAMERA}{PATH}{gray}{LIGHT}{hidden}")), [NOT_IN_VIEW]);
+    assert_eq!(warnings(&format!("{CAMERA}{PATH}{gray}{LIGHT}{plane}")), [NOT_IN_VIEW]);
 }
 
 #[test]
 fn paths_without_bounces_show_only_emission() {
-    let scene = |depth: u32, more: &str| {
+    let scene = |depth: u32, extra: &str| {
         let render = format!("[render]\nintegrator = 'path'\nmax_depth = {depth}\n");
-        warnings(&format!("{CAMERA}{render}{GRAY}{LIGHT}{more}{}", sphere([0.0; 3])))
+        warnings(&format!("{CAMERA}{render}{GRAY}{LIGHT}{extra}{}", sphere([0.0; 3])))
     };
     let [warning] = &scene(0, "")[..] else {
         panic!("{:?}", scene(0, ""))

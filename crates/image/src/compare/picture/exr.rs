@@ -9,23 +9,23 @@ use exr::error::Error;
 use exr::meta::attribute::SampleType;
 use exr::meta::header::Header;
 
-use super::read::{Source, Unreadable, check, length_of, room};
+use super::read::{Source, Unreadable, check, file_length, reserve};
 use super::{Channel, Kind, Picture, Plane};
 
 impl From<Error> for Unreadable {
     fn from(error: Error) -> Self {
         match error {
             Error::Io(error) if error.kind() != io::ErrorKind::UnexpectedEof => Unreadable::Io(error),
-            Error::NotSupported(what) => Unreadable::Kind(what.into_owned()),
+            Error::NotSupported(feature) => Unreadable::Kind(feature.into_owned()),
             Error::Io(error) => Unreadable::Damaged(error.to_string()),
-            other => Unreadable::Damaged(other.to_string()),
+            error => Unreadable::Damaged(error.to_string()),
         }
     }
 }
 
-/// Decodes block by block, which saves memory.
-pub(super) fn read(source: &mut dyn Source, most_pixels: u64) -> Result<Picture, Unreadable> {
-    let length = length_of(source)?;
+/// Decodes an image block by block, which saves memory.
+pub(super) fn read(source: &mut dyn Source, max_pixels: u64) -> Result<Picture, Unreadable> {
+    let length = file_length(source)?;
     let reader = exr::block::read(source, false)?;
     let headers = reader.headers().to_vec();
     let first = headers
@@ -38,7 +38,7 @@ pub(super) fn read(source: &mut dyn Source, most_pixels: u64) -> Result<Picture,
             return Err(Unreadable::Kind("deep data".to_owned()));
         }
         if header.layer_size != first.layer_size || header.own_attributes.layer_position != position {
-            return Err(Unreadable::Kind("parts of different sizes or places".to_owned()));
+            return Err(Unreadable::Kind("parts of different sizes or positions".to_owned()));
         }
     }
     let side = |length: usize| u32::try_from(length).ok().filter(|length| *length > 0);
@@ -46,10 +46,10 @@ pub(super) fn read(source: &mut dyn Source, most_pixels: u64) -> Result<Picture,
         return Err(Unreadable::Damaged("it has no pixels".to_owned()));
     };
     let channels = headers.iter().flat_map(|header| &header.channels.list);
-    let pixel = channels
+    let bytes_per_pixel = channels
         .map(|channel| channel.sample_type.bytes_per_sample() as u64)
         .sum();
-    check(most_pixels, length, (columns.into(), rows.into()), pixel)?;
+    check(max_pixels, length, (columns.into(), rows.into()), bytes_per_pixel)?;
     let names = names(&headers)?;
     let mut planes = Vec::new();
     for header in &headers {
@@ -61,25 +61,25 @@ pub(super) fn read(source: &mut dyn Source, most_pixels: u64) -> Result<Picture,
     }
     let chunks = reader.filter_chunks(false, |_, _, block| (block.level.x(), block.level.y()) == (0, 0))?;
     // A file may contain a block twice and omit another block.
-    let (mut seen, mut area) = (BTreeSet::new(), 0);
+    let (mut blocks, mut area) = (BTreeSet::new(), 0);
     chunks.decompress_parallel(false, |_, block| {
         let damaged = || Error::Invalid("block".into());
         let part = planes.get_mut(block.index.layer).ok_or_else(damaged)?;
-        let (at, size) = (block.index.pixel_position, block.index.pixel_size);
-        if at.x().checked_add(size.x()).is_none_or(|end| end > width) {
+        let (position, size) = (block.index.pixel_position, block.index.pixel_size);
+        if position.x().checked_add(size.x()).is_none_or(|end| end > width) {
             return Err(damaged());
         }
-        if at.y().checked_add(size.y()).is_none_or(|end| end > height) {
+        if position.y().checked_add(size.y()).is_none_or(|end| end > height) {
             return Err(damaged());
         }
-        if seen.insert((block.index.layer, at.x(), at.y())) {
+        if blocks.insert((block.index.layer, position.x(), position.y())) {
             area += size.area() as u64;
         }
         let mut bytes = block.data.as_slice();
-        for y in at.y()..at.y() + size.y() {
+        for y in position.y()..position.y() + size.y() {
             for plane in part.iter_mut() {
                 let line = bytes.split_off(..size.x() * bytes_of(plane)).ok_or_else(damaged)?;
-                store(plane, y * width + at.x(), line);
+                store(plane, y * width + position.x(), line);
             }
         }
         Ok(())
@@ -105,7 +105,7 @@ pub(super) fn read(source: &mut dyn Source, most_pixels: u64) -> Result<Picture,
 /// Returns the channel names. In multi-part files, the part name is prepended unless already present.
 fn names(headers: &[Header]) -> Result<Vec<String>, Unreadable> {
     let mut names = Vec::new();
-    let mut known = BTreeSet::new();
+    let mut unique = BTreeSet::new();
     for header in headers {
         let part = header.own_attributes.layer_name.as_ref().map(ToString::to_string);
         let part = part.filter(|part| headers.len() > 1 && !part.is_empty());
@@ -115,7 +115,7 @@ fn names(headers: &[Header]) -> Result<Vec<String>, Unreadable> {
                 Some(part) if !channel.starts_with(&format!("{part}.")) => format!("{part}.{channel}"),
                 _ => channel,
             };
-            if !known.insert(name.clone()) {
+            if !unique.insert(name.clone()) {
                 return Err(Unreadable::Kind(format!("two channels are called {name}")));
             }
             names.push(name);
@@ -128,10 +128,10 @@ fn names(headers: &[Header]) -> Result<Vec<String>, Unreadable> {
 }
 
 fn empty(columns: u32, rows: u32, samples: SampleType) -> Result<Plane, Unreadable> {
-    /// Allocates zeros. Memory is mapped on first use, because a header may claim any size.
+    /// Allocates zeros. The system maps their memory on first use, because a header may claim any size.
     fn zeros<T: Clone + Default>(width: u64, height: u64) -> Result<Vec<T>, Unreadable> {
         let count = width * height;
-        drop(room::<T>(width, height, count)?);
+        drop(reserve::<T>(width, height, count)?);
         Ok(vec![T::default(); count as usize])
     }
     let (width, height) = (u64::from(columns), u64::from(rows));
@@ -147,15 +147,15 @@ fn bytes_of(plane: &Plane) -> usize {
 }
 
 fn store(plane: &mut Plane, start: usize, line: &[u8]) {
-    fn put<T, const N: usize>(to: &mut [T], line: &[u8], value: impl Fn([u8; N]) -> T) {
+    fn copy<T, const N: usize>(to: &mut [T], line: &[u8], value: impl Fn([u8; N]) -> T) {
         for (to, bytes) in to.iter_mut().zip(line.as_chunks::<N>().0) {
             *to = value(*bytes);
         }
     }
     match plane {
-        Plane::Whole(values) => put(&mut values[start..], line, u32::from_ne_bytes),
-        Plane::Halves(values) => put(&mut values[start..], line, u16::from_ne_bytes),
-        Plane::Floats(values) => put(&mut values[start..], line, f32::from_ne_bytes),
+        Plane::Whole(values) => copy(&mut values[start..], line, u32::from_ne_bytes),
+        Plane::Halves(values) => copy(&mut values[start..], line, u16::from_ne_bytes),
+        Plane::Floats(values) => copy(&mut values[start..], line, f32::from_ne_bytes),
         Plane::Bytes(_) | Plane::Shorts(_) | Plane::One => {} // not in OpenEXR
     }
 }

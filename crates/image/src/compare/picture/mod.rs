@@ -10,7 +10,7 @@ use ::exr::prelude::f16;
 
 pub use read::Unreadable;
 
-/// Interpretation of the values.
+/// Interpretation of the values of an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// Values encoded for display, 0 to 1: PNG, JPEG, WebP.
@@ -40,7 +40,7 @@ pub struct Picture {
 /// A named channel.
 #[derive(Clone, Debug)]
 pub struct Channel {
-    /// For example `R`, `A`, `normal.X`.
+    /// Name, such as `R`, `A` or `normal.X`.
     pub name: String,
     /// Values; the channels of a gray image share a plane.
     pub plane: Arc<Plane>,
@@ -49,11 +49,11 @@ pub struct Channel {
 /// Values of a channel in row-major order, top row first.
 #[derive(Clone, Debug)]
 pub enum Plane {
-    /// 255 is 1.
+    /// 8-bit integers; 255 is 1.
     Bytes(Vec<u8>),
-    /// 65,535 is 1.
+    /// 16-bit integers; 65,535 is 1.
     Shorts(Vec<u16>),
-    /// Unscaled integers.
+    /// 32-bit integers, unscaled.
     Whole(Vec<u32>),
     /// Bits of half-precision floats.
     Halves(Vec<u16>),
@@ -83,9 +83,9 @@ impl Plane {
         value[0]
     }
 
-    /// Returns true if both planes store equal integers in these pixels. For floats and for planes of different types,
-    /// always returns false.
-    pub fn is_plainly(&self, other: &Plane, pixels: Range<usize>) -> bool {
+    /// Returns true if both planes store equal integers in these pixels. Always returns false for floats and for planes
+    /// of different types.
+    pub fn stores_same_integers(&self, other: &Plane, pixels: Range<usize>) -> bool {
         match (self, other) {
             (Plane::Bytes(a), Plane::Bytes(b)) => a[pixels.clone()] == b[pixels],
             (Plane::Shorts(a), Plane::Shorts(b)) => a[pixels.clone()] == b[pixels],
@@ -160,23 +160,23 @@ impl Picture {
     }
 }
 
-/// Encodes a plane like a PNG. Colors are divided by alpha and gamma-encoded (1/2.2).
+/// Encodes a plane as `wgray render` does for a PNG: colors are divided by alpha and gamma-encoded (1/2.2).
 fn displayed(plane: &Plane, alpha: Option<&Arc<Plane>>, pixels: usize, bits: u8, is_color: bool) -> Plane {
     const CHUNK: usize = 4096;
-    let (mut values, mut shares) = ([0.0; CHUNK], [1.0; CHUNK]);
+    let (mut values, mut alphas) = ([0.0; CHUNK], [1.0; CHUNK]);
     let (mut bytes, mut words) = (Vec::new(), Vec::new());
     for start in (0..pixels).step_by(CHUNK) {
         let count = CHUNK.min(pixels - start);
         plane.values(start..start + count, &mut values[..count]);
         if let Some(alpha) = alpha {
-            alpha.values(start..start + count, &mut shares[..count]);
+            alpha.values(start..start + count, &mut alphas[..count]);
         }
-        for (value, share) in values[..count].iter().zip(&shares) {
+        for (value, alpha_value) in values[..count].iter().zip(&alphas) {
             // Uses `f32`, like the PNG encoder of a render, so that the bytes are equal.
-            let (value, share) = (*value as f32, *share as f32);
+            let (value, alpha_value) = (*value as f32, *alpha_value as f32);
             let value = match alpha {
-                Some(_) if !(share > 0.0) => 0.0,
-                Some(_) => value / share,
+                Some(_) if !(alpha_value > 0.0) => 0.0,
+                Some(_) => value / alpha_value,
                 None => value,
             };
             let exponent = if is_color { super::colors::DISPLAY } else { 1.0 };

@@ -12,20 +12,20 @@ use crate::blocking_path;
 use crate::memory::fallible;
 
 /// Memory limit of a decoder in addition to the image, in bytes.
-const BESIDE: usize = 64 << 20;
+const MAX_DECODER_BYTES: usize = 64 << 20;
 
 /// Maximum pixels per byte of a JPEG: each block of 8 x 8 values takes at least one bit and covers up to 32 x 32
 /// pixels.
 const MAX_JPEG_PIXELS_PER_BYTE: u64 = 8 * 32 * 32;
 
-/// Limit on the decoded size in bytes: a constant, plus an allowance per byte of the file. A small file may decode to
-/// 65,536 x 65,536 zeros.
+/// Limit on the decoded size in bytes: a constant, plus an allowance per byte of the file. Without the limit, a small
+/// file could decode to 65,536 x 65,536 zeros.
 const MAX_BYTES: (u64, u64) = (1 << 30, 256);
 
 /// Why a file cannot be read as an image.
 #[derive(Debug, thiserror::Error)]
 pub enum Unreadable {
-    /// The file cannot be opened or read. Not marked as the source, because the message already contains its text.
+    /// The file cannot be opened or read. The error is not the `source`, because the message contains its text.
     #[error("cannot be read: {0}")]
     Io(io::Error),
     /// The path is a directory.
@@ -44,18 +44,18 @@ pub enum Unreadable {
     #[error("is not supported: {0}")]
     Kind(String),
     /// The image has too many pixels.
-    #[error("has {width} x {height} pixels; the limit is {most} pixels")]
+    #[error("has {width} x {height} pixels; the limit is {limit} pixels")]
     Pixels {
         /// Columns.
         width: u64,
         /// Rows.
         height: u64,
         /// Maximum number of pixels.
-        most: u64,
+        limit: u64,
     },
     /// The image takes far more memory than its file has bytes.
     #[error(
-        "has {width} x {height} pixels, which take {bytes} bytes; the limit for a file of {length} bytes is {most} bytes"
+        "has {width} x {height} pixels, which take {bytes} bytes; the limit for a file of {length} bytes is {limit} bytes"
     )]
     Large {
         /// Columns.
@@ -67,7 +67,7 @@ pub enum Unreadable {
         /// Bytes of the file.
         length: u64,
         /// Maximum bytes of the values.
-        most: u64,
+        limit: u64,
     },
     /// The image does not fit into memory.
     #[error("does not fit into memory: {width} x {height} pixels take {bytes} bytes")]
@@ -111,17 +111,17 @@ impl Picture {
         decode(&mut BufReader::with_capacity(1 << 16, file), u64::MAX)
     }
 
-    /// Decodes an image.
+    /// Decodes an image in memory.
     ///
     /// # Errors
     ///
     /// [`Unreadable`], with the reason.
-    pub fn decode(bytes: Vec<u8>, most_pixels: u64) -> Result<Picture, Unreadable> {
-        decode(&mut Cursor::new(bytes), most_pixels)
+    pub fn decode(bytes: Vec<u8>, max_pixels: u64) -> Result<Picture, Unreadable> {
+        decode(&mut Cursor::new(bytes), max_pixels)
     }
 }
 
-fn decode(source: &mut dyn Source, most_pixels: u64) -> Result<Picture, Unreadable> {
+fn decode(source: &mut dyn Source, max_pixels: u64) -> Result<Picture, Unreadable> {
     let mut start = Vec::new();
     source.take(64).read_to_end(&mut start)?;
     source.seek(SeekFrom::Start(0))?;
@@ -129,44 +129,46 @@ fn decode(source: &mut dyn Source, most_pixels: u64) -> Result<Picture, Unreadab
         return Err(Unreadable::Empty);
     }
     match image::guess_format(&start) {
-        Ok(ImageFormat::Png) => png(source, most_pixels),
-        Ok(ImageFormat::OpenExr) => super::exr::read(source, most_pixels),
-        Ok(format @ (ImageFormat::Jpeg | ImageFormat::WebP | ImageFormat::Hdr)) => other(source, format, most_pixels),
+        Ok(ImageFormat::Png) => png(source, max_pixels),
+        Ok(ImageFormat::OpenExr) => super::exr::read(source, max_pixels),
+        Ok(format @ (ImageFormat::Jpeg | ImageFormat::WebP | ImageFormat::Hdr)) => {
+            decode_8_bit_or_hdr(source, format, max_pixels)
+        }
         _ => Err(Unreadable::Format),
     }
 }
 
 /// Rejects images with too many pixels, or with values that take far more memory than the file.
 pub(super) fn check(
-    most_pixels: u64,
+    max_pixels: u64,
     length: u64,
     (width, height): (u64, u64),
-    bytes_of_pixel: u64,
+    bytes_per_pixel: u64,
 ) -> Result<(), Unreadable> {
-    if width.saturating_mul(height) > most_pixels {
+    if width.saturating_mul(height) > max_pixels {
         return Err(Unreadable::Pixels {
             width,
             height,
-            most: most_pixels,
+            limit: max_pixels,
         });
     }
-    let bytes = width.saturating_mul(height).saturating_mul(bytes_of_pixel);
-    let most = MAX_BYTES.0.saturating_add(length.saturating_mul(MAX_BYTES.1));
-    match bytes <= most {
+    let bytes = width.saturating_mul(height).saturating_mul(bytes_per_pixel);
+    let limit = MAX_BYTES.0.saturating_add(length.saturating_mul(MAX_BYTES.1));
+    match bytes <= limit {
         true => Ok(()),
         false => Err(Unreadable::Large {
             width,
             height,
             bytes,
             length,
-            most,
+            limit,
         }),
     }
 }
 
 /// Reserves memory for values, or returns [`Unreadable::Memory`].
-pub(super) fn room<T>(width: u64, height: u64, count: u64) -> Result<Vec<T>, Unreadable> {
-    let refused = Unreadable::Memory {
+pub(super) fn reserve<T>(width: u64, height: u64, count: u64) -> Result<Vec<T>, Unreadable> {
+    let too_large = Unreadable::Memory {
         width,
         height,
         bytes: count.saturating_mul(size_of::<T>() as u64),
@@ -174,7 +176,7 @@ pub(super) fn room<T>(width: u64, height: u64, count: u64) -> Result<Vec<T>, Unr
     let mut values = Vec::new();
     match usize::try_from(count) {
         Ok(count) if fallible(|| values.try_reserve_exact(count)).is_ok() => Ok(values),
-        _ => Err(refused),
+        _ => Err(too_large),
     }
 }
 
@@ -188,26 +190,28 @@ impl From<png::DecodingError> for Unreadable {
     fn from(error: png::DecodingError) -> Self {
         match error {
             png::DecodingError::IoError(error) if error.kind() != io::ErrorKind::UnexpectedEof => Unreadable::Io(error),
-            other => Unreadable::Damaged(other.to_string()),
+            error => Unreadable::Damaged(error.to_string()),
         }
     }
 }
 
 /// Returns the length in bytes, and seeks to the start.
-pub(super) fn length_of(source: &mut dyn Source) -> io::Result<u64> {
+pub(super) fn file_length(source: &mut dyn Source) -> io::Result<u64> {
     let length = source.seek(SeekFrom::End(0))?;
     source.seek(SeekFrom::Start(0))?;
     Ok(length)
 }
 
-/// Decodes row by row unless interlaced, which saves memory.
-fn png(source: &mut dyn Source, most_pixels: u64) -> Result<Picture, Unreadable> {
-    let length = length_of(source)?;
+/// Decodes a PNG row by row, which saves memory, unless it is interlaced.
+fn png(source: &mut dyn Source, max_pixels: u64) -> Result<Picture, Unreadable> {
+    let length = file_length(source)?;
     let mut options = png::DecodeOptions::default();
     options.set_ignore_text_chunk(true);
     options.set_ignore_iccp_chunk(true);
     let mut decoder = png::Decoder::new_with_options(source, options);
-    decoder.set_limits(png::Limits { bytes: BESIDE });
+    decoder.set_limits(png::Limits {
+        bytes: MAX_DECODER_BYTES,
+    });
     decoder.set_transformations(png::Transformations::EXPAND); // palettes to colors, fewer than 8 bits to 8
     let mut reader = decoder.read_info()?;
     let (width, height) = (reader.info().width, reader.info().height);
@@ -216,18 +220,18 @@ fn png(source: &mut dyn Source, most_pixels: u64) -> Result<Picture, Unreadable>
     let samples = color.samples();
     let is_deep = depth == png::BitDepth::Sixteen;
     let (columns, rows) = (u64::from(width), u64::from(height));
-    let bytes_of_pixel = samples as u64 * if is_deep { 2 } else { 1 };
-    check(most_pixels, length, (columns, rows), bytes_of_pixel)?;
+    let bytes_per_pixel = samples as u64 * if is_deep { 2 } else { 1 };
+    check(max_pixels, length, (columns, rows), bytes_per_pixel)?;
     let mut planes = Planes::new(columns, rows, samples, is_deep)?;
     if is_interlaced {
         let size = reader.output_buffer_size().unwrap_or(usize::MAX) as u64;
-        let mut bytes = room(columns, rows, size)?;
+        let mut bytes = reserve(columns, rows, size)?;
         bytes.resize(size as usize, 0);
         reader.next_frame(&mut bytes)?;
-        planes.take(&bytes);
+        planes.append(&bytes);
     } else {
         while let Some(row) = reader.next_row()? {
-            planes.take(row.data());
+            planes.append(row.data());
         }
     }
     reader.finish()?;
@@ -251,15 +255,15 @@ impl Planes {
         };
         for _ in 0..samples {
             match is_deep {
-                true => planes.words.push(room(width, height, count)?),
-                false => planes.bytes.push(room(width, height, count)?),
+                true => planes.words.push(reserve(width, height, count)?),
+                false => planes.bytes.push(reserve(width, height, count)?),
             }
         }
         Ok(planes)
     }
 
-    /// Appends whole pixels; 16-bit samples are big-endian.
-    fn take(&mut self, pixels: &[u8]) {
+    /// Appends complete pixels; 16-bit samples are big-endian.
+    fn append(&mut self, pixels: &[u8]) {
         let samples = self.samples;
         for (i, plane) in self.bytes.iter_mut().enumerate() {
             plane.extend(pixels.iter().skip(i).step_by(samples));
@@ -300,11 +304,12 @@ impl Planes {
     }
 }
 
-fn other(source: &mut dyn Source, format: ImageFormat, most_pixels: u64) -> Result<Picture, Unreadable> {
-    let length = length_of(source)?;
+/// Decodes JPEG, WebP and Radiance files.
+fn decode_8_bit_or_hdr(source: &mut dyn Source, format: ImageFormat, max_pixels: u64) -> Result<Picture, Unreadable> {
+    let length = file_length(source)?;
     let mut reader = ImageReader::with_format(source, format);
     reader.limits(Limits::no_limits());
-    let decoder = reader.into_decoder().map_err(refused)?;
+    let decoder = reader.into_decoder().map_err(decode_error)?;
     let (width, height) = decoder.dimensions();
     if width == 0 || height == 0 {
         return Err(Unreadable::Damaged("it has no pixels".to_owned()));
@@ -313,20 +318,20 @@ fn other(source: &mut dyn Source, format: ImageFormat, most_pixels: u64) -> Resu
         && length.saturating_mul(MAX_JPEG_PIXELS_PER_BYTE) < u64::from(width) * u64::from(height)
     {
         return Err(Unreadable::Damaged(format!(
-            "its header says {width} x {height} pixels, and {length} bytes cannot hold them"
+            "its header specifies {width} x {height} pixels, which do not fit into {length} bytes"
         )));
     }
     let color = decoder.color_type();
     let size = (width.into(), height.into());
-    check(most_pixels, length, size, color.bytes_per_pixel().into())?;
-    // Reserved here first, since a failed allocation in the library aborts the process.
-    drop(room::<u8>(width.into(), height.into(), decoder.total_bytes())?);
-    let image = DynamicImage::from_decoder(decoder).map_err(refused)?;
+    check(max_pixels, length, size, color.bytes_per_pixel().into())?;
+    // Memory is reserved here first, because a failed allocation in the library aborts the process.
+    drop(reserve::<u8>(width.into(), height.into(), decoder.total_bytes())?);
+    let image = DynamicImage::from_decoder(decoder).map_err(decode_error)?;
     let (columns, rows) = (u64::from(width), u64::from(height));
     if format == ImageFormat::Hdr {
         let values = image.into_rgb32f().into_raw();
         let channels = ["R", "G", "B"].into_iter().enumerate().map(|(i, name)| {
-            let mut plane = room(columns, rows, columns * rows)?;
+            let mut plane = reserve(columns, rows, columns * rows)?;
             plane.extend(values.iter().skip(i).step_by(3));
             Ok(Channel {
                 name: name.to_owned(),
@@ -343,17 +348,21 @@ fn other(source: &mut dyn Source, format: ImageFormat, most_pixels: u64) -> Resu
     }
     let image = match color {
         image::ColorType::L8 | image::ColorType::La8 | image::ColorType::Rgb8 | image::ColorType::Rgba8 => image,
-        other => return Err(Unreadable::Kind(format!("its values are {other:?}, not of 8 bits"))),
+        color => {
+            return Err(Unreadable::Kind(format!(
+                "its values are {color:?}; they must have 8 bits"
+            )));
+        }
     };
     let mut planes = Planes::new(columns, rows, usize::from(color.channel_count()), false)?;
-    planes.take(image.as_bytes());
+    planes.append(image.as_bytes());
     Ok(planes.picture(width, height))
 }
 
-fn refused(error: image::ImageError) -> Unreadable {
+fn decode_error(error: image::ImageError) -> Unreadable {
     match error {
         image::ImageError::IoError(error) if error.kind() != io::ErrorKind::UnexpectedEof => Unreadable::Io(error),
         image::ImageError::Unsupported(error) => Unreadable::Kind(error.to_string()),
-        other => Unreadable::Damaged(other.to_string()),
+        error => Unreadable::Damaged(error.to_string()),
     }
 }

@@ -1,4 +1,4 @@
-//! Integrators. Each is the twin of the file of the same name in `shaders/integrators/`.
+//! Integrators. Each file is the twin of the file with the same name in `shaders/integrators/`.
 
 pub mod path;
 pub mod phong;

@@ -100,7 +100,8 @@ pub fn advance(scene: &Packed, state: &mut PathState, pixel: UVec2) {
     let hit = closest_hit(scene, path.ray, path.origin_prim, path.inside_prim);
     if hit.primitive == NO_INDEX {
         state.ended = true;
-        let shown = ((s.alpha == 0) & (s.environment_flags & ENVIRONMENT_INVISIBLE == 0)) | (path.depth > 0);
+        let is_environment_visible =
+            ((s.alpha == 0) & (s.environment_flags & ENVIRONMENT_INVISIBLE == 0)) | (path.depth > 0);
         let environment_light = if s.environment_flags & ENVIRONMENT_MAP != 0 {
             environment_mis(scene, path.ray.direction, state.pdf, state.prev_normal)
         } else {
@@ -110,24 +111,32 @@ pub fn advance(scene: &Packed, state: &mut PathState, pixel: UVec2) {
             true => scene.environment.background,
             false => environment_light,
         };
-        let found = path.throughput * environment_light;
-        return add_radiance(scene, state, found, shown, path.depth);
+        let contribution = path.throughput * environment_light;
+        return add_radiance(scene, state, contribution, is_environment_visible, path.depth);
     }
     let prim = fetch_hit_primitive(scene, hit);
     let mut surface = surface_of(scene, &prim, hit, path.ray);
-    let at = hit_differential(scene, &prim, hit, surface, path.ray, path.differential);
-    let looked;
-    let faceted;
+    let hit_diff = hit_differential(scene, &prim, hit, surface, path.ray, path.differential);
+    let textured;
+    let microfacets;
     let (mut material, normal, coat_normal) = if (s.lookups == 0) & (s.vertex_colors == 0) {
         let normal = surface.shading_normal;
         (material_of(scene, &prim), normal, normal)
     } else {
-        let mut shading = evaluate_material(scene, &prim, hit, material_of(scene, &prim), surface, at, s.lookups);
+        let mut shading = evaluate_material(
+            scene,
+            &prim,
+            hit,
+            material_of(scene, &prim),
+            surface,
+            hit_diff,
+            s.lookups,
+        );
         if s.vertex_colors != 0 {
             shading.material = with_vertex_colors(scene, &shading.material, hit);
         }
-        looked = bounded(shading.material);
-        (&looked, shading.normal, shading.coat_normal)
+        textured = bounded(shading.material);
+        (&textured, shading.normal, shading.coat_normal)
     };
     if s.alpha_surfaces != 0
         && !alpha_accepts(
@@ -141,7 +150,7 @@ pub fn advance(scene: &Packed, state: &mut PathState, pixel: UVec2) {
             surface.side,
         )
     {
-        return continue_through(scene, state, surface, at, hit.t);
+        return continue_through(scene, state, surface, hit_diff, hit.t);
     }
     if s.absorption != 0 {
         let inside = has_inside(material) & (surface.side < 0.0) & (material.alpha_mode == OPAQUE);
@@ -153,13 +162,13 @@ pub fn advance(scene: &Packed, state: &mut PathState, pixel: UVec2) {
     }
     surface.shading_normal = shaded_normal(surface, material, normal);
     state.skipped_distance = 0.0;
-    let mixed;
+    let principled_lobes;
     let mixture = if material.kind == PRINCIPLED {
         let frame = facet_frame(scene, surface, material);
         surface.du = frame.u;
         surface.dv = frame.v;
-        mixed = mixture_at(scene, &surface, material, coat_normal);
-        &mixed
+        principled_lobes = mixture_at(scene, &surface, material, coat_normal);
+        &principled_lobes
     } else {
         &NO_MIXTURE
     };
@@ -172,13 +181,13 @@ pub fn advance(scene: &Packed, state: &mut PathState, pixel: UVec2) {
     }
     let seed = scene.camera.seed;
     let key = hash4(UVec4::new(pixel.x, pixel.y, seed, 1 + 2 * path.depth));
-    let other_key = hash4(UVec4::new(pixel.x, pixel.y, seed, 2 + 2 * path.depth));
+    let decision_key = hash4(UVec4::new(pixel.x, pixel.y, seed, 2 + 2 * path.depth));
     let mut choices = UVec2::ZERO;
     if (s.materials & !(1 << DIFFUSE | 1 << EMITTER) != 0) | (s.rr_depth < s.bounces) {
-        choices = decision_set(scene, UVec2::new(other_key.z, other_key.w), state.sample);
+        choices = decision_set(scene, UVec2::new(decision_key.z, decision_key.w), state.sample);
     }
     if is_delta(material) {
-        sample_delta_bsdf(scene, state, surface, at, material, unit_float(choices.x));
+        sample_delta_bsdf(scene, state, surface, hit_diff, material, unit_float(choices.x));
     } else {
         if s.tlas_kinds & (1 << INSTANCE) != 0 {
             surface.ray_origin += surface.terminator_offset;
@@ -187,24 +196,24 @@ pub fn advance(scene: &Packed, state: &mut PathState, pixel: UVec2) {
             let frame = facet_frame(scene, surface, material);
             surface.du = frame.u;
             surface.dv = frame.v;
-            faceted = facets_of(scene, &surface, *material);
-            material = &faceted;
+            microfacets = facets_of(scene, &surface, *material);
+            material = &microfacets;
         }
         if s.emitters != 0 {
             let mut bits = UVec2::ZERO;
             if s.emitters > 1 {
-                bits = decision_set(scene, UVec2::new(other_key.x, other_key.y), state.sample);
+                bits = decision_set(scene, UVec2::new(decision_key.x, decision_key.y), state.sample);
             }
-            let mut chosen = EmitterSelection {
+            let mut selection = EmitterSelection {
                 emitter: select_emitter(scene, bits),
                 density: 0.0,
             };
             if s.light_tree != 0 {
                 let normal = lit_normal(&surface, material);
-                let level_key = UVec2::new(other_key.x, other_key.y);
-                chosen = light_tree_select(
+                let level_key = UVec2::new(decision_key.x, decision_key.y);
+                selection = light_tree_select(
                     scene,
-                    chosen.emitter,
+                    selection.emitter,
                     surface.ray_origin,
                     normal,
                     level_key,
@@ -212,7 +221,9 @@ pub fn advance(scene: &Packed, state: &mut PathState, pixel: UVec2) {
                 );
             }
             let u = decision(scene, UVec2::new(key.x, key.y), state.sample);
-            add_direct_light(scene, state, &prim, &surface, material, mixture, chosen, u, true, pixel);
+            add_direct_light(
+                scene, state, &prim, &surface, material, mixture, selection, u, true, pixel,
+            );
         }
         let u = decision(scene, UVec2::new(key.z, key.w), state.sample);
         sample_bsdf(
@@ -229,8 +240,8 @@ pub fn advance(scene: &Packed, state: &mut PathState, pixel: UVec2) {
     if s.rr_depth < s.bounces {
         with_roulette(scene, state, unit_float(choices.y));
     }
-    let carries = largest(state.path.throughput) > 0.0;
-    state.ended |= !carries;
+    let has_throughput = largest(state.path.throughput) > 0.0;
+    state.ended |= !has_throughput;
 }
 
 #[inline(always)]
@@ -266,11 +277,11 @@ pub fn decision(scene: &Packed, key: UVec2, sample: u32) -> Vec2 {
 }
 
 #[inline(always)]
-pub fn add_radiance(scene: &Packed, state: &mut PathState, found: Vec3, taken: bool, bounces: u32) {
+pub fn add_radiance(scene: &Packed, state: &mut PathState, contribution: Vec3, is_enabled: bool, bounces: u32) {
     let s = &scene.specialization;
-    let mut radiance = if taken { found } else { Vec3::ZERO };
+    let mut radiance = if is_enabled { contribution } else { Vec3::ZERO };
     if s.max_indirect != 0 && bounces > 1 {
-        let scale = f32::from_bits(s.max_indirect) / max(largest(found), 1e-30);
+        let scale = f32::from_bits(s.max_indirect) / max(largest(contribution), 1e-30);
         radiance *= min(scale, 1.0);
     }
     state.radiance += radiance;
@@ -313,15 +324,15 @@ pub fn add_emission(
             ray.origin -= ray.direction * state.skipped_distance;
             from_previous.t += state.skipped_distance;
         }
-        let other = emitter_pdf(prim, from_previous, density, ray, surface.normal);
-        weight = power_heuristic(state.pdf, other);
+        let light_pdf = emitter_pdf(prim, from_previous, density, ray, surface.normal);
+        weight = power_heuristic(state.pdf, light_pdf);
     }
-    let found = state.path.throughput * material.emission * weight;
-    add_radiance(scene, state, found, true, state.path.depth)
+    let contribution = state.path.throughput * material.emission * weight;
+    add_radiance(scene, state, contribution, true, state.path.depth)
 }
 
-pub fn continue_through(scene: &Packed, state: &mut PathState, surface: Surface, at: HitDifferential, t: f32) {
-    state.path = pass_through_path(state.path, surface, at);
+pub fn continue_through(scene: &Packed, state: &mut PathState, surface: Surface, hit_diff: HitDifferential, t: f32) {
+    state.path = pass_through_path(state.path, surface, hit_diff);
     if scene.specialization.camera_invisible != 0 && state.path.depth == 0 {
         let start = state.path.ray;
         state.path = skip_camera_invisible(scene, state.path);
@@ -349,32 +360,32 @@ pub fn sample_delta_bsdf(
     scene: &Packed,
     state: &mut PathState,
     surface: Surface,
-    at: HitDifferential,
+    hit_diff: HitDifferential,
     material: &Material,
     random: f32,
 ) {
     state.pdf = 0.0;
     let mut path = if (material.kind == GLASS) | (material.kind == ROUGH_GLASS) {
-        let passage = dielectric_sample(state.path, surface, at, material, random);
-        state.eta2 = state.eta2 * passage.eta * passage.eta;
-        if scene.specialization.absorption != 0 && passage.passes {
+        let glass_sample = dielectric_sample(state.path, surface, hit_diff, material, random);
+        state.eta2 = state.eta2 * glass_sample.eta * glass_sample.eta;
+        if scene.specialization.absorption != 0 && glass_sample.is_transmitted {
             state.absorption = if surface.side > 0.0 {
                 material.absorption
             } else {
                 Vec3::ZERO
             };
         }
-        passage.path
+        glass_sample.path
     } else if material.kind == THIN {
         let cosine = dot(surface.wo, surface.shading_normal);
         if random >= thin_reflectance(material.ior, cosine) {
             let throughput = state.path.throughput * material.tint;
-            refracted_path(state.path, surface, at, throughput, 1.0, cosine, cosine)
+            refracted_path(state.path, surface, hit_diff, throughput, 1.0, cosine, cosine)
         } else {
-            reflected_path(state.path, surface, at, state.path.throughput)
+            reflected_path(state.path, surface, hit_diff, state.path.throughput)
         }
     } else {
-        let mut continued = mirrored_path(state.path, surface, at, material).primary;
+        let mut continued = mirrored_path(state.path, surface, hit_diff, material).primary;
         if material.kind == METAL {
             let cosine = dot(surface.wo, surface.shading_normal);
             continued.throughput = state.path.throughput * metal_fresnel(material, cosine);
@@ -394,57 +405,57 @@ pub fn add_direct_light(
     surface: &Surface,
     material: &Material,
     mixture: &PrincipledLobes,
-    chosen: EmitterSelection,
+    selection: EmitterSelection,
     u: Vec2,
-    wanted: bool,
+    is_enabled: bool,
     pixel: UVec2,
 ) {
-    let light = sample_emitter(scene, chosen, surface.ray_origin, lit_normal(surface, material), u);
+    let light = sample_emitter(scene, selection, surface.ray_origin, lit_normal(surface, material), u);
     let reflected = reflection(scene, prim, surface, material, mixture, normalize(light.to));
-    let mut found = state.path.throughput * reflected.value * light.radiance * (1.0 / light.pdf);
-    let turned;
-    let mut from_side = surface;
-    let mut to = light.to;
+    let mut contribution = state.path.throughput * reflected.value * light.radiance * (1.0 / light.pdf);
+    let flipped_surface;
+    let mut exit_surface = surface;
+    let mut to_light = light.to;
     let mut absorption = state.absorption;
-    if is_transmissive(material) & (dot(surface.normal, to) < 0.0) {
-        turned = flipped(scene, surface);
-        from_side = &turned;
-        to = light.to
+    if is_transmissive(material) & (dot(surface.normal, to_light) < 0.0) {
+        flipped_surface = flipped(scene, surface);
+        exit_surface = &flipped_surface;
+        to_light = light.to
             + if light.t_max < 2.0 {
-                surface.ray_origin - from_side.ray_origin
+                surface.ray_origin - exit_surface.ray_origin
             } else {
                 Vec3::ZERO
             };
         absorption = absorption_after(absorption, surface, material);
     }
     if scene.specialization.absorption != 0 {
-        found *= transmittance(absorption, light.t_max * dot(light.to, light.to).sqrt());
+        contribution *= transmittance(absorption, light.t_max * dot(light.to, light.to).sqrt());
     }
-    found *= if light.is_delta {
+    contribution *= if light.is_delta {
         1.0
     } else {
         power_heuristic(light.pdf, reflected.pdf)
     };
-    let most = largest(found);
-    let is_dark = !(wanted && most > 0.0 && most < INFINITE_T);
+    let max_component = largest(contribution);
+    let is_dark = !(is_enabled && max_component > 0.0 && max_component < INFINITE_T);
     if scene.specialization.alpha_surfaces != 0 {
         let bounce = state.path.depth + 1;
         let (t_max, target_prim) = (light.t_max, light.primitive);
         let occluded = is_occluded_alpha(
             scene,
             is_dark,
-            from_side,
-            to,
+            exit_surface,
+            to_light,
             t_max,
             target_prim,
             pixel,
             state.sample,
             bounce,
         );
-        return add_radiance(scene, state, found, !occluded, bounce);
+        return add_radiance(scene, state, contribution, !occluded, bounce);
     }
-    let occluded = is_occluded(scene, is_dark, from_side, to, light.t_max, light.primitive);
-    add_radiance(scene, state, found, !occluded, state.path.depth + 1)
+    let occluded = is_occluded(scene, is_dark, exit_surface, to_light, light.t_max, light.primitive);
+    add_radiance(scene, state, contribution, !occluded, state.path.depth + 1)
 }
 
 #[expect(clippy::too_many_arguments, reason = "the twin of a WGSL function has its arguments")]
@@ -465,11 +476,11 @@ pub fn sample_bsdf(
             v: surface.dv,
         };
         let wo = vector_to_lobe(frame, surface.shading_normal, surface.wo);
-        let found = facet_sample(material, wo, u, random);
-        apply_lobe_sample(scene, state, prim, surface, material, found);
+        let lobe_sample = facet_sample(material, wo, u, random);
+        apply_lobe_sample(scene, state, prim, surface, material, lobe_sample);
     } else if material.kind == PRINCIPLED {
-        let found = principled_sample(mixture, local_wo(surface), u, random, scene.specialization.lobes);
-        apply_lobe_sample(scene, state, prim, surface, material, found);
+        let lobe_sample = principled_sample(mixture, local_wo(surface), u, random, scene.specialization.lobes);
+        apply_lobe_sample(scene, state, prim, surface, material, lobe_sample);
     } else {
         let wi = if material.kind == PHONG {
             modified_phong_sample(material, surface.shading_normal, surface.wo, u, random)
@@ -512,36 +523,36 @@ pub fn apply_lobe_sample(
     prim: &HitPrimitive,
     surface: &Surface,
     material: &Material,
-    found: LobeSample,
+    lobe_sample: LobeSample,
 ) {
     let frame = Tangents {
         u: surface.du,
         v: surface.dv,
     };
-    let wi = normalize(vector_from_lobe(frame, surface.shading_normal, found.wi));
-    let lit = direction_allowed(scene, prim, surface, material, wi);
-    let weight = if lit { found.weight } else { Vec3::ZERO };
-    let turned;
-    let mut from_side = surface;
-    if found.wi.z < 0.0 {
-        turned = flipped(scene, surface);
-        from_side = &turned;
-        state.eta2 = state.eta2 * found.eta * found.eta;
+    let wi = normalize(vector_from_lobe(frame, surface.shading_normal, lobe_sample.wi));
+    let is_allowed = direction_allowed(scene, prim, surface, material, wi);
+    let weight = if is_allowed { lobe_sample.weight } else { Vec3::ZERO };
+    let flipped_surface;
+    let mut exit_surface = surface;
+    if lobe_sample.wi.z < 0.0 {
+        flipped_surface = flipped(scene, surface);
+        exit_surface = &flipped_surface;
+        state.eta2 = state.eta2 * lobe_sample.eta * lobe_sample.eta;
         state.absorption = absorption_after(state.absorption, surface, material);
     }
     state.path = Path {
         ray: Ray {
-            origin: from_side.ray_origin,
+            origin: exit_surface.ray_origin,
             direction: wi,
         },
         differential: Differential::default(),
         throughput: state.path.throughput * weight,
         depth: state.path.depth + 1,
         branch: 0,
-        origin_prim: from_side.exclude_front,
-        inside_prim: from_side.exclude_back,
+        origin_prim: exit_surface.exclude_front,
+        inside_prim: exit_surface.exclude_back,
     };
-    state.pdf = found.pdf;
+    state.pdf = lobe_sample.pdf;
 }
 
 #[inline(always)]

@@ -80,28 +80,28 @@ pub fn radiance(scene: &Packed, ray: Ray, differential: Differential, pixel: UVe
 
 pub fn scatter(scene: &Packed, prim: &HitPrimitive, hit: Hit, path: Path, pixel: UVec2, sample: u32) -> SpecularSplit {
     let mut surface = surface_of(scene, prim, hit, path.ray);
-    let at = hit_differential(scene, prim, hit, surface, path.ray, path.differential);
+    let hit_diff = hit_differential(scene, prim, hit, surface, path.ray, path.differential);
     let lookups = scene.specialization.specular_lookups;
-    let shading = evaluate_material(scene, prim, hit, material_of(scene, prim), surface, at, lookups);
+    let shading = evaluate_material(scene, prim, hit, material_of(scene, prim), surface, hit_diff, lookups);
     let material = &shading.material;
     surface.shading_normal = usable_normal(surface, shading.normal);
     if material.kind == MIRROR {
-        return mirrored_path(path, surface, at, material);
+        return mirrored_path(path, surface, hit_diff, material);
     }
     let bounce = path.depth * MAX_PATH_LEAVES + path.branch;
     let bits = decision_bits(pixel, scene.camera.seed, sample, bounce, NO_INDEX);
-    glass_path(path, surface, at, material, unit_float(bits.x))
+    glass_path(path, surface, hit_diff, material, unit_float(bits.x))
 }
 
 pub fn radiance_from(scene: &Packed, prim: &HitPrimitive, hit: Hit, path: Path, pixel: UVec2, sample: u32) -> Vec3 {
     let s = &scene.specialization;
-    let plain = material_of(scene, prim);
-    if plain.kind == EMITTER {
-        return plain.emission;
+    let untextured = material_of(scene, prim);
+    if untextured.kind == EMITTER {
+        return untextured.emission;
     }
     let mut surface = surface_of(scene, prim, hit, path.ray);
-    let at = hit_differential(scene, prim, hit, surface, path.ray, path.differential);
-    let shading = evaluate_material(scene, prim, hit, plain, surface, at, s.lookups);
+    let hit_diff = hit_differential(scene, prim, hit, surface, path.ray, path.differential);
+    let shading = evaluate_material(scene, prim, hit, untextured, surface, hit_diff, s.lookups);
     let material = &shading.material;
     surface.shading_normal = shading.normal;
     if !scene.bvh.instances.is_empty() {
@@ -140,7 +140,7 @@ pub fn lobes_of_light(
     pixel: UVec2,
     sample: u32,
 ) -> Lobes {
-    let to = segments_to_light(light, surface.position);
+    let segments = segments_to_light(light, surface.position);
     let key = sample_key(pixel, scene.camera.seed, 1 + light.number);
     let mut lobes = Lobes {
         diffuse: 0.0,
@@ -158,13 +158,13 @@ pub fn lobes_of_light(
         };
         let mut unlit = 0;
         if scene.specialization.tlas_kinds != 0 {
-            unlit = unlit_mask(prim, surface, to, block);
+            unlit = unlit_mask(prim, surface, segments, block);
         }
         let occluded = occluded_samples(scene, surface, light, block, unlit);
         lobes = phong_block(
             surface,
             material,
-            to,
+            segments,
             block,
             occluded,
             scene.specialization.exponent_bits,

@@ -7,7 +7,7 @@ use fearless_simd::f32x8;
 use fearless_simd::prelude::*;
 
 use super::four::Four;
-use super::line::greater;
+use super::line::maximum;
 use super::{Line, Mesh, Nearest, remaining_t_max};
 use crate::bvh::{BUILD_MAX_DEPTH, Node};
 
@@ -36,11 +36,11 @@ pub fn closest<S: Simd>(simd: S, mesh: &Mesh, line: &Line, start: f32, skip: u32
         |items, _| {
             let slots = items.clone().step_by(4);
             for (first, triangles) in slots.zip(mesh.triangles[items].chunks(4)) {
-                let (mut met, t) = Four::new(simd, mesh, triangles).intersect(simd, line);
-                while met != 0 {
-                    let i = met.trailing_zeros() as usize;
-                    met &= met - 1;
-                    let (t, number) = (start + greater(t[i], 0.0), triangles[i][3]);
+                let (mut hits, t) = Four::new(simd, mesh, triangles).intersect(simd, line);
+                while hits != 0 {
+                    let i = hits.trailing_zeros() as usize;
+                    hits &= hits - 1;
+                    let (t, number) = (start + maximum(t[i], 0.0), triangles[i][3]);
                     let nearer = t < best.t || (t == best.t && number < best.number);
                     if nearer && t > 0.0 && number != skip {
                         let slot = (first + i) as u32;
@@ -66,10 +66,10 @@ pub fn any<S: Simd>(simd: S, mesh: &Mesh, line: &Line, skip: u32, t_max: f32) ->
         #[inline(always)]
         |items, limit| {
             for triangles in mesh.triangles[items].chunks(4) {
-                let (mut met, t) = Four::new(simd, mesh, triangles).intersect(simd, line);
-                while met != 0 {
-                    let i = met.trailing_zeros() as usize;
-                    met &= met - 1;
+                let (mut hits, t) = Four::new(simd, mesh, triangles).intersect(simd, line);
+                while hits != 0 {
+                    let i = hits.trailing_zeros() as usize;
+                    hits &= hits - 1;
                     found |= t[i] > 0.0 && t[i] < t_max && triangles[i][3] != skip;
                 }
             }
@@ -88,19 +88,19 @@ pub fn leaves<S: Simd>(
     mut limit: f32,
     mut visit: impl FnMut(Range<usize>, f32) -> f32,
 ) {
-    // Per axis: 1 for a negative direction, origins relative to near and far sides, reciprocals.
-    let mut down = [0; 3];
-    let mut from = [[0.0; 3]; 2];
+    // Per axis: 1 for a negative direction; origins for near and far sides; reciprocals of the direction.
+    let mut is_negative = [0; 3];
+    let mut origins = [[0.0; 3]; 2];
     let mut inverse = [0.0; 3];
     for i in 0..3 {
         let k = line.axes[i];
-        let is_down = line.inverse[i] < 0.0;
-        down[k] = usize::from(is_down);
-        from[down[k]][k] = line.o_low[i];
-        from[1 - down[k]][k] = line.o_high[i];
+        let negative = line.inverse[i] < 0.0;
+        is_negative[k] = usize::from(negative);
+        origins[is_negative[k]][k] = line.o_low[i];
+        origins[1 - is_negative[k]][k] = line.o_high[i];
         inverse[k] = line.inverse[i];
     }
-    // Sorted per node, nearest on top.
+    // The children of a node are sorted, with the nearest on top.
     let mut stack: ArrayVec<(f32, u32), STACK> = ArrayVec::new();
     stack.push((f32::NEG_INFINITY, 0));
     while let Some((entry, number)) = stack.pop() {
@@ -113,23 +113,23 @@ pub fn leaves<S: Simd>(
         let mut near = f32x8::splat(simd, f32::NEG_INFINITY);
         let mut far = f32x8::splat(simd, limit);
         for k in 0..3 {
-            near = near.max((side(simd, node, planes[down[k]], k, scale[k]) - from[0][k]) * inverse[k]);
-            far = far.min((side(simd, node, planes[1 - down[k]], k, scale[k]) - from[1][k]) * inverse[k]);
+            near = near.max((side(simd, node, planes[is_negative[k]], k, scale[k]) - origins[0][k]) * inverse[k]);
+            far = far.min((side(simd, node, planes[1 - is_negative[k]], k, scale[k]) - origins[1][k]) * inverse[k]);
         }
-        let passed = (near.simd_le(far) & far.simd_ge(f32x8::splat(simd, 0.0))).to_bitmask() as u32;
-        let mut leaves = passed & !u32::from(node.inner);
+        let hits = (near.simd_le(far) & far.simd_ge(f32x8::splat(simd, 0.0))).to_bitmask() as u32;
+        let mut leaves = hits & !u32::from(node.inner);
         while leaves != 0 {
-            let c = leaves.trailing_zeros() as usize;
+            let slot = leaves.trailing_zeros() as usize;
             leaves &= leaves - 1;
-            limit = visit(node.items(c), limit);
+            limit = visit(node.items(slot), limit);
         }
         let first = stack.len();
-        let mut inner = passed & u32::from(node.inner);
-        while inner != 0 {
-            let c = inner.trailing_zeros();
-            inner &= inner - 1;
-            let before = u32::from(node.inner) & ((1 << c) - 1);
-            let child = (near[c as usize], node.first_child + before.count_ones());
+        let mut inner_hits = hits & u32::from(node.inner);
+        while inner_hits != 0 {
+            let slot = inner_hits.trailing_zeros();
+            inner_hits &= inner_hits - 1;
+            let lower_slots = u32::from(node.inner) & ((1 << slot) - 1);
+            let child = (near[slot as usize], node.first_child + lower_slots.count_ones());
             let mut i = stack.len();
             stack.push(child);
             while i > first && stack[i - 1].0 < child.0 {

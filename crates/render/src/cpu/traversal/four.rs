@@ -8,8 +8,8 @@ use super::{Line, Mesh};
 /// Up to four triangles of a leaf. Unused lanes repeat the last triangle.
 pub struct Four<S: Simd> {
     corners: [[f32x4<S>; 3]; 3],
-    /// Mask of the lanes in use.
-    full: u32,
+    /// Mask of the used lanes.
+    used: u32,
 }
 
 impl<S: Simd> Four<S> {
@@ -17,12 +17,12 @@ impl<S: Simd> Four<S> {
     #[inline(always)]
     pub fn new(simd: S, mesh: &Mesh, triangles: &[[u32; 4]]) -> Four<S> {
         let last = triangles.len().min(4) - 1;
-        let places = [0, 1.min(last), 2.min(last), last];
+        let lanes = [0, 1.min(last), 2.min(last), last];
         let mut corners = [[f32x4::splat(simd, 0.0); 3]; 3];
         for (i, corner) in corners.iter_mut().enumerate() {
             let mut rows = [f32x4::splat(simd, 0.0); 4];
-            for (row, place) in rows.iter_mut().zip(places) {
-                *row = f32x4::simd_from(simd, mesh.vertices[triangles[place][i] as usize]);
+            for (row, lane) in rows.iter_mut().zip(lanes) {
+                *row = f32x4::simd_from(simd, mesh.vertices[triangles[lane][i] as usize]);
             }
             let [a, b, c, d] = rows;
             let (low, high) = (a.zip_low(c), b.zip_low(d));
@@ -34,7 +34,7 @@ impl<S: Simd> Four<S> {
         }
         Four {
             corners,
-            full: (2 << last) - 1,
+            used: (2 << last) - 1,
         }
     }
 
@@ -43,22 +43,22 @@ impl<S: Simd> Four<S> {
     #[inline(always)]
     pub fn intersect(&self, simd: S, line: &Line) -> (u32, f32x4<S>) {
         let zero = f32x4::splat(simd, 0.0);
-        let mut seen = [[zero; 3]; 3];
-        for (seen, corner) in seen.iter_mut().zip(&self.corners) {
+        let mut sheared = [[zero; 3]; 3];
+        for (sheared, corner) in sheared.iter_mut().zip(&self.corners) {
             let [x, y, z] = [
                 corner[line.axes[0]] - line.o[0],
                 corner[line.axes[1]] - line.o[1],
                 corner[line.axes[2]] - line.o[2],
             ];
-            *seen = [x - z * line.shear[0], y - z * line.shear[1], z];
+            *sheared = [x - z * line.shear[0], y - z * line.shear[1], z];
         }
-        let [a, b, c] = seen;
+        let [a, b, c] = sheared;
         let u = c[0] * b[1] - c[1] * b[0];
         let v = a[0] * c[1] - a[1] * c[0];
         let w = b[0] * a[1] - b[1] * a[0];
         let inside = (u.simd_ge(zero) & v.simd_ge(zero) & w.simd_ge(zero))
             | (u.simd_le(zero) & v.simd_le(zero) & w.simd_le(zero));
-        if inside.to_bitmask() as u32 & self.full == 0 {
+        if inside.to_bitmask() as u32 & self.used == 0 {
             return (0, zero);
         }
         let determinant = u + v + w;
@@ -75,7 +75,7 @@ impl<S: Simd> Four<S> {
         // This order of operands preserves NaN.
         let t = near.simd_gt(t).select(near, t);
         let t = far.simd_lt(t).select(far, t);
-        let met = inside & determinant.simd_ne(zero) & near.simd_le(far) & far.simd_ge(zero);
-        (met.to_bitmask() as u32 & self.full, t)
+        let hits = inside & determinant.simd_ne(zero) & near.simd_le(far) & far.simd_ge(zero);
+        (hits.to_bitmask() as u32 & self.used, t)
     }
 }

@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 /// Minimum magnitude of direction components in box tests, so that reciprocals are finite.
-pub const LEAST: f32 = f32::from_bits((127 - 100) << 23);
+pub const MIN_COMPONENT: f32 = f32::from_bits((127 - 100) << 23);
 
 /// A ray with precomputed values that box and triangle tests share.
 #[derive(Clone, Copy, Debug)]
@@ -23,9 +23,9 @@ pub struct Line {
 #[inline(always)]
 pub fn away_from_zero(x: f32) -> f32 {
     match () {
-        _ if x.abs() >= LEAST => x,
-        _ if x < 0.0 => -LEAST,
-        _ => LEAST,
+        _ if x.abs() >= MIN_COMPONENT => x,
+        _ if x < 0.0 => -MIN_COMPONENT,
+        _ => MIN_COMPONENT,
     }
 }
 
@@ -70,13 +70,13 @@ impl Line {
     /// Returns the interval inside a box, with axes permuted by `self.axes`.
     #[inline(always)]
     pub fn slab(&self, low: [f32; 3], high: [f32; 3]) -> [f32; 2] {
-        let mut within = [f32::NEG_INFINITY, f32::INFINITY];
+        let mut interval = [f32::NEG_INFINITY, f32::INFINITY];
         for k in 0..3 {
             let a = (low[k] - self.o_low[k]) * self.inverse[k];
             let b = (high[k] - self.o_high[k]) * self.inverse[k];
-            within = [greater(within[0], less(a, b)), less(within[1], greater(a, b))];
+            interval = [maximum(interval[0], minimum(a, b)), minimum(interval[1], maximum(a, b))];
         }
-        within
+        interval
     }
 
     /// Returns a vertex relative to the origin, sheared so that the direction is the last axis.
@@ -112,13 +112,13 @@ impl Line {
         let [mut low, mut high] = [corners[0]; 2];
         for corner in &corners[1..] {
             for k in 0..3 {
-                low[k] = less(low[k], corner[k]);
-                high[k] = greater(high[k], corner[k]);
+                low[k] = minimum(low[k], corner[k]);
+                high[k] = maximum(high[k], corner[k]);
             }
         }
         let [near, far] = self.slab(low, high);
         // This order of operands preserves NaN.
-        let t = less(far, greater(near, t));
+        let t = minimum(far, maximum(near, t));
         (near <= far && t > 0.0).then_some(t)
     }
 }
@@ -130,12 +130,12 @@ pub fn in_order<const N: usize>(v: &[f32; N], axes: [usize; 3]) -> [f32; 3] {
 
 /// Returns the minimum; `b` if either number is NaN.
 #[inline(always)]
-pub fn less(a: f32, b: f32) -> f32 {
+pub fn minimum(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
 }
 
 /// Returns the maximum; `b` if either number is NaN.
 #[inline(always)]
-pub fn greater(a: f32, b: f32) -> f32 {
+pub fn maximum(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
 }

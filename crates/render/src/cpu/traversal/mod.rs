@@ -1,14 +1,14 @@
 //! Closest-hit and occlusion queries over a BVH of triangles or other items.
 //!
-//! The results are the same as testing every triangle with [`Line::triangle`], whatever the BVH: a triangle is hit only
-//! where its box is; every step of the box test is monotone, so that a box is hit wherever a box inside it is; at equal
-//! distance the smallest index wins.
+//! The results do not depend on the BVH and equal those of testing every triangle with [`Line::triangle`]: a ray hits a
+//! triangle only where it hits the triangle's box; every step of the box test is monotone, so that a ray that hits a
+//! box also hits every enclosing box; at equal distance, the smallest index wins.
 //!
-//! Each function is compiled for several instruction sets (`fearless_simd`). All give the same bits, since nothing is
-//! contracted to fused multiply-adds.
+//! Each function is compiled for several instruction sets (`fearless_simd`). All versions give the same bits, since no
+//! operation is contracted to a fused multiply-add.
 //!
-//! Measured on an AMD EPYC with AVX-512 under other load, in CPU time of one thread (a bumpy sphere of 70,000 triangles
-//! on a floor, `benches/trees.rs`): 157 ns per camera ray, 665 ns per 16 shadow segments. Plain loops instead of
+//! Measured with `benches/trees.rs` (a bumpy sphere of 70,000 triangles on a floor) on an AMD EPYC with AVX-512 and
+//! other load, in CPU time of one thread: 157 ns per camera ray, 665 ns per 16 shadow segments. Plain loops instead of
 //! `fearless_simd` made rays 8 % slower with AVX-512 and 30 % with AVX2.
 
 mod closest;
@@ -40,19 +40,20 @@ pub struct Mesh<'a> {
 pub struct Nearest {
     /// Distance, as a multiple of the length of the ray's direction.
     pub t: f32,
+    /// Index of the triangle.
     pub number: u32,
     /// Position in leaf order.
     pub slot: u32,
 }
 
-/// Returns an upper bound on the distance from `start` to anything nearer than `t`, with a margin for rounding.
+/// Returns an upper bound on the distance from `start` to hits nearer than `t`, with a margin for rounding.
 pub fn remaining_t_max(start: f32, t: f32) -> f32 {
     (t - start) + t * 4.7683716e-7
 }
 
-/// Returns the closest triangle nearer than `best`, except the triangle with index `skip`; `best` if no triangle is
-/// hit. A distance is `start` plus the nonnegative distance from the ray's origin, and positive. At equal distance the
-/// smallest index wins.
+/// Returns the closest hit nearer than `best`, except on the triangle with index `skip`; `best` if there is no such
+/// hit. The distance of a hit is positive: `start` plus the nonnegative distance from the ray's origin. At equal
+/// distance, the smallest index wins.
 pub fn closest(level: Level, mesh: &Mesh, line: &Line, start: f32, skip: u32, best: Nearest) -> Nearest {
     dispatch!(level, simd => closest::closest(simd, mesh, line, start, skip, best))
 }
@@ -68,43 +69,44 @@ pub fn leaves(level: Level, nodes: &[Node], line: &Line, limit: f32, visit: impl
     dispatch!(level, simd => closest::leaves(simd, nodes, line, limit, visit))
 }
 
-/// Maximum segments per query.
-pub const MOST: usize = 32;
+/// Maximum number of segments per query.
+pub const MAX_SEGMENTS: usize = 32;
 
-/// Up to [`MOST`] vectors as a structure of arrays. Unused lanes repeat the first.
+/// Up to [`MAX_SEGMENTS`] vectors as a structure of arrays. Unused lanes repeat the first vector.
 #[derive(Clone, Debug)]
 pub struct Directions {
     pub count: usize,
-    pub along: [[f32; MOST]; 3],
+    pub components: [[f32; MAX_SEGMENTS]; 3],
 }
 
 impl Directions {
-    /// Creates lanes of at most [`MOST`] vectors.
+    /// Creates the structure from the first [`MAX_SEGMENTS`] vectors.
     pub fn new(vectors: &[Vec3]) -> Directions {
         let first = vectors.first().copied().unwrap_or(Vec3::Z);
         let mut directions = Directions {
-            count: vectors.len().min(MOST),
-            along: first.to_array().map(|x| [x; MOST]),
+            count: vectors.len().min(MAX_SEGMENTS),
+            components: first.to_array().map(|x| [x; MAX_SEGMENTS]),
         };
-        for (i, v) in vectors.iter().enumerate().take(MOST) {
+        for (i, v) in vectors.iter().enumerate().take(MAX_SEGMENTS) {
             for k in 0..3 {
-                directions.along[k][i] = v[k];
+                directions.components[k][i] = v[k];
             }
         }
         directions
     }
 
     pub fn get(&self, i: usize) -> Vec3 {
-        let [x, y, z] = &self.along;
+        let [x, y, z] = &self.components;
         Vec3::new(x[i], y[i], z[i])
     }
 
+    /// Returns the mask of all vectors.
     pub fn all(&self) -> u32 {
         ((1_u64 << self.count) - 1) as u32
     }
 }
 
-/// Up to [`MOST`] segments from one point.
+/// Up to [`MAX_SEGMENTS`] segments from one point.
 #[derive(Clone, Copy, Debug)]
 pub struct Segments<'a> {
     pub o: Vec3,
@@ -117,30 +119,30 @@ pub struct Segments<'a> {
     pub skip: u32,
 }
 
-/// Returns the mask of the segments in `asked` that a triangle occludes.
-pub fn occluded(level: Level, mesh: &Mesh, segments: &Segments, asked: u32) -> u32 {
-    dispatch!(level, simd => occluded::occluded(simd, mesh, segments, asked))
+/// Returns the mask of the segments that a triangle occludes, among those in `mask`.
+pub fn occluded(level: Level, mesh: &Mesh, segments: &Segments, mask: u32) -> u32 {
+    dispatch!(level, simd => occluded::occluded(simd, mesh, segments, mask))
 }
 
-/// Returns the mask of the segments in `asked` that an item occludes. `boxes` returns an item's bounds, or `None` if it
-/// occludes nothing. `visit` gets an item and the mask of segments that hit its bounds, and returns the mask of
-/// segments that the item occludes.
+/// Returns the mask of the segments that an item occludes, among those in `mask`. `bounds` returns an item's bounds, or
+/// `None` if the item occludes nothing. `visit` gets an item and the mask of the segments that hit the item's bounds,
+/// and returns the mask of the segments that the item occludes.
 pub fn occluded_items(
     level: Level,
     nodes: &[Node],
     segments: &Segments,
-    asked: u32,
-    boxes: impl Fn(usize) -> Option<Aabb>,
+    mask: u32,
+    bounds: impl Fn(usize) -> Option<Aabb>,
     visit: impl FnMut(usize, u32) -> u32,
 ) -> u32 {
-    dispatch!(level, simd => occluded::items(simd, nodes, segments, asked, boxes, visit))
+    dispatch!(level, simd => occluded::items(simd, nodes, segments, mask, bounds, visit))
 }
 
-/// Returns all instruction sets of this machine.
+/// Returns all instruction sets of this processor.
 #[cfg(test)]
 pub(crate) fn levels() -> Vec<Level> {
     let best = Level::new();
-    #[allow(unused_mut, reason = "not all machines have several")]
+    #[allow(unused_mut, reason = "only some processors have several")]
     let mut levels = vec![best];
     #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
     {

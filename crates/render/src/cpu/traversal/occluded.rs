@@ -8,36 +8,38 @@ use fearless_simd::prelude::*;
 
 use super::closest::{STACK, side};
 use super::four::Four;
-use super::line::{LEAST, axes_from, greater, in_order, less};
-use super::{Directions, Line, MOST, Mesh, Segments};
+use super::line::{MIN_COMPONENT, axes_from, in_order, maximum, minimum};
+use super::{Directions, Line, MAX_SEGMENTS, Mesh, Segments};
 use crate::bvh::{Aabb, Node};
 
-/// Maximum number of segments tested one by one, against all boxes of a node or triangles of a leaf at once.
-const FEW: u32 = 6;
+/// Maximum number of segments that are tested one by one, each against all boxes of a node or four triangles of a leaf
+/// at once.
+const FEW_SEGMENTS: u32 = 6;
 
 /// Maximum number of SIMD vectors: the narrowest vectors have four lanes.
-const MAX_LANES: usize = MOST / 4;
+const MAX_LANES: usize = MAX_SEGMENTS / 4;
 
+/// A SIMD vector of segments.
 #[derive(Clone, Copy)]
 struct Lanes<S: Simd> {
     /// Permutation of axes as in [`Line`](super::Line), if all segments share it.
     axes: Option<[usize; 3]>,
-    /// Segments whose largest component is x, and y.
+    /// Masks of the segments whose direction has its largest component along x, and along y.
     largest: [S::mask32s; 2],
     /// Shear as in [`Line`](super::Line).
     shear: [S::f32s; 3],
     inverse: [S::f32s; 3],
 }
 
-/// Bounds on all directions along an axis, for a conservative box test.
+/// Bounds on one component of all directions, for a conservative box test.
 #[derive(Clone, Copy, Default)]
 struct Slope {
     /// All directions have the same sign.
-    same: bool,
-    /// Near and far side of a box (0: lower, 1: upper) if the signs agree, else lower and upper.
+    same_sign: bool,
+    /// Near and far side of a box (0: lower, 1: upper) if the signs agree, else lower and upper side.
     sides: [usize; 2],
-    /// Origins relative to these sides.
-    from: [f32; 2],
+    /// Origins for tests of these sides.
+    origins: [f32; 2],
     /// Reciprocals that minimize the near and maximize the far distance if the signs agree, otherwise reciprocals that
     /// minimize the entry distance for either side.
     inverse: [f32; 2],
@@ -45,23 +47,23 @@ struct Slope {
 
 /// See [`super::occluded`].
 #[inline(always)]
-pub fn occluded<S: Simd>(simd: S, mesh: &Mesh, segments: &Segments, asked: u32) -> u32 {
+pub fn occluded<S: Simd>(simd: S, mesh: &Mesh, segments: &Segments, mask: u32) -> u32 {
     let o = segments.o.to_array();
-    walk(
+    traverse(
         simd,
         mesh.nodes,
         segments,
-        asked,
+        mask,
         #[inline(always)]
-        |lanes, items, mask| {
-            let mut pending = mask;
+        |lanes, items, leaf_mask| {
+            let mut pending = leaf_mask;
             for triangles in mesh.triangles[items].chunks(4) {
-                if pending.count_ones() <= FEW {
+                if pending.count_ones() <= FEW_SEGMENTS {
                     let four = Four::new(simd, mesh, triangles);
                     for i in bits_of(pending) {
-                        let (met, t) = four.intersect(simd, &line_at(lanes, i, &o, segments.pad));
-                        for c in bits_of(met) {
-                            if t[c] > 0.0 && t[c] < segments.t_max && triangles[c][3] != segments.skip {
+                        let (hits, t) = four.intersect(simd, &line_at(lanes, i, &o, segments.pad));
+                        for lane in bits_of(hits) {
+                            if t[lane] > 0.0 && t[lane] < segments.t_max && triangles[lane][3] != segments.skip {
                                 pending &= !(1 << i);
                             }
                         }
@@ -84,7 +86,7 @@ pub fn occluded<S: Simd>(simd: S, mesh: &Mesh, segments: &Segments, asked: u32) 
                     );
                 }
             }
-            mask & !pending
+            leaf_mask & !pending
         },
     )
 }
@@ -95,29 +97,29 @@ pub fn items<S: Simd>(
     simd: S,
     nodes: &[Node],
     segments: &Segments,
-    asked: u32,
-    boxes: impl Fn(usize) -> Option<Aabb>,
+    mask: u32,
+    bounds: impl Fn(usize) -> Option<Aabb>,
     mut visit: impl FnMut(usize, u32) -> u32,
 ) -> u32 {
     let o = segments.o.to_array();
-    walk(
+    traverse(
         simd,
         nodes,
         segments,
-        asked,
+        mask,
         #[inline(always)]
-        |lanes, items, mask| {
+        |lanes, items, leaf_mask| {
             let mut occluded = 0;
             for item in items {
-                let Some(bounds) = boxes(item) else { continue };
-                let segments_hitting_child = in_lanes(
+                let Some(item_bounds) = bounds(item) else { continue };
+                let candidates = in_lanes(
                     lanes,
                     #[inline(always)]
-                    |lanes| passing_box(simd, lanes, &o, segments, &bounds),
-                ) & mask
+                    |lanes| passing_box(simd, lanes, &o, segments, &item_bounds),
+                ) & leaf_mask
                     & !occluded;
-                if segments_hitting_child != 0 {
-                    occluded |= visit(item, segments_hitting_child);
+                if candidates != 0 {
+                    occluded |= visit(item, candidates);
                 }
             }
             occluded
@@ -147,21 +149,21 @@ fn in_lanes<S: Simd>(lanes: &[Lanes<S>], mut test: impl FnMut(&Lanes<S>) -> u64)
     bits
 }
 
-/// Visits leaves with the segments that hit them. `visit` returns the segments that the leaf occludes. Returns all
-/// occluded segments.
+/// Visits each leaf with the mask of the segments that hit the leaf. `visit` returns the mask of the segments that the
+/// leaf occludes. Returns the mask of all occluded segments.
 #[inline(always)]
-fn walk<S: Simd>(
+fn traverse<S: Simd>(
     simd: S,
     nodes: &[Node],
     segments: &Segments,
-    asked: u32,
+    mask: u32,
     mut visit: impl FnMut(&[Lanes<S>], Range<usize>, u32) -> u32,
 ) -> u32 {
-    let mut pending = asked & segments.directions.all();
+    let mut pending = mask & segments.directions.all();
     if pending == 0 {
         return 0;
     }
-    let asked = pending;
+    let requested = pending;
     let mut lanes = ArrayVec::new();
     let slopes = prepare(simd, segments, &mut lanes);
     let zero = f32x8::splat(simd, 0.0);
@@ -176,23 +178,24 @@ fn walk<S: Simd>(
         let node = &nodes[number as usize];
         let scale = node.scale().to_array();
         let planes = [&node.low, &node.high];
-        let mut seen = [[zero; 3]; 2];
+        let mut planes_from_origin = [[zero; 3]; 2];
         for k in 0..3 {
             for i in 0..2 {
-                seen[i][k] = side(simd, node, planes[slopes[k].sides[i]], k, scale[k]) - slopes[k].from[i];
+                planes_from_origin[i][k] =
+                    side(simd, node, planes[slopes[k].sides[i]], k, scale[k]) - slopes[k].origins[i];
             }
         }
         // Segments that hit each child's box, and children that any segment hits.
         let mut children = [0u32; 8];
-        let mut any = 0;
-        if mask.count_ones() <= FEW {
+        let mut hit_children = 0;
+        if mask.count_ones() <= FEW_SEGMENTS {
             for i in bits_of(mask) {
                 let inverse = &lanes[i / S::f32s::LEN].inverse;
                 let (mut near, mut far) = (zero, t_max);
                 for k in 0..3 {
                     let inverse = inverse[k][i % S::f32s::LEN];
-                    let (a, b) = (seen[0][k] * inverse, seen[1][k] * inverse);
-                    if slopes[k].same {
+                    let (a, b) = (planes_from_origin[0][k] * inverse, planes_from_origin[1][k] * inverse);
+                    if slopes[k].same_sign {
                         near = near.max(a);
                         far = far.min(b);
                     } else {
@@ -200,52 +203,52 @@ fn walk<S: Simd>(
                         far = far.min(a.max(b));
                     }
                 }
-                let passed = (near.simd_le(far) & far.simd_gt(zero)).to_bitmask() as u32;
-                any |= passed;
+                let hits = (near.simd_le(far) & far.simd_gt(zero)).to_bitmask() as u32;
+                hit_children |= hits;
                 // Branchless, to avoid mispredictions.
-                for (c, child) in children.iter_mut().enumerate() {
-                    *child |= (passed >> c & 1) << i;
+                for (slot, child) in children.iter_mut().enumerate() {
+                    *child |= (hits >> slot & 1) << i;
                 }
             }
         } else {
             let (mut near, mut far) = (zero, t_max);
             for k in 0..3 {
-                near = near.max(seen[0][k] * slopes[k].inverse[0]);
-                let second = seen[1][k] * slopes[k].inverse[1];
-                if slopes[k].same {
+                near = near.max(planes_from_origin[0][k] * slopes[k].inverse[0]);
+                let second = planes_from_origin[1][k] * slopes[k].inverse[1];
+                if slopes[k].same_sign {
                     far = far.min(second);
                 } else {
                     near = near.max(second);
                 }
             }
-            let passed = (near.simd_le(far) & far.simd_gt(zero)).to_bitmask() as u32;
-            for c in bits_of(passed) {
-                children[c] = mask
+            let hits = (near.simd_le(far) & far.simd_gt(zero)).to_bitmask() as u32;
+            for slot in bits_of(hits) {
+                children[slot] = mask
                     & in_lanes(
                         &lanes,
                         #[inline(always)]
-                        |lanes| segments_hitting_child(simd, lanes, &slopes, &seen, c, segments.t_max),
+                        |lanes| segments_hitting_child(simd, lanes, &slopes, &planes_from_origin, slot, segments.t_max),
                     );
-                any |= u32::from(children[c] != 0) << c;
+                hit_children |= u32::from(children[slot] != 0) << slot;
             }
         }
-        for c in bits_of(any & u32::from(node.inner)) {
-            let before = u32::from(node.inner) & ((1 << c) - 1);
-            stack.push((node.first_child + before.count_ones(), children[c]));
+        for slot in bits_of(hit_children & u32::from(node.inner)) {
+            let lower_slots = u32::from(node.inner) & ((1 << slot) - 1);
+            stack.push((node.first_child + lower_slots.count_ones(), children[slot]));
         }
-        for c in bits_of(any & !u32::from(node.inner)) {
-            let mask = children[c] & pending;
+        for slot in bits_of(hit_children & !u32::from(node.inner)) {
+            let mask = children[slot] & pending;
             if mask != 0 {
-                pending &= !visit(&lanes, node.items(c), mask);
+                pending &= !visit(&lanes, node.items(slot), mask);
             }
         }
     }
-    asked & !pending
+    requested & !pending
 }
 
 #[inline(always)]
-fn line_at<S: Simd>(lanes: &[Lanes<S>], place: usize, o: &[f32; 3], pad: f32) -> Line {
-    let (lanes, i) = (&lanes[place / S::f32s::LEN], place % S::f32s::LEN);
+fn line_at<S: Simd>(lanes: &[Lanes<S>], segment: usize, o: &[f32; 3], pad: f32) -> Line {
+    let (lanes, i) = (&lanes[segment / S::f32s::LEN], segment % S::f32s::LEN);
     let axes = lanes.axes.unwrap_or_else(|| {
         let [x, y] = lanes.largest.map(|mask| mask.to_bitmask() >> i & 1 == 1);
         axes_from(if x {
@@ -268,7 +271,7 @@ fn line_at<S: Simd>(lanes: &[Lanes<S>], place: usize, o: &[f32; 3], pad: f32) ->
     }
 }
 
-/// Arranges the segments in vectors and returns bounds on their directions.
+/// Arranges the segments in vectors, and returns bounds on the directions of all segments.
 #[inline(always)]
 fn prepare<S: Simd>(simd: S, segments: &Segments, lanes: &mut ArrayVec<Lanes<S>, MAX_LANES>) -> [Slope; 3] {
     let one = S::f32s::splat(simd, 1.0);
@@ -276,60 +279,60 @@ fn prepare<S: Simd>(simd: S, segments: &Segments, lanes: &mut ArrayVec<Lanes<S>,
         [S::f32s::splat(simd, f32::INFINITY); 3],
         [S::f32s::splat(simd, f32::NEG_INFINITY); 3],
     ];
-    let Directions { count, along } = segments.directions;
+    let Directions { count, components } = segments.directions;
     for i in (0..*count).step_by(S::f32s::LEN) {
         let mut d = [one; 3];
         let mut inverse = [one; 3];
         for k in 0..3 {
-            d[k] = S::f32s::from_slice(simd, &along[k][i..i + S::f32s::LEN]);
-            let away = away_from_zero(simd, d[k]);
-            bounds[0][k] = bounds[0][k].min(away);
-            bounds[1][k] = bounds[1][k].max(away);
-            inverse[k] = one / away;
+            d[k] = S::f32s::from_slice(simd, &components[k][i..i + S::f32s::LEN]);
+            let clamped = away_from_zero(simd, d[k]);
+            bounds[0][k] = bounds[0][k].min(clamped);
+            bounds[1][k] = bounds[1][k].max(clamped);
+            inverse[k] = one / clamped;
         }
         let [x, y, z] = d.map(|d| d.abs());
         let x_first = x.simd_ge(y) & x.simd_ge(z);
         let y_first = y.simd_ge(z) & !x_first;
-        let all = (1 << S::f32s::LEN) - 1;
+        let full_mask = (1 << S::f32s::LEN) - 1;
         let axes = match (x_first.to_bitmask(), y_first.to_bitmask()) {
-            (x, _) if x == all => Some(axes_from(0)),
-            (_, y) if y == all => Some(axes_from(1)),
+            (x, _) if x == full_mask => Some(axes_from(0)),
+            (_, y) if y == full_mask => Some(axes_from(1)),
             (0, 0) => Some(axes_from(2)),
             _ => None,
         };
-        let mut new = Lanes {
+        let mut vector = Lanes {
             axes,
             largest: [x_first, y_first],
             shear: [one; 3],
             inverse,
         };
-        let [x, y, z] = new.in_order(d);
-        new.shear = [x / z, y / z, one / z];
-        lanes.push(new);
+        let [x, y, z] = vector.in_order(d);
+        vector.shear = [x / z, y / z, one / z];
+        lanes.push(vector);
     }
     let mut slopes = [Slope::default(); 3];
     for k in 0..3 {
-        let (least, most) = (bounds[0][k].reduce_min(), bounds[1][k].reduce_max());
+        let (min_direction, max_direction) = (bounds[0][k].reduce_min(), bounds[1][k].reduce_max());
         let [low, high] = [segments.o[k] + segments.pad, segments.o[k] - segments.pad];
-        let [of_least, of_most] = [1.0 / least, 1.0 / most];
+        let [inverse_min, inverse_max] = [1.0 / min_direction, 1.0 / max_direction];
         slopes[k] = match () {
-            _ if least > 0.0 => Slope {
-                same: true,
+            _ if min_direction > 0.0 => Slope {
+                same_sign: true,
                 sides: [0, 1],
-                from: [low, high],
-                inverse: [of_most, of_least],
+                origins: [low, high],
+                inverse: [inverse_max, inverse_min],
             },
-            _ if most < 0.0 => Slope {
-                same: true,
+            _ if max_direction < 0.0 => Slope {
+                same_sign: true,
                 sides: [1, 0],
-                from: [high, low],
-                inverse: [of_least, of_most],
+                origins: [high, low],
+                inverse: [inverse_min, inverse_max],
             },
             _ => Slope {
-                same: false,
+                same_sign: false,
                 sides: [0, 1],
-                from: [low, high],
-                inverse: [of_most, of_least],
+                origins: [low, high],
+                inverse: [inverse_max, inverse_min],
             },
         };
     }
@@ -339,9 +342,11 @@ fn prepare<S: Simd>(simd: S, segments: &Segments, lanes: &mut ArrayVec<Lanes<S>,
 /// Like [`line::away_from_zero`](super::line::away_from_zero).
 #[inline(always)]
 fn away_from_zero<S: Simd>(simd: S, d: S::f32s) -> S::f32s {
-    let least = S::f32s::splat(simd, LEAST);
-    let near = d.simd_lt(S::f32s::splat(simd, 0.0)).select(-least, least);
-    d.abs().simd_ge(least).select(d, near)
+    let min_component = S::f32s::splat(simd, MIN_COMPONENT);
+    let clamped = d
+        .simd_lt(S::f32s::splat(simd, 0.0))
+        .select(-min_component, min_component);
+    d.abs().simd_ge(min_component).select(d, clamped)
 }
 
 impl<S: Simd> Lanes<S> {
@@ -410,7 +415,7 @@ fn segments_hitting_child<S: Simd>(
     simd: S,
     lanes: &Lanes<S>,
     slopes: &[Slope; 3],
-    seen: &[[f32x8<S>; 3]; 2],
+    planes_from_origin: &[[f32x8<S>; 3]; 2],
     child: usize,
     t_max: f32,
 ) -> u64 {
@@ -418,9 +423,9 @@ fn segments_hitting_child<S: Simd>(
     let mut near = zero;
     let mut far = S::f32s::splat(simd, t_max);
     for k in 0..3 {
-        let a = lanes.inverse[k] * seen[0][k][child];
-        let b = lanes.inverse[k] * seen[1][k][child];
-        if slopes[k].same {
+        let a = lanes.inverse[k] * planes_from_origin[0][k][child];
+        let b = lanes.inverse[k] * planes_from_origin[1][k][child];
+        if slopes[k].same_sign {
             near = near.max(a);
             far = far.min(b);
         } else {
@@ -441,13 +446,13 @@ fn occluded_by_triangle<S: Simd>(
     vertices: [&[f32; 4]; 3],
 ) -> u64 {
     let zero = S::f32s::splat(simd, 0.0);
-    let mut seen = [[zero; 3]; 3];
-    for (seen, vertex) in seen.iter_mut().zip(vertices) {
+    let mut sheared = [[zero; 3]; 3];
+    for (sheared, vertex) in sheared.iter_mut().zip(vertices) {
         let from_o = [vertex[0] - o[0], vertex[1] - o[1], vertex[2] - o[2]];
         let [x, y, z] = lanes.splat_in_order(simd, from_o);
-        *seen = [x - lanes.shear[0] * z, y - lanes.shear[1] * z, z];
+        *sheared = [x - lanes.shear[0] * z, y - lanes.shear[1] * z, z];
     }
-    let [a, b, c] = seen;
+    let [a, b, c] = sheared;
     let u = c[0] * b[1] - c[1] * b[0];
     let v = a[0] * c[1] - a[1] * c[0];
     let w = b[0] * a[1] - b[1] * a[0];
@@ -462,17 +467,17 @@ fn occluded_by_triangle<S: Simd>(
     let [mut low, mut high] = [[0.0; 3]; 2];
     for k in 0..3 {
         let [a, b, c] = vertices.map(|vertex| vertex[k]);
-        low[k] = less(less(a, b), c);
-        high[k] = greater(greater(a, b), c);
+        low[k] = minimum(minimum(a, b), c);
+        high[k] = maximum(maximum(a, b), c);
     }
     let [near, far] = line_intervals(simd, lanes, o, segments.pad, low, high);
     // This order of operands preserves NaN.
     let t = near.simd_gt(t).select(near, t);
     let t = far.simd_lt(t).select(far, t);
-    let hit = inside
+    let is_hit = inside
         & determinant.simd_ne(zero)
         & near.simd_le(far)
         & t.simd_gt(zero)
         & t.simd_lt(S::f32s::splat(simd, segments.t_max));
-    hit.to_bitmask()
+    is_hit.to_bitmask()
 }

@@ -45,7 +45,7 @@ struct Scene {
 }
 
 impl Scene {
-    fn new(corners: &[Vec3], triangles: &[[u32; 3]], most_in_leaf: u32) -> Scene {
+    fn new(corners: &[Vec3], triangles: &[[u32; 3]], max_leaf_size: u32) -> Scene {
         let boxes: Vec<Aabb> = triangles
             .iter()
             .map(|t| {
@@ -56,13 +56,13 @@ impl Scene {
                 }
             })
             .collect();
-        let tree = build(&boxes, most_in_leaf);
-        let numbered = |i: &u32| {
+        let tree = build(&boxes, max_leaf_size);
+        let with_index = |i: &u32| {
             let [a, b, c] = triangles[*i as usize];
             [a, b, c, *i]
         };
         Scene {
-            triangles: tree.order.iter().map(numbered).collect(),
+            triangles: tree.order.iter().map(with_index).collect(),
             vertices: corners.iter().map(|v| v.extend(0.0).to_array()).collect(),
             tree,
         }
@@ -95,16 +95,16 @@ impl Scene {
     }
 
     /// Brute-force [`occluded`].
-    fn occluded(&self, segments: &Segments, asked: u32) -> u32 {
+    fn occluded(&self, segments: &Segments, mask: u32) -> u32 {
         let mut bits = 0;
         for i in 0..segments.directions.count {
             let line = Line::new(segments.o, segments.directions.get(i), segments.pad);
-            let hides = |triangle: &[u32; 4]| {
+            let occludes = |triangle: &[u32; 4]| {
                 triangle[3] != segments.skip && self.t(triangle, &line).is_some_and(|t| t < segments.t_max)
             };
-            bits |= u32::from(self.triangles.iter().any(hides)) << i;
+            bits |= u32::from(self.triangles.iter().any(occludes)) << i;
         }
-        bits & asked
+        bits & mask
     }
 }
 
@@ -114,17 +114,17 @@ struct Visits {
     hits: u32,
     misses: u32,
     occluded: u32,
-    free: u32,
+    unoccluded: u32,
 }
 
-/// Compares queries by rays and segments with brute force. `line` returns an origin and a direction.
+/// Compares queries by rays and segments with brute force. `random_ray` returns an origin and a direction.
 fn compare(
     scene: &Scene,
     random: &mut Random,
     count: usize,
-    mut line: impl FnMut(&mut Random) -> (Vec3, Vec3),
+    mut random_ray: impl FnMut(&mut Random) -> (Vec3, Vec3),
 ) -> Visits {
-    let mut seen = Visits::default();
+    let mut visits = Visits::default();
     let levels = levels();
     for i in 0..count {
         let pad = [0.0, 1e-6, 1e-3][i % 3];
@@ -133,7 +133,7 @@ fn compare(
         } else {
             u32::MAX
         };
-        let (o, d) = line(random);
+        let (o, d) = random_ray(random);
         let best = Nearest {
             t: if i % 7 == 0 {
                 random.number().abs()
@@ -143,17 +143,17 @@ fn compare(
             number: random.bits(),
             slot: 0,
         };
-        let prepared = Line::new(o, d, pad);
-        let right = scene.closest(&prepared, skip, best);
+        let line = Line::new(o, d, pad);
+        let expected = scene.closest(&line, skip, best);
         for level in &levels {
-            let found = closest(*level, &scene.mesh(), &prepared, 0.0, skip, best);
-            assert_eq!(found, right, "{level:?} {o} {d}");
-            assert_eq!(found.t.to_bits(), right.t.to_bits());
+            let found = closest(*level, &scene.mesh(), &line, 0.0, skip, best);
+            assert_eq!(found, expected, "{level:?} {o} {d}");
+            assert_eq!(found.t.to_bits(), expected.t.to_bits());
         }
-        if right == best {
-            seen.misses += 1
+        if expected == best {
+            visits.misses += 1
         } else {
-            seen.hits += 1
+            visits.hits += 1
         }
 
         // Segments to nearby points, or in any direction.
@@ -163,7 +163,7 @@ fn compare(
                 if spread < 1.0 {
                     d + random.vector() * (spread * d.length())
                 } else {
-                    line(random).1
+                    random_ray(random).1
                 }
             })
             .collect();
@@ -174,17 +174,17 @@ fn compare(
             t_max: if i % 2 == 0 { 1.0 } else { 1e30 },
             skip,
         };
-        let there = (0..directions.len()).fold(0, |bits, i| bits | 1 << i);
-        let asked = there & if i % 3 == 1 { random.bits() } else { !0 };
-        let right = scene.occluded(&segments, asked);
+        let all = (0..directions.len()).fold(0, |bits, i| bits | 1 << i);
+        let mask = all & if i % 3 == 1 { random.bits() } else { !0 };
+        let expected = scene.occluded(&segments, mask);
         for level in &levels {
-            let bits = occluded(*level, &scene.mesh(), &segments, asked);
-            assert_eq!(bits, right, "{level:?} {segments:?}");
+            let bits = occluded(*level, &scene.mesh(), &segments, mask);
+            assert_eq!(bits, expected, "{level:?} {segments:?}");
         }
-        seen.occluded += right.count_ones();
-        seen.free += (asked & !right).count_ones();
+        visits.occluded += expected.count_ones();
+        visits.unoccluded += (mask & !expected).count_ones();
     }
-    seen
+    visits
 }
 
 /// Returns triangles of a given size at random points, with coordinates from -1 to 1.
@@ -204,10 +204,10 @@ fn soups() {
     for (count, size) in [(1, 1.0), (2, 1.0), (9, 0.8), (300, 0.1), (2000, 0.05), (500, 0.5)] {
         let scene = soup(random, count, size);
         let rays = 400_000 / (count + 100);
-        let seen = compare(&scene, random, rays, |random| (random.vector() * 1.5, random.vector()));
+        let visits = compare(&scene, random, rays, |random| (random.vector() * 1.5, random.vector()));
         assert!(
-            seen.hits > 5 && seen.misses > 5 && seen.occluded > 50 && seen.free > 50,
-            "{seen:?}"
+            visits.hits > 5 && visits.misses > 5 && visits.occluded > 50 && visits.unoccluded > 50,
+            "{visits:?}"
         );
     }
 }
@@ -231,9 +231,9 @@ fn an_empty_scene() {
 
 /// Returns a grid of squares, two triangles each, in z = 0 or rising by `slope` per square along x.
 fn grid(side: u32, slope: f32) -> Scene {
-    let at =
+    let vertex =
         |x: u32, y: u32| Vec3::new(x as f32, y as f32, slope * x as f32) / side as f32 * 2.0 - Vec3::new(1.0, 1.0, 0.0);
-    let corners: Vec<Vec3> = (0..=side).flat_map(|y| (0..=side).map(move |x| at(x, y))).collect();
+    let corners: Vec<Vec3> = (0..=side).flat_map(|y| (0..=side).map(move |x| vertex(x, y))).collect();
     let mut triangles = Vec::new();
     for y in 0..side {
         for x in 0..side {
@@ -250,13 +250,13 @@ fn edges_and_corners_of_a_grid() {
     let random = &mut Random(3);
     for slope in [0.0, 0.25, -1.0] {
         let scene = grid(16, slope);
-        // From above, from and along the plane, through vertices and edges, and parallel to the axes.
-        let place = |random: &mut Random| {
+        // Rays from above, from and along the plane, through vertices and edges, and parallel to the axes.
+        let grid_point = |random: &mut Random| {
             Vec3::new(random.below(33) as f32, random.below(33) as f32, 0.0) / 16.0 - Vec3::new(1.0, 1.0, 0.0)
         };
-        let seen = compare(&scene, random, 300, |random| {
-            let above = [0.0, 1.0, 0.125, -0.5][random.below(4)];
-            let (from, to) = (place(random) + Vec3::Z * above, place(random));
+        let visits = compare(&scene, random, 300, |random| {
+            let height = [0.0, 1.0, 0.125, -0.5][random.below(4)];
+            let (from, to) = (grid_point(random) + Vec3::Z * height, grid_point(random));
             let axis = Vec3::AXES[random.below(3)];
             match random.below(4) {
                 0 => (from, axis),
@@ -266,8 +266,8 @@ fn edges_and_corners_of_a_grid() {
             }
         });
         assert!(
-            seen.hits > 20 && seen.misses > 20 && seen.occluded > 20 && seen.free > 20,
-            "{seen:?}"
+            visits.hits > 20 && visits.misses > 20 && visits.occluded > 20 && visits.unoccluded > 20,
+            "{visits:?}"
         );
     }
 }
@@ -277,11 +277,11 @@ fn no_ray_passes_between_adjacent_triangles() {
     let random = &mut Random(4);
     let scene = grid(16, 0.3);
     for _ in 0..2000 {
-        // From above to points on edges.
-        let along = (random.number() + 1.0) * 0.5;
+        // Rays from above to points on edges.
+        let fraction = (random.number() + 1.0) * 0.5;
         let edge = random.below(scene.triangles.len());
         let [a, b] = [0, 1].map(|i| Vec3::from_slice(&scene.vertices[scene.triangles[edge][i] as usize][..3]));
-        let to = a + (b - a) * along;
+        let to = a + (b - a) * fraction;
         if to.x.abs().max(to.y.abs()) > 0.999 {
             continue;
         }
@@ -305,14 +305,14 @@ fn degenerate_triangles() {
         triangles.extend([[a, a, a], [a, b, b], [a, b, a], [a, b, c], [a, b, c], [c, b, a]]);
     }
     let scene = Scene::new(&corners, &triangles, 4);
-    let any = corners.clone();
-    let seen = compare(&scene, random, 400, |random| {
-        let from = any[random.below(count)];
-        (from, any[random.below(count)] - from * [1.0, 0.0][random.below(2)])
+    let points = corners.clone();
+    let visits = compare(&scene, random, 400, |random| {
+        let from = points[random.below(count)];
+        (from, points[random.below(count)] - from * [1.0, 0.0][random.below(2)])
     });
     assert!(
-        seen.hits > 20 && seen.misses > 20 && seen.occluded > 20 && seen.free > 20,
-        "{seen:?}"
+        visits.hits > 20 && visits.misses > 20 && visits.occluded > 20 && visits.unoccluded > 20,
+        "{visits:?}"
     );
 }
 
@@ -336,18 +336,21 @@ fn huge_and_tiny() {
     // Mixed sizes, near and far from the origin.
     let mut corners = Vec::new();
     for i in 0..300 {
-        let far = if i % 2 == 0 { Vec3::splat(1000.0) } else { Vec3::ZERO };
-        let middle = random.vector() + far;
+        let offset = if i % 2 == 0 { Vec3::splat(1000.0) } else { Vec3::ZERO };
+        let middle = random.vector() + offset;
         let size = 10f32.powi(i % 12 - 6);
         corners.extend((0..3).map(|_| middle + random.vector() * size));
     }
     let triangles: Vec<[u32; 3]> = (0..300).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
     let scene = Scene::new(&corners, &triangles, 4);
-    let seen = compare(&scene, random, 400, |random| {
+    let visits = compare(&scene, random, 400, |random| {
         let from = random.vector() * 2.0 + [Vec3::ZERO, Vec3::splat(1000.0)][random.below(2)];
         (from, random.vector())
     });
-    assert!(seen.hits > 20 && seen.occluded > 20 && seen.free > 20, "{seen:?}");
+    assert!(
+        visits.hits > 20 && visits.occluded > 20 && visits.unoccluded > 20,
+        "{visits:?}"
+    );
 }
 
 #[test]
@@ -358,15 +361,15 @@ fn directions_with_zeros() {
         let x = random.number();
         [0.0, -0.0, 1e-38, -1e-42, x, x, 1.0, -1.0][random.below(8)]
     };
-    let seen = compare(&scene, random, 400, |random| {
+    let visits = compare(&scene, random, 400, |random| {
         (
             random.vector(),
             Vec3::new(component(random), component(random), component(random)),
         )
     });
     assert!(
-        seen.hits > 20 && seen.misses > 20 && seen.occluded > 20 && seen.free > 20,
-        "{seen:?}"
+        visits.hits > 20 && visits.misses > 20 && visits.occluded > 20 && visits.unoccluded > 20,
+        "{visits:?}"
     );
 }
 
@@ -378,7 +381,7 @@ fn leaves_are_visited_until_the_limit() {
         for _ in 0..100 {
             let (o, d) = (random.vector(), random.vector());
             let line = Line::new(o, d, 0.0);
-            let right = scene.closest(&line, u32::MAX, NONE);
+            let expected = scene.closest(&line, u32::MAX, NONE);
             let mut best = NONE;
             leaves(level, &scene.tree.nodes, &line, best.t, |items: Range<usize>, limit| {
                 assert_eq!(limit, best.t);
@@ -392,7 +395,7 @@ fn leaves_are_visited_until_the_limit() {
                 }
                 best.t
             });
-            assert_eq!(best, right);
+            assert_eq!(best, expected);
 
             let directions: Vec<Vec3> = (0..32).map(|_| d + random.vector() * 0.5).collect();
             let segments = Segments {
@@ -402,24 +405,24 @@ fn leaves_are_visited_until_the_limit() {
                 t_max: 1.0,
                 skip: u32::MAX,
             };
-            let asked = random.bits();
+            let mask = random.bits();
             let mut visits = 0;
             let bounds = |i: usize| {
                 let corners = [0, 1, 2].map(|k| scene.vertices[scene.triangles[i][k] as usize]);
                 Some(Aabb::around(&corners.map(|v| Vec3::new(v[0], v[1], v[2]))))
             };
-            let bits = occluded_items(level, &scene.tree.nodes, &segments, asked, bounds, |item, some| {
-                assert_eq!(some & !asked, 0);
+            let bits = occluded_items(level, &scene.tree.nodes, &segments, mask, bounds, |item, candidates| {
+                assert_eq!(candidates & !mask, 0);
                 visits += 1;
                 let mut occluded = 0;
-                for (i, d) in directions.iter().enumerate().filter(|(i, _)| some >> i & 1 == 1) {
+                for (i, d) in directions.iter().enumerate().filter(|(i, _)| candidates >> i & 1 == 1) {
                     let line = Line::new(o, *d, 0.0);
-                    let hides = scene.t(&scene.triangles[item], &line).is_some_and(|t| t < 1.0);
-                    occluded |= u32::from(hides) << i;
+                    let occludes = scene.t(&scene.triangles[item], &line).is_some_and(|t| t < 1.0);
+                    occluded |= u32::from(occludes) << i;
                 }
                 occluded
             });
-            assert_eq!(bits, scene.occluded(&segments, asked));
+            assert_eq!(bits, scene.occluded(&segments, mask));
             assert!(visits < 200, "{visits} visits");
         }
     }
@@ -447,12 +450,12 @@ fn single_triangles() {
         let vertices = corners.map(|v| v.extend(0.0).to_array());
         let found = Line::new(o, d, 0.0).triangle([&vertices[0], &vertices[1], &vertices[2]]);
         match moller_trumbore_f64(o.as_dvec3(), d.as_dvec3(), corners.map(|v| v.as_dvec3())) {
-            Some((t, inside)) if inside > 1e-3 && t > 1e-3 => {
+            Some((t, min_barycentric)) if min_barycentric > 1e-3 && t > 1e-3 => {
                 let found = f64::from(found.unwrap());
                 assert!((found - t).abs() < 1e-3 * t, "{found} {t}");
                 hits += 1;
             }
-            Some((t, inside)) if inside < -1e-3 || t < -1e-3 => {
+            Some((t, min_barycentric)) if min_barycentric < -1e-3 || t < -1e-3 => {
                 assert_eq!(found, None);
                 misses += 1;
             }

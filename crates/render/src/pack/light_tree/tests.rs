@@ -51,7 +51,7 @@ impl Random {
         }
     }
 
-    fn lamp(&mut self, i: u32, two_sided: bool) -> TreeEmitter {
+    fn emitter(&mut self, i: u32, two_sided: bool) -> TreeEmitter {
         let (center, normal) = (self.point() * 5.0, self.direction());
         let half = if self.unit() < 0.2 { 0.0 } else { 0.3 * self.unit() };
         let cone = match half == 0.0 {
@@ -71,10 +71,10 @@ impl Random {
 }
 
 /// Returns true if a cone contains a normal, or its opposite if two-sided.
-fn has(cone: &Cone, normal: DVec3) -> bool {
-    let away = cone.axis.angle_between(normal);
-    let away = if cone.two_sided { away.min(PI - away) } else { away };
-    away <= cone.spread + 1e-7
+fn contains(cone: &Cone, normal: DVec3) -> bool {
+    let angle = cone.axis.angle_between(normal);
+    let angle = if cone.two_sided { angle.min(PI - angle) } else { angle };
+    angle <= cone.spread + 1e-7
 }
 
 #[test]
@@ -83,18 +83,21 @@ fn the_union_of_two_cones_contains_both() {
     let mut narrower = 0;
     for _ in 0..4000 {
         let (a, b) = (random.cone(), random.cone());
-        let both = a.with(&b);
-        assert!(both.edge >= a.edge.max(b.edge) && (both.axis.length() - 1.0).abs() < 1e-9);
-        assert!(both.two_sided == (a.two_sided || b.two_sided));
-        narrower += u32::from(both.spread < PI);
+        let union = a.with(&b);
+        assert!(union.edge >= a.edge.max(b.edge) && (union.axis.length() - 1.0).abs() < 1e-9);
+        assert!(union.two_sided == (a.two_sided || b.two_sided));
+        narrower += u32::from(union.spread < PI);
         for cone in [a, b] {
             for _ in 0..8 {
                 // Half of the normals are on the rim.
                 let side = cone.axis.any_orthonormal_vector();
-                let around = DQuat::from_axis_angle(cone.axis, random.unit() * 2.0 * PI) * side;
+                let tilt_axis = DQuat::from_axis_angle(cone.axis, random.unit() * 2.0 * PI) * side;
                 let angle = cone.spread * if random.unit() < 0.5 { 1.0 } else { random.unit() };
-                let normal = DQuat::from_axis_angle(around, angle) * cone.axis;
-                assert!(has(&both, normal), "{a:?} {b:?}: {both:?} has no {normal}");
+                let normal = DQuat::from_axis_angle(tilt_axis, angle) * cone.axis;
+                assert!(
+                    contains(&union, normal),
+                    "{a:?} {b:?}: {union:?} does not contain {normal}"
+                );
             }
         }
     }
@@ -168,33 +171,33 @@ fn probabilities(nodes: &[LightNode], count: usize, p: Vec3, n: Vec3) -> Vec<f64
 fn a_tree_built_in_parallel_has_the_same_nodes() {
     let mut random = Random(5);
     for count in [0, 1, 2, 5, 16, 17, 300, 5000] {
-        let lamps: Vec<TreeEmitter> = (0..count).map(|i| random.lamp(i, i % 3 == 0)).collect();
-        let serial = build_with(&lamps, usize::MAX);
+        let emitters: Vec<TreeEmitter> = (0..count).map(|i| random.emitter(i, i % 3 == 0)).collect();
+        let serial = build_with(&emitters, usize::MAX);
         for parallel in [1, 40, PARALLEL] {
-            let nodes = build_with(&lamps, parallel);
+            let nodes = build_with(&emitters, parallel);
             assert!(
                 bytemuck::cast_slice::<_, u32>(&nodes) == bytemuck::cast_slice::<_, u32>(&serial),
                 "{count}, {parallel}"
             );
         }
-        let changed = build_with(&lamps[..lamps.len().saturating_sub(1)], 1);
+        let changed = build_with(&emitters[..emitters.len().saturating_sub(1)], 1);
         assert!(count == 0 || bytemuck::cast_slice::<_, u32>(&changed) != bytemuck::cast_slice::<_, u32>(&serial));
     }
 }
 
 #[test]
-fn probabilities_sum_to_one_and_visible_emitters_have_one() {
+fn probabilities_sum_to_one_and_are_positive_for_visible_emitters() {
     let mut random = Random(2);
     for (count, two_sided) in [(1, false), (2, false), (17, true), (300, false), (300, true)] {
-        let lamps: Vec<TreeEmitter> = (0..count).map(|i| random.lamp(i, two_sided)).collect();
-        let nodes = build(&lamps);
+        let emitters: Vec<TreeEmitter> = (0..count).map(|i| random.emitter(i, two_sided)).collect();
+        let nodes = build(&emitters);
         assert_eq!(
             nodes
                 .iter()
                 .flat_map(children)
                 .filter(|(_, below)| *below == NO_INDEX)
                 .count(),
-            lamps.len()
+            emitters.len()
         );
         let mut dark = 0;
         for _ in 0..200 {
@@ -204,19 +207,20 @@ fn probabilities_sum_to_one_and_visible_emitters_have_one() {
             } else {
                 random.direction()
             };
-            let found = probabilities(&nodes, lamps.len(), p.as_vec3(), n.as_vec3());
+            let found = probabilities(&nodes, emitters.len(), p.as_vec3(), n.as_vec3());
             let sum: f64 = found.iter().sum();
             assert!((sum - 1.0).abs() < 1e-5, "{sum}");
-            for emitter in &lamps {
+            for emitter in &emitters {
                 // Facing the surface, on both sides.
                 let (center, half) = (0.5 * (emitter.low + emitter.high), 0.5 * (emitter.high - emitter.low).x);
                 let u = emitter.cone.axis.any_orthonormal_vector();
                 let v = emitter.cone.axis.cross(u);
                 let lit = (0..9).any(|k| {
-                    let at = center + (u * f64::from(k % 3 - 1) + v * f64::from(k / 3 - 1)) * half / 2.0;
-                    let to = (at - p).normalize();
-                    let faces = emitter.cone.spread > 3.0 || -to.dot(emitter.cone.axis) > 0.0 || emitter.cone.two_sided;
-                    faces && (n == DVec3::ZERO || to.dot(n) > 0.0)
+                    let point = center + (u * f64::from(k % 3 - 1) + v * f64::from(k / 3 - 1)) * half / 2.0;
+                    let to_point = (point - p).normalize();
+                    let faces =
+                        emitter.cone.spread > 3.0 || -to_point.dot(emitter.cone.axis) > 0.0 || emitter.cone.two_sided;
+                    faces && (n == DVec3::ZERO || to_point.dot(n) > 0.0)
                 });
                 let probability = found[emitter.index as usize];
                 assert!(!lit || probability > 0.0, "{emitter:?} from {p}, {n}");
@@ -230,34 +234,34 @@ fn probabilities_sum_to_one_and_visible_emitters_have_one() {
 #[test]
 fn nodes_link_to_parents_and_bound_children() {
     let mut random = Random(3);
-    let lamps: Vec<TreeEmitter> = (0..1000).map(|i| random.lamp(i, false)).collect();
-    let nodes = build(&lamps);
+    let emitters: Vec<TreeEmitter> = (0..1000).map(|i| random.emitter(i, false)).collect();
+    let nodes = build(&emitters);
     assert_eq!(nodes[0].parent.x, NO_INDEX);
     assert!(nodes.len() < 500, "too many nodes: {}", nodes.len());
     let center = |node: &LightNode, i: usize| Vec3::new(node.x[i], node.y[i], node.z[i]);
-    let (mut seen, mut leaves) = (0, 0);
+    let (mut visited, mut leaves) = (0, 0);
     let mut pending = vec![0_u32];
     while let Some(number) = pending.pop() {
-        seen += 1;
+        visited += 1;
         let node = &nodes[number as usize];
         for (i, below) in children(node) {
             if below == NO_INDEX {
                 leaves += 1;
                 continue;
             }
-            let inside = &nodes[below as usize];
-            assert_eq!(inside.parent.x, 4 * number + i as u32);
+            let child = &nodes[below as usize];
+            assert_eq!(child.parent.x, 4 * number + i as u32);
             let mut sum = 0.0;
-            for (j, _) in children(inside) {
+            for (j, _) in children(child) {
                 // Spheres around boxes: a child's sphere may stick out, but its center does not.
-                assert!((center(node, i) - center(inside, j)).length() <= node.radius[i] * 1.0001);
-                sum += inside.intensity[j];
+                assert!((center(node, i) - center(child, j)).length() <= node.radius[i] * 1.0001);
+                sum += child.intensity[j];
             }
             assert!((sum - node.intensity[i]).abs() <= 1e-5 * node.intensity[i]);
             pending.push(below);
         }
     }
-    assert_eq!((seen, leaves), (nodes.len(), lamps.len()));
+    assert_eq!((visited, leaves), (nodes.len(), emitters.len()));
 }
 
 /// Averages the positive part of evenly spread heights.
@@ -275,28 +279,28 @@ fn importance_matches_the_formula_with_angles() {
         let emitter = TreeEmitter {
             cone: random.cone(),
             intensity: 1.0,
-            ..random.lamp(i, false)
+            ..random.emitter(i, false)
         };
         let node = build(&[emitter])[0];
         let (p, n) = (random.point() * 6.0, random.direction());
-        let to = 0.5 * (emitter.low + emitter.high) - p;
-        let (distance, radius) = (to.length(), 0.5 * (emitter.high - emitter.low).length());
-        let seen = if distance <= radius {
+        let to_center = 0.5 * (emitter.low + emitter.high) - p;
+        let (distance, radius) = (to_center.length(), 0.5 * (emitter.high - emitter.low).length());
+        let angular_radius = if distance <= radius {
             PI
         } else {
             (radius / distance).asin()
         };
-        let along = emitter.cone.axis.angle_between(-to);
-        let along = if emitter.cone.two_sided {
-            along.min(PI - along)
+        let from_axis = emitter.cone.axis.angle_between(-to_center);
+        let from_axis = if emitter.cone.two_sided {
+            from_axis.min(PI - from_axis)
         } else {
-            along
+            from_axis
         };
-        let leaving = (along - emitter.cone.spread).max(0.0);
-        let facing = n.angle_between(to);
-        let around = distance * distance + 0.1 * radius * radius;
+        let leaving = (from_axis - emitter.cone.spread).max(0.0);
+        let facing = n.angle_between(to_center);
+        let squared_distance = distance * distance + 0.1 * radius * radius;
         let height = |angle: f64| mean_above(distance * angle.cos(), radius).max(0.03 * radius);
-        let value = height(leaving) * height(facing) / (around * around);
+        let value = height(leaving) * height(facing) / (squared_distance * squared_distance);
         let found = light_importances(&node, p.as_vec3(), n.as_vec3());
         assert_eq!(
             (found.y, found.z, found.w),
@@ -304,7 +308,7 @@ fn importance_matches_the_formula_with_angles() {
             "only the first child exists"
         );
         let found = f64::from(found.x);
-        if leaving - seen < emitter.cone.edge && facing - seen < FRAC_PI_2 {
+        if leaving - angular_radius < emitter.cone.edge && facing - angular_radius < FRAC_PI_2 {
             compared += 1;
             assert!(
                 (found - value).abs() < 2e-3 * value.max(1e-3),
@@ -364,7 +368,7 @@ fn children_are_selected_in_proportion_to_importance() {
 
 #[test]
 fn coincident_and_exponential_emitters_give_shallow_trees() {
-    let at = |i: u32, p: DVec3, intensity: f64| TreeEmitter {
+    let emitter_at = |i: u32, p: DVec3, intensity: f64| TreeEmitter {
         low: p,
         high: p,
         cone: Cone::ALL,
@@ -373,8 +377,8 @@ fn coincident_and_exponential_emitters_give_shallow_trees() {
         instance: 0,
         index: i,
     };
-    let depth = |lamps: &[TreeEmitter]| {
-        let nodes = build(lamps);
+    let depth = |emitters: &[TreeEmitter]| {
+        let nodes = build(emitters);
         let levels = |mut i: usize| {
             let mut levels = 0;
             while nodes[i].parent.x != NO_INDEX {
@@ -386,15 +390,17 @@ fn coincident_and_exponential_emitters_give_shallow_trees() {
         (0..nodes.len()).map(levels).max().unwrap()
     };
     let count = 20_000;
-    let one_place: Vec<TreeEmitter> = (0..count).map(|i| at(i, DVec3::ONE, 1.0)).collect();
-    assert!(depth(&one_place) <= 8, "{}", depth(&one_place));
-    let row: Vec<TreeEmitter> = (0..count).map(|i| at(i, DVec3::X * f64::from(i), 1.0)).collect();
+    let coincident: Vec<TreeEmitter> = (0..count).map(|i| emitter_at(i, DVec3::ONE, 1.0)).collect();
+    assert!(depth(&coincident) <= 8, "{}", depth(&coincident));
+    let row: Vec<TreeEmitter> = (0..count)
+        .map(|i| emitter_at(i, DVec3::X * f64::from(i), 1.0))
+        .collect();
     assert!(depth(&row) <= 12, "{}", depth(&row));
     // The distances and intensities form geometric progressions: without a depth limit, the emitters would be split off
     // one by one.
-    let falling: Vec<TreeEmitter> = (0..300)
-        .map(|i| at(i, DVec3::X * 0.5_f64.powi(i as i32), 0.001_f64.powi(i as i32 % 90)))
+    let geometric: Vec<TreeEmitter> = (0..300)
+        .map(|i| emitter_at(i, DVec3::X * 0.5_f64.powi(i as i32), 0.001_f64.powi(i as i32 % 90)))
         .collect();
-    assert!(depth(&falling) <= 48 + 9, "{}", depth(&falling));
+    assert!(depth(&geometric) <= 48 + 9, "{}", depth(&geometric));
     assert!(build(&[]).is_empty());
 }

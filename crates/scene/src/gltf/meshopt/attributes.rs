@@ -21,12 +21,12 @@ enum Channel {
 
 /// Decodes `count` elements of `stride` bytes, a multiple of 4 and at most 256.
 pub(super) fn attributes(stream: &[u8], count: usize, stride: usize) -> Result<Vec<u8>, &'static str> {
-    let (version, channels, smallest_tail) = match stream.first() {
+    let (version, channels, min_tail) = match stream.first() {
         Some(0xa0) => (0, 0, 32),
         Some(0xa1) => (1, stride / 4, 24),
         _ => return Err("the stream must begin with the byte 0xa0 or 0xa1"),
     };
-    let tail = (stride + channels).max(smallest_tail);
+    let tail = (stride + channels).max(min_tail);
     let Some(end) = stream.len().checked_sub(tail).filter(|end| *end >= 1) else {
         return Err(TOO_SHORT);
     };
@@ -40,16 +40,16 @@ pub(super) fn attributes(stream: &[u8], count: usize, stride: usize) -> Result<V
             (0, 0) => Channel::Bytes,
             (1, 0) => Channel::Pairs,
             (2, bits) => Channel::Xor(u32::from(bits)),
-            _ => return Err("the modes of the stream's channels must be 0, 1 or 2, only the last with a rotation"),
+            _ => return Err("the channel modes of the stream must be 0, 1 or 2, and only mode 2 may have a rotation"),
         };
     }
-    let most = ((8192 / stride) & !(GROUP - 1)).min(BLOCK);
+    let max_elements = ((8192 / stride) & !(GROUP - 1)).min(BLOCK);
     // Each block takes at least one byte per channel, which limits the memory use.
-    if count.div_ceil(most).saturating_mul(stride / 4) > data.len() {
+    if count.div_ceil(max_elements).saturating_mul(stride / 4) > data.len() {
         return Err(TOO_SHORT);
     }
     let mut elements = vec![0; count * stride];
-    for block in elements.chunks_mut(most * stride) {
+    for block in elements.chunks_mut(max_elements * stride) {
         let length = block.len() / stride;
         let groups = length.div_ceil(GROUP);
         let controls = match version {
@@ -75,10 +75,10 @@ pub(super) fn attributes(stream: &[u8], count: usize, stride: usize) -> Result<V
                     *group = read_group(&mut data, width)?;
                 }
             }
-            let at = 4 * channel;
-            let before = [last[at], last[at + 1], last[at + 2], last[at + 3]];
-            let after = undo(*kind, &deltas, before, &mut block[at..], stride, length);
-            last[at..at + 4].copy_from_slice(&after);
+            let offset = 4 * channel;
+            let before = [last[offset], last[offset + 1], last[offset + 2], last[offset + 3]];
+            let after = decode_channel(*kind, &deltas, before, &mut block[offset..], stride, length);
+            last[offset..offset + 4].copy_from_slice(&after);
         }
     }
     match data.is_empty() {
@@ -104,18 +104,18 @@ fn read_group(data: &mut &[u8], width: u32) -> Result<[u8; GROUP], &'static str>
         deltas.copy_from_slice(packed);
         return Ok(deltas);
     }
-    let most = (1 << width) - 1;
-    let each = 8 / width;
+    let escape = (1 << width) - 1;
+    let per_byte = 8 / width;
     for (i, delta) in deltas.iter_mut().enumerate() {
         let i = i as u32;
-        let byte = packed[(i / each) as usize];
-        let place = i % each;
+        let byte = packed[(i / per_byte) as usize];
+        let slot = i % per_byte;
         // Single-bit deltas start at the lowest bit of a byte, wider deltas at the highest bit.
-        let shift = if width == 1 { place } else { 8 - width * (place + 1) };
-        *delta = byte >> shift & most;
+        let shift = if width == 1 { slot } else { 8 - width * (slot + 1) };
+        *delta = byte >> shift & escape;
     }
     for delta in &mut deltas {
-        if *delta == most {
+        if *delta == escape {
             *delta = take(data, 1)?[0];
         }
     }
@@ -123,27 +123,27 @@ fn read_group(data: &mut &[u8], width: u32) -> Result<[u8; GROUP], &'static str>
 }
 
 /// Decodes a channel of a block; returns the last element.
-fn undo(
+fn decode_channel(
     kind: Channel,
     deltas: &[[u8; BLOCK]; 4],
     before: [u8; 4],
-    places: &mut [u8],
+    elements: &mut [u8],
     stride: usize,
     length: usize,
 ) -> [u8; 4] {
-    let mut now = before;
-    for (i, place) in places.chunks_mut(stride).take(length).enumerate() {
+    let mut values = before;
+    for (i, element) in elements.chunks_mut(stride).take(length).enumerate() {
         let delta = [deltas[0][i], deltas[1][i], deltas[2][i], deltas[3][i]];
-        now = match kind {
+        values = match kind {
             Channel::Bytes => std::array::from_fn(|k| {
                 let delta = (delta[k] >> 1) ^ (delta[k] & 1).wrapping_neg();
-                now[k].wrapping_add(delta)
+                values[k].wrapping_add(delta)
             }),
             Channel::Pairs => {
                 let pair = |k: usize| {
                     let delta = u16::from_le_bytes([delta[k], delta[k + 1]]);
                     let delta = (delta >> 1) ^ (delta & 1).wrapping_neg();
-                    u16::from_le_bytes([now[k], now[k + 1]])
+                    u16::from_le_bytes([values[k], values[k + 1]])
                         .wrapping_add(delta)
                         .to_le_bytes()
                 };
@@ -152,10 +152,10 @@ fn undo(
             }
             Channel::Xor(bits) => {
                 let delta = u32::from_le_bytes(delta).rotate_right(bits);
-                (u32::from_le_bytes(now) ^ delta).to_le_bytes()
+                (u32::from_le_bytes(values) ^ delta).to_le_bytes()
             }
         };
-        place[..4].copy_from_slice(&now);
+        element[..4].copy_from_slice(&values);
     }
-    now
+    values
 }

@@ -15,24 +15,24 @@ impl Filter {
     pub fn apply(self, bytes: &mut [u8], stride: usize) {
         match (self, stride) {
             (Filter::None, _) => {}
-            (Filter::Octahedral, 4) => each(bytes, |v: [i8; 4]| {
+            (Filter::Octahedral, 4) => map_elements(bytes, |v: [i8; 4]| {
                 octahedral(v.map(f32::from), 127.0, v[3], |x| x as i8)
             }),
-            (Filter::Octahedral, _) => each(bytes, |v: [i16; 4]| {
+            (Filter::Octahedral, _) => map_elements(bytes, |v: [i16; 4]| {
                 octahedral(v.map(f32::from), 32767.0, v[3], |x| x as i16)
             }),
-            (Filter::Quaternion, _) => each(bytes, quaternion),
+            (Filter::Quaternion, _) => map_elements(bytes, quaternion),
             (Filter::Exponential, _) => {
                 for word in bytes.as_chunks_mut::<4>().0 {
                     *word = exponential(i32::from_le_bytes(*word)).to_le_bytes();
                 }
             }
-            (Filter::Color, 4) => each(bytes, |v: [i8; 4]| {
+            (Filter::Color, 4) => map_elements(bytes, |v: [i8; 4]| {
                 let [y, _, _, a] = v.map(|x| i32::from(x as u8));
                 let rgba = color(y, i32::from(v[1]), i32::from(v[2]), a, 255.0);
                 rgba.map(|x| (x as u8) as i8)
             }),
-            (Filter::Color, _) => each(bytes, |v: [i16; 4]| {
+            (Filter::Color, _) => map_elements(bytes, |v: [i16; 4]| {
                 let [y, _, _, a] = v.map(|x| i32::from(x as u16));
                 let rgba = color(y, i32::from(v[1]), i32::from(v[2]), a, 65535.0);
                 rgba.map(|x| (x as u16) as i16)
@@ -67,38 +67,38 @@ impl Component for i16 {
     }
 }
 
-fn each<T: Component>(bytes: &mut [u8], change: impl Fn([T; 4]) -> [T; 4]) {
+fn map_elements<T: Component>(bytes: &mut [u8], convert: impl Fn([T; 4]) -> [T; 4]) {
     let size = T::SIZE;
     for element in bytes.chunks_exact_mut(4 * size) {
-        let changed = change(std::array::from_fn(|k| T::read(&element[k * size..])));
-        for (value, bytes) in changed.into_iter().zip(element.chunks_exact_mut(size)) {
+        let converted = convert(std::array::from_fn(|k| T::read(&element[k * size..])));
+        for (value, bytes) in converted.into_iter().zip(element.chunks_exact_mut(size)) {
             value.write(bytes);
         }
     }
 }
 
-/// Decodes an octahedral unit vector; the last component is unchanged.
-fn octahedral<T>([x, y, one, _]: [f32; 4], most: f32, last: T, whole: impl Fn(f32) -> T) -> [T; 4] {
-    let (x, y) = (x / one, y / one);
+/// Decodes an octahedral unit vector whose third component is the scale; the last component is unchanged.
+fn octahedral<T>([x, y, scale, _]: [f32; 4], max: f32, last: T, to_integer: impl Fn(f32) -> T) -> [T; 4] {
+    let (x, y) = (x / scale, y / scale);
     let z = 1.0 - x.abs() - y.abs();
     let t = z.min(0.0);
     let (x, y) = (x - t.copysign(x), y - t.copysign(y));
     let length = (x * x + y * y + z * z).sqrt();
-    let [x, y, z] = [x, y, z].map(|x| whole((x / length * most).round()));
+    let [x, y, z] = [x, y, z].map(|x| to_integer((x / length * max).round()));
     [x, y, z, last]
 }
 
 fn quaternion(v: [i16; 4]) -> [i16; 4] {
-    let one = f32::from(v[3] | 3);
+    let scale = f32::from(v[3] | 3);
     let range = 1.0 / 2f32.sqrt();
-    let [x, y, z] = [v[0], v[1], v[2]].map(|x| f32::from(x) / one * range);
+    let [x, y, z] = [v[0], v[1], v[2]].map(|x| f32::from(x) / scale * range);
     let w = (1.0 - x * x - y * y - z * z).max(0.0).sqrt();
-    let left_out = usize::from(v[3] as u16 & 3);
-    let mut turned = [0; 4];
+    let omitted = usize::from(v[3] as u16 & 3);
+    let mut result = [0; 4];
     for (k, x) in [w, x, y, z].into_iter().enumerate() {
-        turned[(left_out + k) % 4] = (x * 32767.0).round() as i16;
+        result[(omitted + k) % 4] = (x * 32767.0).round() as i16;
     }
-    turned
+    result
 }
 
 fn exponential(value: i32) -> f32 {
@@ -108,12 +108,12 @@ fn exponential(value: i32) -> f32 {
     power * mantissa as f32
 }
 
-/// Decodes YCoCg of the bit depth given by the highest bit of alpha.
-fn color(y: i32, co: i32, cg: i32, a: i32, most: f32) -> [f32; 4] {
+/// Decodes a YCoCg color. The highest bit of alpha determines the bit depth.
+fn color(y: i32, co: i32, cg: i32, a: i32, max: f32) -> [f32; 4] {
     let bits = 32 - a.leading_zeros();
-    let all = (1 << bits) - 1;
-    let alpha = a & (all >> 1);
+    let max_value = (1 << bits) - 1;
+    let alpha = a & (max_value >> 1);
     let alpha = alpha << 1 | alpha & 1;
-    let scale = most / all as f32;
+    let scale = max / max_value as f32;
     [y + co - cg, y + cg, y - co - cg, alpha].map(|x| (x as f32 * scale).round())
 }

@@ -10,7 +10,7 @@ pub(super) fn triangles(stream: &[u8], count: usize, size: usize) -> Result<Vec<
     let (codes, rest) = stream[1..].split_at_checked(count / 3).ok_or(TOO_SHORT)?;
     let (data, table) = rest.split_last_chunk::<16>().ok_or(TOO_SHORT)?;
     if table[14..] != [0, 0] || table.iter().any(|entry| entry >> 4 == 15 || entry & 15 == 15) {
-        return Err("the stream's table must have no nibble of 15, and end with two zeros");
+        return Err("the table of the stream must not contain the nibble 15, and must end with two zero bytes");
     }
     let mut decoder = Decoder {
         numbers: Numbers { data },
@@ -46,7 +46,7 @@ pub(super) fn indices(stream: &[u8], count: usize, size: usize) -> Result<Vec<u8
     for _ in 0..count {
         let number = numbers.next()?;
         let last = &mut last[(number & 1) as usize];
-        *last = last.wrapping_add(unfolded(number >> 1));
+        *last = last.wrapping_add(zigzag_decoded(number >> 1));
         bytes.extend_from_slice(&last.to_le_bytes()[..size]);
     }
     match numbers.data.is_empty() {
@@ -56,7 +56,7 @@ pub(super) fn indices(stream: &[u8], count: usize, size: usize) -> Result<Vec<u8
 }
 
 /// Decodes a zigzag-encoded integer, which has its sign in the lowest bit.
-fn unfolded(number: u32) -> u32 {
+fn zigzag_decoded(number: u32) -> u32 {
     (number >> 1) ^ (number & 1).wrapping_neg()
 }
 
@@ -81,7 +81,7 @@ impl Numbers<'_> {
                 return Ok(number);
             }
         }
-        Err("the stream's numbers must have at most 5 bytes")
+        Err("the numbers of the stream must have at most 5 bytes")
     }
 }
 
@@ -102,7 +102,7 @@ impl<T: Copy> Fifo<T> {
         let index = usize::from(index);
         match index < self.pushed {
             true => Ok(self.entries[(self.pushed - 1 - index) % 16]),
-            false => Err("the stream must not ask for what it has not had yet"),
+            false => Err("the stream must only refer to earlier edges and vertices"),
         }
     }
 }
@@ -124,14 +124,14 @@ impl Decoder<'_> {
         }
         let [a, b] = self.edges.get(high)?;
         let c = match low {
-            0 => self.unused(),
+            0 => self.next_index(),
             1..13 => self.vertices.get(low)?,
             13 | 14 => {
                 let step = if low == 13 { u32::MAX } else { 1 };
                 self.last = self.last.wrapping_add(step);
                 self.last
             }
-            _ => self.said()?,
+            _ => self.explicit_index()?,
         };
         self.edges.push([c, b]);
         self.edges.push([a, c]);
@@ -141,50 +141,56 @@ impl Decoder<'_> {
         Ok([a, b, c])
     }
 
-    /// Decodes a triangle that shares no edge of the FIFO.
+    /// Decodes a triangle that shares no edge with the FIFO.
     fn corners(&mut self, low: u8, table: &[u8; 16]) -> Result<[u32; 3], &'static str> {
-        let how = match low {
+        let codes = match low {
             0..14 => table[usize::from(low)],
             _ => {
-                let how = self.numbers.byte()?;
-                if how == 0 {
+                let codes = self.numbers.byte()?;
+                if codes == 0 {
                     self.next = 0;
                 }
-                how
+                codes
             }
         };
-        let (second, third) = (how >> 4, how & 15);
-        let a = if low == 15 { self.said()? } else { self.unused() };
+        let (second, third) = (codes >> 4, codes & 15);
+        let a = if low == 15 {
+            self.explicit_index()?
+        } else {
+            self.next_index()
+        };
         let b = self.corner(second)?;
         let c = self.corner(third)?;
         self.edges.push([b, a]);
         self.edges.push([c, b]);
         self.edges.push([a, c]);
         self.vertices.push(a);
-        for (how, vertex) in [(second, b), (third, c)] {
-            if how == 0 || how == 15 {
+        for (code, vertex) in [(second, b), (third, c)] {
+            if code == 0 || code == 15 {
                 self.vertices.push(vertex);
             }
         }
         Ok([a, b, c])
     }
 
-    fn corner(&mut self, how: u8) -> Result<u32, &'static str> {
-        match how {
-            0 => Ok(self.unused()),
-            15 => self.said(),
-            _ => self.vertices.get(how - 1),
+    fn corner(&mut self, code: u8) -> Result<u32, &'static str> {
+        match code {
+            0 => Ok(self.next_index()),
+            15 => self.explicit_index(),
+            _ => self.vertices.get(code - 1),
         }
     }
 
-    fn unused(&mut self) -> u32 {
+    /// Returns the next index in ascending order.
+    fn next_index(&mut self) -> u32 {
         let index = self.next;
         self.next = index.wrapping_add(1);
         index
     }
 
-    fn said(&mut self) -> Result<u32, &'static str> {
-        self.last = self.last.wrapping_add(unfolded(self.numbers.next()?));
+    /// Reads an index that is coded as a delta.
+    fn explicit_index(&mut self) -> Result<u32, &'static str> {
+        self.last = self.last.wrapping_add(zigzag_decoded(self.numbers.next()?));
         Ok(self.last)
     }
 }

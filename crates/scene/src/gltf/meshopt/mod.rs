@@ -1,7 +1,8 @@
 //! Buffer views compressed with `EXT_meshopt_compression` or its superset `KHR_meshopt_compression` (Khronos Group,
 //! specifications of the extensions).
 //!
-//! The crate `meshopt-rs` 0.1.2 only supports version 0 of the bitstream, and does not check filters.
+//! wgray has its own decoder because the crate `meshopt-rs` 0.1.2 only supports version 0 of the bitstream and does not
+//! check filters.
 
 mod attributes;
 mod filter;
@@ -11,13 +12,13 @@ use serde::Deserialize;
 use serde_json::{Map, Value};
 
 use self::filter::Filter;
-use super::error::{GltfFault, plain, shown};
+use super::error::{GltfFault, json_message, quoted};
 
-/// Names of the extension, in order of precedence.
+/// Names of the extensions, in order of precedence.
 const NAMES: [&str; 2] = ["KHR_meshopt_compression", "EXT_meshopt_compression"];
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Compressed {
+pub(super) struct Compression {
     /// Name of the extension.
     pub name: &'static str,
     pub buffer: usize,
@@ -50,14 +51,18 @@ struct MeshoptExtension {
     filter: Option<String>,
 }
 
-/// Returns the compression of a view of `length` bytes.
-pub(super) fn compressed(key: &str, others: &Map<String, Value>, length: u64) -> Result<Option<Compressed>, GltfFault> {
-    let Some((name, extension)) = NAMES.iter().find_map(|name| Some((*name, others.get(*name)?))) else {
+/// Returns the compression of a buffer view of `length` bytes; `None` if it is not compressed.
+pub(super) fn parse_compression(
+    key: &str,
+    extensions: &Map<String, Value>,
+    length: u64,
+) -> Result<Option<Compression>, GltfFault> {
+    let Some((name, extension)) = NAMES.iter().find_map(|name| Some((*name, extensions.get(*name)?))) else {
         return Ok(None);
     };
     let key = format!("{key}.extensions.{name}");
     let extension: MeshoptExtension = serde_path_to_error::deserialize(extension)
-        .map_err(|error| GltfFault::key(format!("{key}.{}", error.path()), plain(error.inner())))?;
+        .map_err(|error| GltfFault::key(format!("{key}.{}", error.path()), json_message(error.inner())))?;
     let fault = |field: &str, value: &dyn std::fmt::Display, rule: &str| {
         Err(GltfFault::key(format!("{key}.{field}"), format!("{value} {rule}")))
     };
@@ -66,7 +71,7 @@ pub(super) fn compressed(key: &str, others: &Map<String, Value>, length: u64) ->
         "ATTRIBUTES" => Mode::Attributes,
         "TRIANGLES" => Mode::Triangles,
         "INDICES" => Mode::Indices,
-        other => return fault("mode", &shown(other), "must be ATTRIBUTES, TRIANGLES or INDICES"),
+        other => return fault("mode", &quoted(other), "must be ATTRIBUTES, TRIANGLES or INDICES"),
     };
     let filter = match extension.filter.as_deref().unwrap_or("NONE") {
         "NONE" => Filter::None,
@@ -76,14 +81,14 @@ pub(super) fn compressed(key: &str, others: &Map<String, Value>, length: u64) ->
         "COLOR" => Filter::Color,
         other => {
             let rule = "must be NONE, OCTAHEDRAL, QUATERNION, EXPONENTIAL or COLOR";
-            return fault("filter", &shown(other), rule);
+            return fault("filter", &quoted(other), rule);
         }
     };
     let rule = match mode {
         Mode::Attributes if !(4..=256).contains(&stride) || !stride.is_multiple_of(4) => {
             "must be a multiple of 4, from 4 to 256"
         }
-        Mode::Triangles | Mode::Indices if stride != 2 && stride != 4 => "must be 2 or 4, as these are indices",
+        Mode::Triangles | Mode::Indices if stride != 2 && stride != 4 => "must be 2 or 4 for indices",
         _ => match filter {
             Filter::Octahedral | Filter::Color if stride != 4 && stride != 8 => "must be 4 or 8 for this filter",
             Filter::Quaternion if stride != 8 => "must be 8 for this filter",
@@ -94,13 +99,13 @@ pub(super) fn compressed(key: &str, others: &Map<String, Value>, length: u64) ->
         return fault("byteStride", &stride, rule);
     }
     if mode != Mode::Attributes && filter != Filter::None {
-        return fault("filter", &"a filter", "must go with the mode ATTRIBUTES");
+        return fault("filter", &"a filter", "requires the mode ATTRIBUTES");
     }
     if mode == Mode::Triangles && !extension.count.is_multiple_of(3) {
         return fault("count", &extension.count, "must be a multiple of 3");
     }
     if extension.count.checked_mul(stride) != Some(length) {
-        let rule = format!("elements of {stride} bytes must be the {length} bytes of the view");
+        let rule = format!("times byteStride {stride} must be {length}, the size of the view");
         return fault("count", &extension.count, &rule);
     }
     let Ok(count) = usize::try_from(extension.count) else {
@@ -110,7 +115,7 @@ pub(super) fn compressed(key: &str, others: &Map<String, Value>, length: u64) ->
             "must fit into the address space of this machine",
         );
     };
-    Ok(Some(Compressed {
+    Ok(Some(Compression {
         name,
         buffer: extension.buffer as usize,
         offset: extension.byte_offset,
@@ -122,7 +127,7 @@ pub(super) fn compressed(key: &str, others: &Map<String, Value>, length: u64) ->
     }))
 }
 
-impl Compressed {
+impl Compression {
     pub fn size(&self) -> u64 {
         self.count as u64 * self.stride as u64
     }
@@ -141,8 +146,8 @@ impl Compressed {
     }
 }
 
-const TOO_SHORT: &str = "the stream must have bytes for all elements";
-const TOO_LONG: &str = "the stream must end where its elements end";
+const TOO_SHORT: &str = "the stream must contain all elements";
+const TOO_LONG: &str = "the stream must end after the last element";
 
 #[cfg(test)]
 mod tests;

@@ -1,10 +1,10 @@
-//! Tests of the meshopt decoder: reference streams and damaged ones.
+//! Tests of the meshopt decoder with reference streams and damaged streams.
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use serde_json::{Value, json};
 
-use super::{Compressed, compressed};
+use super::{Compression, parse_compression};
 use crate::gltf::made::{container, read};
 
 /// Output of `tests/gltf/meshopt.mjs`.
@@ -12,18 +12,18 @@ const STREAMS: &str = include_str!("streams.txt");
 
 struct Stream {
     name: &'static str,
-    how: Compressed,
+    compression: Compression,
     bytes: Vec<u8>,
-    wanted: &'static str,
+    expected: &'static str,
 }
 
-fn described(mode: &str, filter: &str, stride: u64, count: u64) -> Result<Compressed, String> {
+fn compression_of(mode: &str, filter: &str, stride: u64, count: u64) -> Result<Compression, String> {
     let extension = json!({
         "buffer": 0, "byteLength": 0, "byteStride": stride, "count": count, "mode": mode, "filter": filter,
     });
-    let others = json!({ "KHR_meshopt_compression": extension });
-    match compressed("v", others.as_object().unwrap(), stride.wrapping_mul(count)) {
-        Ok(how) => Ok(how.unwrap()),
+    let extensions = json!({ "KHR_meshopt_compression": extension });
+    match parse_compression("v", extensions.as_object().unwrap(), stride.wrapping_mul(count)) {
+        Ok(compression) => Ok(compression.unwrap()),
         Err(fault) => Err(fault.of("a".as_ref()).to_string()),
     }
 }
@@ -31,16 +31,16 @@ fn described(mode: &str, filter: &str, stride: u64, count: u64) -> Result<Compre
 fn streams() -> Vec<Stream> {
     let streams = STREAMS.lines().map(|line| {
         let fields: Vec<&str> = line.split(' ').collect();
-        let [name, mode, filter, stride, count, bytes, wanted] = fields[..] else {
+        let [name, mode, filter, stride, count, bytes, expected] = fields[..] else {
             panic!("{line}");
         };
-        let how = described(mode, filter, stride.parse().unwrap(), count.parse().unwrap()).unwrap();
+        let compression = compression_of(mode, filter, stride.parse().unwrap(), count.parse().unwrap()).unwrap();
         let bytes = STANDARD.decode(bytes).unwrap();
         Stream {
             name,
-            how,
+            compression,
             bytes,
-            wanted,
+            expected,
         }
     });
     streams.collect()
@@ -60,32 +60,34 @@ fn streams_decode_to_what_the_reference_makes_of_them() {
     assert!(all.len() > 50, "{}", all.len());
     for Stream {
         name,
-        how,
+        compression,
         bytes,
-        wanted,
+        expected,
     } in all
     {
-        let found = how.decode(&bytes).unwrap_or_else(|rule| panic!("{name}: {rule}"));
-        assert_eq!(found.len() as u64, how.size());
-        if how.filter == super::Filter::None {
-            assert_eq!(hash(&found), wanted, "{name}");
+        let found = compression
+            .decode(&bytes)
+            .unwrap_or_else(|rule| panic!("{name}: {rule}"));
+        assert_eq!(found.len() as u64, compression.size());
+        if compression.filter == super::Filter::None {
+            assert_eq!(hash(&found), expected, "{name}");
             continue;
         }
-        let wanted = STANDARD.decode(wanted).unwrap();
-        assert_eq!(found.len(), wanted.len());
-        if how.filter == super::Filter::Exponential {
+        let expected = STANDARD.decode(expected).unwrap();
+        assert_eq!(found.len(), expected.len());
+        if compression.filter == super::Filter::Exponential {
             // Values must be equal, except for the sign of zeros.
             let floats = |bytes: &[u8]| -> Vec<f32> {
                 let words = bytes.as_chunks::<4>().0.iter();
                 words.map(|word| f32::from_le_bytes(*word)).collect()
             };
-            assert_eq!(floats(&found), floats(&wanted), "{name}");
+            assert_eq!(floats(&found), floats(&expected), "{name}");
             continue;
         }
         // The specification allows a difference of one unit in the last place.
-        let is_color = how.filter == super::Filter::Color;
+        let is_color = compression.filter == super::Filter::Color;
         let numbers = |bytes: &[u8]| -> Vec<i32> {
-            match (how.stride, is_color) {
+            match (compression.stride, is_color) {
                 (4, false) => bytes.iter().map(|x| i32::from(*x as i8)).collect(),
                 (4, true) => bytes.iter().map(|x| i32::from(*x)).collect(),
                 _ => bytes
@@ -99,35 +101,38 @@ fn streams_decode_to_what_the_reference_makes_of_them() {
                     .collect(),
             }
         };
-        let (found, wanted) = (numbers(&found), numbers(&wanted));
-        for (i, (found, wanted)) in found.iter().zip(&wanted).enumerate() {
-            assert!((found - wanted).abs() <= 1, "{name}: {i}: {found}, not {wanted}");
+        let (found, expected) = (numbers(&found), numbers(&expected));
+        for (i, (found, expected)) in found.iter().zip(&expected).enumerate() {
+            assert!((found - expected).abs() <= 1, "{name}: {i}: {found}, not {expected}");
         }
     }
 }
 
 #[test]
-fn examples_of_the_specification_decode() {
+fn examples_of_the_specification_are_decoded() {
     // Sixteen 4-bit deltas of the first byte.
     let mut stream = vec![0xa0, 2, 0x17, 0x5f, 0xf0, 0xbc, 0x77, 0xa9, 0x21, 0x00, 0x34, 0xb5];
     stream.extend([0; 3 + 32]);
-    let bytes = described("ATTRIBUTES", "NONE", 4, 16).unwrap().decode(&stream).unwrap();
+    let bytes = compression_of("ATTRIBUTES", "NONE", 4, 16)
+        .unwrap()
+        .decode(&stream)
+        .unwrap();
     let mut sum = 0i32;
     let deltas = [-1, -4, -3, 26, -91, 0, -6, 6, -4, -4, 5, -5, 1, -1, 0, 0];
-    let wanted: Vec<u8> = deltas
+    let expected: Vec<u8> = deltas
         .iter()
         .flat_map(|delta| {
             sum += delta;
             [sum as u8, 0, 0, 0]
         })
         .collect();
-    assert_eq!(bytes, wanted);
+    assert_eq!(bytes, expected);
     // 7 bits per byte, zigzag, from the first baseline.
     let indices = |numbers: &[u8]| {
         let mut stream = vec![0xd1];
         stream.extend(numbers);
         stream.extend([0; 4]);
-        described("INDICES", "NONE", 4, 1).unwrap().decode(&stream)
+        compression_of("INDICES", "NONE", 4, 1).unwrap().decode(&stream)
     };
     let word = |x: u32| Ok(x.to_le_bytes().to_vec());
     assert_eq!(indices(&[0x7c]), word(0x7c >> 2));
@@ -136,49 +141,63 @@ fn examples_of_the_specification_decode() {
     assert_eq!(indices(&[0xff, 0xff, 0xff, 0xff, 0x0f]), word(!(u32::MAX >> 2)));
     assert_eq!(
         indices(&[0xff, 0xff, 0xff, 0xff, 0x8f, 0x00]),
-        Err("the stream's numbers must have at most 5 bytes")
+        Err("the numbers of the stream must have at most 5 bytes")
     );
     // A new triangle, and one that shares an edge.
     let mut stream = vec![0xe1, 0xf0, 0x00];
     stream.extend([0; 16]);
-    let bytes = described("TRIANGLES", "NONE", 2, 6).unwrap().decode(&stream).unwrap();
+    let bytes = compression_of("TRIANGLES", "NONE", 2, 6)
+        .unwrap()
+        .decode(&stream)
+        .unwrap();
     assert_eq!(bytes, [0, 0, 1, 0, 2, 0, 0, 0, 2, 0, 3, 0]);
     // No edge yet.
     let mut stream = vec![0xe1, 0x00];
     stream.extend([0; 16]);
-    assert!(described("TRIANGLES", "NONE", 2, 3).unwrap().decode(&stream).is_err());
+    assert!(
+        compression_of("TRIANGLES", "NONE", 2, 3)
+            .unwrap()
+            .decode(&stream)
+            .is_err()
+    );
 }
 
 #[test]
 fn damaged_streams_do_not_panic() {
-    let (mut good, mut bad) = (0, 0);
-    for Stream { name, how, bytes, .. } in streams() {
+    let (mut accepted, mut rejected) = (0, 0);
+    for Stream {
+        name,
+        compression,
+        bytes,
+        ..
+    } in streams()
+    {
         for length in 0..bytes.len() {
             // In a truncated stream, the tail is at the wrong position.
-            if how.decode(&bytes[..length]).is_ok() {
+            if compression.decode(&bytes[..length]).is_ok() {
                 panic!("{name}: {length} of {} bytes", bytes.len());
             }
-            bad += 1;
+            rejected += 1;
         }
         let mut longer = bytes.clone();
         longer.push(0);
-        assert!(how.decode(&longer).is_err(), "{name}");
+        assert!(compression.decode(&longer).is_err(), "{name}");
         let step = 1 + bytes.len() / 300;
-        for at in (0..bytes.len()).step_by(step) {
+        for position in (0..bytes.len()).step_by(step) {
             for change in [1, 0x10, 0x80, 0xff] {
                 let mut bytes = bytes.clone();
-                bytes[at] ^= change;
-                match how.decode(&bytes) {
+                bytes[position] ^= change;
+                match compression.decode(&bytes) {
                     Ok(found) => {
-                        assert_eq!(found.len() as u64, how.size());
-                        good += 1;
+                        assert_eq!(found.len() as u64, compression.size());
+                        accepted += 1;
                     }
-                    Err(_) => bad += 1,
+                    Err(_) => rejected += 1,
                 }
             }
         }
     }
-    assert!(good > 1000 && bad > 1000, "{good} {bad}");
+    assert!(accepted > 1000 && rejected > 1000, "{accepted} {rejected}");
 }
 
 #[test]
@@ -190,16 +209,16 @@ fn small_streams_allocate_little_memory() {
         ("TRIANGLES", 0xe1),
         ("INDICES", 0xd1),
     ] {
-        let how = described(mode, "NONE", 4, 3 * huge).unwrap();
+        let compression = compression_of(mode, "NONE", 4, 3 * huge).unwrap();
         let mut stream = vec![0; 100];
         stream[0] = first;
-        assert!(how.decode(&stream).is_err());
+        assert!(compression.decode(&stream).is_err());
     }
-    let how = described("ATTRIBUTES", "NONE", 4, 256 * 10).unwrap();
+    let compression = compression_of("ATTRIBUTES", "NONE", 4, 256 * 10).unwrap();
     let mut stream = vec![0xaa; 1 + 10 + 24];
     stream[0] = 0xa1;
     stream[11..].fill(0);
-    assert_eq!(how.decode(&stream).unwrap(), vec![0; 4 * 2560]);
+    assert_eq!(compression.decode(&stream).unwrap(), vec![0; 4 * 2560]);
 }
 
 #[test]
@@ -262,27 +281,15 @@ fn extension_values_are_validated() {
             3,
             "byteStride: 260 must be a multiple of 4, from 4 to 256",
         ),
-        (
-            "TRIANGLES",
-            "NONE",
-            8,
-            3,
-            "byteStride: 8 must be 2 or 4, as these are indices",
-        ),
-        (
-            "INDICES",
-            "NONE",
-            1,
-            3,
-            "byteStride: 1 must be 2 or 4, as these are indices",
-        ),
+        ("TRIANGLES", "NONE", 8, 3, "byteStride: 8 must be 2 or 4 for indices"),
+        ("INDICES", "NONE", 1, 3, "byteStride: 1 must be 2 or 4 for indices"),
         ("TRIANGLES", "NONE", 4, 4, "count: 4 must be a multiple of 3"),
         (
             "INDICES",
             "COLOR",
             4,
             3,
-            "filter: a filter must go with the mode ATTRIBUTES",
+            "filter: a filter requires the mode ATTRIBUTES",
         ),
         (
             "ATTRIBUTES",
@@ -317,15 +324,15 @@ fn extension_values_are_validated() {
             "NONE",
             4,
             u64::MAX / 2,
-            "count: 9223372036854775807 elements of 4 bytes must be the 18446744073709551612 bytes of the view",
+            "count: 9223372036854775807 times byteStride 4 must be 18446744073709551612, the size of the view",
         ),
     ] {
         assert_eq!(
-            described(mode, filter, stride, count).unwrap_err(),
+            compression_of(mode, filter, stride, count).unwrap_err(),
             format!("a: v.extensions.KHR_meshopt_compression.{expected}")
         );
     }
-    assert!(described("ATTRIBUTES", "EXPONENTIAL", 256, 3).is_ok());
+    assert!(compression_of("ATTRIBUTES", "EXPONENTIAL", 256, 3).is_ok());
 }
 
 #[test]
@@ -364,7 +371,7 @@ fn compressed_views_behave_like_others() {
     for name in super::NAMES {
         let document = view(name, &[]).unwrap();
         let bytes = document.view(0).unwrap();
-        assert_eq!(hash(bytes), stream.wanted);
+        assert_eq!(hash(bytes), stream.expected);
         assert_eq!(bytes.as_ptr(), document.view(0).unwrap().as_ptr()); // decoded once
         assert_eq!(
             document.indices(0).unwrap()[99],
@@ -380,14 +387,14 @@ fn compressed_views_behave_like_others() {
     let key = format!("bufferViews[0].extensions.{name}");
     assert_eq!(
         message("buffer", json!(2)),
-        "a: bufferViews[0]: 2 is out of range; the file has 2"
+        "a: bufferViews[0]: 2 is out of range; number of buffers: 2"
     );
     assert_eq!(
         message("buffer", json!(1)),
         "a: buffers[1]: has no uri, but buffer views refer to it"
     );
     assert!(message("buffer", json!(-1)).starts_with(&format!("a: {key}.buffer: ")));
-    assert!(message("count", json!(99)).starts_with(&format!("a: {key}.count: 99 elements")));
+    assert!(message("count", json!(99)).starts_with(&format!("a: {key}.count: 99 times byteStride 12 ")));
     let parts = [(5, length), (u64::MAX, length), (0, usize::MAX)];
     for (offset, length) in parts {
         let message = match view(name, &[("byteOffset", json!(offset)), ("byteLength", json!(length))]) {
@@ -395,7 +402,7 @@ fn compressed_views_behave_like_others() {
             Ok(document) => document.view(0).unwrap_err().to_string(),
         };
         assert!(
-            message.contains(&format!("{key}: {length} bytes from byte {offset} on")),
+            message.contains(&format!("{key}: offset {offset} and length {length} exceed")),
             "{message}"
         );
     }

@@ -1,13 +1,13 @@
 //! PLY headers: elements and property types.
 
 use super::super::damage::{self, Damages};
-use super::super::error::{Location, MeshFault, shown};
+use super::super::error::{Location, MeshFault, quoted};
 use super::super::tokens::Tokens;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Format {
     Ascii,
-    Binary { is_big: bool },
+    Binary { is_big_endian: bool },
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -23,7 +23,7 @@ pub(super) enum Scalar {
 }
 
 impl Scalar {
-    fn named(name: &[u8]) -> Option<Scalar> {
+    fn from_name(name: &[u8]) -> Option<Scalar> {
         Some(match name {
             b"char" | b"int8" => Scalar::I8,
             b"uchar" | b"uint8" => Scalar::U8,
@@ -47,7 +47,7 @@ impl Scalar {
     }
 
     /// Returns the maximum of an integer type.
-    pub fn largest(self) -> Option<f64> {
+    pub fn max_value(self) -> Option<f64> {
         Some(match self {
             Scalar::I8 => i8::MAX.into(),
             Scalar::U8 => u8::MAX.into(),
@@ -59,14 +59,14 @@ impl Scalar {
         })
     }
 
-    pub fn is_whole(self) -> bool {
+    pub fn is_integer(self) -> bool {
         !matches!(self, Scalar::F32 | Scalar::F64)
     }
 }
 
 pub(super) struct Property {
     pub name: String,
-    /// Type of a list's length.
+    /// Type of the length of a list; `None` if the property is not a list.
     pub count: Option<Scalar>,
     pub scalar: Scalar,
 }
@@ -75,7 +75,7 @@ pub(super) struct Element {
     pub name: String,
     pub count: usize,
     pub properties: Vec<Property>,
-    pub place: Location,
+    pub location: Location,
 }
 
 pub(super) struct Header {
@@ -92,48 +92,48 @@ impl Header {
 }
 
 pub(super) fn header(words: &mut Tokens, damages: &mut Damages) -> Result<Header, MeshFault> {
-    if words.on_line() != Some(&b"ply"[..]) {
+    if words.next_on_line() != Some(&b"ply"[..]) {
         return Err(words.fault("the file must begin with \"ply\""));
     }
     let mut format = None;
     let mut elements: Vec<Element> = Vec::new();
     loop {
         if !words.skip_line() {
-            return Err(words.fault("the file ends inside of its header; \"end_header\" is missing"));
+            return Err(words.fault("the file ends inside the header; \"end_header\" is missing"));
         }
-        match words.on_line() {
+        match words.next_on_line() {
             None | Some(b"comment" | b"obj_info") => {}
             Some(b"format") => {
-                let name = words.on_line().unwrap_or_default();
+                let name = words.next_on_line().unwrap_or_default();
                 format = Some(match name {
                     b"ascii" => Format::Ascii,
-                    b"binary_little_endian" => Format::Binary { is_big: false },
-                    b"binary_big_endian" => Format::Binary { is_big: true },
+                    b"binary_little_endian" => Format::Binary { is_big_endian: false },
+                    b"binary_big_endian" => Format::Binary { is_big_endian: true },
                     _ => {
                         let rule = "must be ascii, binary_little_endian or binary_big_endian";
-                        return Err(words.fault(format!("format: {} {rule}", shown(name))));
+                        return Err(words.fault(format!("format: {} {rule}", quoted(name))));
                     }
                 });
-                let version = words.on_line().unwrap_or_default();
+                let version = words.next_on_line().unwrap_or_default();
                 if version != &b"1.0"[..] {
-                    return Err(words.fault(format!("format: version {} must be 1.0", shown(version))));
+                    return Err(words.fault(format!("format: version {} must be 1.0", quoted(version))));
                 }
             }
             Some(b"element") => {
-                let name = String::from_utf8_lossy(words.on_line().unwrap_or_default()).into_owned();
-                let count = words.on_line().unwrap_or_default();
+                let name = String::from_utf8_lossy(words.next_on_line().unwrap_or_default()).into_owned();
+                let count = words.next_on_line().unwrap_or_default();
                 let count = std::str::from_utf8(count)
                     .ok()
                     .and_then(|count| count.parse().ok())
                     .ok_or_else(|| {
-                        let rule = "must be a whole number that memory has room for";
-                        words.fault(format!("element {name:?}: {} {rule}", shown(count)))
+                        let rule = "must be a whole number that fits into memory";
+                        words.fault(format!("element {name:?}: {} {rule}", quoted(count)))
                     })?;
                 elements.push(Element {
                     name,
                     count,
                     properties: Vec::new(),
-                    place: words.place(),
+                    location: words.location(),
                 });
             }
             Some(b"property") => {
@@ -146,7 +146,7 @@ pub(super) fn header(words: &mut Tokens, damages: &mut Damages) -> Result<Header
             Some(b"end_header") => break,
             Some(word) => {
                 let rule = "must be \"format\", \"comment\", \"obj_info\", \"element\", \"property\" or \"end_header\"";
-                damages.add(damage::LINE, || words.fault(format!("{} {rule}", shown(word))));
+                damages.add(damage::LINE, || words.fault(format!("{} {rule}", quoted(word))));
             }
         }
     }
@@ -159,29 +159,29 @@ pub(super) fn header(words: &mut Tokens, damages: &mut Damages) -> Result<Header
 
 fn property(words: &mut Tokens) -> Result<Property, MeshFault> {
     let scalar = |words: &Tokens, name: &[u8]| {
-        Scalar::named(name).ok_or_else(|| {
+        Scalar::from_name(name).ok_or_else(|| {
             let rule = "must be a type: char, uchar, short, ushort, int, uint, float or double";
-            words.fault(format!("property: {} {rule}", shown(name)))
+            words.fault(format!("property: {} {rule}", quoted(name)))
         })
     };
-    let mut kind = words.on_line().unwrap_or_default();
+    let mut kind = words.next_on_line().unwrap_or_default();
     let mut count = None;
     if kind == &b"list"[..] {
-        let word = words.on_line().unwrap_or_default();
-        let number = scalar(words, word)?;
-        if !number.is_whole() {
-            return Err(words.fault(format!("property: {} must be a type of whole numbers", shown(word))));
+        let word = words.next_on_line().unwrap_or_default();
+        let length_type = scalar(words, word)?;
+        if !length_type.is_integer() {
+            return Err(words.fault(format!("property: {} must be an integer type", quoted(word))));
         }
-        count = Some(number);
-        kind = words.on_line().unwrap_or_default();
+        count = Some(length_type);
+        kind = words.next_on_line().unwrap_or_default();
     }
     let scalar = scalar(words, kind)?;
-    match words.on_line() {
+    match words.next_on_line() {
         Some(name) => Ok(Property {
             name: String::from_utf8_lossy(name).into_owned(),
             count,
             scalar,
         }),
-        None => Err(words.fault("property: its name is missing")),
+        None => Err(words.fault("property: the name is missing")),
     }
 }

@@ -1,15 +1,15 @@
 //! PLY values: ASCII, or binary with either byte order.
 
-use super::super::error::{Location, MeshFault, shown};
+use super::super::error::{Location, MeshFault, quoted};
 use super::super::tokens::{self, Tokens};
 use super::header::Scalar;
 
 pub(super) trait Values {
     fn next(&mut self, scalar: Scalar) -> Result<f64, MeshFault>;
     fn skip(&mut self, scalar: Scalar, count: usize) -> Result<(), MeshFault>;
-    fn fewest_bytes(&self, scalar: Scalar) -> usize;
-    fn left(&self) -> usize;
-    fn place(&mut self) -> Location;
+    fn min_bytes(&self, scalar: Scalar) -> usize;
+    fn bytes_left(&self) -> usize;
+    fn location(&mut self) -> Location;
     /// Ends a row. Returns the line of the row if it has unread values.
     fn end_row(&mut self) -> Option<Location> {
         None
@@ -19,15 +19,15 @@ pub(super) trait Values {
 pub(super) struct Ascii<'a> {
     pub words: Tokens<'a>,
     /// Each row is one line.
-    pub by_lines: bool,
+    pub row_per_line: bool,
 }
 
 impl Values for Ascii<'_> {
     #[inline]
     fn next(&mut self, _: Scalar) -> Result<f64, MeshFault> {
-        match self.words.anywhere() {
+        match self.words.next_word() {
             Some(word) => {
-                tokens::number(word).ok_or_else(|| self.words.fault(format!("{} must be a number", shown(word))))
+                tokens::number(word).ok_or_else(|| self.words.fault(format!("{} must be a number", quoted(word))))
             }
             None => Err(self.words.fault("the file ends too early: values are missing")),
         }
@@ -37,49 +37,49 @@ impl Values for Ascii<'_> {
         (0..count).try_for_each(|_| self.next(scalar).map(|_| ()))
     }
 
-    /// A value has at least a digit and a separator; `left` includes a separator for the last value.
-    fn fewest_bytes(&self, _: Scalar) -> usize {
+    /// A value has at least a digit and a separator; `bytes_left` includes a separator for the last value.
+    fn min_bytes(&self, _: Scalar) -> usize {
         2
     }
 
-    fn left(&self) -> usize {
-        self.words.left() + 1
+    fn bytes_left(&self) -> usize {
+        self.words.bytes_left() + 1
     }
 
-    fn place(&mut self) -> Location {
-        self.words.find_word_anywhere();
-        self.words.place()
+    fn location(&mut self) -> Location {
+        self.words.find_next_word();
+        self.words.location()
     }
 
     fn end_row(&mut self) -> Option<Location> {
-        let place = self.words.place();
-        (self.by_lines && self.words.skip_rest()).then_some(place)
+        let location = self.words.location();
+        (self.row_per_line && self.words.skip_rest()).then_some(location)
     }
 }
 
 pub(super) struct Binary<'a> {
     pub bytes: &'a [u8],
-    pub at: usize,
-    pub is_big: bool,
+    pub offset: usize,
+    pub is_big_endian: bool,
 }
 
 impl Binary<'_> {
     #[inline]
     fn take<const N: usize>(&mut self) -> Result<[u8; N], MeshFault> {
-        let Some(bytes) = self.bytes[self.at..].first_chunk::<N>() else {
-            return Err(self.ended());
+        let Some(bytes) = self.bytes[self.offset..].first_chunk::<N>() else {
+            return Err(self.truncated());
         };
-        self.at += N;
+        self.offset += N;
         let mut bytes = *bytes;
-        if self.is_big {
+        if self.is_big_endian {
             bytes.reverse();
         }
         Ok(bytes)
     }
 
     #[cold]
-    fn ended(&self) -> MeshFault {
-        Location::Byte(self.at).fault("the file ends too early: values are missing")
+    fn truncated(&self) -> MeshFault {
+        Location::Byte(self.offset).fault("the file ends too early: values are missing")
     }
 }
 
@@ -100,23 +100,23 @@ impl Values for Binary<'_> {
 
     fn skip(&mut self, scalar: Scalar, count: usize) -> Result<(), MeshFault> {
         match count.checked_mul(scalar.size()) {
-            Some(size) if size <= self.left() => {
-                self.at += size;
+            Some(size) if size <= self.bytes_left() => {
+                self.offset += size;
                 Ok(())
             }
-            _ => Err(self.ended()),
+            _ => Err(self.truncated()),
         }
     }
 
-    fn fewest_bytes(&self, scalar: Scalar) -> usize {
+    fn min_bytes(&self, scalar: Scalar) -> usize {
         scalar.size()
     }
 
-    fn left(&self) -> usize {
-        self.bytes.len() - self.at
+    fn bytes_left(&self) -> usize {
+        self.bytes.len() - self.offset
     }
 
-    fn place(&mut self) -> Location {
-        Location::Byte(self.at)
+    fn location(&mut self) -> Location {
+        Location::Byte(self.offset)
     }
 }

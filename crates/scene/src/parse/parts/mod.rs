@@ -1,6 +1,6 @@
 //! Splits scene files into parts that are parsed one at a time, because parsing needs about 30 times the memory of the
 //! text. A part is a table of `[[shapes]]`, `[[lights]]`, `[materials.NAME]`, `[textures.NAME]`, `[meshes.NAME]` or
-//! `[[instances]]`; everything else is one part.
+//! `[[instances]]`; all other text is parsed together.
 
 use std::borrow::Cow;
 use std::ops::Range;
@@ -10,12 +10,12 @@ use toml::{Table, Value};
 use toml_parser::Source;
 use toml_parser::lexer::{Token, TokenKind};
 
-use super::syntax::{explained, syntax_error};
+use super::syntax::{explain, syntax_error};
 use crate::error::SceneError;
 use crate::key_path::{KeyPath, Segment};
 
 /// Maximum size in bytes of a part, and of a file that must be parsed as a whole.
-pub const LARGEST: usize = 4 << 20;
+pub const MAX_PART_BYTES: usize = 4 << 20;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
@@ -59,7 +59,7 @@ impl Kind {
 pub struct Part {
     pub kind: Kind,
     /// Range in the text, including the header.
-    pub place: Range<usize>,
+    pub range: Range<usize>,
 }
 
 /// The parts of a text. Each part is a standalone TOML document.
@@ -70,8 +70,8 @@ pub struct Parts<'a> {
 
 #[derive(Debug)]
 pub struct SyntaxFault {
-    /// Byte offset.
-    pub at: usize,
+    /// Byte offset in the file.
+    pub offset: usize,
     message: String,
     /// True if the message is from the TOML parser, with a known location.
     is_syntax: bool,
@@ -81,15 +81,15 @@ impl SyntaxFault {
     /// Returns an error of the document that starts at `start`.
     pub fn of(start: usize, error: &Error) -> SyntaxFault {
         SyntaxFault {
-            at: start + error.span().map_or(0, |span| span.start),
+            offset: start + error.span().map_or(0, |span| span.start),
             message: error.message().to_owned(),
             is_syntax: error.span().is_some(),
         }
     }
 
-    fn too_large(at: usize, message: String) -> SyntaxFault {
+    fn too_large(offset: usize, message: String) -> SyntaxFault {
         SyntaxFault {
-            at,
+            offset,
             message,
             is_syntax: false,
         }
@@ -97,20 +97,20 @@ impl SyntaxFault {
 
     pub fn into_error(self, text: &str, origin: &str) -> SceneError {
         let message = match self.is_syntax {
-            true => explained(text, self.at, &self.message),
+            true => explain(text, self.offset, &self.message),
             false => self.message,
         };
-        syntax_error(text, origin, self.at, &message)
+        syntax_error(text, origin, self.offset, &message)
     }
 
-    /// Returns the error for a text that must be parsed as a whole but is too large.
-    pub fn whole(text: &str) -> SyntaxFault {
+    /// Returns the error for a file that must be parsed as a whole but is too large.
+    pub fn file_too_large(text: &str) -> SyntaxFault {
         let size = text.len() as f64 / f64::from(1 << 20);
         let rule =
             "every texture, material, light, shape, mesh and instance must have its own header, such as [[shapes]]";
         let message = format!(
-            "in a file larger than {} MiB {rule}; it has {size:.1} MiB",
-            LARGEST >> 20
+            "in a file larger than {} MiB, {rule}; this file has {size:.1} MiB",
+            MAX_PART_BYTES >> 20
         );
         SyntaxFault::too_large(0, message)
     }
@@ -120,34 +120,34 @@ impl SyntaxFault {
 #[derive(Default)]
 pub struct Rest {
     pub text: String,
-    /// The start offset of each piece, in this document and in the whole text.
+    /// The start offset of each piece, in this document and in the file.
     pieces: Vec<(usize, usize)>,
 }
 
 impl Rest {
-    /// Returns the offset of a byte in the whole text.
-    pub fn place(&self, at: usize) -> usize {
-        let next = self.pieces.partition_point(|(here, _)| *here <= at);
-        let (here, there) = next.checked_sub(1).map_or((0, 0), |last| self.pieces[last]);
-        there + (at - here)
+    /// Converts a byte offset in this document to a byte offset in the file.
+    pub fn file_offset(&self, offset: usize) -> usize {
+        let next = self.pieces.partition_point(|(start, _)| *start <= offset);
+        let (start, file_start) = next.checked_sub(1).map_or((0, 0), |last| self.pieces[last]);
+        file_start + (offset - start)
     }
 }
 
 /// The name of a part, if any, and its table.
-pub type Named = (Option<String>, Table);
+pub type NamedTable = (Option<String>, Table);
 
 impl<'a> Parts<'a> {
     pub fn of(text: &'a str) -> Parts<'a> {
         let mut parts: Vec<Part> = Vec::new();
         // Keys of the header of the current part.
-        let mut open: Option<Vec<&str>> = None;
+        let mut open_keys: Option<Vec<&str>> = None;
         for header in Headers::of(text) {
-            let below = |keys: &Vec<&str>| header.keys.len() > keys.len() && header.keys.starts_with(keys);
-            if open.as_ref().is_some_and(below) {
+            let is_subtable = |keys: &Vec<&str>| header.keys.len() > keys.len() && header.keys.starts_with(keys);
+            if open_keys.as_ref().is_some_and(is_subtable) {
                 continue;
             }
-            if let (Some(_), Some(part)) = (open.take(), parts.last_mut()) {
-                part.place.end = header.start;
+            if let (Some(_), Some(part)) = (open_keys.take(), parts.last_mut()) {
+                part.range.end = header.start;
             }
             let kind = Kind::ALL.into_iter().find(|kind| {
                 let length = if kind.is_map() { 2 } else { 1 };
@@ -156,9 +156,9 @@ impl<'a> Parts<'a> {
                     && header.keys.first() == Some(&kind.name())
             });
             if let Some(kind) = kind {
-                let place = header.start..text.len();
-                parts.push(Part { kind, place });
-                open = Some(header.keys);
+                let range = header.start..text.len();
+                parts.push(Part { kind, range });
+                open_keys = Some(header.keys);
             }
         }
         Parts {
@@ -170,44 +170,44 @@ impl<'a> Parts<'a> {
     pub fn rest(&self) -> Rest {
         let mut rest = Rest::default();
         let mut end = 0;
-        let places = self.parts.iter().map(|part| part.place.clone());
-        for place in places.chain(std::iter::once(self.text.len()..self.text.len())) {
-            if end < place.start {
+        let ranges = self.parts.iter().map(|part| part.range.clone());
+        for range in ranges.chain(std::iter::once(self.text.len()..self.text.len())) {
+            if end < range.start {
                 rest.pieces.push((rest.text.len(), end));
-                rest.text.push_str(&self.text[end..place.start]);
+                rest.text.push_str(&self.text[end..range.start]);
             }
-            end = place.end;
+            end = range.end;
         }
         rest
     }
 
-    /// Returns the error of a text with a part larger than [`LARGEST`].
+    /// Returns the error of a text with a part larger than [`MAX_PART_BYTES`].
     pub fn too_large(&self) -> Option<SyntaxFault> {
-        let large = self.parts.iter().find(|part| part.place.len() > LARGEST);
+        let large = self.parts.iter().find(|part| part.range.len() > MAX_PART_BYTES);
         if let Some(part) = large {
-            let message = format!("the table that starts here is larger than {} MiB", LARGEST >> 20);
-            return Some(SyntaxFault::too_large(part.place.start, message));
+            let message = format!("the table that starts here is larger than {} MiB", MAX_PART_BYTES >> 20);
+            return Some(SyntaxFault::too_large(part.range.start, message));
         }
-        let parts: usize = self.parts.iter().map(|part| part.place.len()).sum();
+        let parts: usize = self.parts.iter().map(|part| part.range.len()).sum();
         let rest = self.text.len() - parts;
-        (rest > LARGEST).then(|| SyntaxFault::whole(self.text))
+        (rest > MAX_PART_BYTES).then(|| SyntaxFault::file_too_large(self.text))
     }
 
     pub fn read_rest(&self) -> Result<Table, SyntaxFault> {
         let rest = self.rest();
         toml::from_str(&rest.text).map_err(|error| {
-            let broken = SyntaxFault::of(0, &error);
+            let fault = SyntaxFault::of(0, &error);
             SyntaxFault {
-                at: rest.place(broken.at),
-                ..broken
+                offset: rest.file_offset(fault.offset),
+                ..fault
             }
         })
     }
 
-    /// Parses a part; `None` if the part is not a single element of its section; the file must then be parsed as a
+    /// Parses a part; `None` if the part is not a single element of its section, so that the file must be parsed as a
     /// whole.
-    pub fn read(&self, part: &Part) -> Result<Option<Named>, SyntaxFault> {
-        let document = toml::from_str(self.text(part)).map_err(|error| SyntaxFault::of(part.place.start, &error));
+    pub fn read(&self, part: &Part) -> Result<Option<NamedTable>, SyntaxFault> {
+        let document = toml::from_str(self.text(part)).map_err(|error| SyntaxFault::of(part.range.start, &error));
         let mut document: Table = document?;
         Ok(match document.remove(part.kind.name()) {
             Some(Value::Array(mut tables)) if tables.len() == 1 => match tables.pop() {
@@ -223,18 +223,18 @@ impl<'a> Parts<'a> {
     }
 
     /// Returns the TOML error of two parts with the same name.
-    pub fn twice(&self, name: &str, part: &Part) -> Option<SyntaxFault> {
+    pub fn duplicate_name(&self, name: &str, part: &Part) -> Option<SyntaxFault> {
         let path = [part.kind.name(), name].map(Segment::from);
         let (first, _) = self.find(&KeyPath(path.to_vec()))?;
-        let both = [self.text(first), self.text(part)];
-        let error = toml::from_str::<Table>(&both.concat()).err()?;
-        let at = error.span().map_or(0, |span| span.start);
-        let start = match at.checked_sub(both[0].len()) {
-            Some(at) => part.place.start + at,
-            None => first.place.start + at,
+        let texts = [self.text(first), self.text(part)];
+        let error = toml::from_str::<Table>(&texts.concat()).err()?;
+        let offset = error.span().map_or(0, |span| span.start);
+        let file_offset = match offset.checked_sub(texts[0].len()) {
+            Some(offset) => part.range.start + offset,
+            None => first.range.start + offset,
         };
         Some(SyntaxFault {
-            at: start,
+            offset: file_offset,
             ..SyntaxFault::of(0, &error)
         })
     }
@@ -249,7 +249,7 @@ impl<'a> Parts<'a> {
             Segment::Index(index) => (parts.nth(*index)?, Segment::Index(0)),
             Segment::Key(name) => {
                 let part = parts.find(|part| {
-                    let lines = self.text[part.place.clone()].lines();
+                    let lines = self.text[part.range.clone()].lines();
                     let header: Option<Table> = lines.take(1).find_map(|line| toml::from_str(line).ok());
                     let tables = header.and_then(|mut header| header.remove(first));
                     tables.is_some_and(|tables| tables.get(name).is_some())
@@ -262,7 +262,7 @@ impl<'a> Parts<'a> {
     }
 
     pub fn text(&self, part: &Part) -> &'a str {
-        &self.text[part.place.clone()]
+        &self.text[part.range.clone()]
     }
 }
 
@@ -273,12 +273,12 @@ struct Header<'a> {
     keys: Vec<&'a str>,
 }
 
-/// The headers of a text, in order. Invalid ones are skipped.
+/// The headers of a text, in order. Invalid headers are skipped.
 struct Headers<'a, T: Iterator<Item = Token>> {
     text: &'a str,
     tokens: T,
     /// True where a statement may begin: at the start, and on a new line.
-    begins: bool,
+    at_statement_start: bool,
 }
 
 impl<'a> Headers<'a, toml_parser::lexer::Lexer<'a>> {
@@ -286,7 +286,7 @@ impl<'a> Headers<'a, toml_parser::lexer::Lexer<'a>> {
         Headers {
             text,
             tokens: Source::new(text).lex(),
-            begins: true,
+            at_statement_start: true,
         }
     }
 }
@@ -322,24 +322,24 @@ impl<'a, T: Iterator<Item = Token>> Iterator for Headers<'a, T> {
     type Item = Header<'a>;
 
     fn next(&mut self) -> Option<Header<'a>> {
-        let mut depth = 0_usize; // of brackets in a value
+        let mut depth = 0_usize; // nesting depth of brackets in a value
         while let Some(token) = self.tokens.next() {
             match token.kind() {
-                TokenKind::Newline if depth == 0 => self.begins = true,
+                TokenKind::Newline if depth == 0 => self.at_statement_start = true,
                 TokenKind::Whitespace | TokenKind::Newline | TokenKind::Comment => {}
-                TokenKind::LeftSquareBracket if self.begins => {
-                    self.begins = false;
+                TokenKind::LeftSquareBracket if self.at_statement_start => {
+                    self.at_statement_start = false;
                     match self.header(token.span().start()) {
                         Some(header) => return Some(header),
-                        None => self.begins = true, // on the next line, or the text is invalid
+                        None => self.at_statement_start = true, // a line break in the header, or an invalid text
                     }
                 }
                 TokenKind::LeftSquareBracket | TokenKind::LeftCurlyBracket => {
-                    self.begins = false;
+                    self.at_statement_start = false;
                     depth += 1;
                 }
                 TokenKind::RightSquareBracket | TokenKind::RightCurlyBracket => depth = depth.saturating_sub(1),
-                _ => self.begins = false,
+                _ => self.at_statement_start = false,
             }
         }
         None

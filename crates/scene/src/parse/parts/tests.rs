@@ -14,17 +14,17 @@ const SPHERE: &str = "[[shapes]]\ntype = 'sphere'\nmaterial = 'a'\ncenter = [0, 
 const RED: &str = "[materials.a]\ntype = 'phong'\ncolor = [1, 0, 0]\n";
 const BLUE: &str = "[materials.\"b c\"]\ntype = 'phong'\ncolor = [0, 0, 1]\n";
 
-fn whole(text: &str) -> Result<Description, SceneError> {
+fn parse_whole(text: &str) -> Result<Description, SceneError> {
     let table = toml::from_str(text).map_err(|error| SyntaxFault::of(0, &error).into_error(text, "s"))?;
     read_file(table).map_err(|problems| invalid(text, "s", problems, &Defines::new(&[])))
 }
 
-fn by_parts(text: &str) -> Result<Description, String> {
+fn parse_by_parts(text: &str) -> Result<Description, String> {
     Description::parse(text, "s").map_err(|error| error.to_string())
 }
 
 fn assert_same(text: &str) {
-    match (whole(text), by_parts(text)) {
+    match (parse_whole(text), parse_by_parts(text)) {
         (Ok(whole), Ok(parts)) => assert!(whole == parts, "{text}"),
         (Err(whole), Err(parts)) => assert_eq!(whole.to_string(), parts, "{text}"),
         (whole, parts) => panic!("{text}\n{whole:?}\n{parts:?}"),
@@ -33,14 +33,14 @@ fn assert_same(text: &str) {
 
 #[test]
 fn valid_files_parse_equally_by_parts() {
-    let sub = "[materials.a.normal_map]\ntexture = 't'\n";
+    let subtable = "[materials.a.normal_map]\ntexture = 't'\n";
     let image = "[textures.t]\ntype = 'image'\nfile = 'a [[shapes]] b'\n";
     let unusual = "[[ shapes ]] # [[lights]]\n type = \"\"\"sphere\"\"\"\nmaterial = '[[shapes]]'\ncenter = [ # [x]\n0,\n\
                    [[shapes]]\n][0:0]";
     let nested = "[[shapes]]\r\ntype = 'triangle'\r\nmaterial = 'a'\r\nvertices = [\r\n[0, 0, 0],\r\n  [1, 0, 0],\r\n[0, 1, 0]]\r\n";
     let text = "[materials.z]\ntype = 'phong'\n[materials.z.color]\ntexture = \"\"\"\n[[shapes]]\n\"\"\"\n";
     let render = "[render]\nseed = 3\n[render.pixel_samples]\ncount = 4\n";
-    let pieces = [POINT, SPHERE, RED, BLUE, sub, image, nested, text, render];
+    let pieces = [POINT, SPHERE, RED, BLUE, subtable, image, nested, text, render];
     // All orders of three pieces; misplaced subtables and duplicate tables are errors.
     for a in pieces {
         for b in pieces {
@@ -59,7 +59,7 @@ fn valid_files_parse_equally_by_parts() {
     assert_same(&format!("{START}[materials]\nb = {{ type = 'mirror' }}\n{RED}{SPHERE}"));
     assert_same(&format!("{START}materials.b.type = 'mirror'\n{RED}{SPHERE}"));
     assert_same(&format!("{START}[\"materials\".b]\ntype = 'mirror'\n{RED}{SPHERE}"));
-    let parts = Parts::of(&format!("{START}{RED}{sub}{BLUE}{SPHERE}{SPHERE}{render}{POINT}"))
+    let parts = Parts::of(&format!("{START}{RED}{subtable}{BLUE}{SPHERE}{SPHERE}{render}{POINT}"))
         .parts
         .len();
     assert_eq!(parts, 5);
@@ -67,13 +67,13 @@ fn valid_files_parse_equally_by_parts() {
 
 #[test]
 fn invalid_files_have_equal_errors_by_parts() {
-    let good = format!(
+    let valid = format!(
         "{START}{POINT}{RED}{render}{SPHERE}{BLUE}{SPHERE}{POINT}",
         render = "[render]\nseed = 3\n"
     );
-    assert_same(&good);
-    // Each line is removed, duplicated or truncated, or text is inserted before it.
-    let lines: Vec<&str> = good.lines().collect();
+    assert_same(&valid);
+    // Each line is removed, duplicated or truncated, or text is inserted before the line.
+    let lines: Vec<&str> = valid.lines().collect();
     for i in 0..lines.len() {
         let line = lines[i];
         let half = &line[..line.len() / 2];
@@ -103,8 +103,8 @@ fn invalid_files_have_equal_errors_by_parts() {
 
 #[test]
 fn sizes_of_parts_and_whole_files_are_limited() {
-    let many = "[0, 0, 0],".repeat(LARGEST / 10 + 1);
-    let error_of = |text: &str| by_parts(text).unwrap_err();
+    let many = "[0, 0, 0],".repeat(MAX_PART_BYTES / 10 + 1);
+    let error_of = |text: &str| parse_by_parts(text).unwrap_err();
     let long = format!("{START}{RED}[[shapes]]\nx = [{many}]\n");
     assert_eq!(
         error_of(&long),
@@ -114,35 +114,38 @@ fn sizes_of_parts_and_whole_files_are_limited() {
     assert!(error_of(&rest).starts_with("s:1:1: "));
     assert!(
         error_of(&rest)
-            .contains("in a file larger than 4 MiB every texture, material, light, shape, mesh and instance")
+            .contains("in a file larger than 4 MiB, every texture, material, light, shape, mesh and instance")
     );
-    let spheres = SPHERE.repeat(LARGEST / SPHERE.len() + 1);
-    assert!(by_parts(&format!("{START}{spheres}{RED}")).unwrap().shapes.len() > 50_000);
+    let spheres = SPHERE.repeat(MAX_PART_BYTES / SPHERE.len() + 1);
+    assert!(parse_by_parts(&format!("{START}{spheres}{RED}")).unwrap().shapes.len() > 50_000);
     assert!(error_of(&format!("{START}{spheres}[materials]\n{RED}")).contains("must have its own header"));
-    let bad = format!("{START}{spheres}{RED}[render]\nseed = -1\n");
-    let line = 1 + bad[..bad.len() - 10].matches('\n').count();
+    let invalid = format!("{START}{spheres}{RED}[render]\nseed = -1\n");
+    let line = 1 + invalid[..invalid.len() - 10].matches('\n').count();
     assert!(
-        error_of(&bad).starts_with(&format!("s:{line}: render.seed: -1 ")),
+        error_of(&invalid).starts_with(&format!("s:{line}: render.seed: -1 ")),
         "{}",
-        error_of(&bad)
+        error_of(&invalid)
     );
-    let bad = format!(
+    let invalid = format!(
         "{START}{RED}{spheres}{}{BLUE}",
         BLUE.replace("b c", "d").replace("color", "colour")
     );
-    let line = bad.matches('\n').count() - 3;
+    let line = invalid.matches('\n').count() - 3;
     assert!(
-        error_of(&bad).starts_with(&format!("s:{line}: materials.d.colour: ")),
+        error_of(&invalid).starts_with(&format!("s:{line}: materials.d.colour: ")),
         "{}",
-        error_of(&bad)
+        error_of(&invalid)
     );
-    let twice = error_of(&format!("{START}{RED}{spheres}{RED}"));
-    assert!(twice.contains("duplicate key") && !twice.starts_with("s:3:"), "{twice}");
-    let bad = format!("{START}{spheres}{}", SPHERE.replace("radius", "size"));
-    let line = bad.matches('\n').count();
+    let duplicate = error_of(&format!("{START}{RED}{spheres}{RED}"));
     assert!(
-        error_of(&bad).starts_with(&format!("s:{line}: shapes[")),
+        duplicate.contains("duplicate key") && !duplicate.starts_with("s:3:"),
+        "{duplicate}"
+    );
+    let invalid = format!("{START}{spheres}{}", SPHERE.replace("radius", "size"));
+    let line = invalid.matches('\n').count();
+    assert!(
+        error_of(&invalid).starts_with(&format!("s:{line}: shapes[")),
         "{}",
-        error_of(&bad)
+        error_of(&invalid)
     );
 }

@@ -24,7 +24,7 @@ fn a_spot_has_a_direction_or_looks_at_a_point() {
     };
     assert_eq!((direction, cone, inner), (-glam::DVec3::Z, 30_f64.to_radians(), 0.0));
     for (keys, rule) in [
-        ("", "lights[0].direction is missing; set it or look_at"),
+        ("", "lights[0].direction is missing; set direction or look_at"),
         (
             "direction = [0, 0, 1]\nlook_at = [0, 0, 0]",
             "lights[0].direction: cannot be combined with look_at; remove one",
@@ -45,7 +45,7 @@ fn a_spot_has_a_direction_or_looks_at_a_point() {
 
 #[test]
 fn a_spot_has_angles_in_their_ranges() {
-    let with = |keys: &str| spot(&format!("direction = [1, 0, 0]\n{keys}"));
+    let parse = |keys: &str| spot(&format!("direction = [1, 0, 0]\n{keys}"));
     for keys in [
         "cone_angle = 0.01",
         "cone_angle = 180",
@@ -53,7 +53,7 @@ fn a_spot_has_angles_in_their_ranges() {
         "cone_angle = 0.01\ninner_angle = 0.01",
         "cone_angle = 90\ninner_angle = 0",
     ] {
-        assert!(with(keys).is_ok(), "{keys}");
+        assert!(parse(keys).is_ok(), "{keys}");
     }
     for (keys, rule) in [
         ("cone_angle = 0", "cone_angle: 0 must be from 0.01 to 180"),
@@ -65,7 +65,7 @@ fn a_spot_has_angles_in_their_ranges() {
         ),
         ("cone_angle = 20\ninner_angle = -1", "inner_angle: -1 must be"),
     ] {
-        let message = with(keys).expect_err(keys);
+        let message = parse(keys).expect_err(keys);
         assert!(message.contains(rule), "{message}");
     }
 }

@@ -9,7 +9,7 @@ use super::*;
 use crate::{Description, Encoding, Image, Scene, SceneError, Texels};
 
 /// A scene with all kinds of references to meshes.
-const GOOD: &str = r#"image = { width = 4, height = 4 }
+const VALID: &str = r#"image = { width = 4, height = 4 }
 camera = { position = [0, -9, 0], look_at = [0, 0, 0], fov = 40 }
 [textures.checks]
 type = "checker"
@@ -58,7 +58,7 @@ fn folder() -> TempDir {
     write("broken.obj", "v 0 0 0\nf 1 2 3\n");
     write("far.obj", "v 0 0 0\nv 1e9 0 0\nv 0 1 0\nf 1 2 3\n");
     write("small.obj", "v 0 0 0\nv 1e-8 0 0\nv 0 1e-8 0\nf 1 2 3\n");
-    write("odd.obj", &format!("{ONE}f 1 1 2\n"));
+    write("degenerate.obj", &format!("{ONE}f 1 1 2\n"));
     folder
 }
 
@@ -71,31 +71,31 @@ fn parse(text: &str) -> Result<Scene, SceneError> {
     parse_in(&folder(), text)
 }
 
-fn with(line: &str, changed: &str) -> String {
+fn with_line(line: &str, changed: &str) -> String {
     let line = format!("\n{line}\n");
-    assert_eq!(GOOD.matches(&line).count(), 1, "{line}");
-    GOOD.replace(&line, &format!("\n{changed}\n"))
+    assert_eq!(VALID.matches(&line).count(), 1, "{line}");
+    VALID.replace(&line, &format!("\n{changed}\n"))
 }
 
 fn to_world(scene: &Scene, shape: usize) -> DAffine3 {
     match scene.shapes[shape].geometry {
         Geometry::Mesh { to_world, .. } => to_world,
-        _ => panic!("no mesh: {:?}", scene.shapes[shape]),
+        _ => panic!("shape {shape} is not a mesh: {:?}", scene.shapes[shape]),
     }
 }
 
 fn groups(scene: &Scene, shape: usize) -> &[usize] {
     match &scene.shapes[shape].geometry {
         Geometry::Mesh { materials, .. } => materials,
-        _ => panic!("no mesh: {:?}", scene.shapes[shape]),
+        _ => panic!("shape {shape} is not a mesh: {:?}", scene.shapes[shape]),
     }
 }
 
-const LINE_OF_MATERIALS: &str = r#"materials = { roof = "red", brick = "white" }"#;
-const LINE_OF_MATRIX: &str = "matrix = [[1, 0, 0, 5], [0, 1, 0, 6], [0, 0, 1, 7]]";
+const MATERIALS_LINE: &str = r#"materials = { roof = "red", brick = "white" }"#;
+const MATRIX_LINE: &str = "matrix = [[1, 0, 0, 5], [0, 1, 0, 6], [0, 0, 1, 7]]";
 
 /// Valid line, replacement, error.
-const BAD: &[(&str, &str, &str)] = &[
+const INVALID: &[(&str, &str, &str)] = &[
     (
         "file = \"parts.obj\"",
         "file = \"none.obj\"",
@@ -144,94 +144,94 @@ const BAD: &[(&str, &str, &str)] = &[
     ),
     // Placement.
     (
-        LINE_OF_MATRIX,
+        MATRIX_LINE,
         "scale = 0",
-        "shapes[1].scale: 0 must not be 0, and be from 1e-6 to 1e6, or from -1e6 to -1e-6",
+        "shapes[1].scale: 0 must be from 1e-6 to 1e6, or from -1e6 to -1e-6",
     ),
     (
-        LINE_OF_MATRIX,
+        MATRIX_LINE,
         "scale = [1, -2e6, 1]",
-        "shapes[1].scale: -2e6 must not be 0, and be from 1e-6 to 1e6, or from -1e6 to -1e-6",
+        "shapes[1].scale: -2e6 must be from 1e-6 to 1e6, or from -1e6 to -1e-6",
     ),
     (
-        LINE_OF_MATRIX,
+        MATRIX_LINE,
         "scale = [1, nan, 1]",
-        "shapes[1].scale: nan must not be 0, and be from 1e-6 to 1e6, or from -1e6 to -1e-6",
+        "shapes[1].scale: nan must be from 1e-6 to 1e6, or from -1e6 to -1e-6",
     ),
     (
-        LINE_OF_MATRIX,
+        MATRIX_LINE,
         "scale = [1, 2]",
         "shapes[1].scale: [1, 2] must be a number or a list of 3 numbers",
     ),
     (
-        LINE_OF_MATRIX,
+        MATRIX_LINE,
         "rotate = [0, 361, 0]",
         "shapes[1].rotate: 361 must be from -360 to 360",
     ),
     (
-        LINE_OF_MATRIX,
+        MATRIX_LINE,
         "rotate = 90",
         "shapes[1].rotate: 90 must be a list of 3 angles in degrees or a table such as",
     ),
     (
-        LINE_OF_MATRIX,
+        MATRIX_LINE,
         "rotate = { axis = [0, 0, 0], degrees = 9 }",
         "shapes[1].rotate.axis: [0, 0, 0] must not be zero: its length must be at least 1e-9",
     ),
     (
-        LINE_OF_MATRIX,
+        MATRIX_LINE,
         "rotate = { axis = [0, 0, 1], degrees = inf }",
         "shapes[1].rotate.degrees: inf must be from -360 to 360",
     ),
     (
-        LINE_OF_MATRIX,
+        MATRIX_LINE,
         "translate = [0, 0, -2e9]",
-        "shapes[1].translate: -2e9 must be finite, from -1e9 to 1e9",
+        "shapes[1].translate: -2e9 must be from -1e9 to 1e9",
     ),
     (
-        LINE_OF_MATRIX,
+        MATRIX_LINE,
         "translate = [1e9, 0, 0]",
-        "shapes[1].file: \"one.obj\" reaches to 1.000000001e9 there; coordinates must be from -1e9 to 1e9",
+        "shapes[1].file: \"one.obj\" reaches to 1.000000001e9 in world space; coordinates must be from -1e9 to 1e9",
     ),
     (
         "translate = [1, 2, 3]",
         "matrix = []",
-        "shapes[0].matrix: cannot be combined with translate, rotate or scale, which it stands in for",
+        "shapes[0].matrix: cannot be combined with translate, rotate or scale, which matrix replaces",
     ),
     (
-        LINE_OF_MATRIX,
+        MATRIX_LINE,
         "matrix = [[1, 0, 0, 5], [0, 1, 0, 6]]",
-        "shapes[1].matrix: must be a list of 3 rows of 4 numbers; it has 2. There may be a fourth one, which is [0, 0, 0, 1]",
+        "shapes[1].matrix: must be a list of 3 rows of 4 numbers, optionally followed by the row [0, 0, 0, 1]; number of rows: 2",
     ),
     (
-        LINE_OF_MATRIX,
+        MATRIX_LINE,
         "matrix = [[1, 0, 0, 5], [0, 1, 0, 6], [0, 0, 1, 7], [0, 0, 0, 2]]",
-        "shapes[1].matrix[3]: [0, 0, 0, 2] must be [0, 0, 0, 1], or not be there",
+        "shapes[1].matrix[3]: [0, 0, 0, 2] must be [0, 0, 0, 1], or absent",
     ),
     (
-        LINE_OF_MATRIX,
+        MATRIX_LINE,
         "matrix = [[1, 0, 0, 5], [0, 1, 0, 6], [0, 0, 1, 7], [0, 0, 0, 1], [0, 0, 0, 1]]",
-        "shapes[1].matrix: must be a list of 3 rows of 4 numbers; it has 5. ",
+        "shapes[1].matrix: must be a list of 3 rows of 4 numbers, optionally followed by the row [0, 0, 0, 1]; number of rows: 5",
     ),
     (
-        LINE_OF_MATRIX,
+        MATRIX_LINE,
         "matrix = [[1, 0, 0, 5], [0, 1, 0, 2e9], [0, 0, 1, 7]]",
-        "shapes[1].matrix[1]: 2e9 must be finite, from -1e9 to 1e9",
+        "shapes[1].matrix[1]: 2e9 must be from -1e9 to 1e9",
     ),
     (
-        LINE_OF_MATRIX,
+        MATRIX_LINE,
         "matrix = [[1, 0, 0, 5], [0, nan, 0, 6], [0, 0, 1, 7]]",
-        "shapes[1].matrix[1]: nan must be finite, from -1e9 to 1e9",
+        "shapes[1].matrix[1]: nan must be from -1e9 to 1e9",
     ),
     (
-        LINE_OF_MATRIX,
+        MATRIX_LINE,
         "matrix = [[1, 0, 0, 5], [0, 0, 0, 6], [0, 0, 1, 7]]",
-        "shapes[1].matrix: its column 1, [0, 0, 0], must have a length from 1e-6 to 1e6",
+        "shapes[1].matrix: column 1, [0, 0, 0], must have a length from 1e-6 to 1e6",
     ),
     (
-        LINE_OF_MATRIX,
+        MATRIX_LINE,
         "matrix = [[1, 0, 1, 5], [0, 1, 1, 6], [0, 0, 0, 7]]",
-        "shapes[1].matrix: its first three columns must not lie in one plane",
+        "shapes[1].matrix: the first three columns must not lie in one plane",
     ),
     // Materials.
     (
@@ -242,7 +242,7 @@ const BAD: &[(&str, &str, &str)] = &[
     (
         "material = \"white\"",
         "material = \"checked\"",
-        "shapes[1].material: \"checked\" must have no texture here, as \"one.obj\" has no texture coordinates",
+        "shapes[1].material: \"checked\" must have no texture here, because \"one.obj\" has no texture coordinates",
     ),
     (
         "material = \"white\"",
@@ -250,32 +250,32 @@ const BAD: &[(&str, &str, &str)] = &[
         "shapes[1].materials.roof: \"one.obj\" has no groups with names",
     ),
     (
-        LINE_OF_MATERIALS,
+        MATERIALS_LINE,
         "materials = { roof = \"red\", floor = \"white\" }",
-        "instances[0].materials.floor: \"parts.obj\" has no such group or material; there are \"brick\", \"door\", \
+        "instances[0].materials.floor: \"parts.obj\" has no such group or material; available: \"brick\", \"door\", \
          \"roof\", \"wall\"",
     ),
     (
-        LINE_OF_MATERIALS,
+        MATERIALS_LINE,
         "materials = { roof = \"red\", brick = \"blue\" }",
         "instances[0].materials.brick: there is no material \"blue\"; the scene has",
     ),
     (
-        LINE_OF_MATERIALS,
+        MATERIALS_LINE,
         "materials = { roof = \"red\", brick = \"checked\" }",
-        "instances[0].materials.brick: \"checked\" must have no texture here, as \"parts.obj\" has no texture",
+        "instances[0].materials.brick: \"checked\" must have no texture here, because \"parts.obj\" has no texture",
     ),
 ];
 
 #[test]
 fn invalid_meshes_are_reported_with_line_key_value_and_rule() {
     let folder = folder();
-    for &(line, bad, expected) in BAD {
-        let message = parse_in(&folder, &with(line, bad)).unwrap_err().to_string();
+    for &(line, invalid, expected) in INVALID {
+        let message = parse_in(&folder, &with_line(line, invalid)).unwrap_err().to_string();
         let (_, rest) = message.split_once("s.toml:").unwrap();
-        let (place, rest) = rest.split_once(": ").unwrap();
+        let (line_number, rest) = rest.split_once(": ").unwrap();
         assert!(rest.starts_with(expected), "{rest}\n{expected}");
-        assert!(place.parse::<usize>().unwrap() > 13, "{message}");
+        assert!(line_number.parse::<usize>().unwrap() > 13, "{message}");
     }
 }
 
@@ -287,8 +287,8 @@ fn errors_in_mesh_files_have_their_own_location() {
         ("far.obj", "\"far.obj\" reaches to "),
         ("small.obj", ""),
     ] {
-        // The transform scales at least by 2, and moves three times as far.
-        let text = GOOD.replacen("file = \"one.obj\"", &format!("file = \"{file}\""), 1);
+        // The transform scales by 2: far.obj becomes too large, and small.obj stays large enough.
+        let text = VALID.replacen("file = \"one.obj\"", &format!("file = \"{file}\""), 1);
         match parse_in(&folder, &text) {
             Ok(_) => assert_eq!(expected, ""),
             Err(error) => {
@@ -301,10 +301,10 @@ fn errors_in_mesh_files_have_their_own_location() {
             }
         }
     }
-    let text = with("scale = 2", "scale = 1e-3").replacen("file = \"one.obj\"", "file = \"small.obj\"", 1);
+    let text = with_line("scale = 2", "scale = 1e-3").replacen("file = \"one.obj\"", "file = \"small.obj\"", 1);
     let error = parse_in(&folder, &text).unwrap_err().to_string();
     assert!(
-        error.contains("shapes[0].file: \"small.obj\" must be at least 1e-9 long there; it is "),
+        error.contains("shapes[0].file: \"small.obj\" must be at least 1e-9 long in world space; its length is "),
         "{error}"
     );
 }
@@ -321,11 +321,11 @@ fn images_in_memory_are_not_meshes() {
     let camera = crate::PerspectiveDescription::new([0.0, -9.0, 0.0], [0.0; 3], 40.0);
     let scene = Description::new(4, 4, camera).with_shape(MeshDescription::new("red", "one.obj"));
     let error = scene.validate_with(&assets).unwrap_err().to_string();
-    assert_eq!(error, "shapes[0].file: \"one.obj\" is an image in memory, and no mesh");
+    assert_eq!(error, "shapes[0].file: \"one.obj\" is an image in memory, not a mesh");
 }
 
 #[test]
-fn unknown_names_without_candidates() {
+fn unknown_names_are_reported_in_scenes_without_names() {
     let start = "image = { width = 1, height = 1 }\ncamera = { position = [0, 1, 0], look_at = [1, 0, 0], fov = 1 }\n";
     let error_of = |text: &str| {
         let message = parse(&format!("{start}{text}")).unwrap_err().to_string();
@@ -351,8 +351,8 @@ fn groups_are_counted() {
         },
         material: 0,
     };
-    few_groups(&[shape(MAX_GROUPS / 2), shape(MAX_GROUPS / 2)]).unwrap();
-    let error = few_groups(&[shape(MAX_GROUPS / 2), shape(MAX_GROUPS / 2 + 1)]).unwrap_err();
+    check_group_count(&[shape(MAX_GROUPS / 2), shape(MAX_GROUPS / 2)]).unwrap();
+    let error = check_group_count(&[shape(MAX_GROUPS / 2), shape(MAX_GROUPS / 2 + 1)]).unwrap_err();
     assert_eq!(
         error.to_string(),
         "the meshes have 16777217 groups in total; at most 16777216 are allowed"
@@ -361,20 +361,26 @@ fn groups_are_counted() {
 
 #[test]
 fn group_names_take_precedence_over_material_names() {
-    // checked, red, white
-    let scene = parse(GOOD).unwrap();
+    // The materials in order are checked, red and white.
+    let scene = parse(VALID).unwrap();
     assert_eq!((groups(&scene, 0), groups(&scene, 1)), (&[1][..], &[2][..]));
     assert_eq!(groups(&scene, 2), [1, 2, 2]);
     let changed = "material = 'red'\nmaterials = { wall = 'white' }";
-    assert_eq!(groups(&parse(&with(LINE_OF_MATERIALS, changed)).unwrap(), 2), [1, 2, 1]);
+    assert_eq!(
+        groups(&parse(&with_line(MATERIALS_LINE, changed)).unwrap(), 2),
+        [1, 2, 1]
+    );
     // The name of a group takes precedence over the name of its material.
     let changed = "material = 'red'\nmaterials = { brick = 'white', door = 'red' }";
-    assert_eq!(groups(&parse(&with(LINE_OF_MATERIALS, changed)).unwrap(), 2), [1, 2, 1]);
+    assert_eq!(
+        groups(&parse(&with_line(MATERIALS_LINE, changed)).unwrap(), 2),
+        [1, 2, 1]
+    );
 }
 
 #[test]
-fn textures_are_on_meshes_with_coordinates() {
-    let text = with("material = \"white\"", "material = \"checked\"");
+fn meshes_with_texture_coordinates_may_have_textures() {
+    let text = with_line("material = \"white\"", "material = \"checked\"");
     let scene = parse(&text.replace("one.obj", "coordinates.obj")).unwrap();
     assert_eq!(groups(&scene, 1), [0]);
     let Geometry::Mesh { mesh, .. } = &scene.shapes[1].geometry else {
@@ -384,10 +390,10 @@ fn textures_are_on_meshes_with_coordinates() {
 }
 
 #[test]
-fn every_texture_of_a_material_needs_coordinates() {
+fn every_texture_of_a_material_needs_texture_coordinates() {
     let texture = "{ texture = \"checks\" }";
     let plain = "[1, 1, 1]";
-    for (needs, lines) in [
+    for (needs_coordinates, lines) in [
         (false, format!("type = \"diffuse\"\ncolor = {plain}\nroughness = 0.5")),
         (true, format!("type = \"diffuse\"\ncolor = {texture}")),
         (
@@ -406,15 +412,15 @@ fn every_texture_of_a_material_needs_coordinates() {
         (true, format!("type = \"mirror\"\nemission = {texture}")),
         (true, format!("type = \"glass\"\nior = 1.5\nemission = {texture}")),
     ] {
-        let text = with("material = \"white\"", "material = \"checked\"")
+        let text = with_line("material = \"white\"", "material = \"checked\"")
             .replace("type = \"mirror\"\ntint = { texture = \"checks\" }", &lines)
             .replace("[meshes.parts]", "[render]\nintegrator = \"path\"\n[meshes.parts]");
         assert!(text.contains(&lines));
         parse(&text.replace("one.obj", "coordinates.obj")).unwrap();
         match parse(&text) {
-            Ok(_) => assert!(!needs, "{lines}"),
+            Ok(_) => assert!(!needs_coordinates, "{lines}"),
             Err(error) => {
-                assert!(needs, "{lines}: {error}");
+                assert!(needs_coordinates, "{lines}: {error}");
                 assert!(error.to_string().contains("shapes[1].material: "), "{error}");
             }
         }
@@ -422,96 +428,107 @@ fn every_texture_of_a_material_needs_coordinates() {
 }
 
 #[test]
-fn meshes_are_scaled_then_turned_then_moved() {
-    let scene = parse(GOOD).unwrap();
-    let at = |shape, p: [f64; 3]| to_world(&scene, shape).transform_point3(p.into());
-    assert_eq!(at(0, [1.0, 0.0, 0.0]), DVec3::new(1.0, 4.0, 3.0));
-    assert_eq!(at(0, [0.0, 2.0, 4.0]), DVec3::new(-3.0, 2.0, 11.0));
-    assert_eq!(at(1, [1.0, 2.0, 4.0]), DVec3::new(6.0, 8.0, 11.0));
+fn meshes_are_scaled_then_rotated_then_translated() {
+    let scene = parse(VALID).unwrap();
+    let transformed = |shape, p: [f64; 3]| to_world(&scene, shape).transform_point3(p.into());
+    assert_eq!(transformed(0, [1.0, 0.0, 0.0]), DVec3::new(1.0, 4.0, 3.0));
+    assert_eq!(transformed(0, [0.0, 2.0, 4.0]), DVec3::new(-3.0, 2.0, 11.0));
+    assert_eq!(transformed(1, [1.0, 2.0, 4.0]), DVec3::new(6.0, 8.0, 11.0));
     let half = std::f64::consts::FRAC_1_SQRT_2;
-    assert!(at(2, [1.0, 0.0, 0.0]).distance(DVec3::new(half, half, 0.0)) < 1e-15);
+    assert!(transformed(2, [1.0, 0.0, 0.0]).distance(DVec3::new(half, half, 0.0)) < 1e-15);
 }
 
 #[test]
 fn rotations_apply_in_the_order_of_the_axes() {
-    let text = with("rotate = [0, 0, 90]", "rotate = [90, 0, 90]").replace("scale = 2\n", "");
+    let text = with_line("rotate = [0, 0, 90]", "rotate = [90, 0, 90]").replace("scale = 2\n", "");
     let scene = parse(&text).unwrap();
-    let turned = |p: [f64; 3]| to_world(&scene, 0).transform_vector3(p.into());
+    let rotated = |p: [f64; 3]| to_world(&scene, 0).transform_vector3(p.into());
     // The rotation about x maps y to z; then, the rotation about z maps x to y.
-    assert_eq!(turned([0.0, 1.0, 0.0]), DVec3::Z);
-    assert_eq!(turned([1.0, 0.0, 0.0]), DVec3::Y);
-    assert_eq!(turned([0.0, 0.0, 1.0]), DVec3::X);
-    let text = with("rotate = [0, 0, 90]", "rotate = [30, -50, 70]");
+    assert_eq!(rotated([0.0, 1.0, 0.0]), DVec3::Z);
+    assert_eq!(rotated([1.0, 0.0, 0.0]), DVec3::Y);
+    assert_eq!(rotated([0.0, 0.0, 1.0]), DVec3::X);
+    let text = with_line("rotate = [0, 0, 90]", "rotate = [30, -50, 70]");
     let scene = parse(&text).unwrap();
-    let turn = |axis: DVec3, degrees: f64| DMat3::from_axis_angle(axis, degrees.to_radians());
-    let expected = turn(DVec3::Z, 70.0) * turn(DVec3::Y, -50.0) * turn(DVec3::X, 30.0) * 2.0;
+    let rotation_matrix = |axis: DVec3, degrees: f64| DMat3::from_axis_angle(axis, degrees.to_radians());
+    let expected =
+        rotation_matrix(DVec3::Z, 70.0) * rotation_matrix(DVec3::Y, -50.0) * rotation_matrix(DVec3::X, 30.0) * 2.0;
     assert!(to_world(&scene, 0).matrix3.abs_diff_eq(expected, 1e-14));
 }
 
 #[test]
-fn another_axis_may_be_up() {
+fn any_axis_may_be_up() {
     for (up, x, y, z) in [
         ("x", DVec3::Z, DVec3::X, DVec3::Y),
         ("y", DVec3::X, DVec3::Z, DVec3::NEG_Y),
         ("z", DVec3::X, DVec3::Y, DVec3::Z),
     ] {
-        let text = with(LINE_OF_MATRIX, &format!("up = '{up}'"));
-        let map = to_world(&parse(&text).unwrap(), 1);
-        assert_eq!((map.x_axis, map.y_axis, map.z_axis), (x, y, z), "{up}");
+        let text = with_line(MATRIX_LINE, &format!("up = '{up}'"));
+        let transform = to_world(&parse(&text).unwrap(), 1);
+        assert_eq!(
+            (transform.x_axis, transform.y_axis, transform.z_axis),
+            (x, y, z),
+            "{up}"
+        );
         // The transform is not a reflection.
-        assert_eq!(map.matrix3.determinant(), 1.0);
-        // The other transforms are applied after the rotation.
-        let text = with(
-            LINE_OF_MATRIX,
+        assert_eq!(transform.matrix3.determinant(), 1.0);
+        // The scale and the translation are applied after this rotation.
+        let text = with_line(
+            MATRIX_LINE,
             &format!("up = '{up}'\nscale = [1, 2, 3]\ntranslate = [5, 6, 7]"),
         );
-        let map = to_world(&parse(&text).unwrap(), 1);
+        let transform = to_world(&parse(&text).unwrap(), 1);
         let scale = DVec3::new(1.0, 2.0, 3.0);
-        assert_eq!((map.x_axis, map.y_axis, map.z_axis), (x * scale, y * scale, z * scale));
-        assert_eq!(map.translation, DVec3::new(5.0, 6.0, 7.0));
+        assert_eq!(
+            (transform.x_axis, transform.y_axis, transform.z_axis),
+            (x * scale, y * scale, z * scale)
+        );
+        assert_eq!(transform.translation, DVec3::new(5.0, 6.0, 7.0));
     }
 }
 
 #[test]
 fn a_matrix_may_have_a_fourth_row_and_mirror() {
-    let three = to_world(&parse(GOOD).unwrap(), 1);
-    let four = "matrix = [[1, 0, 0, 5], [0, 1, 0, 6], [0, 0, 1, 7], [0, 0, 0, 1]]";
-    assert_eq!(to_world(&parse(&with(LINE_OF_MATRIX, four)).unwrap(), 1), three);
+    let expected = to_world(&parse(VALID).unwrap(), 1);
+    let four_rows = "matrix = [[1, 0, 0, 5], [0, 1, 0, 6], [0, 0, 1, 7], [0, 0, 0, 1]]";
+    assert_eq!(
+        to_world(&parse(&with_line(MATRIX_LINE, four_rows)).unwrap(), 1),
+        expected
+    );
     let mirrored = "matrix = [[-1, 0, 0, 5], [0.5, 1, 0, 6], [0, 0, 1, 7]]";
-    let map = to_world(&parse(&with(LINE_OF_MATRIX, mirrored)).unwrap(), 1);
-    assert_eq!(map.transform_point3(DVec3::ONE), DVec3::new(4.0, 7.5, 8.0));
+    let transform = to_world(&parse(&with_line(MATRIX_LINE, mirrored)).unwrap(), 1);
+    assert_eq!(transform.transform_point3(DVec3::ONE), DVec3::new(4.0, 7.5, 8.0));
 }
 
 #[test]
-fn values_at_the_limits_are_good() {
-    for good in [
+fn values_at_the_limits_are_valid() {
+    for valid in [
         "scale = [1e-6, -1e-6, 1e6]",
         "rotate = [360, -360, 0]",
         "translate = [0, 999999999, -1e9]\nscale = [1, 1e-6, 0.25]",
         "matrix = [[1, 0, 1, 5], [0, 1, 1, 6], [0, 0, 1e-5, 7]]",
     ] {
-        parse(&with(LINE_OF_MATRIX, good)).unwrap();
+        parse(&with_line(MATRIX_LINE, valid)).unwrap();
     }
 }
 
 #[test]
 fn warnings_about_a_file_appear_once() {
-    assert_eq!(parse(GOOD).unwrap().notes, Vec::<String>::new());
-    let scene = parse(&GOOD.replace("one.obj", "odd.obj")).unwrap();
+    assert_eq!(parse(VALID).unwrap().notes, Vec::<String>::new());
+    let scene = parse(&VALID.replace("one.obj", "degenerate.obj")).unwrap();
     assert_eq!(
         scene.notes,
-        ["odd.obj: 1 of 2 triangles has no area (degenerate) and was removed"]
+        ["degenerate.obj: 1 of 2 triangles has no area (degenerate) and was removed"]
     );
-    let text = GOOD.replace("one.obj", "odd.obj") + "[meshes.other]\nfile = './odd.obj'\n";
+    let text = VALID.replace("one.obj", "degenerate.obj") + "[meshes.other]\nfile = './degenerate.obj'\n";
     assert_eq!(parse(&text).unwrap().notes.len(), 2);
 }
 
 #[test]
 fn shapes_and_instances_of_a_file_share_its_triangles() {
-    let scene = parse(&(GOOD.to_owned() + "[[instances]]\nmesh = 'parts'\nmaterial = 'red'\n")).unwrap();
+    let scene = parse(&(VALID.to_owned() + "[[instances]]\nmesh = 'parts'\nmaterial = 'red'\n")).unwrap();
     let mesh = |shape: usize| match &scene.shapes[shape].geometry {
         Geometry::Mesh { mesh, .. } => mesh,
-        _ => panic!("no mesh"),
+        _ => panic!("shape {shape} is not a mesh"),
     };
     assert!(Arc::ptr_eq(mesh(0), mesh(1)));
     assert!(Arc::ptr_eq(mesh(2), mesh(3)));

@@ -21,75 +21,76 @@ const SPECULAR: f64 = 2.0;
 
 impl SceneMaterials<'_> {
     /// Returns a principled material. Ignores `Ka`, because exporters write arbitrary values for it.
-    pub(super) fn principled(&mut self, own: &MtlMaterial, file: &Path, traits: Traits) -> Material {
+    pub(super) fn principled(&mut self, mtl: &MtlMaterial, file: &Path, traits: Traits) -> Material {
         let mut warnings = Warnings::default();
-        let clamped = |warnings: &mut Warnings, name: &'static str, color: [f64; 3], limit: f64| {
+        let clamp_color = |warnings: &mut Warnings, name: &'static str, color: [f64; 3], limit: f64| {
             let color = DVec3::from(color);
-            let inside = color.clamp(DVec3::ZERO, DVec3::splat(limit));
-            if inside != color {
-                let (color, limit, inside) = (show(color), number(limit), show(inside));
-                let rule = format!("each of {color} must be from 0 to {limit}; {inside} stands in");
+            let clamped = color.clamp(DVec3::ZERO, DVec3::splat(limit));
+            if clamped != color {
+                let (color, limit, clamped) = (show(color), number(limit), show(clamped));
+                let rule = format!("each of {color} must be from 0 to {limit}; {clamped} is used instead");
                 warnings.add(name, rule);
             }
-            inside
+            clamped
         };
-        let share = |warnings: &mut Warnings, name: &'static str, value: f64| {
-            let inside = value.clamp(0.0, 1.0);
-            if inside != value {
-                let rule = format!("{} must be from 0 to 1; {inside} stands in", number(value));
+        let clamp_fraction = |warnings: &mut Warnings, name: &'static str, value: f64| {
+            let clamped = value.clamp(0.0, 1.0);
+            if clamped != value {
+                let rule = format!("{} must be from 0 to 1; {clamped} is used instead", number(value));
                 warnings.add(name, rule);
             }
-            inside
+            clamped
         };
-        let diffuse = clamped(&mut warnings, "Kd", own.diffuse.unwrap_or([DIFFUSE; 3]), 1.0);
-        let emission = clamped(&mut warnings, "Ke", own.emission.unwrap_or_default(), BRIGHTEST);
-        let has_factors = own.metallic.is_some() || own.roughness.is_some();
-        let has_maps = own.metallic_map.is_some() || own.roughness_map.is_some();
-        let specular = match (own.illumination, own.specular) {
+        let diffuse = clamp_color(&mut warnings, "Kd", mtl.diffuse.unwrap_or([DIFFUSE; 3]), 1.0);
+        let emission = clamp_color(&mut warnings, "Ke", mtl.emission.unwrap_or_default(), BRIGHTEST);
+        let has_factors = mtl.metallic.is_some() || mtl.roughness.is_some();
+        let has_maps = mtl.metallic_map.is_some() || mtl.roughness_map.is_some();
+        let specular = match (mtl.illumination, mtl.specular) {
             (Some(0 | 1), _) => 0.0,
             (_, Some(color)) => {
-                let mean = clamped(&mut warnings, "Ks", color, BRIGHTEST).element_sum() / 3.0;
+                let mean = clamp_color(&mut warnings, "Ks", color, BRIGHTEST).element_sum() / 3.0;
                 (SPECULAR * mean).min(1.0)
             }
             (_, None) => f64::from(has_factors || has_maps),
         };
-        let roughness = match (own.roughness, own.shininess) {
-            (Some(roughness), _) => share(&mut warnings, "Pr", roughness),
+        let roughness = match (mtl.roughness, mtl.shininess) {
+            (Some(roughness), _) => clamp_fraction(&mut warnings, "Pr", roughness),
             // The highlight is as wide as with the Blinn-Phong exponent.
             (None, Some(exponent)) => (2.0 / (exponent.max(0.0) + 2.0)).powf(0.25),
             (None, None) => 1.0,
         };
-        let opacity = share(&mut warnings, "d", own.opacity.unwrap_or(1.0));
-        let metallic = share(&mut warnings, "Pm", own.metallic.unwrap_or(0.0));
-        if opacity == 0.0 && own.opacity_map.is_none() {
-            warnings.add("d", "0 makes the material invisible; it is opaque at 1");
+        let opacity = clamp_fraction(&mut warnings, "d", mtl.opacity.unwrap_or(1.0));
+        let metallic = clamp_fraction(&mut warnings, "Pm", mtl.metallic.unwrap_or(0.0));
+        if opacity == 0.0 && mtl.opacity_map.is_none() {
+            warnings.add("d", "0 makes the material invisible; 1 is opaque");
         }
-        warnings.ignored(own);
+        warnings.ignored(mtl);
         let mut map = |name: &'static str, map: &Option<String>, part: Part| {
-            let found = self.map(&beside(file, map.as_ref()?), part, traits.has_uvs);
-            warnings.of_map(name, found, "it is ignored")
+            let found = self.map_texture(&beside(file, map.as_ref()?), part, traits.has_uvs);
+            warnings.texture_or_warning(name, found, "it is ignored")
         };
         let colors = Part::Colors(None);
         let linear = Part::Colors(Some(Encoding::Linear));
-        let or_plain = |texture: Option<usize>, plain: f64| match texture {
+        let texture_or_value = |texture: Option<usize>, plain: f64| match texture {
             Some(texture) => Value::Texture(texture, Channel::R),
             None => Value::Plain(plain),
         };
-        let of_color = |texture: Option<usize>, plain: DVec3| texture.map_or(Color::Plain(plain), Color::Texture);
-        let base_color = of_color(map("map_Kd", &own.diffuse_map, colors), diffuse);
-        let emission = of_color(map("map_Ke", &own.emission_map, colors), emission);
-        let metallic = or_plain(map("map_Pm", &own.metallic_map, linear), metallic);
-        let roughness_map = map("map_Pr", &own.roughness_map, linear);
-        let normal = map("norm", &own.normal_map, linear);
-        let bump = normal.or_else(|| map("map_Bump", &own.bump_map, linear));
-        let alpha = self.opacity(own, file, traits, &mut warnings);
+        let texture_or_color =
+            |texture: Option<usize>, plain: DVec3| texture.map_or(Color::Plain(plain), Color::Texture);
+        let base_color = texture_or_color(map("map_Kd", &mtl.diffuse_map, colors), diffuse);
+        let emission = texture_or_color(map("map_Ke", &mtl.emission_map, colors), emission);
+        let metallic = texture_or_value(map("map_Pm", &mtl.metallic_map, linear), metallic);
+        let roughness_map = map("map_Pr", &mtl.roughness_map, linear);
+        let normal = map("norm", &mtl.normal_map, linear);
+        let bump = normal.or_else(|| map("map_Bump", &mtl.bump_map, linear));
+        let alpha = self.opacity(mtl, file, traits, &mut warnings);
         let normal_map = bump.filter(|texture| normal.is_some() || self.has_directions(*texture, &mut warnings));
-        self.warn(own, file, warnings);
+        self.warn(mtl, file, warnings);
         let is_opaque = alpha.is_none() && opacity == 1.0;
         Material {
             reflection: Reflection::Principled(Box::new(Principled {
                 metallic,
-                roughness: or_plain(roughness_map, roughness),
+                roughness: texture_or_value(roughness_map, roughness),
                 specular: Value::Plain(specular),
                 alpha: alpha.unwrap_or(Value::Plain(opacity)),
                 alpha_mode: if is_opaque { AlphaMode::Opaque } else { AlphaMode::Blend },
@@ -106,13 +107,13 @@ impl SceneMaterials<'_> {
     }
 
     /// Returns the opacity of `map_d`: the alpha channel of the image, or the red channel if there is no alpha channel.
-    fn opacity(&mut self, own: &MtlMaterial, file: &Path, traits: Traits, warnings: &mut Warnings) -> Option<Value> {
-        let path = beside(file, own.opacity_map.as_ref()?);
-        if let Ok(texture) = self.map(&path, Part::Alpha, traits.has_uvs) {
+    fn opacity(&mut self, mtl: &MtlMaterial, file: &Path, traits: Traits, warnings: &mut Warnings) -> Option<Value> {
+        let path = beside(file, mtl.opacity_map.as_ref()?);
+        if let Ok(texture) = self.map_texture(&path, Part::Alpha, traits.has_uvs) {
             return Some(Value::Texture(texture, Channel::A));
         }
-        let red = self.map(&path, Part::Colors(Some(Encoding::Linear)), traits.has_uvs);
-        let texture = warnings.of_map("map_d", red, "it is ignored")?;
+        let red = self.map_texture(&path, Part::Colors(Some(Encoding::Linear)), traits.has_uvs);
+        let texture = warnings.texture_or_warning("map_d", red, "it is ignored")?;
         Some(Value::Texture(texture, Channel::R))
     }
 
@@ -126,7 +127,7 @@ impl SceneMaterials<'_> {
             _ => false,
         };
         if !has_colors {
-            let rule = "a map of heights is ignored; bake a normal map, and name it by norm";
+            let rule = "a height map is ignored; bake a normal map and reference it with norm";
             warnings.add("map_Bump", rule);
         }
         has_colors

@@ -13,7 +13,7 @@ use super::super::super::{
 };
 
 /// A scene with all features. Each line is unique, so that tests can replace it.
-const GOOD: &str = r#"
+const VALID: &str = r#"
 image = { width = 4, height = 4 }
 camera = { position = [0, -3, 1], look_at = [0, 0, 1], fov = 45 }
 [render]
@@ -81,10 +81,10 @@ fn parse(text: &str) -> Result<Scene, SceneError> {
     Scene::parse(text, "s.toml")
 }
 
-fn with(line: &str, changed: &str) -> String {
+fn with_line(line: &str, changed: &str) -> String {
     let line = format!("\n{line}\n");
-    assert_eq!(GOOD.matches(&line).count(), 1, "{line}");
-    GOOD.replace(&line, &format!("\n{changed}\n"))
+    assert_eq!(VALID.matches(&line).count(), 1, "{line}");
+    VALID.replace(&line, &format!("\n{changed}\n"))
 }
 
 fn plain(r: f64, g: f64, b: f64) -> Color {
@@ -93,7 +93,7 @@ fn plain(r: f64, g: f64, b: f64) -> Color {
 
 #[test]
 fn a_path_tracer_scene_has_the_values_of_its_file() {
-    let scene = parse(GOOD).unwrap();
+    let scene = parse(VALID).unwrap();
     assert_eq!(scene.notes, Vec::<String>::new());
     let render = scene.render;
     assert_eq!(render.integrator, Integrator::Path);
@@ -118,7 +118,11 @@ fn a_path_tracer_scene_has_the_values_of_its_file() {
     );
     assert_eq!(render.background, color);
     let material = |name: &str| {
-        let i = scene.material_names.iter().position(|known| known == name).unwrap();
+        let i = scene
+            .material_names
+            .iter()
+            .position(|material_name| material_name == name)
+            .unwrap();
         scene.materials[i].clone()
     };
     let expected = |reflection, emission| Material {
@@ -211,9 +215,9 @@ fn a_path_tracer_scene_has_the_values_of_its_file() {
 fn metals_have_an_index_by_name_or_by_numbers() {
     let silver = "color = [0.9, 0.9, 0.8]";
     let index = |text: &str| {
-        let scene = parse(&with(silver, text)).unwrap();
-        let at = scene.material_names.iter().position(|name| name == "silver").unwrap();
-        match &scene.materials[at].reflection {
+        let scene = parse(&with_line(silver, text)).unwrap();
+        let silver_index = scene.material_names.iter().position(|name| name == "silver").unwrap();
+        match &scene.materials[silver_index].reflection {
             Reflection::Conductor { color, index, facets } => (*color, *index, *facets),
             other => panic!("{other:?}"),
         }
@@ -235,20 +239,20 @@ fn metals_have_an_index_by_name_or_by_numbers() {
     // The page lists all names.
     let page = include_str!("../../../../../docs/scene-format.md");
     for name in MetalIndex::names() {
-        let (_, named, _) = index(&format!("metal = '{name}'"));
-        assert_eq!(named, MetalIndex::named(name));
+        let (_, found, _) = index(&format!("metal = '{name}'"));
+        assert_eq!(found, MetalIndex::named(name));
         assert!(page.contains(&format!("`\"{name}\"`")), "{name}");
     }
-    for (own, other) in [("eta", "k"), ("k", "eta")] {
-        let message = parse(&with(silver, &format!("{own} = [1, 1, 1]")))
+    for (key, missing_key) in [("eta", "k"), ("k", "eta")] {
+        let message = parse(&with_line(silver, &format!("{key} = [1, 1, 1]")))
             .unwrap_err()
             .to_string();
         assert!(
-            message.ends_with(&format!("materials.silver.{other} is missing; {own} needs it")),
+            message.ends_with(&format!("materials.silver.{missing_key} is missing; {key} needs it")),
             "{message}"
         );
     }
-    let unknown = parse(&with(silver, "metal = 'bronze'")).unwrap_err().to_string();
+    let unknown = parse(&with_line(silver, "metal = 'bronze'")).unwrap_err().to_string();
     assert!(
         unknown.contains("materials.silver.metal: \"bronze\" must be one of \"aluminium\", "),
         "{unknown}"
@@ -264,7 +268,9 @@ fn absent_keys_have_defaults() {
         "alpha = true",
         "pixel_samples = { count = 5 }",
     ];
-    let text = absent.iter().fold(GOOD.to_owned(), |text, line| text.replace(line, ""));
+    let text = absent
+        .iter()
+        .fold(VALID.to_owned(), |text, line| text.replace(line, ""));
     let render = parse(&text).unwrap().render;
     assert_eq!(
         (render.max_depth, render.rr_depth, render.clamp, render.alpha),
@@ -287,15 +293,15 @@ fn absent_keys_have_defaults() {
         assert_eq!(render.pixel_samples, samples(pattern, 9), "{integrator}");
     }
     // The default pattern of the path tracer supports adaptive sampling.
-    parse(&with("clamp = 10", "adaptive = { error = 0.01 }")).unwrap();
+    parse(&with_line("clamp = 10", "adaptive = { error = 0.01 }")).unwrap();
 }
 
 #[test]
 fn the_background_becomes_the_environment() {
     let environment = "[environment]\ncolor = [0.5, 0.25, 0]";
-    let dark = parse(&with(environment, "")).unwrap();
+    let dark = parse(&with_line(environment, "")).unwrap();
     assert_eq!((dark.render.background, dark.environment), (DVec3::ZERO, None));
-    let text = with(environment, "").replace("[render]", "[render]\nbackground = [0.1, 0.2, 0.3]");
+    let text = with_line(environment, "").replace("[render]", "[render]\nbackground = [0.1, 0.2, 0.3]");
     let scene = parse(&text).unwrap();
     let color = DVec3::new(0.1, 0.2, 0.3);
     assert_eq!(scene.render.background, color);
@@ -309,9 +315,9 @@ fn the_background_becomes_the_environment() {
         })
     );
     // A black background has no effect.
-    let text = GOOD.replace("[render]", "[render]\nbackground = [0, 0, 0]");
-    assert_eq!(parse(&text).unwrap(), parse(GOOD).unwrap());
-    let black = parse(&with("color = [0.5, 0.25, 0]", "color = [0, 0, 0]")).unwrap();
+    let text = VALID.replace("[render]", "[render]\nbackground = [0, 0, 0]");
+    assert_eq!(parse(&text).unwrap(), parse(VALID).unwrap());
+    let black = parse(&with_line("color = [0.5, 0.25, 0]", "color = [0, 0, 0]")).unwrap();
     assert_eq!(black.environment, None);
     // The Phong integrator only has a background.
     let text = "image = { width = 1, height = 1 }\ncamera = { position = [0, 1, 0], look_at = [1, 0, 0], fov = 1 }\n\
@@ -321,7 +327,7 @@ fn the_background_becomes_the_environment() {
 }
 
 #[test]
-fn descriptions_made_in_code_are_read_back() {
+fn descriptions_made_in_code_are_written_and_read_back() {
     let mut clay = DiffuseDescription::new([0.5, 0.4, 0.3]);
     clay.roughness = ValueDescription::texture("spots");
     clay.emission = Some(ColorDescription::texture("spots"));

@@ -64,8 +64,8 @@ fov = 190
 blades = 1
 ";
     let found = errors(text);
-    let places: Vec<_> = found.iter().map(|line| line.rsplitn(2, ": ").last().unwrap()).collect();
-    let wanted = [
+    let locations: Vec<_> = found.iter().map(|line| line.rsplitn(2, ": ").last().unwrap()).collect();
+    let expected = [
         "4: materials.z.shininess",
         "7: materials.a.tint",
         "12: shapes[0].radius",
@@ -87,11 +87,15 @@ blades = 1
         "46: camera.fov",
         "47: camera.blades",
     ];
-    let places: Vec<_> = places
+    let locations: Vec<_> = locations
         .iter()
-        .map(|place| place.split(": ").take(2).collect::<Vec<_>>().join(": "))
+        .map(|location| location.split(": ").take(2).collect::<Vec<_>>().join(": "))
         .collect();
-    assert_eq!(places, wanted.map(|place| format!("s.toml:{place}")), "{found:#?}");
+    assert_eq!(
+        locations,
+        expected.map(|location| format!("s.toml:{location}")),
+        "{found:#?}"
+    );
     // `adaptive` is validated after `pixel_samples`.
     let found = errors(&text.replace("pixel_samples = 0", "pixel_samples = 9"));
     assert!(
@@ -124,7 +128,7 @@ type = 'point'
 position = [0, 0]
 color = [1, 1, 1]
 ";
-    let wanted = [
+    let expected = [
         "s.toml:3: image.heightt: unknown key; did you mean \"height\"?",
         "s.toml:5: camera.fovv: unknown key; did you mean \"fov\"?",
         "s.toml:7: render.seed: \"x\" must be a whole number from 0 to 4294967295",
@@ -134,9 +138,9 @@ color = [1, 1, 1]
         "s.toml:17: lights[0].position: [0, 0] must be a list of 3 numbers",
     ];
     let found = errors(text);
-    assert_eq!(found.len(), wanted.len(), "{found:#?}");
-    for (found, wanted) in found.iter().zip(wanted) {
-        assert!(found.starts_with(wanted), "{found}\n{wanted}");
+    assert_eq!(found.len(), expected.len(), "{found:#?}");
+    for (found, expected) in found.iter().zip(expected) {
+        assert!(found.starts_with(expected), "{found}\n{expected}");
     }
     // Without headers, the file is parsed as a whole.
     let text = format!("{SMALL}shapes = [{{ type = 'a' }}, {{ type = 'sphere', radiuss = 1 }}]\n[render]\nseeds = 3\n");
@@ -185,8 +189,8 @@ material = 'm'
         }
     };
     // The image is missing, or the description of the image is invalid; materials and shapes are valid.
-    let texture = |more: &str| format!("[textures.t]\n{image}{more}\n{uses}");
-    assert_eq!(count(&texture("")), 0, "a warning");
+    let texture = |extra: &str| format!("[textures.t]\n{image}{extra}\n{uses}");
+    assert_eq!(count(&texture("")), 0, "a missing image is only a warning");
     assert_eq!(count(&texture("max_anisotropy = 99")), 1);
     assert_eq!(count(&format!("{}\n[render]\nmax_depth = 9999999", texture(""))), 1);
     assert_eq!(
@@ -219,7 +223,7 @@ material = 'm'
     );
 }
 
-/// A typo is reported before gigabytes are read.
+/// Tests that a typo is reported before gigabytes are read.
 #[test]
 fn files_are_not_read_for_a_scene_with_invalid_settings() {
     let folder = tempfile::tempdir().unwrap();
@@ -240,7 +244,7 @@ fn files_are_not_read_for_a_scene_with_invalid_settings() {
     );
     assert!(
         count(&text.replace("{ type = 'gltf', file = 'a.glb' }", "")) > 2,
-        "control"
+        "the files of a scene with valid settings must be read"
     );
 }
 
@@ -273,11 +277,11 @@ radius = 1
             "s.toml:12: shapes[0].material: 7 must be a string",
         ]
     );
-    // Also if there is an unknown section.
+    // All keys are also reported if there is an unknown section.
     let found = errors(&format!("{SMALL}{text}[shape]\n[environment]\nrotate = 'x'\n"));
     assert_eq!(found.len(), 9, "{found:#?}");
     assert_eq!(found[7], "s.toml:14: shape: unknown key; did you mean \"shapes\"?");
-    // A missing key may be the misspelled one.
+    // A missing key is not reported if a misspelled key may be meant.
     assert_eq!(
         errors(&format!(
             "{SMALL}[[shapes]]\ntype = 'sphere'\ncentre = [0, 0, 0]\nradius = 'x'\nmaterial = 'm'\n"
@@ -290,7 +294,7 @@ radius = 1
 }
 
 #[test]
-fn only_the_first_of_many_errors_are_reported() {
+fn only_the_first_20_errors_are_reported() {
     let shape = "[[shapes]]\ntype = 'sphere'\nmaterial = 'none'\ncenter = [0, 0, 0]\nradius = 1\n";
     for (count, last) in [
         (20, None),
@@ -335,7 +339,7 @@ fn only_the_first_of_many_errors_are_reported() {
 }
 
 #[test]
-fn a_value_of_a_define_is_the_only_error() {
+fn an_invalid_define_is_the_only_reported_error() {
     let overrides = crate::Overrides {
         define: vec!["camera.fov=190".parse().unwrap()],
         ..Default::default()

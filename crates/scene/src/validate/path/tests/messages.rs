@@ -3,7 +3,7 @@
 use super::*;
 
 /// Valid line, invalid replacement, error.
-const BAD: &[(&str, &str, &str)] = &[
+const INVALID: &[(&str, &str, &str)] = &[
     (
         "max_depth = 3",
         "max_depth = 1025",
@@ -49,12 +49,12 @@ const BAD: &[(&str, &str, &str)] = &[
     (
         "color = [0.5, 0.25, 0]",
         "color = [0.5, -0.25, 0]",
-        "environment.color: -0.25 must be finite, from 0 to 1e6",
+        "environment.color: -0.25 must be from 0 to 1e6",
     ),
     (
         "color = [0.5, 0.25, 0]",
         "color = [0.5, 1.1e6, 0]",
-        "environment.color: 1.1e6 must be finite, from 0 to 1e6",
+        "environment.color: 1.1e6 must be from 0 to 1e6",
     ),
     (
         "color = [0.5, 0.4, 0.3]",
@@ -134,12 +134,12 @@ const BAD: &[(&str, &str, &str)] = &[
     (
         "emission = [7, 0, 0]",
         "emission = [7, 0, -1]",
-        "materials.gold.emission: -1 must be finite, from 0 to 1e6",
+        "materials.gold.emission: -1 must be from 0 to 1e6",
     ),
     (
         "emission = [7, 0, 0]",
         "emission = [1.1e6, 0, 0]",
-        "materials.gold.emission: 1.1e6 must be finite, from 0 to 1e6",
+        "materials.gold.emission: 1.1e6 must be from 0 to 1e6",
     ),
     (
         "color = [0.9, 0.9, 0.8]",
@@ -164,12 +164,12 @@ const BAD: &[(&str, &str, &str)] = &[
     (
         "absorption = [0, 2, 3]",
         "absorption = [0, -2, 3]",
-        "materials.wine.absorption: -2 must be finite, from 0 to 1e6",
+        "materials.wine.absorption: -2 must be from 0 to 1e6",
     ),
     (
         "absorption = [0, 2, 3]",
         "absorption = [0, 2, inf]",
-        "materials.wine.absorption: inf must be finite, from 0 to 1e6",
+        "materials.wine.absorption: inf must be from 0 to 1e6",
     ),
     (
         "material = \"clay\"",
@@ -185,24 +185,24 @@ const BAD: &[(&str, &str, &str)] = &[
 
 #[test]
 fn invalid_values_are_reported_with_line_key_value_and_rule() {
-    for &(line, bad, expected) in BAD {
-        let text = with(line, bad);
-        let place = text[..text.find(bad).unwrap()].lines().count() + 1;
+    for &(line, invalid, expected) in INVALID {
+        let text = with_line(line, invalid);
+        let line_number = text[..text.find(invalid).unwrap()].lines().count() + 1;
         let message = parse(&text).unwrap_err().to_string();
-        assert_eq!(message, format!("s.toml:{place}: {expected}"));
+        assert_eq!(message, format!("s.toml:{line_number}: {expected}"));
     }
-    let text = GOOD.replace("[render]", "[render]\nbackground = [0, 0.5, 0]");
-    let place = text[..text.find("[environment]").unwrap()].lines().count() + 1;
+    let text = VALID.replace("[render]", "[render]\nbackground = [0, 0.5, 0]");
+    let line_number = text[..text.find("[environment]").unwrap()].lines().count() + 1;
     let rule = "cannot be combined with render.background, [0, 0.5, 0]; remove one";
     assert_eq!(
         parse(&text).unwrap_err().to_string(),
-        format!("s.toml:{place}: environment: {rule}")
+        format!("s.toml:{line_number}: environment: {rule}")
     );
 }
 
 #[test]
-fn values_at_the_limits_are_good() {
-    for (line, good) in [
+fn values_at_the_limits_are_valid() {
+    for (line, valid) in [
         ("max_depth = 3", "max_depth = 0"),
         ("max_depth = 3", "max_depth = 1024"),
         ("rr_depth = 2", "rr_depth = 0"),
@@ -220,10 +220,10 @@ fn values_at_the_limits_are_good() {
         ("ior = 1.33", "ior = 100"),
         ("absorption = [0, 2, 3]", "absorption = [0, 1e6, 0]"),
     ] {
-        parse(&with(line, good)).unwrap_or_else(|error| panic!("{good}: {error}"));
+        parse(&with_line(line, valid)).unwrap_or_else(|error| panic!("{valid}: {error}"));
     }
     // A plane may have a black texture as emission.
-    let dark = with(
+    let dark = with_line(
         "emission = { texture = \"spots\" }",
         "emission = { texture = \"dark\" }",
     );
@@ -283,7 +283,7 @@ fn path_tracer_features_are_rejected_under_phong() {
             line + 3 + usize::from(!text.contains("[render]"))
         );
         assert_eq!(parse(&under_phong).unwrap_err().to_string(), expected);
-        // Without an integrator the path tracer is used.
+        // If no integrator is specified, the path tracer is used.
         let scene = parse(&text).unwrap();
         assert_eq!(scene.render.integrator, Integrator::Path);
         let key = key.split(':').next().unwrap_or_default();
@@ -291,7 +291,7 @@ fn path_tracer_features_are_rejected_under_phong() {
             "render.integrator is not set; using \"path\", which {key} requires. Set it in the scene to silence this warning"
         );
         assert_eq!(scene.notes[0], note);
-        // The overridden integrator is used.
+        // An override determines the integrator.
         let overrides = |integrator| Overrides {
             integrator: Some(integrator),
             ..Overrides::default()

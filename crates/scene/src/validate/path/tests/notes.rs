@@ -22,17 +22,17 @@ fn keys_that_the_path_tracer_ignores_cause_notes() {
         ("light_samples = { count = 4 }", LIGHT_SAMPLES),
         ("light_samples = { pattern = 'sobol', count = 16 }", LIGHT_SAMPLES),
     ] {
-        let text = GOOD.replace("[render]", &format!("[render]\n{added}"));
+        let text = VALID.replace("[render]", &format!("[render]\n{added}"));
         assert_eq!(notes(&text), [expected]);
         let render = parse(&text).unwrap().render;
         assert_eq!((render.ambient, render.shadows), (DVec3::ZERO, Shadows::Opaque));
     }
-    for same in [
+    for default in [
         "ambient = [0, 0, 0]",
         "shadows = 'opaque'",
         "light_samples = { count = 16 }",
     ] {
-        let text = GOOD.replace("[render]", &format!("[render]\n{same}"));
+        let text = VALID.replace("[render]", &format!("[render]\n{default}"));
         assert_eq!(notes(&text), Vec::<String>::new());
     }
     // The option causes one warning, independent of its value.
@@ -41,7 +41,7 @@ fn keys_that_the_path_tracer_ignores_cause_notes() {
             light_samples: Some(count),
             ..Overrides::default()
         };
-        let scene = Scene::parse_with(GOOD, "s.toml", &overrides).unwrap();
+        let scene = Scene::parse_with(VALID, "s.toml", &overrides).unwrap();
         assert_eq!(scene.notes, [LIGHT_SAMPLES]);
     }
     // The Phong integrator supports all of these keys.
@@ -61,12 +61,12 @@ fn too_bright_phong_materials_cause_a_note() {
         (specular, "specular = [0.501, 0, 0]", Some("\"red\" (1.01)")),
         (specular, "specular = [0.5, 1, 1]", None),
         (specular, "specular = [0, 1.5, 1]", Some("\"red\" (1.5)")),
-        // The maximum of the texture's colors is 1, 2, 3.
+        // The maximum of the texture's colors is [1, 2, 3].
         (diffuse, "diffuse = { texture = 'spots' }", Some("\"red\" (3.5)")),
         (diffuse, "diffuse = { texture = 'dark' }", None),
         (specular, "specular = { texture = 'spots' }", Some("\"red\" (3)")),
     ] {
-        let text = with(line, changed);
+        let text = with_line(line, changed);
         let expected: Vec<String> = expected
             .map(|expected| format!("{RULE}{expected}"))
             .into_iter()
@@ -77,7 +77,7 @@ fn too_bright_phong_materials_cause_a_note() {
     let materials: String = (0..10)
         .map(|i| format!("[materials.m{i}]\ntype = 'phong'\ncolor = [0.{i}, 0.8, 0]\n"))
         .collect();
-    let found = notes(&GOOD.replace("[materials.clay]", &format!("{materials}[materials.clay]")));
+    let found = notes(&VALID.replace("[materials.clay]", &format!("{materials}[materials.clay]")));
     let names: Vec<String> = (0..8).map(|i| format!("\"m{i}\" (1.6)")).collect();
     assert_eq!(found, [format!("{RULE}{} and 2 more", names.join(", "))]);
 }
@@ -85,7 +85,7 @@ fn too_bright_phong_materials_cause_a_note() {
 #[test]
 fn unused_alpha_causes_a_note() {
     let leaf = |keys: &str| {
-        notes(&with(
+        notes(&with_line(
             "[materials.clay]",
             &format!("[materials.leaf]\ntype = 'principled'\n{keys}\n[materials.clay]"),
         ))
@@ -110,7 +110,7 @@ fn unused_alpha_causes_a_note() {
     let leaves: String = (0..9)
         .map(|i| format!("[materials.leaf{i}]\ntype = 'principled'\nalpha = 0.{i}\n"))
         .collect();
-    let found = notes(&with("[materials.clay]", &format!("{leaves}[materials.clay]")));
+    let found = notes(&with_line("[materials.clay]", &format!("{leaves}[materials.clay]")));
     let names: Vec<String> = (0..8).map(|i| format!("\"leaf{i}\"")).collect();
     let rule = ALPHA.trim_end_matches("\"leaf\"");
     assert_eq!(found, [format!("{rule}{} and 1 more", names.join(", "))]);

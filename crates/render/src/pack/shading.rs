@@ -1,0 +1,37 @@
+//! The part of a packed scene that depends on neither shapes, lights nor the camera.
+
+use super::environment_map::EnvironmentMap;
+use super::materials::Appearances;
+use wgray_scene::{Environment, Scene};
+
+/// Packed materials, textures and environment map, without their texels. Packing texels takes most of the time: mip
+/// pyramids, and tables of the environment and of materials.
+pub struct PackedShading {
+    pub(super) appearances: Appearances,
+    pub(super) environment_map: EnvironmentMap,
+}
+
+impl PackedShading {
+    /// Packs materials, textures and environment map. Also returns their texels.
+    pub fn of(scene: &Scene) -> (PackedShading, Vec<u32>) {
+        let mut appearances = Appearances::of(scene);
+        let mut texels = std::mem::take(&mut appearances.texels);
+        let shading = PackedShading {
+            appearances,
+            environment_map: EnvironmentMap::of(scene, &mut texels),
+        };
+        (shading, texels)
+    }
+
+    /// Returns true if both scenes are packed to the same materials, textures and environment map.
+    pub fn is_shared(a: &Scene, b: &Scene) -> bool {
+        let map = |scene: &'_ Scene| {
+            scene
+                .environment
+                .as_ref()
+                .and_then(|Environment { image, .. }| image.clone())
+        };
+        (a.render.integrator, &a.materials, &a.textures) == (b.render.integrator, &b.materials, &b.textures)
+            && map(a) == map(b)
+    }
+}

@@ -1,0 +1,183 @@
+//! Renders of one scene that share a device, its kernels, and the packed scene.
+
+use std::ops::ControlFlow;
+use std::sync::Arc;
+
+use wgray_render::pack::{self, PackedShading};
+use wgray_render::records::Packed;
+use wgray_scene::{Camera, Scene};
+
+use crate::context::Context;
+use crate::error::Error;
+use crate::options::Options;
+use crate::picture::Picture;
+use crate::render::{Progressive, render_progressive_with, render_with};
+use crate::renderer::{FaultHandler, OpenScene, Renderer, warnings};
+
+/// A scene to be rendered several times. The first render packs the scene (BVHs, textures, tables of the environment)
+/// and opens the device; later renders use them again. Every image has the bits that [`render`](crate::render()) gives.
+///
+/// ```
+/// # fn main() -> Result<(), wgray::Error> {
+/// # let smaller = wgray::Overrides { size: Some((16, 16)), ..Default::default() };
+/// # let scene = wgray::Scene::load_with("scenes/turntable.toml", &smaller)?;
+/// let mut session = wgray::Session::new(&wgray::Context::new(), scene);
+/// for frame in 1..=3 {
+///     let camera = session.scene().camera_at(frame.into())?;
+///     session.set_camera(camera)?;
+///     let image = session.render(&wgray::Options::default())?;
+///     assert_eq!(image.width(), 16);
+/// }
+/// # Ok(())
+/// # }
+/// ```
+pub struct Session {
+    context: Context,
+    scene: Arc<Scene>,
+    /// Packed materials, textures and environment; `None` before the first render.
+    shading: Option<PackedShading>,
+    /// The packed scene while no device is open for it.
+    packed: Option<Arc<Packed>>,
+    open: Option<OpenScene>,
+}
+
+impl Session {
+    /// Starts a session for a scene. The scene is packed by the first render.
+    pub fn new(context: &Context, scene: impl Into<Arc<Scene>>) -> Session {
+        Session {
+            context: context.clone(),
+            scene: scene.into(),
+            shading: None,
+            packed: None,
+            open: None,
+        }
+    }
+
+    /// Returns the scene, with the current camera.
+    pub fn scene(&self) -> &Arc<Scene> {
+        &self.scene
+    }
+
+    /// Changes the camera. Only the camera's record is packed again, unless the camera's target moves so far that
+    /// coordinates need another origin: then shapes and lights are packed again.
+    ///
+    /// # Errors
+    ///
+    /// The driver of the device reports an error. The next render opens the device again.
+    pub fn set_camera(&mut self, camera: Camera) -> Result<(), Error> {
+        let scene = Arc::make_mut(&mut self.scene);
+        scene.camera = camera;
+        if let Some(open) = self.open.as_mut().filter(|open| keeps_kernel(open, &camera)) {
+            let edited = open.edit_camera(|packed| pack::set_camera(packed, scene));
+            if edited.is_err() {
+                self.close();
+            }
+            return Ok(edited?);
+        }
+        self.close();
+        if let (Some(mut packed), Some(shading)) = (self.packed.take(), &self.shading) {
+            if packed.origin == pack::origin(&camera) {
+                pack::set_camera(Arc::make_mut(&mut packed), &self.scene);
+            } else {
+                let texels = Arc::unwrap_or_clone(packed).textures.texels;
+                packed = Arc::new(pack::pack_with(&self.scene, shading, texels));
+            }
+            self.packed = Some(packed);
+        }
+        Ok(())
+    }
+
+    /// Changes the scene. Materials, textures and the environment are packed again only if any of them differs, and the
+    /// BVHs of meshes are built again only for other meshes (by `Arc` identity).
+    pub fn set_scene(&mut self, scene: impl Into<Arc<Scene>>) {
+        let former = std::mem::replace(&mut self.scene, scene.into());
+        self.close();
+        match (&self.shading, self.packed.take()) {
+            (Some(shading), Some(packed)) if PackedShading::is_shared(&former, &self.scene) => {
+                let texels = Arc::unwrap_or_clone(packed).textures.texels;
+                self.packed = Some(Arc::new(pack::pack_with(&self.scene, shading, texels)));
+            }
+            _ => self.shading = None,
+        }
+    }
+
+    /// Renders the scene. See [`render`](crate::render()).
+    ///
+    /// # Errors
+    ///
+    /// The errors of [`render`](crate::render()).
+    pub fn render(&mut self, options: &Options) -> Result<Picture, Error> {
+        options.region(&self.scene).map_err(Error::Option)?;
+        let scene = Arc::clone(&self.scene);
+        render_with(self.renderer(options, warnings())?, &scene, options)
+    }
+
+    /// Renders the scene progressively. See [`render_progressive`](crate::render_progressive).
+    ///
+    /// # Errors
+    ///
+    /// The errors of [`render_progressive`](crate::render_progressive).
+    pub fn render_progressive(
+        &mut self,
+        options: &Options,
+        watch: &mut dyn FnMut(&mut Progressive) -> Result<ControlFlow<()>, Error>,
+    ) -> Result<Picture, Error> {
+        options.region(&self.scene).map_err(Error::Option)?;
+        let scene = Arc::clone(&self.scene);
+        render_progressive_with(self.renderer(options, warnings())?, &scene, options, watch)
+    }
+
+    /// Packs the scene and opens the device, unless this has been done for the same options.
+    pub(crate) fn renderer<'a>(
+        &'a mut self,
+        options: &Options,
+        mut on_fault: FaultHandler<'a>,
+    ) -> Result<Renderer<'a>, Error> {
+        let layers = options.needs_layers(&self.scene);
+        let open = match self.open.take() {
+            Some(open) if open.suits(options, layers) => open,
+            other => {
+                self.open = other;
+                let packed = self.packed(options);
+                OpenScene::new(&self.context, packed, options, &mut on_fault)?
+            }
+        };
+        self.packed = None;
+        Ok(Renderer::new(self.open.insert(open), on_fault))
+    }
+
+    /// Returns the scene, packed for these options.
+    pub(crate) fn packed(&mut self, options: &Options) -> Arc<Packed> {
+        let layers = options.needs_layers(&self.scene);
+        if let Some(open) = &self.open
+            && open.suits(options, layers)
+        {
+            return Arc::clone(open.scene());
+        }
+        self.close();
+        let packed = self.packed.get_or_insert_with(|| {
+            let (shading, texels) = PackedShading::of(&self.scene);
+            let packed = pack::pack_with(&self.scene, &shading, texels);
+            self.shading = Some(shading);
+            Arc::new(packed)
+        });
+        if packed.film_layout().layers != layers {
+            Arc::make_mut(packed).specialization.layers = layers.into();
+        }
+        Arc::clone(packed)
+    }
+
+    /// Closes the scene, but not its device, which the context keeps.
+    fn close(&mut self) {
+        if let Some(open) = self.open.take() {
+            self.packed = Some(open.into_scene());
+        }
+    }
+}
+
+/// Returns true if only the camera's record changes: neither the origin of coordinates nor the kernel.
+fn keeps_kernel(open: &OpenScene, camera: &Camera) -> bool {
+    let packed = open.scene();
+    packed.origin == pack::origin(camera)
+        && pack::camera_features(&packed.specialization, camera) == packed.specialization
+}
