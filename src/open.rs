@@ -14,6 +14,9 @@ use crate::context::Context;
 use crate::device::{Device, DeviceInfo};
 use crate::error::{Error, RenderError};
 
+/// Returns whether to use an adapter, given its name and whether it is software.
+pub(crate) type AcceptAdapter<'a> = &'a dyn Fn(&str, bool) -> bool;
+
 /// A scene on the CPU or on an adapter.
 pub(crate) enum Engine {
     Cpu(Cpu<Arc<Packed>>),
@@ -94,15 +97,15 @@ pub(crate) fn choice_of(device: &Device) -> gpu::AdapterChoice {
     }
 }
 
-/// Puts a scene on the first matching adapter that `wanted` accepts, which gets the name, and whether the adapter is
-/// software. Without `wanted`, a device that the context has opened for the same request is used again.
+/// Puts a scene on the first matching adapter that `wanted` accepts. Without `wanted`, a device that the context has
+/// opened for the same request is used again.
 #[cfg(feature = "gpu")]
 pub(crate) fn adapter(
     context: &Context,
     scene: &Arc<Packed>,
     device: &Device,
     exact_rounding: bool,
-    wanted: Option<&dyn Fn(&str, bool) -> bool>,
+    wanted: Option<AcceptAdapter>,
 ) -> Result<(Engine, DeviceInfo), Error> {
     let opened = match wanted {
         None => context.devices.get(device),
@@ -140,7 +143,7 @@ pub(crate) fn adapter(
     _: &Arc<Packed>,
     device: &Device,
     _: bool,
-    _: Option<&dyn Fn(&str, bool) -> bool>,
+    _: Option<AcceptAdapter>,
 ) -> Result<(Engine, DeviceInfo), Error> {
     Err(Error::Render(gpu_missing(device)))
 }

@@ -13,7 +13,7 @@ use wgray_render::records::Packed;
 use crate::context::Context;
 use crate::device::{Device, DeviceInfo};
 use crate::error::{Error, RenderError};
-use crate::open::{Engine, adapter, faster_on_cpu};
+use crate::open::{AcceptAdapter, Engine, adapter, faster_on_cpu};
 use crate::options::Options;
 
 /// Prefix of messages that explain why the CPU is used.
@@ -155,7 +155,7 @@ impl OpenScene {
         self.engine.edit_camera(edit)
     }
 
-    fn adapter(&self, wanted: Option<&dyn Fn(&str, bool) -> bool>) -> Result<(Engine, DeviceInfo), Error> {
+    fn adapter(&self, wanted: Option<AcceptAdapter>) -> Result<(Engine, DeviceInfo), Error> {
         let scene = self.engine.scene();
         adapter(&self.context, scene, &self.device, self.exact_rounding, wanted)
     }
