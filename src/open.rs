@@ -19,19 +19,19 @@ pub(crate) type AcceptAdapter<'a> = &'a dyn Fn(&str, bool) -> bool;
 
 /// A scene on the CPU or on an adapter.
 pub(crate) enum Engine {
-    Cpu(Cpu<Arc<Packed>>),
+    Cpu(Box<Cpu<Arc<Packed>>>),
     #[cfg(feature = "gpu")]
     Gpu(Box<Gpu>, Arc<Packed>),
 }
 
 impl Engine {
     pub(crate) fn cpu(scene: Arc<Packed>) -> Engine {
-        Engine::Cpu(Cpu::new(scene))
+        Engine::Cpu(Box::new(Cpu::new(scene)))
     }
 
     pub(crate) fn backend(&mut self) -> &mut dyn Backend {
         match self {
-            Engine::Cpu(cpu) => cpu,
+            Engine::Cpu(cpu) => &mut **cpu,
             #[cfg(feature = "gpu")]
             Engine::Gpu(gpu, _) => &mut **gpu,
         }
