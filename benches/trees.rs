@@ -139,7 +139,7 @@ impl View {
         let line = Line::new(EYE, View::direction(pixel), PAD);
         let none = Nearest {
             t: f32::INFINITY,
-            number: u32::MAX,
+            triangle: u32::MAX,
             slot: 0,
         };
         closest(level, &self.mesh(), &line, 0.0, u32::MAX, none)
@@ -147,7 +147,7 @@ impl View {
 
     /// Mask of occluded samples; `None` if the light is behind the surface or the ray misses.
     fn occluded(&self, level: Level, pixel: usize, hit: Nearest) -> Option<u32> {
-        let triangle = self.surface.triangles.get(hit.number as usize)?;
+        let triangle = self.surface.triangles.get(hit.triangle as usize)?;
         let [a, b, c] = triangle.map(|i| self.surface.corners[i as usize]);
         let d = View::direction(pixel);
         let normal = (b - a).cross(c - a).normalize();
@@ -165,7 +165,7 @@ impl View {
             pad: PAD,
             directions: &Directions::new(&directions),
             t_max: 1.0,
-            skip: hit.number,
+            skip: hit.triangle,
         };
         Some(occluded(level, &self.mesh(), &segments, 0xffff))
     }
@@ -183,7 +183,7 @@ fn traversals(criterion: &mut Criterion) {
     group.bench_function("camera rays", |b| {
         b.iter(|| -> usize {
             let rays = (0..pixels).into_par_iter().with_min_len(SIDE);
-            rays.filter(|i| view.first_hit(level, *i).number != u32::MAX).count()
+            rays.filter(|i| view.first_hit(level, *i).triangle != u32::MAX).count()
         });
     });
     group.throughput(Throughput::Elements(16 * to_light as u64));

@@ -31,8 +31,8 @@ fn block_distributions(normal: vec3f) -> u32 {
     return environment.blocks + rows * ENVIRONMENT_BLOCKS + normal_bin(normal) * (rows + 1u) * (ENVIRONMENT_BLOCKS + 1u);
 }
 
-// Finds the interval that contains u among 32 intervals; empty intervals come last. `digits` extends the 24 binary
-// digits of u.
+// Finds the interval of a cumulative distribution over 32 intervals that contains u, which is never an empty interval.
+// `digits` extends the 24 binary digits of u.
 fn interval_at(distribution: u32, u: f32, digits: f32) -> Interval {
     var entry = distribution;
     entry += select(0u, 16u, u >= environment_float(entry + 16u));

@@ -179,5 +179,5 @@ impl Session {
 fn keeps_kernel(open: &OpenScene, camera: &Camera) -> bool {
     let packed = open.scene();
     packed.origin == pack::origin(camera)
-        && pack::camera_features(&packed.specialization, camera) == packed.specialization
+        && pack::with_camera_features(&packed.specialization, camera) == packed.specialization
 }

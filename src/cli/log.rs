@@ -129,8 +129,8 @@ fn write(line: &str) {
     let _ = io::stderr().lock().write_all(format!("{line}\n").as_bytes());
 }
 
-/// Prints panics as JSON if messages are JSON.
-pub fn catch_panics() {
+/// Installs a hook that prints panics as JSON, if messages are JSON.
+pub fn install_panic_hook() {
     if is_json() {
         std::panic::set_hook(Box::new(|panic| {
             let facts = Facts::from_iter([("exit_code".to_owned(), Value::from(101))]);

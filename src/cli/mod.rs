@@ -121,7 +121,7 @@ pub fn main() -> ExitCode {
         Err(error) => return explain(&hints::improve(error)),
     };
     log::choose(cli.log_format);
-    log::catch_panics();
+    log::install_panic_hook();
     allocator::catch_signal_stacks();
     let threads = match &cli.command {
         Command::Render(args) => args.threads,

@@ -350,7 +350,7 @@ fn hit_triangle_plane(sheet: &Sheet, matrix: DMat3, triangle: usize, (o, d): (DV
     Point {
         position,
         uv: uv.truncate(),
-        // The normal faces the viewer, like the triangle.
+        // The interpolated normal is flipped together with the geometric normal, which faces the viewer.
         normal: if d.dot(normal_direction) * matrix.determinant() > 0.0 {
             -normal
         } else {

@@ -13,8 +13,8 @@ use wgray_render::output::AovSource;
 use wgray_render::pack::pack;
 use wgray_render::records::{Packed, Specialization};
 use wgray_scene::{
-    CameraDescription, Description, Integrator, Overrides, PendingScene, Pieces, Places, Scene, folder_of, is_course,
-    is_gltf, is_mesh, is_model, read_bytes, read_text,
+    CameraDescription, Description, Integrator, Overrides, PendingScene, Pieces, Places, Scene, folder_of, is_gltf,
+    is_json_scene, is_mesh, is_model, read_bytes, read_text,
 };
 
 /// The locations of the files of a session, and the overrides.
@@ -152,7 +152,7 @@ impl Sources {
         let kind = match &self.scene {
             scene if is_gltf(scene) => "glTF",
             scene if is_mesh(scene) => "a mesh",
-            scene if is_course(scene) => "JSON",
+            scene if is_json_scene(scene) => "JSON",
             _ => return None,
         };
         Some(format!(

@@ -60,7 +60,7 @@ pub use load::{PendingScene, folder_of, read_bytes, read_text};
 pub use material::{Facets, Material, Principled, Reflection};
 pub use metals::MetalIndex;
 pub use note::Note;
-pub use parse::{Pieces, Places, is_course};
+pub use parse::{Pieces, Places, is_json_scene};
 pub use presentation::{Presentation, UpAxis};
 pub use problem::{ErrorPlace, Problem};
 pub use scene::*;

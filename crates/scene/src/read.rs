@@ -4,7 +4,7 @@ use std::path::Path;
 
 use crate::defines::Defines;
 use crate::error::SceneError;
-use crate::parse::is_course;
+use crate::parse::is_json_scene;
 use crate::{Description, course};
 
 impl Description {
@@ -19,7 +19,7 @@ impl Description {
     }
 
     pub(crate) fn parse_with(text: &str, origin: &str, defines: &mut Defines) -> Result<Self, SceneError> {
-        match is_course(Path::new(origin)) {
+        match is_json_scene(Path::new(origin)) {
             true => course::read(text, origin, defines),
             false => Description::parse_toml(text, origin, defines),
         }

@@ -92,10 +92,10 @@ fn closest_of_mesh(scene: &Packed, before: Hit, instance_index: u32, ray: Ray, s
     let direction = vector_to_mesh(i, ray.direction);
     let origin = point_to_mesh(i, ray.origin) + direction * start;
     let pad = mesh_pad(i, origin);
-    // At equal distance, this instance wins only over instances with larger indices.
+    // At equal distance, the larger triangle index loses: this instance wins only over instances with larger indices.
     let best = Nearest {
         t: before.t,
-        number: if instance_index + 1 < before.instance {
+        triangle: if instance_index + 1 < before.instance {
             NO_INDEX
         } else {
             0
@@ -118,7 +118,7 @@ fn closest_of_mesh(scene: &Packed, before: Hit, instance_index: u32, ray: Ray, s
     Hit {
         t: found.t,
         instance: instance_index + 1,
-        primitive: found.number,
+        primitive: found.triangle,
         slot: found.slot,
         barycentric,
     }

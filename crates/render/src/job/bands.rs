@@ -40,8 +40,9 @@ pub struct Bands<'a> {
     store: &'a mut dyn CheckpointStore,
     bands: VecDeque<Band>,
     samples: u32,
-    /// True if the bands rendered together are complete; `None` if bands are rendered one after the other.
-    together_complete: Option<bool>,
+    /// True once joint rendering has ended, because it is complete or the time is up; `None` if bands are rendered one
+    /// after the other.
+    joint_rendering_ended: Option<bool>,
     /// Samples per pixel at the end of the current pass, if the bands are rendered in passes ([`Bands::in_passes`]).
     pass_end: Option<u32>,
     steps: Steps,
@@ -151,7 +152,7 @@ impl<'a> Bands<'a> {
             store,
             bands: queue,
             samples,
-            together_complete: None,
+            joint_rendering_ended: None,
             pass_end: None,
             steps: Steps::new(split, DISPATCH_DURATION, order),
             finished_samples: 0.0,
@@ -168,7 +169,7 @@ impl<'a> Bands<'a> {
     /// [`RenderError::Memory`] if the films do not fit.
     pub fn as_a_whole(mut self, film_layout: FilmLayout) -> Result<Bands<'a>, RenderError> {
         check_memory(self.pixels().saturating_mul(film_layout.bytes() as u64))?;
-        self.together_complete = Some(false);
+        self.joint_rendering_ended = Some(false);
         Ok(self)
     }
 
@@ -201,14 +202,14 @@ impl<'a> Bands<'a> {
         watch: &mut Watch,
         on_progress: &mut dyn FnMut(),
     ) -> Result<Option<FinishedBand>, RenderError> {
-        if self.together_complete == Some(false) {
+        if self.joint_rendering_ended == Some(false) {
             self.render_together(backend, watch, on_progress)?;
-            self.together_complete = Some(true);
+            self.joint_rendering_ended = Some(true);
         }
         if self.bands.is_empty() {
             return Ok(None);
         }
-        if self.together_complete.is_none() {
+        if self.joint_rendering_ended.is_none() {
             self.make_first_small(backend);
             self.render_band(0, self.samples, backend, watch, on_progress)?;
         }
@@ -237,7 +238,7 @@ impl<'a> Bands<'a> {
         on_progress: &mut dyn FnMut(),
     ) -> Result<Option<u32>, RenderError> {
         let samples = self.passed_samples();
-        if self.pass_end.is_none() || self.together_complete != Some(false) || samples >= self.samples {
+        if self.pass_end.is_none() || self.joint_rendering_ended != Some(false) || samples >= self.samples {
             return Ok(None);
         }
         let end = match self.pass_end {
@@ -246,7 +247,7 @@ impl<'a> Bands<'a> {
         };
         self.pass_end = Some(end);
         if self.render_all(end, backend, watch, on_progress)? == Outcome::TimeIsUp {
-            self.together_complete = Some(true);
+            self.joint_rendering_ended = Some(true);
             return Ok(None);
         }
         for band in &mut self.bands {
@@ -424,7 +425,7 @@ impl<'a> Bands<'a> {
             let end = match watch(backend, region, finished_samples / self.total_samples)? {
                 Flow::Cancel => Some(Err(RenderError::Cancelled)),
                 Flow::TimeIsUp
-                    if self.together_complete.is_some() && others_have_samples && self.steps.samples() > 0 =>
+                    if self.joint_rendering_ended.is_some() && others_have_samples && self.steps.samples() > 0 =>
                 {
                     Some(Ok(Outcome::TimeIsUp))
                 }
@@ -471,7 +472,7 @@ impl<'a> Bands<'a> {
             band.last_pass.get_or_insert(previous);
         }
         if is_due {
-            if self.together_complete.is_some() {
+            if self.joint_rendering_ended.is_some() {
                 self.keep_others(i);
             }
             self.store.sync();

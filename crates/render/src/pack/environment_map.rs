@@ -203,7 +203,8 @@ impl Grid {
         }
     }
 
-    /// Writes reciprocal powers of blocks, and their distribution per bin of normals and for all directions.
+    /// Writes the reciprocal of the power of each block, then the cumulative distributions over the blocks: one for each
+    /// bin of normals, weighted by the clamped cosine, and one without the cosine.
     fn write_distributions(&self, weights: &[f64], axes: [DVec3; 3], sum: f64, words: &mut Vec<u32>) {
         let side = ENVIRONMENT_BLOCKS as usize;
         let mut powers = vec![0.0; self.rows() * side];

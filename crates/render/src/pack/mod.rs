@@ -34,7 +34,7 @@ use self::primitive::pack_shapes;
 pub(crate) use self::primitive::primitive;
 pub use self::shading::PackedShading;
 use self::specialize::Parts;
-pub use self::specialize::camera_features;
+pub use self::specialize::with_camera_features;
 use crate::records::*;
 use wgray_scene::{PixelFilter, PixelFilterKind, Scene};
 
@@ -144,8 +144,8 @@ pub fn pack_with(scene: &Scene, shading: &PackedShading, texels: Vec<u32>) -> Pa
     }
 }
 
-/// Packs the camera of a scene again. The packed scene must have the same [`origin`], and its kernel the same
-/// [`camera_features`].
+/// Replaces the camera of a packed scene by the camera of `scene`, whose [`origin`] must be `packed.origin`. A compiled
+/// kernel can be kept if [`with_camera_features`] does not change the specialization.
 pub fn set_camera(packed: &mut Packed, scene: &Scene) {
     packed.camera = pack_camera(
         &scene.camera,
@@ -154,7 +154,7 @@ pub fn set_camera(packed: &mut Packed, scene: &Scene) {
         scene.height,
         scene.render.seed,
     );
-    packed.specialization = camera_features(&packed.specialization, &scene.camera);
+    packed.specialization = with_camera_features(&packed.specialization, &scene.camera);
 }
 
 /// Packs values that apply to the whole scene. `probability` is the probability of sampling the environment map.

@@ -31,7 +31,7 @@ pub(super) struct Parts<'a> {
 
 impl Parts<'_> {
     pub fn specialization(&self) -> Specialization {
-        camera_features(&self.without_camera(), &self.scene.camera)
+        with_camera_features(&self.without_camera(), &self.scene.camera)
     }
 
     fn without_camera(&self) -> Specialization {
@@ -101,7 +101,7 @@ impl Parts<'_> {
 }
 
 /// Sets the constants that depend on the camera.
-pub fn camera_features(specialization: &Specialization, camera: &scene::Camera) -> Specialization {
+pub fn with_camera_features(specialization: &Specialization, camera: &scene::Camera) -> Specialization {
     Specialization {
         lens: camera.lens.is_some().into(),
         panoramic: (camera.projection == Projection::Panorama).into(),

@@ -96,7 +96,7 @@ records! {
         pub determinant: f32,
         /// Solids: object-space vector from the anchor to the center. Else 0.
         pub middle: Vec3,
-        /// Solids: `|middle|² - 1`, for a cylinder without z.
+        /// Solids: constant term of the implicit equation, `|middle|² - 1`; for cylinders, of x and y of `middle` only.
         pub level: f32,
     }
 

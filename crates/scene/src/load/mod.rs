@@ -21,7 +21,7 @@ use crate::error::SceneError;
 use crate::gltf::GltfError;
 use crate::key_path::KeyPath;
 use crate::note::Note;
-use crate::parse::{Places, invalid, is_course, line_of_path};
+use crate::parse::{Places, invalid, is_json_scene, line_of_path};
 use crate::problem::{Problem, Problems};
 use crate::{Description, Scene};
 
@@ -255,14 +255,14 @@ impl<'a> PendingScene<'a> {
             defines,
             description,
         } = self;
-        let is_course = is_course(Path::new(origin));
-        let root = if is_course {
+        let is_json_scene = is_json_scene(Path::new(origin));
+        let root = if is_json_scene {
             course::asset_root(folder)
         } else {
             folder.to_owned()
         };
         let assets = overrides.assets(folder, &root);
-        let invalid = |problems| match is_course {
+        let invalid = |problems| match is_json_scene {
             true => course::invalid(text, origin, problems, &defines),
             false => invalid(text, origin, problems, &defines),
         };

@@ -6,7 +6,7 @@ use std::path::Path;
 use toml::{Table, Value};
 
 use super::parts::{Kind, Part, Parts, Rest, SyntaxFault};
-use super::{Problems, Read, invalid, is_course, read, read_camera, read_file, tagged};
+use super::{Problems, Read, invalid, is_json_scene, read, read_camera, read_file, tagged};
 use crate::defines::Defines;
 use crate::error::SceneError;
 use crate::key_path::{KeyPath, Segment};
@@ -23,7 +23,7 @@ impl Description {
         before: &Description,
         path: &KeyPath,
     ) -> Result<Option<Change>, SceneError> {
-        if is_course(Path::new(origin)) {
+        if is_json_scene(Path::new(origin)) {
             return Ok(None);
         }
         let to_error = |fault: SyntaxFault| fault.into_error(text, origin);

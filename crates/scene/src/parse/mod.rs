@@ -64,7 +64,7 @@ impl Description {
 }
 
 /// Returns true if a scene file with this name is in JSON.
-pub fn is_course(name: &Path) -> bool {
+pub fn is_json_scene(name: &Path) -> bool {
     let extension = name.extension();
     extension.is_some_and(|extension| extension.eq_ignore_ascii_case("json"))
 }

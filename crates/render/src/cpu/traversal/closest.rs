@@ -40,11 +40,11 @@ pub fn closest<S: Simd>(simd: S, mesh: &Mesh, line: &Line, start: f32, skip: u32
                 while hits != 0 {
                     let i = hits.trailing_zeros() as usize;
                     hits &= hits - 1;
-                    let (t, number) = (start + maximum(t[i], 0.0), triangles[i][3]);
-                    let nearer = t < best.t || (t == best.t && number < best.number);
-                    if nearer && t > 0.0 && number != skip {
+                    let (t, triangle) = (start + maximum(t[i], 0.0), triangles[i][3]);
+                    let nearer = t < best.t || (t == best.t && triangle < best.triangle);
+                    if nearer && t > 0.0 && triangle != skip {
                         let slot = (first + i) as u32;
-                        best = Nearest { t, number, slot };
+                        best = Nearest { t, triangle, slot };
                     }
                 }
             }

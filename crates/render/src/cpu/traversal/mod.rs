@@ -41,7 +41,7 @@ pub struct Nearest {
     /// Distance, as a multiple of the length of the ray's direction.
     pub t: f32,
     /// Index of the triangle.
-    pub number: u32,
+    pub triangle: u32,
     /// Position in leaf order.
     pub slot: u32,
 }

@@ -9,7 +9,7 @@ use crate::bvh::{Aabb, Tree, build};
 
 const NONE: Nearest = Nearest {
     t: f32::INFINITY,
-    number: u32::MAX,
+    triangle: u32::MAX,
     slot: 0,
 };
 
@@ -85,9 +85,9 @@ impl Scene {
     fn closest(&self, line: &Line, skip: u32, best: Nearest) -> Nearest {
         let triangles = (0..).zip(&self.triangles).filter(|(_, t)| t[3] != skip);
         triangles.fold(best, |best, (slot, triangle)| match self.t(triangle, line) {
-            Some(t) if (t, triangle[3]) < (best.t, best.number) => Nearest {
+            Some(t) if (t, triangle[3]) < (best.t, best.triangle) => Nearest {
                 t,
-                number: triangle[3],
+                triangle: triangle[3],
                 slot,
             },
             _ => best,
@@ -140,7 +140,7 @@ fn compare(
             } else {
                 f32::INFINITY
             },
-            number: random.bits(),
+            triangle: random.bits(),
             slot: 0,
         };
         let line = Line::new(o, d, pad);
@@ -386,11 +386,15 @@ fn leaves_are_visited_until_the_limit() {
             leaves(level, &scene.tree.nodes, &line, best.t, |items: Range<usize>, limit| {
                 assert_eq!(limit, best.t);
                 for (slot, triangle) in (items.start as u32..).zip(&scene.triangles[items]) {
-                    let number = triangle[3];
+                    let index = triangle[3];
                     if let Some(t) = scene.t(triangle, &line)
-                        && (t, number) < (best.t, best.number)
+                        && (t, index) < (best.t, best.triangle)
                     {
-                        best = Nearest { t, number, slot };
+                        best = Nearest {
+                            t,
+                            triangle: index,
+                            slot,
+                        };
                     }
                 }
                 best.t

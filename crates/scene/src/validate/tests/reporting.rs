@@ -237,7 +237,7 @@ fn files_are_not_read_for_a_scene_with_invalid_settings() {
     let origin = folder.path().join("s.toml").display().to_string();
     let count = |text: &str| Scene::parse(text, &origin).unwrap_err().to_string().lines().count();
     assert_eq!(count(&text.replace("fov = 40", "fov = 400")), 1);
-    // A missing file is reported without reading.
+    // A missing file is also reported, although no file is read.
     assert_eq!(
         count(&text.replace("fov = 40", "fov = 400").replace("a.hdr", "b.hdr")),
         2
