@@ -67,18 +67,18 @@ fn peak(criterion: &mut Criterion) {
 #[cfg(not(target_arch = "x86_64"))]
 fn peak(_: &mut Criterion) {}
 
-/// Functions that dominate the render time.
+/// Measures the functions that dominate the render time.
 fn twins(criterion: &mut Criterion) {
     let scene = scene("scenes/cornell.toml", 400);
-    let of_kind = |kind| {
+    let index_of_kind = |kind| {
         scene
             .primitives
             .iter()
             .position(|q| q.kind == kind)
-            .expect("cornell has all of these")
+            .expect("scenes/cornell.toml has all of these kinds")
     };
     let [rectangle, triangle, ellipsoid] =
-        [RECTANGLE, TRIANGLE, ELLIPSOID].map(|kind| &scene.primitives[of_kind(kind)]);
+        [RECTANGLE, TRIANGLE, ELLIPSOID].map(|kind| &scene.primitives[index_of_kind(kind)]);
     let ray = Ray {
         origin: Vec3::new(0.0, -3.0, 1.3),
         direction: Vec3::new(0.1, 0.98, -0.2).normalize(),
@@ -93,8 +93,8 @@ fn twins(criterion: &mut Criterion) {
         group: 0,
         key: UVec2::ZERO,
     };
-    let cone = light_frustum(light, surface.ray_origin);
-    let bound = scene.bounds[of_kind(ELLIPSOID)];
+    let frustum = light_frustum(light, surface.ray_origin);
+    let bound = scene.bounds[index_of_kind(ELLIPSOID)];
 
     let mut group = criterion.benchmark_group("twins");
     group.bench_function("intersect_rectangle", |b| {
@@ -106,7 +106,7 @@ fn twins(criterion: &mut Criterion) {
     group.bench_function("intersect_ellipsoid", |b| {
         b.iter(|| intersect_ellipsoid(ellipsoid, false, black_box(ray), INFINITE_T))
     });
-    group.bench_function("may_block", |b| b.iter(|| may_block(&black_box(bound), &cone)));
+    group.bench_function("may_block", |b| b.iter(|| may_block(&black_box(bound), &frustum)));
     group.bench_function("occlusion_mask of 16 samples, triangle", |b| {
         b.iter(|| occlusion_mask(TRIANGLE, triangle, black_box(surface.ray_origin), false, light, block))
     });
@@ -114,17 +114,27 @@ fn twins(criterion: &mut Criterion) {
         b.iter(|| occlusion_mask(ELLIPSOID, ellipsoid, black_box(surface.ray_origin), false, light, block))
     });
     group.bench_function("phong_block of 16 samples", |b| {
-        let to = segments_to_light(light, surface.ray_origin);
-        let none = Lobes {
+        let segments = segments_to_light(light, surface.ray_origin);
+        let no_lobes = Lobes {
             diffuse: 0.0,
             specular: 0.0,
         };
-        b.iter(|| phong_block(&surface, &scene.materials[0], to, block, black_box(0), 5, none))
+        b.iter(|| {
+            phong_block(
+                &surface,
+                &scene.materials[0],
+                segments,
+                block,
+                black_box(0),
+                5,
+                no_lobes,
+            )
+        })
     });
     group.finish();
 }
 
-/// The throughput is in nominal rays.
+/// Measures renders of whole images. The throughput is in nominal rays.
 fn images(criterion: &mut Criterion) {
     let device = gpu::choose(&AdapterChoice::Auto).expect("benchmarks need an adapter");
     let adapter = device.info.name.clone();
@@ -133,7 +143,7 @@ fn images(criterion: &mut Criterion) {
         let mut group = criterion.benchmark_group(path);
         let rays = 128 * 128 * u64::from(scene.sampling.pixel_samples) * (1 + scene.light_samples());
         group.throughput(Throughput::Elements(rays)).sample_size(20);
-        let new = |baked| {
+        let open_gpu = |baked| {
             let options = Options {
                 baked,
                 ..Options::best(&device)
@@ -141,8 +151,8 @@ fn images(criterion: &mut Criterion) {
             Gpu::new(&device, &scene, &Shaders::built_in(), options).expect("the project's shaders compile")
         };
         let backends: [(String, Box<dyn Backend>); 3] = [
-            (format!("{adapter}, scene as constants"), Box::new(new(true))),
-            (format!("{adapter}, scene in buffers"), Box::new(new(false))),
+            (format!("{adapter}, scene as constants"), Box::new(open_gpu(true))),
+            (format!("{adapter}, scene in buffers"), Box::new(open_gpu(false))),
             ("cpu".to_string(), Box::new(Cpu::new(&scene))),
         ];
         for (name, mut backend) in backends {

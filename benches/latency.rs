@@ -24,7 +24,7 @@ const TIMEOUT: Duration = Duration::from_secs(120);
 /// The expression of `kernels/render.wgsl` that is multiplied by a factor.
 const EXPRESSION: &str = "path_value(path)";
 
-/// Times from a change until the old image is discarded, the first image, and a sample in each pixel.
+/// Times from a change until the old image is discarded, until the first new image, and until each pixel has a sample.
 type Times = [Duration; 3];
 
 fn main() {
@@ -58,14 +58,14 @@ fn main() {
     println!("{scene}: milliseconds, median and maximum");
     println!(
         "{:<14}{:>16}{:>18}{:>22}",
-        "change", "old one stopped", "first image", "every pixel sampled"
+        "change", "old discarded", "first image", "every pixel sampled"
     );
-    // New seeds and kernels, which no cache contains.
+    // Seeds and factors differ in every run, so that no cache contains their kernels.
     let now = SystemTime::now()
         .duration_since(UNIX_EPOCH)
         .map_or(0, |time| time.as_millis() as usize % 65_536);
     let number = |i: usize| 7_361_000 + now * ROUNDS + i;
-    let seeded = |i: usize| {
+    let scene_with_new_seed = |i: usize| {
         let mut table: toml::Table = text.parse().expect("a scene in TOML");
         let render = table.entry("render").or_insert(toml::Table::new().into());
         let render = render.as_table_mut().expect("a table");
@@ -74,7 +74,7 @@ fn main() {
     };
     let kernel = Shaders::built_in().text("kernels/render.wgsl").to_owned();
     assert!(kernel.contains(EXPRESSION));
-    let scaled = |i: usize| {
+    let scaled_kernel = |i: usize| {
         let factor = 1.0 + number(i) as f64 / f64::from(1 << 23);
         kernel.replace(EXPRESSION, &format!("({EXPRESSION} * vec4f(vec3f({factor:?}), 1.0))"))
     };
@@ -85,23 +85,23 @@ fn main() {
             gesture: None,
         }));
     });
-    rounds(&session, "scene save", |i| replace(&file, &seeded(i)));
+    rounds(&session, "scene save", |i| replace(&file, &scene_with_new_seed(i)));
     rounds(&session, "camera move", |_| {
         session.send(Command::Move(Move::Orbit(0.05, 0.0)));
     });
     rounds(&session, "shader save", |i| {
-        replace(&shaders.join("kernels/render.wgsl"), &scaled(i))
+        replace(&shaders.join("kernels/render.wgsl"), &scaled_kernel(i))
     });
 }
 
-/// Atomic, like an editor.
+/// Replaces a file atomically, like an editor.
 fn replace(path: &Path, text: &str) {
     let mut file = NamedTempFile::new_in(path.parent().expect("a folder")).expect("a file");
     file.write_all(text.as_bytes()).expect("a written file");
     file.persist(path).expect("a replaced file");
 }
 
-/// Repeats a change and prints the times.
+/// Repeats a change and prints its times.
 fn rounds(session: &Session, name: &str, change: impl Fn(usize)) {
     let times: Vec<Times> = (0..ROUNDS)
         .map(|i| {
@@ -118,12 +118,13 @@ fn rounds(session: &Session, name: &str, change: impl Fn(usize)) {
     println!("{name:<14}{:>16}{:>18}{:>22}", cells[0], cells[1], cells[2]);
 }
 
+/// Applies a change and waits until its image has a sample in each pixel.
 fn measure(session: &Session, change: impl FnOnce()) -> Times {
     let frame = || session.frames.borrow().clone();
     let revision = frame().map(|frame| frame.header.revision);
     let start = Instant::now();
     change();
-    let (mut stopped, mut first) = (None, None);
+    let (mut discarded, mut first) = (None, None);
     while start.elapsed() < TIMEOUT {
         let state = session.state.borrow().clone();
         assert!(state.problems.is_empty(), "{}", state.problems[0].message);
@@ -133,12 +134,12 @@ fn measure(session: &Session, change: impl FnOnce()) -> Times {
             state.notice.as_ref().map(|n| &n.text)
         );
         if state.compiling {
-            stopped.get_or_insert(start.elapsed());
+            discarded.get_or_insert(start.elapsed());
         }
         if let Some(frame) = frame().filter(|frame| Some(frame.header.revision) > revision) {
             let first = *first.get_or_insert(start.elapsed());
             if frame.header.sent == frame.header.finest && frame.header.samples > 0 {
-                return [stopped.unwrap_or(first), first, start.elapsed()];
+                return [discarded.unwrap_or(first), first, start.elapsed()];
             }
         }
         std::thread::sleep(Duration::from_millis(1));

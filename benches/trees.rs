@@ -15,8 +15,8 @@ struct Surface {
 }
 
 impl Surface {
-    /// Returns a grid of `columns` x `rows` cells of two triangles each. `at` maps (0..1, 0..1) to positions.
-    fn grid(columns: u32, rows: u32, at: impl Fn(f32, f32) -> Vec3) -> Surface {
+    /// Returns a grid of `columns` x `rows` cells of two triangles each. `position` maps (0..1, 0..1) to a vertex.
+    fn grid(columns: u32, rows: u32, position: impl Fn(f32, f32) -> Vec3) -> Surface {
         let mut surface = Surface {
             corners: Vec::new(),
             triangles: Vec::new(),
@@ -25,7 +25,7 @@ impl Surface {
             for x in 0..=columns {
                 surface
                     .corners
-                    .push(at(x as f32 / columns as f32, y as f32 / rows as f32));
+                    .push(position(x as f32 / columns as f32, y as f32 / rows as f32));
             }
         }
         for y in 0..rows {
@@ -107,12 +107,12 @@ impl View {
             .triangles
             .extend([[0, 1, 2], [0, 2, 3]].map(|t| t.map(|i| first + i)));
         let tree = build(&surface.boxes(), MAX_LEAF_SIZE);
-        let numbered = |i: &u32| {
+        let corners_and_index = |i: &u32| {
             let [a, b, c] = surface.triangles[*i as usize];
             [a, b, c, *i]
         };
         View {
-            triangles: tree.order.iter().map(numbered).collect(),
+            triangles: tree.order.iter().map(corners_and_index).collect(),
             vertices: surface.corners.iter().map(|v| v.extend(0.0).to_array()).collect(),
             tree,
             surface,
@@ -131,21 +131,21 @@ impl View {
         let forward = (Vec3::new(0.0, 0.0, -0.1) - EYE).normalize();
         let right = forward.cross(Vec3::Z).normalize();
         let up = right.cross(forward);
-        let at = |i: usize| ((i as f32 + 0.5) / SIDE as f32 - 0.5) * 0.76;
-        forward + right * at(pixel % SIDE) - up * at(pixel / SIDE)
+        let offset = |i: usize| ((i as f32 + 0.5) / SIDE as f32 - 0.5) * 0.76;
+        forward + right * offset(pixel % SIDE) - up * offset(pixel / SIDE)
     }
 
     fn first_hit(&self, level: Level, pixel: usize) -> Nearest {
         let line = Line::new(EYE, View::direction(pixel), PAD);
-        let none = Nearest {
+        let miss = Nearest {
             t: f32::INFINITY,
             triangle: u32::MAX,
             slot: 0,
         };
-        closest(level, &self.mesh(), &line, 0.0, u32::MAX, none)
+        closest(level, &self.mesh(), &line, 0.0, u32::MAX, miss)
     }
 
-    /// Mask of occluded samples; `None` if the light is behind the surface or the ray misses.
+    /// Returns the mask of occluded samples; `None` if the light is behind the surface or the ray misses.
     fn occluded(&self, level: Level, pixel: usize, hit: Nearest) -> Option<u32> {
         let triangle = self.surface.triangles.get(hit.triangle as usize)?;
         let [a, b, c] = triangle.map(|i| self.surface.corners[i as usize]);
@@ -176,7 +176,7 @@ fn traversals(criterion: &mut Criterion) {
     let level = Level::new();
     let pixels = SIDE * SIDE;
     let hits: Vec<Nearest> = (0..pixels).map(|i| view.first_hit(level, i)).collect();
-    let to_light = (0..pixels).filter_map(|i| view.occluded(level, i, hits[i])).count();
+    let lit_pixels = (0..pixels).filter_map(|i| view.occluded(level, i, hits[i])).count();
     let mut group = criterion.benchmark_group("traverse 70k triangles");
     group.sample_size(20);
     group.throughput(Throughput::Elements(pixels as u64));
@@ -186,7 +186,7 @@ fn traversals(criterion: &mut Criterion) {
             rays.filter(|i| view.first_hit(level, *i).triangle != u32::MAX).count()
         });
     });
-    group.throughput(Throughput::Elements(16 * to_light as u64));
+    group.throughput(Throughput::Elements(16 * lit_pixels as u64));
     group.bench_function("16 shadow rays to a light", |b| {
         b.iter(|| -> u32 {
             let rays = (0..pixels).into_par_iter().with_min_len(SIDE);

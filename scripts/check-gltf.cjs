@@ -19,7 +19,7 @@ function filesIn(name) {
 
 async function main() {
     const files = process.argv.slice(2).flatMap(filesIn);
-    let bad = 0;
+    let rejected = 0;
     for (const file of files) {
         const readSibling = (uri) => fs.promises.readFile(path.join(path.dirname(file), decodeURIComponent(uri)));
         const report = await validator.validateBytes(new Uint8Array(fs.readFileSync(file)), {
@@ -29,10 +29,10 @@ async function main() {
         });
         const issues = report.issues.messages.filter((issue) => issue.severity < 2 && !ignored.includes(issue.code));
         for (const issue of issues) console.log(`${file}: ${issue.code} ${issue.pointer ?? ""}: ${issue.message}`);
-        if (issues.length > 0) bad += 1;
+        if (issues.length > 0) rejected += 1;
     }
-    console.log(`${files.length} files, ${bad} with errors or warnings`);
-    if (bad > 0 || files.length === 0) process.exitCode = 1;
+    console.log(`${files.length} files, ${rejected} with errors or warnings`);
+    if (rejected > 0 || files.length === 0) process.exitCode = 1;
 }
 
 main();

@@ -1,6 +1,7 @@
 # Shell functions: the packages of the workspace, as `cargo publish` would upload them.
 
-# Makes the packages in a folder and unpacks them there. The unpacked ones use each other, since no registry has them yet.
+# Builds the packages in a folder and unpacks them there. The unpacked packages depend on each other by path, because no
+# registry has them yet.
 package_crates() {
     folder=$1
     mkdir -p "$folder/.cargo"
@@ -16,5 +17,5 @@ package_crates() {
             wgray-[a-z]*) echo "${name%-*} = { path = \"$name\" }" >>"$folder/.cargo/config.toml" ;;
         esac
     done
-    (cd "$folder"/wgray-[0-9]*/ && cargo metadata --quiet --format-version 1 >/dev/null) # in Cargo.lock too
+    (cd "$folder"/wgray-[0-9]*/ && cargo metadata --quiet --format-version 1 >/dev/null) # also updates Cargo.lock
 }

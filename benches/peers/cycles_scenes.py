@@ -4,8 +4,8 @@
     target/peers/cycles/bin/python cycles_scenes.py SCENE.toml [--size N] [--spp N] [--warm N] [--seed N] [-o FILE] [--each FOLDER]
 
 Supports rectangles, triangles, ellipsoids and meshes with diffuse materials, rectangle lights, a constant environment
-and a perspective camera. Ellipsoids become fine meshes, lights meshes that emit on their front. Cycles counts bounces
-after the first surface, so it gets one less than `max_depth`. Clamping, denoising, adaptive sampling and path guiding
+and a perspective camera. Ellipsoids become fine meshes; lights become meshes that emit on their front. Cycles counts bounces
+after the first surface, so it gets `max_depth` - 1 bounces. Clamping, denoising, adaptive sampling and path guiding
 are off; the pixel filter is a box. Cycles keeps its scene between images. `load_s`, `first_s` and `warm_s` are as in
 mitsuba_scenes.py.
 """
@@ -28,24 +28,24 @@ import scenes
 
 
 def shader(name, color=None, radiance=None):
-    made = bpy.data.materials.new(name)
-    made.use_nodes = True
-    nodes, links = made.node_tree.nodes, made.node_tree.links
+    material = bpy.data.materials.new(name)
+    material.use_nodes = True
+    nodes, links = material.node_tree.nodes, material.node_tree.links
     nodes.clear()
     diffuse = nodes.new("ShaderNodeBsdfDiffuse")
     diffuse.inputs["Color"].default_value = (*(color or [0, 0, 0]), 1)
     out = nodes.new("ShaderNodeOutputMaterial")
     if not radiance:
         links.new(diffuse.outputs[0], out.inputs[0])
-        return made
-    made.cycles.emission_sampling = "FRONT"
+        return material
+    material.cycles.emission_sampling = "FRONT"
     emission, mix, side = nodes.new("ShaderNodeEmission"), nodes.new("ShaderNodeMixShader"), nodes.new("ShaderNodeNewGeometry")
     emission.inputs["Color"].default_value = (*radiance, 1)
     links.new(side.outputs["Backfacing"], mix.inputs[0])
     links.new(emission.outputs[0], mix.inputs[1])
     links.new(diffuse.outputs[0], mix.inputs[2])
     links.new(mix.outputs[0], out.inputs[0])
-    return made
+    return material
 
 
 def add(name, vertices, faces, material, smooth=False):
@@ -66,8 +66,8 @@ def add_quad(name, q, material):
 def add_ellipsoid(name, s, material, rows=64):
     unit = [(math.sin(math.pi * i / rows) * math.cos(math.pi * j / rows), math.sin(math.pi * i / rows) * math.sin(math.pi * j / rows),
              math.cos(math.pi * i / rows)) for i in range(rows + 1) for j in range(2 * rows)]
-    at = lambda i, j: i * 2 * rows + j % (2 * rows)
-    faces = [(at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)) for i in range(rows) for j in range(2 * rows)]
+    vertex_index = lambda i, j: i * 2 * rows + j % (2 * rows)
+    faces = [tuple(vertex_index(*k) for k in ((i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1))) for i in range(rows) for j in range(2 * rows)]
     add(name, [[c + x * a + y * b + z * d for c, a, b, d in zip(s.center, s.a, s.b, s.c)] for x, y, z in unit], faces, material, True)
 
 
@@ -76,10 +76,10 @@ def add_mesh(name, s, material):
         bpy.ops.wm.ply_import(filepath=s.file)
     else:
         bpy.ops.wm.obj_import(filepath=s.file, forward_axis="Y", up_axis="Z")
-    made = bpy.context.selected_objects[0]
-    made.matrix_world = mathutils.Matrix([*s.to_world, [0, 0, 0, 1]])
-    made.data.materials.clear()
-    made.data.materials.append(material)
+    imported = bpy.context.selected_objects[0]
+    imported.matrix_world = mathutils.Matrix([*s.to_world, [0, 0, 0, 1]])
+    imported.data.materials.clear()
+    imported.data.materials.append(material)
 
 
 def load(path, scene, size, spp):
@@ -87,15 +87,15 @@ def load(path, scene, size, spp):
     out = bpy.context.scene
     materials = {}
 
-    def painted(material):
+    def cycles_material(material):
         if material.kind != "diffuse" or not isinstance(material.color, list) or any(material.emission or []):
             raise ValueError(f"{path}: Cycles supports only diffuse materials of constant colour without emission")
         if id(material) not in materials:
-            materials[id(material)] = shader("paint", material.color)
+            materials[id(material)] = shader("diffuse", material.color)
         return materials[id(material)]
 
     for i, s in enumerate(scene.shapes):
-        name, material = f"shape{i}", painted(s.material)
+        name, material = f"shape{i}", cycles_material(s.material)
         if isinstance(s, scenes.Quad):
             add_quad(name, s, material)
         elif isinstance(s, scenes.Triangles):
@@ -120,9 +120,9 @@ def load(path, scene, size, spp):
     camera.sensor_fit, camera.angle = "VERTICAL", math.radians(scene.fov)
     camera.clip_start = 1e-3
     eye = bpy.data.objects.new("camera", camera)
-    back = scenes.unit(scenes.sub(scene.position, scene.look_at))
-    right = scenes.unit(scenes.cross(scene.up, back))
-    columns = [right, scenes.cross(back, right), back, scene.position]
+    backward = scenes.unit(scenes.sub(scene.position, scene.look_at))
+    right = scenes.unit(scenes.cross(scene.up, backward))
+    columns = [right, scenes.cross(backward, right), backward, scene.position]
     eye.matrix_world = mathutils.Matrix([[c[i] for c in columns] for i in range(3)] + [[0, 0, 0, 1]])
     out.collection.objects.link(eye)
     out.camera = eye
@@ -171,10 +171,10 @@ def main():
     os.dup2(silent, 1)
     for n in range(1 + args.warm):
         out.cycles.seed = args.seed + n
-        last = args.output if args.output and n == args.warm else None
-        if last and not last.endswith(".exr"):
+        output = args.output if args.output and n == args.warm else None
+        if output and not output.endswith(".exr"):
             out.render.image_settings.file_format = "PNG"
-        out.render.filepath = last or os.path.join(args.each if args.each and n else folder, f"{args.seed + n}.exr")
+        out.render.filepath = output or os.path.join(args.each if args.each and n else folder, f"{args.seed + n}.exr")
         start = time.perf_counter()
         bpy.ops.render.render(write_still=True)
         times.append(time.perf_counter() - start)

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Compares the metrics of `wgray diff` with reference implementations, on random images and on extreme cases.
 
-FLIP with NVIDIA's implementation (flip-evaluator), SSIM and PSNR with scikit-image, RMSE and relative MSE with NumPy.
-Prints the largest deviation of each metric, and fails if one exceeds the rounding errors. Then compares the pixels that
+FLIP is compared with NVIDIA's implementation (flip-evaluator), SSIM and PSNR with scikit-image, RMSE and relative MSE
+with NumPy. Prints the largest deviation of each metric, and fails if one exceeds the rounding errors. Then compares the pixels that
 wgray reads from EXR files of every compression with those that the OpenEXR library reads.
 
     python3 -m venv venv && venv/bin/pip install flip-evaluator scikit-image OpenEXR
@@ -31,7 +31,7 @@ BOUNDS = {"rmse": 1e-12, "rel_mse": 1e-12, "psnr": 1e-12, "ssim": 1e-11, "flip":
 
 
 def formula(width, height, is_linear):
-    """A pair of images defined by a formula, which tests/compare.rs also uses."""
+    """Returns a pair of images defined by a formula, which tests/compare.rs also uses."""
     y, x, c = numpy.meshgrid(range(height), range(width), range(3), indexing="ij")
     smooth = (x * 5 + y * 3 + c * 40) % 256
     noise = ((x * 7919 + y * 104729 + c * 1299709 + (x * y) * 31) % 101) - 50
@@ -56,21 +56,21 @@ def write(path, image):
 
 
 def expected(a, b):
-    """The metrics of an image and its reference, computed by the reference implementations."""
+    """Returns the metrics of an image and its reference, computed by the reference implementations."""
     is_linear = a.dtype == numpy.float32
     scale = {numpy.dtype(numpy.uint8): 255, numpy.dtype(numpy.uint16): 65535}.get(a.dtype, 1)
     a, b = a.astype(numpy.float64) / scale, b.astype(numpy.float64) / scale
     peak = (numpy.abs(b).max() or 1) if is_linear else 1
-    found = {
+    metrics = {
         "rmse": math.sqrt(((a - b) ** 2).mean()),
         "rel_mse": ((a - b) ** 2 / (b**2 + 0.01)).mean(),
     }
-    found["psnr"] = peak_signal_noise_ratio(b, a, data_range=peak) if found["rmse"] > 0 else math.inf
+    metrics["psnr"] = peak_signal_noise_ratio(b, a, data_range=peak) if metrics["rmse"] > 0 else math.inf
     display_a, display_b = a, b
     if is_linear:
         display_a, display_b = numpy.clip(a, 0, 1) ** (1 / 2.2), numpy.clip(b, 0, 1) ** (1 / 2.2)
     if min(a.shape[:2]) >= 11:
-        found["ssim"] = structural_similarity(
+        metrics["ssim"] = structural_similarity(
             display_b,
             display_a,
             gaussian_weights=True,
@@ -82,10 +82,10 @@ def expected(a, b):
     # NVIDIA's implementation computes an infinite exposure if the median luminance is 0.
     luminance = b @ [0.2126, 0.7152, 0.0722]
     if not is_linear or numpy.sort(luminance.ravel())[luminance.size // 2] > 0:
-        found["flip"] = flip_evaluator.evaluate(
+        metrics["flip"] = flip_evaluator.evaluate(
             b.astype(numpy.float32), a.astype(numpy.float32), "HDR" if is_linear else "LDR", applyMagma=False
         )[1]
-    return found
+    return metrics
 
 
 def image_pairs(count):
@@ -100,9 +100,9 @@ def image_pairs(count):
     green, blue = flat(0), flat(0)
     green[..., 1], blue[..., 2] = 255, 255
     yield "green, blue", (green, blue)
-    one = flat(128)
-    one[11, 13, 1] ^= 1
-    yield "one bit", (one, flat(128))
+    one_bit = flat(128)
+    one_bit[11, 13, 1] ^= 1
+    yield "one bit", (one_bit, flat(128))
     board = (numpy.indices((40, 50)).sum(0) % 2 * 255).astype(numpy.uint8)[..., None].repeat(3, -1)
     yield "board, inverse", (board, 255 - board)
     yield "board, gray", (board, flat(128, size=(40, 50)))
@@ -124,19 +124,19 @@ def image_pairs(count):
             b = (smooth ** random.uniform(0.5, 6) * 10 ** random.uniform(-3, 4)).astype(floats)
             a = (b * numpy.exp(noise)).astype(floats)
         else:
-            most, depth = (65535, numpy.uint16) if kind == 2 else (255, numpy.uint8)
-            b = (smooth * most + 0.5).astype(depth)
-            a = (numpy.clip(smooth + noise, 0, 1) * most + 0.5).astype(depth)
+            maximum, depth = (65535, numpy.uint16) if kind == 2 else (255, numpy.uint8)
+            b = (smooth * maximum + 0.5).astype(depth)
+            a = (numpy.clip(smooth + noise, 0, 1) * maximum + 0.5).astype(depth)
         yield f"random {i}", (a, b)
 
 
 def compressions(program, folder):
-    """Returns the number of kinds of EXR files tested, and a message for each that OpenEXR reads differently."""
+    """Returns the number of kinds of EXR files, and a message for each file that wgray and OpenEXR read differently."""
     random = numpy.random.default_rng(2013)
     y, x = numpy.mgrid[0:70, 0:130]
     image = numpy.stack([x / 130 + 0.1 * random.random(x.shape), y / 70, numpy.sin(x / 9) + 1], -1)
     paths = [pathlib.Path(folder) / name for name in ("packed.exr", "plain.exr")]
-    tested, bad = 0, []
+    tested, failures = 0, []
     for name in ["NO", "RLE", "ZIPS", "ZIP", "PIZ", "PXR24", "B44", "B44A", "DWAA", "DWAB"]:
         for kind in (OpenEXR.scanlineimage, OpenEXR.tiledimage):
             for values in (numpy.float16, numpy.float32):
@@ -145,11 +145,11 @@ def compressions(program, folder):
                     header["tiles"] = OpenEXR.TileDescription()
                 OpenEXR.File(header, {"RGB": image.astype(values)}).write(str(paths[0]))
                 write(paths[1], OpenEXR.File(str(paths[0])).channels()["RGB"].pixels)
-                ran = subprocess.run([program, "diff", *paths], capture_output=True, text=True)
+                result = subprocess.run([program, "diff", *paths], capture_output=True, text=True)
                 tested += 1
-                if ran.returncode != 0:
-                    bad.append(f"{name} {kind} {values.__name__}: {ran.stdout}{ran.stderr}")
-    return tested, bad
+                if result.returncode != 0:
+                    failures.append(f"{name} {kind} {values.__name__}: {result.stdout}{result.stderr}")
+    return tested, failures
 
 
 def main():
@@ -167,36 +167,36 @@ def main():
     flip_at_60 = expected_flip = None
     with tempfile.TemporaryDirectory() as folder:
         for name, (a, b) in image_pairs(options.count):
-            end = ".exr" if a.dtype == numpy.float32 else ".png"
-            paths = [pathlib.Path(folder) / (side + end) for side in "ab"]
+            extension = ".exr" if a.dtype == numpy.float32 else ".png"
+            paths = [pathlib.Path(folder) / (side + extension) for side in "ab"]
             for path, image in zip(paths, (a, b)):
                 write(path, image)
-            ran = subprocess.run([options.program, "diff", "--json", *paths], capture_output=True, text=True)
-            if ran.returncode not in (0, 5):
-                sys.exit(f"{name}: exit code {ran.returncode}: {ran.stderr}")
-            layer = json.loads(ran.stdout)["layers"][0]
+            result = subprocess.run([options.program, "diff", "--json", *paths], capture_output=True, text=True)
+            if result.returncode not in (0, 5):
+                sys.exit(f"{name}: exit code {result.returncode}: {result.stderr}")
+            layer = json.loads(result.stdout)["layers"][0]
             if flip_at_60 is None:  # the control: FLIP at another --ppd must exceed the bound
-                other = [options.program, "diff", "--json", "--ppd", "60", *paths]
-                other = json.loads(subprocess.run(other, capture_output=True, text=True).stdout)
-                flip_at_60, expected_flip = other["layers"][0]["flip"], expected(a, b)["flip"]
+                command = [options.program, "diff", "--json", "--ppd", "60", *paths]
+                control = json.loads(subprocess.run(command, capture_output=True, text=True).stdout)
+                flip_at_60, expected_flip = control["layers"][0]["flip"], expected(a, b)["flip"]
             for metric, value in expected(a, b).items():
-                own = float(layer[metric])
-                deviation = 0.0 if own == value else abs(own - value)
+                measured = float(layer[metric])
+                deviation = 0.0 if measured == value else abs(measured - value)
                 if metric in ("rmse", "rel_mse", "psnr") and value not in (0, math.inf):
                     deviation /= abs(value)
                 largest, image, count = worst[metric]
                 worst[metric] = (*max((largest, image), (deviation, name)), count + 1)
-        kinds, bad = compressions(options.program, folder)
-    for line in bad:
+        kinds, failures = compressions(options.program, folder)
+    for line in failures:
         print(line)
-    print(f"{kinds} kinds of EXR files, {len(bad)} of them read differently by OpenEXR")
-    failed = bool(bad)
+    print(f"{kinds} kinds of EXR files, wgray and OpenEXR read {len(failures)} of them differently")
+    failed = bool(failures)
     if abs(flip_at_60 - expected_flip) <= BOUNDS["flip"]:
         sys.exit("flip: --ppd 60 gives the same value as the default")
     for metric, (deviation, name, count) in worst.items():
-        is_bad = not deviation <= BOUNDS[metric]
-        failed |= is_bad
-        print(f"{metric:8} largest deviation {deviation:.2e}, {name}; {count} images{'  FAILS' if is_bad else ''}")
+        exceeds_bound = not deviation <= BOUNDS[metric]
+        failed |= exceeds_bound
+        print(f"{metric:8} largest deviation {deviation:.2e}, {name}; {count} images{'  FAILS' if exceeds_bound else ''}")
     sys.exit(failed)
 
 

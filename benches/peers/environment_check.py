@@ -7,7 +7,7 @@
 
 Two conventions differ. Up is +y in Mitsuba and the left edge of the image is at -z; in wgray these are +z and -x. The
 axes are rotated accordingly. Mitsuba's first and last rows of texels are at the poles; wgray's are half a row away, and
-the pole has the mean of its row. Mitsuba therefore gets wgray's image resampled at every half row, between which both
+a pole has the mean of the nearest row. Mitsuba therefore gets wgray's image resampled at every half row, between which both
 interpolate linearly. The means of blocks of pixels over a few seeds are compared in units of their standard errors.
 """
 import argparse
@@ -31,7 +31,7 @@ SPHERES = [("floor", [-1.3, 0, 0.6]), ("gold", [0, 0.3, 0.6]), ("glass", [1.3, 0
 
 
 def image():
-    """Noise, brighter in the upper half, with two small bright texels."""
+    """Returns noise that is brighter in the upper half, with two bright texels."""
     texels = np.random.default_rng(1).random((HEIGHT, WIDTH, 3)) ** 4 * 2
     texels[:HEIGHT // 2] += [0.3, 0.5, 0.9]
     texels[8, 20] = [400, 300, 200]
@@ -40,20 +40,20 @@ def image():
 
 
 def with_poles(texels):
-    """The image resampled at every half row from pole to pole."""
+    """Returns the image, resampled at every half row from pole to pole."""
     poles = [np.broadcast_to(row.mean(0), row.shape) for row in (texels[0], texels[-1])]
     nodes = np.concatenate([poles[0][None], texels, poles[1][None]])
-    at = np.concatenate([[0], (np.arange(HEIGHT) + 0.5) / HEIGHT, [1]])
-    wanted = np.arange(2 * HEIGHT + 1) / (2 * HEIGHT)
-    columns = [np.stack([np.interp(wanted, at, nodes[:, x, c]) for c in range(3)], -1) for x in range(WIDTH)]
+    heights = np.concatenate([[0], (np.arange(HEIGHT) + 0.5) / HEIGHT, [1]])
+    new_heights = np.arange(2 * HEIGHT + 1) / (2 * HEIGHT)
+    columns = [np.stack([np.interp(new_heights, heights, nodes[:, x, c]) for c in range(3)], -1) for x in range(WIDTH)]
     return np.stack(columns, 1).astype(np.float32)
 
 
-def ours():
+def wgray_scene():
     return f"""image = {{ width = {SIDE}, height = {SIDE} }}
 camera = {{ position = [0, -5, 1.6], look_at = [0, 0, 0.8], fov = 40 }}
 render = {{ integrator = "path", max_depth = 4, rr_depth = 1024, pixel_samples = {{ count = {SAMPLES}, pattern = "random" }} }}
-environment = {{ file = "around.exr", rotate = [20, 30, 40], scale = 1.5 }}
+environment = {{ file = "environment.exr", rotate = [20, 30, 40], scale = 1.5 }}
 materials.floor = {{ type = "diffuse", color = [0.6, 0.5, 0.4] }}
 materials.gold = {{ type = "conductor", color = [1, 0.8, 0.4] }}
 materials.glass = {{ type = "dielectric", ior = 1.5 }}
@@ -66,8 +66,8 @@ normal = [0, 0, 1]
 """ + "".join(f'[[shapes]]\ntype = "sphere"\nmaterial = "{m}"\ncenter = {c}\nradius = 0.6\n' for m, c in SPHERES)
 
 
-def theirs(texels):
-    turn = lambda axis, degrees: mi.ScalarTransform4f().rotate(axis, degrees)
+def mitsuba_scene(texels):
+    rotate = lambda axis, degrees: mi.ScalarTransform4f().rotate(axis, degrees)
     axes = mi.ScalarTransform4f(np.array([[0, 0, 1, 0], [1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0, 1.0]]))
     rgb = lambda *color: {"type": "rgb", "value": list(color)}
     bsdfs = {
@@ -84,8 +84,8 @@ def theirs(texels):
         "sensor": {"type": "perspective", "fov": 40, "fov_axis": "y", "film": film,
                    "to_world": mi.ScalarTransform4f().look_at([0, -5, 1.6], [0, 0, 0.8], [0, 0, 1]),
                    "sampler": {"type": "independent", "sample_count": SAMPLES}},
-        "around": {"type": "envmap", "bitmap": mi.Bitmap(with_poles(texels)), "scale": 1.5,
-                   "to_world": turn([0, 0, 1], 40) @ turn([0, 1, 0], 30) @ turn([1, 0, 0], 20) @ axes},
+        "environment": {"type": "envmap", "bitmap": mi.Bitmap(with_poles(texels)), "scale": 1.5,
+                   "to_world": rotate([0, 0, 1], 40) @ rotate([0, 1, 0], 30) @ rotate([1, 0, 0], 20) @ axes},
         "disk": {"type": "disk", "to_world": mi.ScalarTransform4f().scale(3), "bsdf": bsdfs["floor"]},
     } | shapes)
 
@@ -98,19 +98,19 @@ def main():
     args = parser.parse_args()
     mi.set_variant("scalar_rgb")
     texels = image()
-    scene = theirs(texels)
+    scene = mitsuba_scene(texels)
     images = ([], [])
     with tempfile.TemporaryDirectory() as folder:
         folder = pathlib.Path(folder)
-        OpenEXR.File({"type": OpenEXR.scanlineimage}, {"RGB": texels}).write(str(folder / "around.exr"))
-        (folder / "scene.toml").write_text(ours())
+        OpenEXR.File({"type": OpenEXR.scanlineimage}, {"RGB": texels}).write(str(folder / "environment.exr"))
+        (folder / "scene.toml").write_text(wgray_scene())
         for seed in range(SEEDS):
             command = [args.wgray, "render", folder / "scene.toml", "-o", folder / "out.exr", "--device", args.device, "--quiet",
                        "--define", f"render.seed={seed + 1}"]
             subprocess.run(command, check=True)
             images[0].append(OpenEXR.File(str(folder / "out.exr")).channels()["RGB"].pixels * args.wrong)
             images[1].append(np.array(mi.render(scene, seed=seed)))
-    good = True
+    all_agree = True
     for block in (8, 32, 64):
         count = SIDE // block
         parts = [np.array(p, dtype=np.float64).reshape(SEEDS, count, block, count, block, 3).mean((2, 4)) for p in images]
@@ -118,11 +118,11 @@ def main():
         error = np.sqrt(sum(part.var(0, ddof=1) / SEEDS for part in parts))
         z = abs(means[0] - means[1]) / error
         # With 14 degrees of freedom: at most 6 standard errors in one block, 2 in the root mean square.
-        fits = z.max() < 6 and np.sqrt((z ** 2).mean()) < 2
-        good &= bool(fits)
+        agrees = z.max() < 6 and np.sqrt((z ** 2).mean()) < 2
+        all_agree &= bool(agrees)
         print(f"blocks of {block}: largest difference {z.max():.2f} standard errors, root mean square {np.sqrt((z ** 2).mean()):.2f}, "
-              f"{abs(means[0] / means[1] - 1).max():.4%} of the light at most: {'the same' if fits else 'DIFFERENT'}")
-    sys.exit(not good)
+              f"largest relative difference {abs(means[0] / means[1] - 1).max():.4%}: {'the same' if agrees else 'DIFFERENT'}")
+    sys.exit(not all_agree)
 
 
 main()

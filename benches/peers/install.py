@@ -47,12 +47,12 @@ class Peers:
                 sys.exit(f"{file} is missing after the installation")
 
     def mesa_backports(self):
-        """The environment variables that select the lavapipe of Debian's backports."""
+        """Returns the environment variables that select the lavapipe of Debian's backports."""
         line = subprocess.run([HERE / "mesa-backports", self.folder / "mesa-25"], check=True, stdout=subprocess.PIPE, text=True)
         return dict(pair.split("=", 1) for pair in line.stdout.split())
 
     def povray(self):
-        """POV-Ray's command and environment: the unpacked one, or the system's if `debs` found it installed."""
+        """Returns the command and environment of the unpacked POV-Ray, or of the system's if it was already installed."""
         unpacked = self.debian / "usr" / "bin" / "povray"
         if not unpacked.exists():
             return shutil.which("povray"), {}
@@ -60,7 +60,7 @@ class Peers:
         return str(unpacked), {"LD_LIBRARY_PATH": ":".join(paths)}
 
     def llvm(self):
-        """The path of LLVM 19 for Mitsuba, whose code generation fails with LLVM 14 and 15 on machines with AVX-512."""
+        """Returns the path of LLVM 19 for Mitsuba, whose code generation fails with LLVM 14 and 15 on machines with AVX-512."""
         system = pathlib.Path("/usr/lib") / self.libraries.name / "libLLVM.so.19.1"
         return next((str(p) for p in (self.libraries / "libLLVM.so.19.1", system) if p.exists()), None)
 

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Compares one light in a room with a thousand lights of the same total power; prints a Markdown table.
 
-The columns are the time, the error, and the time at the error of one light, per kind of light and device.
+The columns are the time, the error, and the time to reach the error of one light, per kind of light and device.
 
 Run it as `target/peers/venv/bin/python benches/peers/lamps.py --wgray target/release/wgray`.
 
@@ -54,44 +54,44 @@ RADIANCE = 40
 AREA = 0.25
 
 
-def places(count):
-    """The centre below the ceiling, or a random point in each cell of a grid."""
+def positions(count):
+    """Returns the point below the middle of the ceiling for one light, else a random point in each cell of a grid."""
     if count == 1:
         return [(0, 0, 2.7)]
     side = round(count ** (1 / 3))
-    chance = random.Random(7)
+    source = random.Random(7)
     cells = [(i, j, k) for i in range(side) for j in range(side) for k in range(side)]
-    return [tuple(low + (high - low) * (cell + 0.1 + 0.8 * chance.random()) / side
-                  for cell, low, high in zip(place, (-1.9, -3.9, 0.3), (1.9, 3.9, 2.9))) for place in cells]
+    return [tuple(low + (high - low) * (index + 0.1 + 0.8 * source.random()) / side
+                  for index, low, high in zip(cell, (-1.9, -3.9, 0.3), (1.9, 3.9, 2.9))) for cell in cells]
 
 
-def light(kind, count, place):
-    """The TOML text of one of `count` lights."""
-    at = f"[{', '.join(f'{x:.4f}' for x in place)}]"
+def light(kind, count, position):
+    """Returns the TOML text of one of `count` lights."""
+    center = f"[{', '.join(f'{x:.4f}' for x in position)}]"
     area = AREA / count
     if kind == "rectangle":
         side = area ** 0.5
-        return (f'[[lights]]\ntype = "rectangle"\ncenter = {at}\nsize = [{side}, {side}]\nnormal = [0, 0, -1]\ntangent = [1, 0, 0]\n'
+        return (f'[[lights]]\ntype = "rectangle"\ncenter = {center}\nsize = [{side}, {side}]\nnormal = [0, 0, -1]\ntangent = [1, 0, 0]\n'
                 f"color = [{RADIANCE}, {RADIANCE}, {RADIANCE}]\nvisible = false\n")
     if kind == "sphere":
-        return f'[[shapes]]\ntype = "sphere"\nmaterial = "light"\ncenter = {at}\nradius = {(area / 4 / np.pi) ** 0.5}\n'
+        return f'[[shapes]]\ntype = "sphere"\nmaterial = "light"\ncenter = {center}\nradius = {(area / 4 / np.pi) ** 0.5}\n'
     power = RADIANCE * area / 4
-    return f'[[lights]]\ntype = "point"\nposition = {at}\ncolor = [{power}, {power}, {power}]\n'
+    return f'[[lights]]\ntype = "point"\nposition = {center}\ncolor = [{power}, {power}, {power}]\n'
 
 
-def dark(kind, place):
-    """A non-emissive sphere of the size of one of a thousand lights; nothing for point lights."""
+def dark_sphere(kind, position):
+    """Returns a non-emissive sphere of the size of one of a thousand lights; nothing for point lights."""
     if kind == "point":
         return ""
-    return light("sphere", 1000, place).replace('"light"', '"dark"')
+    return light("sphere", 1000, position).replace('"light"', '"dark"')
 
 
 def scene(kind, count, arguments):
     walls = "".join(f'[[shapes]]\ntype = "rectangle"\nmaterial = "{material}"\ncenter = {center}\nsize = {size}\nnormal = {normal}\n'
                     f"tangent = {tangent}\n" for material, center, size, normal, tangent in WALLS)
     start = ROOM.format(size=arguments.size, depth=arguments.depth, spp=arguments.spp, radiance=RADIANCE)
-    spheres = "".join(dark(kind, place) for place in places(1000)) if arguments.dark and count == 1 else ""
-    return start + walls + spheres + "".join(light(kind, count, place) for place in places(count))
+    spheres = "".join(dark_sphere(kind, position) for position in positions(1000)) if arguments.dark and count == 1 else ""
+    return start + walls + spheres + "".join(light(kind, count, position) for position in positions(count))
 
 
 def render(folder, text, seed, device, arguments):
@@ -131,7 +131,7 @@ def main():
     parser.add_argument("--spp", type=int, default=16)
     parser.add_argument("--depth", type=int, default=4)
     arguments = parser.parse_args()
-    print("| lights | device | count | mean | seconds | error | seconds at the error of the first | ratio |")
+    print("| lights | device | count | mean | seconds | error | seconds at the error of one light | ratio |")
     print("| --- | --- | --- | --- | --- | --- | --- | --- |")
     with tempfile.TemporaryDirectory() as name:
         for kind in arguments.kinds:

@@ -16,122 +16,122 @@ import numpy as np
 
 import lamps
 
-PLACES = 2000
+POINTS = 2000
 DOWN = np.array([0, 0, -1.0])
 
 
-def walls(chance):
-    """Uniformly distributed points on the walls of the room of `lamps.py`, and their normals."""
+def points_on_walls(source):
+    """Returns uniformly distributed points on the walls of the room of `lamps.py`, and their normals."""
     size = np.array([4, 8, 3.0])
     areas = np.repeat([size[1] * size[2], size[0] * size[2], size[0] * size[1]], 2)
-    wall = chance.choice(6, p=areas / areas.sum(), size=PLACES)
+    wall = source.choice(6, p=areas / areas.sum(), size=POINTS)
     axis, side = wall // 2, wall % 2 - 0.5
-    points, normals = (chance.random((PLACES, 3)) - 0.5) * size, np.zeros((PLACES, 3))
-    rows = np.arange(PLACES)
+    points, normals = (source.random((POINTS, 3)) - 0.5) * size, np.zeros((POINTS, 3))
+    rows = np.arange(POINTS)
     points[rows, axis] = side * size[axis]
     normals[rows, axis] = -2 * side
     return points + [0, 0, 1.5], normals
 
 
-def split(where, some):
-    box = where[some]
-    axis = np.argmax(box.max(0) - box.min(0))
-    some = some[np.argsort(box[:, axis], kind="stable")]
-    return [some[:len(some) // 2], some[len(some) // 2:]]
+def split(positions, lights):
+    selected = positions[lights]
+    axis = np.argmax(selected.max(0) - selected.min(0))
+    lights = lights[np.argsort(selected[:, axis], kind="stable")]
+    return [lights[:len(lights) // 2], lights[len(lights) // 2:]]
 
 
-def tree(where, some, width):
-    """The index of a light, or a list of children: pairs of light indices and their subtree."""
-    if len(some) == 1:
-        return some[0]
-    parts = [some]
+def tree(positions, lights, width):
+    """Returns the index of a light, or a list of children: pairs of light indices and their subtree."""
+    if len(lights) == 1:
+        return lights[0]
+    parts = [lights]
     while len(parts) < width:
-        cost = [len(part) * np.prod(np.ptp(where[part], axis=0) + 0.01) ** (2 / 3) if len(part) > 1 else 0 for part in parts]
+        cost = [len(part) * np.prod(np.ptp(positions[part], axis=0) + 0.01) ** (2 / 3) if len(part) > 1 else 0 for part in parts]
         worst = int(np.argmax(cost))
         if cost[worst] == 0:
             break
-        parts[worst:worst + 1] = split(where, parts[worst])
-    return [(part, tree(where, part, width)) for part in parts]
+        parts[worst:worst + 1] = split(positions, parts[worst])
+    return [(part, tree(positions, part, width)) for part in parts]
 
 
 def heights(points, normals, center, flat):
-    """The distance of a sphere's centre, and its heights above the planes of the light and of the surface."""
+    """Returns the distance of a sphere's centre, and its heights above the planes of the light and of the surface."""
     to = center - points
     distance = np.sqrt((to ** 2).sum(-1))
     return distance, -(to @ DOWN) if flat else distance, (to * normals).sum(-1)
 
 
-def bounded(points, normals, center, radius, flat):
+def cosine_bounds(points, normals, center, radius, flat):
     distance, leaving, facing = heights(points, normals, center, flat)
     cosines = [np.maximum((height + radius) / (distance + radius), 1e-3) for height in (leaving, facing)]
     value = cosines[0] * cosines[1] / (distance ** 2 + 0.5 * radius ** 2)
     return np.where((leaving + 1.57 * radius > 0) & (facing + radius > 0), value, 0)
 
 
-def means(points, normals, center, radius, flat):
+def cosine_means(points, normals, center, radius, flat):
     distance, leaving, facing = heights(points, normals, center, flat)
     square = distance ** 2 + 0.1 * radius ** 2
 
     def above(height):
-        cut = (height + radius) ** 2 / (4 * max(radius, 1e-9))
-        return np.maximum(np.where(np.abs(height) < radius, cut, np.maximum(height, 0)), 0.03 * radius)
+        partial = (height + radius) ** 2 / (4 * max(radius, 1e-9))
+        return np.maximum(np.where(np.abs(height) < radius, partial, np.maximum(height, 0)), 0.03 * radius)
 
     value = above(leaving) * above(facing) / square ** 2
     return np.where((leaving + 1.57 * radius > 0) & (facing + radius > 0), value, 0)
 
 
-def probabilities(where, width, importance, points, normals, flat):
-    out = np.zeros((len(points), len(where)))
+def probabilities(positions, width, importance, points, normals, flat):
+    out = np.zeros((len(points), len(positions)))
 
-    def below(node, probability):
+    def add_node(node, probability):
         if not isinstance(node, list):
             out[:, node] = probability
             return
         values = []
-        for some, _ in node:
-            low, high = where[some].min(0), where[some].max(0)
+        for lights, _ in node:
+            low, high = positions[lights].min(0), positions[lights].max(0)
             radius = np.linalg.norm(high - low) / 2
-            values.append(len(some) * importance(points, normals, (low + high) / 2, radius, flat))
+            values.append(len(lights) * importance(points, normals, (low + high) / 2, radius, flat))
         shares = np.stack(values, -1)
         shares = np.where(shares > 0, np.maximum(shares, shares.sum(-1, keepdims=True) / 4096), 0)
         total = shares.sum(-1, keepdims=True)
         shares = np.where(total > 0, shares / np.where(total > 0, total, 1), 0)
         for i, (_, child) in enumerate(node):
-            below(child, probability * shares[:, i])
+            add_node(child, probability * shares[:, i])
 
-    below(tree(where, np.arange(len(where)), width), np.ones(len(points)))
+    add_node(tree(positions, np.arange(len(positions)), width), np.ones(len(points)))
     return out
 
 
-def variance(where, width, importance, points, normals, flat):
-    to = where[None] - points[:, None]
+def variance(positions, width, importance, points, normals, flat):
+    to = positions[None] - points[:, None]
     squares = (to ** 2).sum(-1)
     cosines = np.maximum((to * normals[:, None]).sum(-1), 0) / np.sqrt(squares)
     light = cosines / squares * (np.maximum(-(to @ DOWN), 0) / np.sqrt(squares) if flat else 1)
-    chances = probabilities(where, width, importance, points, normals, flat)
-    if ((light > 1e-12) & (chances == 0)).any():
+    probability = probabilities(positions, width, importance, points, normals, flat)
+    if ((light > 1e-12) & (probability == 0)).any():
         raise SystemExit("a light that contributes has probability 0")
-    second = np.where(light > 0, light ** 2 / np.maximum(chances, 1e-300), 0).sum(1)
+    second = np.where(light > 0, light ** 2 / np.maximum(probability, 1e-300), 0).sum(1)
     mean = light.sum(1)
     lit = mean > 1e-3
-    found = second[lit] / mean[lit] ** 2 - 1
-    return f"{found.mean():.2f} ({np.median(found):.2f})"
+    relative = second[lit] / mean[lit] ** 2 - 1
+    return f"{relative.mean():.2f} ({np.median(relative):.2f})"
 
 
 def main():
     argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter).parse_args()
-    chance = np.random.default_rng(1)
-    points, normals = walls(chance)
+    source = np.random.default_rng(1)
+    points, normals = points_on_walls(source)
     grid = np.meshgrid(np.linspace(-1.9, 1.9, 25), np.linspace(-3.9, 3.9, 40), [2.7])
-    clumps = [(x, y, 1.5) + 0.05 * chance.standard_normal((100, 3)) for x in (-1, 1) for y in (-3, -1.5, 0, 1.5, 3)]
-    places = {"spread over the room": np.array(lamps.places(1000)), "under the ceiling": np.stack(grid, -1).reshape(-1, 3),
+    clumps = [(x, y, 1.5) + 0.05 * source.standard_normal((100, 3)) for x in (-1, 1) for y in (-3, -1.5, 0, 1.5, 3)]
+    layouts = {"spread over the room": np.array(lamps.positions(1000)), "under the ceiling": np.stack(grid, -1).reshape(-1, 3),
               "in ten clumps": np.concatenate(clumps)}
-    print("| a thousand lights | two children, bounds of cosines | four children | and means of cosines |")
+    print("| a thousand lights | two children, bounds of cosines | four children, bounds of cosines | four children, means of cosines |")
     print("| --- | ---: | ---: | ---: |")
-    for name, where in places.items():
+    for name, positions in layouts.items():
         for kind, flat in (("rectangles that face down", True), ("points", False)):
-            variants = [(2, bounded), (4, bounded), (4, means)]
-            cells = [variance(where, width, importance, points, normals, flat) for width, importance in variants]
+            variants = [(2, cosine_bounds), (4, cosine_bounds), (4, cosine_means)]
+            cells = [variance(positions, width, importance, points, normals, flat) for width, importance in variants]
             print(f"| {kind}, {name} | {' | '.join(cells)} |", flush=True)
 
 

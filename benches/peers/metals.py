@@ -4,8 +4,8 @@
     benches/peers/run --install-only                                    once
     target/peers/venv/bin/python benches/peers/metals.py
 
-Each spectrum is weighted by the colour matching functions of CIE 1931, taken to sRGB's primaries, and divided by what a spectrum of
-1 gives. The last column is the share of light that the metal reflects straight on.
+Each spectrum is weighted by the colour matching functions of CIE 1931, converted to sRGB's primaries, and divided by the result of
+a constant spectrum of 1. The last column is the reflectance at normal incidence.
 """
 import os
 import pathlib
@@ -35,8 +35,8 @@ def main():
     folder = pathlib.Path(mi.__file__).parent / "data" / "ior"
     for metal, name in FILES.items():
         n, k = index(folder, name, "eta"), index(folder, name, "k")
-        straight = ((n - 1) ** 2 + k * k) / ((n + 1) ** 2 + k * k)
-        print(f"{metal:18} {n.round(4)} {k.round(4)} {straight.round(2)}")
+        reflectance = ((n - 1) ** 2 + k * k) / ((n + 1) ** 2 + k * k)
+        print(f"{metal:18} {n.round(4)} {k.round(4)} {reflectance.round(2)}")
 
 
 if __name__ == "__main__":

@@ -37,7 +37,7 @@ import scenes
 SAMPLES, SIDE = 16, 4
 
 
-def wgray(args, path, size):
+def render_wgray(args, path, size):
     """Returns linear RGB and the depth, which is 0 for a miss."""
     with tempfile.TemporaryDirectory() as folder:
         out = os.path.join(folder, "out.exr")
@@ -47,8 +47,8 @@ def wgray(args, path, size):
         return np.stack([channels[c].pixels for c in "RGB"], -1).astype(float), channels["depth.Z"].pixels.astype(float)
 
 
-def mitsuba(path, size, moved=0):
-    """Like `wgray`, with Mitsuba's rays and a camera moved by `moved`; also returns the mask of visible lights."""
+def render_mitsuba(path, size, moved=0):
+    """Like `render_wgray`, with Mitsuba's rays and a camera moved by `moved`; also returns the mask of visible lights."""
     import mitsuba_scenes
     scene = scenes.load(path)
     scene.position = [scene.position[0] + moved, *scene.position[1:]]
@@ -69,8 +69,8 @@ def mitsuba(path, size, moved=0):
     # Materials are identified by their diffuse colour.
     materials = list({tuple(s.material.diffuse): s.material for s in scene.shapes}.values())
     albedo = np.array(si.bsdf().eval_diffuse_reflectance(si)).T
-    which = np.argmin(abs(albedo[:, None] - np.array([m.diffuse for m in materials])).sum(-1), -1)
-    pick = lambda term: np.array([getattr(m, term) for m in materials])[which]
+    material_index = np.argmin(abs(albedo[:, None] - np.array([m.diffuse for m in materials])).sum(-1), -1)
+    pick = lambda term: np.array([getattr(m, term) for m in materials])[material_index]
     image = pick("ambient") * np.array(scene.ambient)
     kd, ks, power = pick("diffuse"), pick("specular"), pick("shininess")
     cells = 2 * (np.arange(SIDE) + 0.5) / SIDE - 1
@@ -90,29 +90,30 @@ def mitsuba(path, size, moved=0):
 
 
 def silhouettes(depth):
-    """The mask of pixels where the depth is not linear along a row or column: edges of surfaces."""
+    """Returns the mask of pixels where the depth is not linear along a row or column: edges of surfaces."""
     a = np.pad(depth, 1, mode="reflect", reflect_type="odd")
     bend = np.maximum(abs(a[2:, 1:-1] - 2 * depth + a[:-2, 1:-1]), abs(a[1:-1, 2:] - 2 * depth + a[1:-1, :-2]))
     return bend > 0.01 * np.where(depth > 0, depth, np.inf).min()
 
 
 def check(args, path, moved=0):
-    ours, our_depth = wgray(args, path, args.size)
-    theirs, depth, on_light = mitsuba(path, args.size, moved)
+    ours, our_depth = render_wgray(args, path, args.size)
+    theirs, depth, on_light = render_mitsuba(path, args.size, moved)
     edge = silhouettes(depth) | silhouettes(our_depth)
-    other_cover = (our_depth > 0) != (depth > 0)
-    deep = (our_depth > 0) & (depth > 0)
-    off = deep & (abs(our_depth - depth) > 1e-4 * depth)
-    plain = ~on_light
-    difference = abs(ours - theirs).max(-1)[plain]
-    mean, other_mean = ours[plain].mean(), theirs[plain].mean()
+    coverage_differs = (our_depth > 0) != (depth > 0)
+    hit_by_both = (our_depth > 0) & (depth > 0)
+    depth_differs = hit_by_both & (abs(our_depth - depth) > 1e-4 * depth)
+    off_light = ~on_light
+    difference = abs(ours - theirs).max(-1)[off_light]
+    mean, their_mean = ours[off_light].mean(), theirs[off_light].mean()
     close = (difference <= 0.02).mean()
-    good = not (other_cover & ~edge).any() and not (off & ~edge).any() and abs(mean / other_mean - 1) <= 0.01 and close >= 0.97
-    print(f"{pathlib.Path(path).stem}{', camera moved' if moved else ''}: {'good' if good else 'FAILS'}; "
-          f"{deep.mean():.1%} of pixels hit by both, {other_cover.sum()} by one alone; depth off in {off.sum()} pixels, "
-          f"{(off & ~edge).sum()} of them not on silhouettes ({edge.mean():.1%} are); means {mean:.5f} and {other_mean:.5f}, "
+    passes = (not (coverage_differs & ~edge).any() and not (depth_differs & ~edge).any()
+              and abs(mean / their_mean - 1) <= 0.01 and close >= 0.97)
+    print(f"{pathlib.Path(path).stem}{', camera moved' if moved else ''}: {'passes' if passes else 'FAILS'}; "
+          f"{hit_by_both.mean():.1%} of pixels hit in both images, {coverage_differs.sum()} pixels in one only; wrong depths: {depth_differs.sum()}, "
+          f"{(depth_differs & ~edge).sum()} of them not on silhouettes ({edge.mean():.1%} of pixels); means {mean:.5f} and {their_mean:.5f}, "
           f"{close:.2%} of pixels within 0.02", flush=True)
-    return good
+    return passes
 
 
 def main():
@@ -124,8 +125,8 @@ def main():
     args = parser.parse_args()
     mi.set_variant("llvm_ad_rgb")
     mi.set_log_level(mi.LogLevel.Error)
-    good = all([check(args, path) for path in args.scenes])
-    sys.exit(not good or check(args, args.scenes[0], moved=0.01))
+    all_pass = all([check(args, path) for path in args.scenes])
+    sys.exit(not all_pass or check(args, args.scenes[0], moved=0.01))
 
 
 if __name__ == "__main__":

@@ -32,7 +32,7 @@ def register():
             return type(self).__name__
 
     class Conductor(Rough):
-        """One-sided. The reflectance is `color`, times the reflectance of complex indices `eta` + i `k` if given."""
+        """A one-sided metal. The reflectance is `color`, times that of the complex indices `eta` + i `k` if given."""
 
         def __init__(self, props):
             mi.BSDF.__init__(self, props)

@@ -1,7 +1,7 @@
 """The Phong BRDF as a Mitsuba BSDF: f = kd / pi + ks (n + 2) / (2 pi) cos^n alpha.
 
 alpha is the angle to the mirror direction. Call `register` after setting the variant; it returns the plugin's name. A
-lobe is selected with a probability proportional to the mean of kd or ks. One-sided: wrap it in Mitsuba's `twosided`.
+lobe is selected with a probability proportional to the mean of kd or ks. The BSDF is one-sided: wrap it in Mitsuba's `twosided`.
 """
 import drjit as dr
 import mitsuba as mi
@@ -22,18 +22,18 @@ def register():
         def to_string(self):
             return f"Phong[{self.power}]"
 
-        def share(self, si, active):
-            """The probability of the glossy lobe."""
+        def glossy_probability(self, si, active):
+            """Returns the probability of the glossy lobe."""
             diffuse, glossy = dr.mean(self.kd.eval(si, active)), dr.mean(self.ks.eval(si, active))
             return dr.select(diffuse + glossy > 0, glossy / (diffuse + glossy), 0)
 
         def lobe(self, si, wo):
-            """cos^n alpha; alpha is counted from the mirrored direction of the viewer."""
+            """Returns cos^n alpha."""
             cosine = dr.maximum(dr.dot(mi.reflect(si.wi), wo), 0)
             return dr.select(cosine > 0, cosine ** self.power, 0)
 
         def sample(self, ctx, si, which, at, active=True):
-            glossy = which < self.share(si, active)
+            glossy = which < self.glossy_probability(si, active)
             cosine = at.x ** (1 / (self.power + 1))
             sine = dr.safe_sqrt(1 - cosine * cosine)
             s, c = dr.sincos(2 * dr.pi * at.y)
@@ -56,9 +56,9 @@ def register():
         def eval_pdf(self, ctx, si, wo, active=True):
             cosine = mi.Frame3f.cos_theta(wo)
             active &= (mi.Frame3f.cos_theta(si.wi) > 0) & (cosine > 0)
-            lobe, n, share = self.lobe(si, wo), self.power, self.share(si, active)
+            lobe, n, probability = self.lobe(si, wo), self.power, self.glossy_probability(si, active)
             value = self.kd.eval(si, active) * dr.inv_pi + self.ks.eval(si, active) * ((n + 2) * lobe / (2 * dr.pi))
-            density = share * (n + 1) * lobe / (2 * dr.pi) + (1 - share) * cosine * dr.inv_pi
+            density = probability * (n + 1) * lobe / (2 * dr.pi) + (1 - probability) * cosine * dr.inv_pi
             return dr.select(active, value * cosine, 0), dr.select(active, density, 0)
 
         def eval_diffuse_reflectance(self, si, active=True):

@@ -3,16 +3,16 @@
 
     DRJIT_LIBLLVM_PATH=... python mitsuba_scenes.py SCENE.toml [--size N] [--spp N] [--light-samples N] [--warm N] [-o FILE]
 
-Direct light only, with LIGHT_SAMPLES shadow rays per light and hit: the work of wgray's Phong integrator with cheaper,
-diffuse shading. Mitsuba chooses a light at random for each of its `emitter_samples`, so it gets LIGHT_SAMPLES times the
+Renders direct light only, with LIGHT_SAMPLES shadow rays per light and hit: as many rays as wgray's Phong integrator,
+with cheaper, diffuse shading. Mitsuba chooses a light at random for each of its `emitter_samples`, so it gets LIGHT_SAMPLES times the
 number of lights. `load_s` is the time to read the scene's files and to build Embree's BVHs, `first_s` that of the first
-render, including compilation, `warm_s` the median of WARM further renders. --warm 0 with -o is the whole process, as in
+render, including compilation, `warm_s` the median of WARM further renders. --warm 0 with -o times the whole process, as in
 a user's script.
 
-With --integrator path it renders a scene of the path tracer: with `path`, or with `volpath` if glass absorbs. The depth
-is `max_depth` + 1, because Mitsuba also counts the segment from the camera. The BSDFs are Mitsuba's, except Phong's,
-which it lacks (mitsuba_phong.py). `emission` becomes an area light on the outer side of a closed shape, and two of them
-back to back for a rectangle, a disk and a triangle. Emissive meshes must be closed. --seed is that of the first image.
+With --integrator path it renders a scene of the path tracer: with `path`, or with `volpath` if glass absorbs. Mitsuba's
+depth is `max_depth` + 1, because Mitsuba also counts the segment from the camera. The BSDFs are Mitsuba's, except Phong's,
+which it lacks (mitsuba_phong.py). `emission` becomes an area light on the outer side of a closed shape, and two area lights
+back to back for a rectangle, a disk and a triangle. Emissive meshes must be closed. --seed is the seed of the first image.
 
 Mitsuba's `sphere` supports neither unequal axes nor shear. --ellipsoids selects the replacement of ellipsoids:
     spheres   a sphere of the same volume; fastest in Mitsuba for few ellipsoids
@@ -39,82 +39,82 @@ import mitsuba_phong
 import scenes
 
 MAX_SPHERES = 1000
-# Distance of an emissive rectangle, disk or triangle from each of its two sides: at 5e-4 nearby surfaces are visibly
-# brighter.
+# Distance of an emissive rectangle, disk or triangle from each of its two area lights: at 5e-4, nearby surfaces are
+# visibly brighter.
 SIDE_OFFSET = 2e-5
 BLACK = {"type": "diffuse", "reflectance": {"type": "rgb", "value": [0, 0, 0]}}
 
 
-def tint(value):
-    """A colour as a Mitsuba texture. Mitsuba's two squares cover a uv interval of 1, ours an interval of 2."""
+def color_texture(value):
+    """Returns a colour as a Mitsuba texture. Two squares cover a uv interval of 1 in Mitsuba, of 2 in wgray."""
     if isinstance(value, scenes.Checker):
         u, v = value.scale
-        return {"type": "checkerboard", "color0": tint(value.even), "color1": tint(value.odd),
+        return {"type": "checkerboard", "color0": color_texture(value.even), "color1": color_texture(value.odd),
                 "to_uv": mi.ScalarTransform3f().scale([u / 2, v / 2])}
     return {"type": "rgb", "value": value}
 
 
-def paint(material, traced, exact):
+def bsdf(material, traced, exact):
     if material.kind == "phong" and traced:
-        plugin = {"type": mitsuba_phong.NAME, "kd": tint(material.diffuse), "ks": tint(material.specular),
+        plugin = {"type": mitsuba_phong.NAME, "kd": color_texture(material.diffuse), "ks": color_texture(material.specular),
                   "shininess": material.shininess}
     elif material.kind in ("phong", "diffuse"):
-        plugin = {"type": "diffuse", "reflectance": tint(material.diffuse if material.kind == "phong" else material.color)}
+        plugin = {"type": "diffuse", "reflectance": color_texture(material.diffuse if material.kind == "phong" else material.color)}
     elif material.kind == "conductor":
-        plugin = {"type": "conductor", "material": "none", "specular_reflectance": tint(material.color)}
+        plugin = {"type": "conductor", "material": "none", "specular_reflectance": color_texture(material.color)}
         if material.index:
-            eta, k = (wide(value) for value in material.index)
+            eta, k = (unbounded_color(value) for value in material.index)
             plugin = {"type": "conductor", "eta": eta, "k": k}
         if any(material.alpha) and exact:
-            plugin = {"type": mitsuba_ggx.CONDUCTOR, "color": tint(material.color)} | microfacets(*material.alpha)
+            plugin = {"type": mitsuba_ggx.CONDUCTOR, "color": color_texture(material.color)} | microfacets(*material.alpha)
             if material.index:
                 plugin |= {f"{name}{i}": float(x) for name, values in zip(("eta", "k"), material.index) for i, x in enumerate(values)}
         elif any(material.alpha):
             plugin |= {"type": "roughconductor", "distribution": "ggx"} | microfacets(*material.alpha)
     elif material.kind == "principled":
-        # Only the metal agrees, at roughnesses with little masking and multiple scattering: GGX with Schlick's formula.
+        # Only the metal (GGX with Schlick's formula) agrees, at roughnesses with little masking and multiple scattering.
         # Disney's diffuse term, specular lobe, glass, clearcoat and sheen differ from glTF's; their cost is comparable.
-        along, across = (float(alpha) for alpha in material.alpha)
-        anisotropy = {"anisotropic": (1 - across / along) / 0.9} if along > across else {}
-        plugin = {"type": "principled", "base_color": tint(material.color), "metallic": float(material.metallic),
-                  "roughness": (along * across) ** 0.25, "specular": 0.5, "clearcoat": float(material.coat[0]),
+        alpha_u, alpha_v = (float(alpha) for alpha in material.alpha)
+        anisotropy = {"anisotropic": (1 - alpha_v / alpha_u) / 0.9} if alpha_u > alpha_v else {}
+        plugin = {"type": "principled", "base_color": color_texture(material.color), "metallic": float(material.metallic),
+                  "roughness": (alpha_u * alpha_v) ** 0.25, "specular": 0.5, "clearcoat": float(material.coat[0]),
                   "clearcoat_gloss": 1.0 - material.coat[1]} | anisotropy
     elif material.thin:
-        return {"type": "thindielectric", "int_ior": float(material.ior), "ext_ior": 1.0, "specular_transmittance": tint(material.color)}
+        return {"type": "thindielectric", "int_ior": float(material.ior), "ext_ior": 1.0, "specular_transmittance": color_texture(material.color)}
     else:
-        plugin = {"type": "dielectric", "int_ior": float(material.ior), "ext_ior": 1.0, "specular_transmittance": tint(material.color)}
+        plugin = {"type": "dielectric", "int_ior": float(material.ior), "ext_ior": 1.0, "specular_transmittance": color_texture(material.color)}
         if any(material.alpha) and exact:
-            plugin = {"type": mitsuba_ggx.DIELECTRIC, "int_ior": float(material.ior), "color": tint(material.color)} | microfacets(*material.alpha)
+            plugin = {"type": mitsuba_ggx.DIELECTRIC, "int_ior": float(material.ior), "color": color_texture(material.color)} | microfacets(*material.alpha)
         elif any(material.alpha):
             plugin |= {"type": "roughdielectric", "distribution": "ggx"} | microfacets(*material.alpha)
         return plugin
     return {"type": "twosided", "b": plugin}
 
 
-def wide(value):
-    """Three numbers that may exceed 1."""
+def unbounded_color(value):
+    """Returns three numbers that may exceed 1 as a Mitsuba texture."""
     return {"type": "rgb", "value": value}
 
 
-def microfacets(along, across):
-    return {"alpha_u": float(along), "alpha_v": float(across)}
+def microfacets(alpha_u, alpha_v):
+    return {"alpha_u": float(alpha_u), "alpha_v": float(alpha_v)}
 
 
 def environment_emitter(T, environment):
-    """A constant or an image environment.
+    """Returns a constant or an image environment.
 
     Mitsuba's rows of texels are at equal angles from pole to pole, wgray's at the centres of bands. With 2 n + 1 rows
-    Mitsuba's include wgray's n rows; the rows in between are means, which both interpolate linearly.
+    Mitsuba's include wgray's n rows; the rows in between are means, as both renderers interpolate linearly.
     """
-    if not isinstance(environment, scenes.Map):
-        return {"type": "constant", "radiance": tint(environment)}
+    if not isinstance(environment, scenes.EnvironmentMap):
+        return {"type": "constant", "radiance": color_texture(environment)}
     rows = np.array(mi.Bitmap(environment.file).convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32, False))
     image = np.empty((2 * len(rows) + 1, *rows.shape[1:]), np.float32)
     image[1::2] = rows
     image[2:-1:2] = (rows[:-1] + rows[1:]) / 2
     image[0], image[-1] = rows[0].mean(0), rows[-1].mean(0)
-    place = T().rotate([0, 0, 1], environment.rotate) @ T(np.array([[0, 0, 1, 0], [1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0, 1.0]]))
-    return {"type": "envmap", "bitmap": mi.Bitmap(image), "scale": float(environment.scale), "to_world": place}
+    to_world = T().rotate([0, 0, 1], environment.rotate) @ T(np.array([[0, 0, 1, 0], [1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0, 1.0]]))
+    return {"type": "envmap", "bitmap": mi.Bitmap(image), "scale": float(environment.scale), "to_world": to_world}
 
 
 def rectangle(T, center, u, v, kind="rectangle"):
@@ -141,7 +141,7 @@ def sphere(T, s):
 
 
 def round_mesh(T, s, path, rows=256):
-    """A sphere, or for unequal axes a mesh of negligible tessellation error with the ellipsoid's normals."""
+    """Returns a sphere, or for unequal axes a mesh of negligible tessellation error with the ellipsoid's normals."""
     axes = np.array([s.a, s.b, s.c], float)
     if np.allclose(axes @ axes.T, np.eye(3) * np.dot(axes[0], axes[0]), atol=1e-9):
         return sphere(T, s)
@@ -158,7 +158,7 @@ def round_mesh(T, s, path, rows=256):
 
 
 def both_sides(T, s, path):
-    """The two one-sided shapes of an open emissive shape; the second is flipped by exchanging its edges."""
+    """Returns the two one-sided shapes of an open emissive shape; exchanged edges flip the second one."""
     if any(isinstance(c, scenes.Checker) and c.scale[0] != c.scale[1] for c in (s.material.color, s.material.diffuse, s.material.emission)):
         raise ValueError("a checker on an emissive shape needs equal scales for u and v")
     if isinstance(s, scenes.Triangles):
@@ -174,24 +174,24 @@ def both_sides(T, s, path):
 
 
 def ellipsoids(shapes):
-    """One shape for all ellipsoids of a material."""
+    """Returns one shape for all ellipsoids of a material."""
     # The singular value decomposition gives orthogonal half axes of the same ellipsoid.
-    turns, scales, _ = np.linalg.svd(np.array([[s.a, s.b, s.c] for s in shapes], float).transpose(0, 2, 1))
-    turns *= np.linalg.det(turns)[:, None, None]
-    return {"type": "ellipsoids", "centers": rows([s.center for s in shapes]), "scales": rows(scales),
-            "quaternions": rows([quaternion(turn) for turn in turns]), "extent": 1.0, "extent_adaptive_clamping": False}
+    rotations, scales, _ = np.linalg.svd(np.array([[s.a, s.b, s.c] for s in shapes], float).transpose(0, 2, 1))
+    rotations *= np.linalg.det(rotations)[:, None, None]
+    return {"type": "ellipsoids", "centers": tensor([s.center for s in shapes]), "scales": tensor(scales),
+            "quaternions": tensor([quaternion(rotation) for rotation in rotations]), "extent": 1.0, "extent_adaptive_clamping": False}
 
 
-def rows(values):
+def tensor(values):
     return mi.TensorXf(np.array(values, np.float32))
 
 
-def quaternion(turn):
-    w = np.sqrt(max(0, 1 + np.trace(turn))) / 2
+def quaternion(rotation):
+    w = np.sqrt(max(0, 1 + np.trace(rotation))) / 2
     if w > 1e-6:
-        x, y, z = (turn[2, 1] - turn[1, 2]) / (4 * w), (turn[0, 2] - turn[2, 0]) / (4 * w), (turn[1, 0] - turn[0, 1]) / (4 * w)
-    else:  # half a turn about the eigenvector of 1
-        w, (x, y, z) = 0, np.linalg.eigh(turn + turn.T)[1][:, -1]
+        x, y, z = ((rotation[k, j] - rotation[j, k]) / (4 * w) for j, k in ((1, 2), (2, 0), (0, 1)))
+    else:  # a rotation by 180 degrees about the eigenvector of eigenvalue 1
+        w, (x, y, z) = 0, np.linalg.eigh(rotation + rotation.T)[1][:, -1]
     return [x, y, z, w]
 
 
@@ -199,39 +199,39 @@ def mesh_file(s):
     kind = os.path.splitext(s.file)[1]
     if kind not in (".ply", ".obj"):
         raise ValueError(f"{s.file}: other renderers support only PLY and OBJ files")
-    # Our files have no normals. In this case wgray's default is flat shading, and Mitsuba's is smooth shading.
+    # The benchmark files have no normals. Without normals, wgray's default is flat shading, Mitsuba's is smooth.
     return {"type": kind[1:], "filename": s.file, "face_normals": s.normals in (None, "flat")}
 
 
 def sensor(T, scene, width, height, spp):
-    row = {"film": {"type": "hdrfilm", "width": width, "height": height, "rfilter": {"type": "box"}},
-           "sampler": {"type": "independent", "sample_count": spp}}
-    place = T().look_at(origin=scene.position, target=scene.look_at, up=scene.up)
+    film = {"film": {"type": "hdrfilm", "width": width, "height": height, "rfilter": {"type": "box"}},
+            "sampler": {"type": "independent", "sample_count": spp}}
+    to_world = T().look_at(origin=scene.position, target=scene.look_at, up=scene.up)
     if scene.height_seen is None and scene.lens:
         diameter, distance = scene.lens
-        return row | {"type": "thinlens", "fov": scene.fov, "fov_axis": "y", "to_world": place, "aperture_radius": diameter / 2,
-                      "focus_distance": float(distance)}
+        return film | {"type": "thinlens", "fov": scene.fov, "fov_axis": "y", "to_world": to_world, "aperture_radius": diameter / 2,
+                       "focus_distance": float(distance)}
     if scene.height_seen is None:
-        return row | {"type": "perspective", "fov": scene.fov, "fov_axis": "y", "to_world": place}
+        return film | {"type": "perspective", "fov": scene.fov, "fov_axis": "y", "to_world": to_world}
     # Mitsuba's orthographic camera sees -1 to 1 along x, and this range divided by the aspect ratio along y.
     half = scene.height_seen / 2 * width / height
-    return row | {"type": "orthographic", "near_clip": 1e-4, "to_world": place @ T().scale([half, half, 1])}
+    return film | {"type": "orthographic", "near_clip": 1e-4, "to_world": to_world @ T().scale([half, half, 1])}
 
 
 def lights(T, scene):
     for l in scene.lights:
-        if isinstance(l, scenes.Point):
-            yield {"type": "point", "position": l.position, "intensity": tint(l.color)}
+        if isinstance(l, scenes.PointLight):
+            yield {"type": "point", "position": l.position, "intensity": color_texture(l.color)}
         elif isinstance(l, scenes.SpotLight):
-            other = np.eye(3)[int(np.argmin(np.abs(l.direction)))]
-            place = T().look_at(origin=l.position, target=list(np.add(l.position, l.direction)), up=list(other))
-            yield {"type": "spot", "to_world": place, "intensity": tint(l.color), "cutoff_angle": l.angle, "beam_width": 0.9999 * l.angle}
-        elif isinstance(l, scenes.Sun):
-            yield {"type": "directional", "direction": l.direction, "irradiance": tint(l.color)}
+            up = np.eye(3)[int(np.argmin(np.abs(l.direction)))]
+            to_world = T().look_at(origin=l.position, target=list(np.add(l.position, l.direction)), up=list(up))
+            yield {"type": "spot", "to_world": to_world, "intensity": color_texture(l.color), "cutoff_angle": l.angle, "beam_width": 0.9999 * l.angle}
+        elif isinstance(l, scenes.DirectionalLight):
+            yield {"type": "directional", "direction": l.direction, "irradiance": color_texture(l.color)}
         else:
             # Mitsuba's light falls off with distance and the cosine at the light; 20 gives about the same brightness.
             radiance = l.color if scene.integrator == "path" else scenes.scaled(l.color, 20)
-            yield rectangle(T, l.center, l.u, l.v) | {"bsdf": BLACK, "emitter": {"type": "area", "radiance": tint(radiance)}}
+            yield rectangle(T, l.center, l.u, l.v) | {"bsdf": BLACK, "emitter": {"type": "area", "radiance": color_texture(radiance)}}
 
 
 def integrator(scene, light_samples):
@@ -242,7 +242,8 @@ def integrator(scene, light_samples):
 
 
 def load(scene, size, spp, light_samples, curved="auto", exact=False):
-    """The Mitsuba scene; `curved` is the value of --ellipsoids. `exact`: use wgray's rough BSDFs (mitsuba_ggx.py)."""
+    """Returns the Mitsuba scene. `curved` is the value of --ellipsoids; `exact` selects wgray's rough BSDFs
+    (mitsuba_ggx.py)."""
     T = mi.ScalarTransform4f
     folder = tempfile.mkdtemp()
     width, height = size or (scene.width, scene.height)
@@ -251,40 +252,40 @@ def load(scene, size, spp, light_samples, curved="auto", exact=False):
         mitsuba_phong.register()
         mitsuba_ggx.register()
     parts = {"type": "scene", "integrator": integrator(scene, light_samples), "sensor": sensor(T, scene, width, height, spp)}
-    if scene.environment and (isinstance(scene.environment, scenes.Map) or any(scene.environment)):
+    if scene.environment and (isinstance(scene.environment, scenes.EnvironmentMap) or any(scene.environment)):
         parts["environment"] = environment_emitter(T, scene.environment)
     bsdfs = {}  # by material, so that shapes share them
 
-    def painted(row, material):
+    def with_material(row, material):
         name = bsdfs.setdefault(id(material), f"material{len(bsdfs)}")
-        parts.setdefault(name, paint(material, traced, exact))
+        parts.setdefault(name, bsdf(material, traced, exact))
         row = row | {"bsdf": {"type": "ref", "id": name}}
         if is_emissive(material):
-            row["emitter"] = {"type": "area", "radiance": tint(material.emission)}
+            row["emitter"] = {"type": "area", "radiance": color_texture(material.emission)}
         if material.absorption and any(material.absorption):
-            most = max(material.absorption)  # a medium's colours are at most 1, its scale is free; 0 gives NaN
-            row["interior"] = {"type": "homogeneous", "albedo": tint([0, 0, 0]), "scale": float(most),
-                               "sigma_t": tint([max(a / most, 1e-6) for a in material.absorption])}
+            scale = max(material.absorption)  # a medium's colours are at most 1, its scale is unlimited; 0 gives NaN
+            row["interior"] = {"type": "homogeneous", "albedo": color_texture([0, 0, 0]), "scale": float(scale),
+                               "sigma_t": color_texture([max(a / scale, 1e-6) for a in material.absorption])}
         return row
 
-    ellipses = [s for s in scene.shapes if isinstance(s, scenes.Ellipsoid)]
+    all_ellipsoids = [s for s in scene.shapes if isinstance(s, scenes.Ellipsoid)]
     if curved == "auto":
-        curved = "exact" if len(ellipses) > MAX_SPHERES else "spheres"
-    together = collections.defaultdict(list)
-    for s in ellipses if curved == "exact" else []:
-        together[id(s.material)].append(s)
-    for i, group in enumerate(together.values()):
-        parts[f"ellipsoids{i}"] = painted(ellipsoids(group), group[0].material)
-    uses = collections.Counter((s.file, id(s.material)) for s in scene.shapes if isinstance(s, scenes.Mesh))
+        curved = "exact" if len(all_ellipsoids) > MAX_SPHERES else "spheres"
+    by_material = collections.defaultdict(list)
+    for s in all_ellipsoids if curved == "exact" else []:
+        by_material[id(s.material)].append(s)
+    for i, group in enumerate(by_material.values()):
+        parts[f"ellipsoids{i}"] = with_material(ellipsoids(group), group[0].material)
+    use_counts = collections.Counter((s.file, id(s.material)) for s in scene.shapes if isinstance(s, scenes.Mesh))
     groups = {}  # names of shape groups
     for i, s in enumerate(scene.shapes):
         path = os.path.join(folder, str(i))
-        checked = any(isinstance(c, scenes.Checker) for c in vars(s.material).values())
-        if checked and not isinstance(s, scenes.Quad):
+        has_checker = any(isinstance(c, scenes.Checker) for c in vars(s.material).values())
+        if has_checker and not isinstance(s, scenes.Quad):
             raise ValueError("other renderers support checkers only on rectangles")
         if is_emissive(s.material) and (isinstance(s, (scenes.Quad, scenes.Disk)) or isinstance(s, scenes.Triangles) and len(s.faces) == 1):
             for side, row in zip(("front", "back"), both_sides(T, s, path)):
-                parts[f"shape{i}{side}"] = painted(row, s.material)
+                parts[f"shape{i}{side}"] = with_material(row, s.material)
             continue
         if isinstance(s, (scenes.Quad, scenes.Disk)):
             row = rectangle(T, s.center, s.u, s.v, "disk" if isinstance(s, scenes.Disk) else "rectangle")
@@ -296,21 +297,21 @@ def load(scene, size, spp, light_samples, curved="auto", exact=False):
             row = sphere(T, s) if curved == "spheres" else round_mesh(T, s, path + ".ply")
         elif isinstance(s, scenes.Mesh):
             key = (s.file, id(s.material))
-            place = T(np.array([*s.to_world, [0, 0, 0, 1]]))
-            if uses[key] == 1 or is_emissive(s.material):  # Mitsuba has no emissive instances
-                row = mesh_file(s) | {"to_world": place}
+            to_world = T(np.array([*s.to_world, [0, 0, 0, 1]]))
+            if use_counts[key] == 1 or is_emissive(s.material):  # Mitsuba has no emissive instances
+                row = mesh_file(s) | {"to_world": to_world}
             else:
                 if key not in groups:
                     groups[key] = f"group{len(groups)}"
-                    parts[groups[key]] = {"type": "shapegroup", "mesh": painted(mesh_file(s), s.material)}
-                parts[f"shape{i}"] = {"type": "instance", "group": {"type": "ref", "id": groups[key]}, "to_world": place}
+                    parts[groups[key]] = {"type": "shapegroup", "mesh": with_material(mesh_file(s), s.material)}
+                parts[f"shape{i}"] = {"type": "instance", "group": {"type": "ref", "id": groups[key]}, "to_world": to_world}
                 continue
         else:
-            other = np.eye(3)[int(np.argmin(np.abs(s.normal)))]
-            u = np.cross(s.normal, other)
+            axis = np.eye(3)[int(np.argmin(np.abs(s.normal)))]
+            u = np.cross(s.normal, axis)
             u *= 1000 / np.linalg.norm(u)
             row = rectangle(T, s.point, u, np.cross(s.normal, u))
-        parts[f"shape{i}"] = painted(row, s.material)
+        parts[f"shape{i}"] = with_material(row, s.material)
     for i, row in enumerate(lights(T, scene)):
         parts[f"light{i}"] = row
     return mi.load_dict(parts)

@@ -4,8 +4,8 @@
     benches/peers/noise_cycles.py MODEL [--size N] [--wgray FILE]
 
 The environment is a constant radiance of 0.5, so that the noise is that of pixel filters, textures, materials and occlusion. Prints
-the noise in percent: the square root of the relMSE against the same renderer's image of 1,024 samples of another seed, for 16
-and 64 samples; of wgray also without ray differentials (no mip levels) and with another pixel filter. Both run on the CPU.
+the noise in percent for 16 and 64 samples: the square root of the relMSE against the same renderer's image of 1,024 samples with
+another seed. wgray also renders without ray differentials (no mip levels) and with other pixel filters. Both renderers run on the CPU.
 """
 import argparse
 import json
@@ -30,8 +30,8 @@ CYCLES = {"Cycles, box": "BOX", "Cycles, Blackman-Harris": "BLACKMAN_HARRIS"}
 
 def noise(wgray, image, reference):
     command = [wgray, "diff", image, reference, "--layers", "color", "--metrics", "rel_mse", "--json"]
-    found = json.loads(subprocess.run([str(part) for part in command], stdout=subprocess.PIPE, check=False).stdout)
-    return 100 * found["layers"][0]["rel_mse"] ** 0.5
+    report = json.loads(subprocess.run([str(part) for part in command], stdout=subprocess.PIPE, check=False).stdout)
+    return 100 * report["layers"][0]["rel_mse"] ** 0.5
 
 
 def main():
@@ -45,22 +45,22 @@ def main():
     options.add_argument("model", type=pathlib.Path)
     options.add_argument("--size", type=int, default=256)
     options.add_argument("--wgray", default=ROOT / "target/release/wgray")
-    asked = options.parse_args()
+    args = options.parse_args()
     python = install.Peers().cycles()
-    info = json.loads(subprocess.run([str(asked.wgray), "info", str(asked.model), "--json"], capture_output=True, check=True).stdout)
+    info = json.loads(subprocess.run([str(args.wgray), "info", str(args.model), "--json"], capture_output=True, check=True).stdout)
     camera = info["camera"]
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
 
-        def by_wgray(defines, samples, seed, image):
-            command = [asked.wgray, "render", asked.model, "--size", f"{asked.size}x{asked.size}", "--spp", samples, "--seed", seed]
+        def render_with_wgray(defines, samples, seed, image):
+            command = [args.wgray, "render", args.model, "--size", f"{args.size}x{args.size}", "--spp", samples, "--seed", seed]
             command += ["--device", "cpu", "--quiet", "--max-depth", 15, "-o", image]
             for define in ["environment={color=[0.5,0.5,0.5]}", *defines]:
                 command += ["-D", define]
             subprocess.run([str(part) for part in command], check=True)
 
-        def by_cycles(pixel_filter, samples, seed, image):
-            values = {"file": str(asked.model.resolve()), "picture": str(image), "size": asked.size, "spp": samples, "seed": seed}
+        def render_with_cycles(pixel_filter, samples, seed, image):
+            values = {"file": str(args.model.resolve()), "output": str(image), "size": args.size, "spp": samples, "seed": seed}
             values |= {"position": camera["position"], "target": camera["look_at"], "fov": camera["fov"]}
             values |= {"sky": [0.5] * 3, "filter": pixel_filter}
             with open(os.devnull, "w") as silent:
@@ -68,15 +68,15 @@ def main():
 
         print("| renderer | " + " | ".join(f"noise at {samples} spp, %" for samples in SAMPLES) + " |")
         print("| --- |" + " ---: |" * len(SAMPLES), flush=True)
-        renderers = [(name, by_wgray, defines) for name, defines in WGRAY.items()]
-        renderers += [(name, by_cycles, pixel_filter) for name, pixel_filter in CYCLES.items()]
+        renderers = [(name, render_with_wgray, defines) for name, defines in WGRAY.items()]
+        renderers += [(name, render_with_cycles, pixel_filter) for name, pixel_filter in CYCLES.items()]
         for name, render, setting in renderers:
             reference, image = folder / "reference.exr", folder / "image.exr"
             render(setting, REFERENCE, 99, reference)
             row = []
             for samples in SAMPLES:
                 render(setting, samples, 0, image)
-                row.append(noise(asked.wgray, image, reference))
+                row.append(noise(args.wgray, image, reference))
             print(f"| {name} | " + " | ".join(f"{percent:.2f}" for percent in row) + " |", flush=True)
 
 

@@ -10,8 +10,8 @@
 The scenes are those of path_scenes.py and scenes/cornell-path.toml. Both renderers render each BATCHES times with
 different seeds, to estimate mean and variance of every pixel. Welch's t-test compares the means at three levels:
 pixels, blocks of 8 x 8 pixels and the whole image, per channel. p-values are corrected for the number of tests of a
-level (Šidák), and the bound of 1 % for the number of levels and scenes, so that a run without faults fails for one of a
-hundred seeds. The standard error is at least 1e-5 of the mean, for rounding errors where both renderers are free of
+level (Šidák), and the bound of 1 % for the number of levels and scenes, so that a correct renderer fails for one seed in
+a hundred. The standard error is at least 1e-5 of the mean, for rounding errors where the images have no
 noise, and 1e-4 where an environment map is visible. Rough metal and glass are those of mitsuba_ggx.py. A scene also
 fails
 
@@ -45,7 +45,7 @@ import path_scenes
 import scenes
 
 LEVEL, BLOCK, ROUNDING = 0.01, 8, 1e-5
-MORE_ROUNDING = 1e-4  # for visible environment maps: the error of Mitsuba's interpolation between texels
+MAP_ROUNDING = 1e-4  # for visible environment maps, because of the error of Mitsuba's interpolation between texels
 # Mitsuba selects lights uniformly, regardless of their power. With few samples the distribution of the means is so
 # skewed that t-tests reject too often.
 MORE_SAMPLES = {"many-lights": 8}
@@ -73,10 +73,10 @@ def welch(ours, theirs, rounding=ROUNDING):
     """Returns t and the two-sided p-value of each part."""
     floor = (rounding * (abs(ours.mean) + abs(theirs.mean)) / 2) ** 2 + 1e-18
     a, b = ours.square, theirs.square
-    free = (a + b) ** 2 / np.maximum(a ** 2 / (ours.count - 1) + b ** 2 / (theirs.count - 1), 1e-300)
-    free = np.where(a + b > floor, np.maximum(free, 1), 1e6)
+    degrees_of_freedom = (a + b) ** 2 / np.maximum(a ** 2 / (ours.count - 1) + b ** 2 / (theirs.count - 1), 1e-300)
+    degrees_of_freedom = np.where(a + b > floor, np.maximum(degrees_of_freedom, 1), 1e6)
     t = (ours.mean - theirs.mean) / np.sqrt(np.maximum(a + b, floor))
-    return t, 2 * stats.t.sf(abs(t), free)
+    return t, 2 * stats.t.sf(abs(t), degrees_of_freedom)
 
 
 def sidak(p):
@@ -84,7 +84,7 @@ def sidak(p):
     return float(-np.expm1(p.size * np.log1p(-min(p.min(), 1 - 1e-16))))
 
 
-def wgray(args, path, seeds, size, spp):
+def render_wgray(args, path, seeds, size, spp):
     images = []
     environment = os.environ | ({"RAYON_NUM_THREADS": str(args.threads)} if args.threads else {})
     with tempfile.TemporaryDirectory() as folder:
@@ -95,14 +95,14 @@ def wgray(args, path, seeds, size, spp):
             done = subprocess.run(command, env=environment, capture_output=True, text=True)
             if done.returncode:
                 raise RuntimeError(f"wgray ended with {done.returncode}: {done.stderr.strip()[-1000:]}")
-            # Not Mitsuba's reader, which hangs with one thread.
+            # Mitsuba's reader is not used, because it hangs with one thread.
             channels = OpenEXR.File(out, separate_channels=True).channels()
             images.append(np.stack([channels[c].pixels for c in "RGB"], -1).astype(float))
             os.remove(out)
     return np.array(images)
 
 
-def mitsuba(args, path, seeds, size, spp):
+def render_mitsuba(args, path, seeds, size, spp):
     import mitsuba_scenes
     loaded = mitsuba_scenes.load(scenes.load(path, "path"), size, spp, 1, curved="mesh", exact=not args.own_facets)
     return np.array([np.array(mi.render(loaded, spp=spp, seed=seed))[..., :3] for seed in seeds], np.float64)
@@ -124,46 +124,47 @@ def check(args, name, path, bound):
     size, spp = ((args.course_size, args.course_spp) if course else (args.size, args.spp * MORE_SAMPLES.get(name, 1)))
     count = args.course_batches if course else args.batches
     try:
-        theirs = mitsuba(args, path, range(1001, 1001 + count), (size, size), spp)
+        theirs = render_mitsuba(args, path, range(1001, 1001 + count), (size, size), spp)
         seeds = range(args.seed, args.seed + count)
-        ours = mitsuba(args, path, seeds, (size, size), spp) if args.wgray == "none" else wgray(args, path, seeds, (size, size), spp)
-    except (RuntimeError, ValueError, OSError) as why:
-        print(f"{name:22} FAILS: {why}", flush=True)
+        renderer = render_mitsuba if args.wgray == "none" else render_wgray
+        ours = renderer(args, path, seeds, (size, size), spp)
+    except (RuntimeError, ValueError, OSError) as error:
+        print(f"{name:22} FAILS: {error}", flush=True)
         return False
     ours *= args.wrong
     if not np.isfinite(ours).all() or not np.isfinite(theirs).all():
         print(f"{name:22} FAILS: non-finite pixels", flush=True)
         return False
-    faults, lowest = [], []
-    rounding = MORE_ROUNDING if name.startswith("map") else ROUNDING
+    failures, lowest = [], []
+    rounding = MAP_ROUNDING if name.startswith("map") else ROUNDING
     levels = {"pixels": lambda x: x, "blocks": blocks, "whole": lambda x: x.mean((1, 2))}
     for level, part in levels.items():
         a, b = means(part(ours)), means(part(theirs))
         t, p = welch(a, b, rounding)
         lowest.append(sidak(p))
         if lowest[-1] < bound:
-            faults.append(level)
+            failures.append(level)
         if level == "pixels":
             rejected, chance = int((p < LEVEL).sum()), LEVEL * p.size
             if rejected > 2 * chance:
-                faults.append("rejected")
+                failures.append("rejected")
             if args.save:
                 save(args.save, name, a, b, t)
-    total, other = (means(x.mean((1, 2, 3))) for x in (ours, theirs))
-    ratio = total.mean / other.mean if other.mean else float("nan")
-    error = np.sqrt(total.square + other.square) / other.mean if other.mean else float("nan")
+    our_total, their_total = (means(x.mean((1, 2, 3))) for x in (ours, theirs))
+    ratio = our_total.mean / their_total.mean if their_total.mean else float("nan")
+    error = np.sqrt(our_total.square + their_total.square) / their_total.mean if their_total.mean else float("nan")
     whole = [means(x.mean((1, 2))) for x in (ours * args.control, theirs)]
     if args.wrong == 1 and sidak(welch(*whole, rounding)[1]) >= bound:
-        faults.append("control")
+        failures.append("control")
     a, b = (means(blocks(x).mean(-1)) for x in (ours, theirs))
-    off = abs(a.mean - b.mean) / np.maximum(b.mean, 1e-12)
-    if course and (off.max() > 0.02 or not abs(ratio - 1) <= 0.005):
-        faults.append("2 %")
-    at = np.unravel_index(off.argmax(), off.shape)
-    noise = np.sqrt(a.square + b.square)[at] / max(b.mean[at], 1e-12)
-    print(f"{name:22} {ratio:8.5f} {error:8.5f} {lowest[0]:9.2g} {rejected:6d} {chance:6.0f} {lowest[1]:9.2g} {off.max():7.2%} {noise:7.2%} "
-          f"{lowest[2]:9.2g} {time.monotonic() - started:6.0f}  {'FAILS: ' + ', '.join(faults) if faults else 'good'}", flush=True)
-    return not faults
+    deviation = abs(a.mean - b.mean) / np.maximum(b.mean, 1e-12)
+    if course and (deviation.max() > 0.02 or not abs(ratio - 1) <= 0.005):
+        failures.append("2 %")
+    worst = np.unravel_index(deviation.argmax(), deviation.shape)
+    noise = np.sqrt(a.square + b.square)[worst] / max(b.mean[worst], 1e-12)
+    print(f"{name:22} {ratio:8.5f} {error:8.5f} {lowest[0]:9.2g} {rejected:6d} {chance:6.0f} {lowest[1]:9.2g} {deviation.max():7.2%} {noise:7.2%} "
+          f"{lowest[2]:9.2g} {time.monotonic() - started:6.0f}  {'FAILS: ' + ', '.join(failures) if failures else 'passes'}", flush=True)
+    return not failures
 
 
 def main():
@@ -187,31 +188,31 @@ def main():
     parser.add_argument("--threads", type=int, help="default: all")
     parser.add_argument("--save", metavar="FOLDER", type=pathlib.Path)
     args = parser.parse_args()
-    for name, least in (("size", BLOCK), ("batches", 4), ("course_size", BLOCK), ("course_batches", 4), ("spp", 1), ("course_spp", 1)):
-        if getattr(args, name) < least:
-            parser.error(f"--{name.replace('_', '-')}: {getattr(args, name)} must be at least {least}")
+    for name, minimum in (("size", BLOCK), ("batches", 4), ("course_size", BLOCK), ("course_batches", 4), ("spp", 1), ("course_spp", 1)):
+        if getattr(args, name) < minimum:
+            parser.error(f"--{name.replace('_', '-')}: {getattr(args, name)} must be at least {minimum}")
     if not 0 <= args.seed <= 1000 - max(args.batches, args.course_batches) + 1:
-        parser.error(f"--seed: {args.seed} the seeds from 1001 are reserved for Mitsuba")
+        parser.error(f"--seed: {args.seed} is too large: the seeds from 1001 are reserved for Mitsuba")
 
     mi.set_variant(args.variant)
     mi.set_log_level(mi.LogLevel.Error)
     if args.threads:
         dr.set_thread_count(args.threads)
-    known = {"cornell": install.ROOT / "scenes/cornell-path.toml"} | path_scenes.write(install.FOLDER / "path-scenes")
-    names = list(known)
+    all_scenes = {"cornell": install.ROOT / "scenes/cornell-path.toml"} | path_scenes.write(install.FOLDER / "path-scenes")
+    names = list(all_scenes)
     if args.scenes:
         names = [n for word in args.scenes.split(",") for n in (path_scenes.COURSE if word == "course" else [word])]
     for name in names:
-        if name not in known:
-            parser.error(f"--scenes: unknown {name!r}: one of course, {', '.join(known)}")
+        if name not in all_scenes:
+            parser.error(f"--scenes: unknown {name!r}: one of course, {', '.join(all_scenes)}")
     bound = -np.expm1(np.log1p(-LEVEL) / (3 * len(names)))
     print(f"{args.spp} samples x {args.batches} batches (course: {args.course_spp} x {args.course_batches}), device {args.device}, "
           f"factor {args.wrong}; corrected p-values below {bound:.2g} fail")
     print(f"{'scene':22} {'ratio':>8} {'+-':>8} {'p pixels':>9} {'at 1 %':>6} {'chance':>6} {'p blocks':>9} {'worst':>7} {'+-':>7} {'p whole':>9} "
           f"{'s':>6}", flush=True)
-    good = [check(args, name, known[name], bound) for name in names]
-    print(f"{sum(good)} good, {len(good) - sum(good)} failed")
-    sys.exit(not all(good))
+    passes = [check(args, name, all_scenes[name], bound) for name in names]
+    print(f"passed: {sum(passes)}, failed: {len(passes) - sum(passes)}")
+    sys.exit(not all(passes))
 
 
 if __name__ == "__main__":

@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""Writes the scenes of path_check.py, which compares wgray's path tracer with Mitsuba's, and their meshes.
+"""Writes the scenes that path_check.py renders with wgray's and Mitsuba's path tracers, and the meshes of the scenes.
 
     python path_scenes.py FOLDER
 
-TOML files of 96 x 96 pixels are written to FOLDER, the three JSON files of the course to FOLDER/configs, their meshes
-to FOLDER/assets. The course's dragon and bunny are not redistributed: bumpy closed meshes of similar size and position
+TOML files of 96 x 96 pixels are written to FOLDER, the three JSON scenes of the course to FOLDER/configs, and the meshes
+of the JSON scenes to FOLDER/assets. The course's dragon and bunny are not redistributed: bumpy closed meshes of similar size and position
 replace them. `ray_differentials` is off, because Mitsuba does not filter its checkers.
 """
 import json
@@ -40,13 +40,13 @@ def material(name, keys):
     return f"\n[materials.{name}]\n{keys}\n"
 
 
-def table(kind, what, **keys):
+def table(section, kind, **keys):
     rows = [f"{key} = {json.dumps(value)}" for key, value in keys.items()]
-    return f'\n[[{kind}]]\ntype = "{what}"\n' + "\n".join(rows) + "\n"
+    return f'\n[[{section}]]\ntype = "{kind}"\n' + "\n".join(rows) + "\n"
 
 
-def shape(what, material, **keys):
-    return table("shapes", what, material=material, **keys)
+def shape(kind, material, **keys):
+    return table("shapes", kind, material=material, **keys)
 
 
 def rectangle(material, center, size, normal, tangent):
@@ -80,13 +80,13 @@ def many_lights(count=64):
                                                                                         "specular = [0.3, 0.3, 0.3]\nshininess = 20")
     for i in range(count):
         power = 10 ** source.uniform(-1, 1.5)
-        at = [source.uniform(-2, 2), source.uniform(-2, 1.4), source.uniform(0.6, 2.5)]
+        position = [source.uniform(-2, 2), source.uniform(-2, 1.4), source.uniform(0.6, 2.5)]
         color = [power * source.uniform(0.2, 1) for _ in range(3)]
         if i % 8:
             side = source.uniform(0.05, 0.2)
-            text += area_light(at, [side, side / 2], [source.uniform(-1, 1), source.uniform(-1, 1), -1], color)
+            text += area_light(position, [side, side / 2], [source.uniform(-1, 1), source.uniform(-1, 1), -1], color)
         else:
-            text += table("lights", "point", position=at, color=[c / 20 for c in color])
+            text += table("lights", "point", position=position, color=[c / 20 for c in color])
     text += table("lights", "directional", direction=[0.5, 0.6, -1], color=[0.6, 0.5, 0.4])
     for i in range(9):
         text += shape("sphere", "ball", center=[i % 3 - 1, i // 3 - 1, 0.3], radius=0.3)
@@ -110,13 +110,13 @@ SHAPES = (shape("disk", "ball", center=[-0.8, 0.2, 0.5], radius=0.4, normal=[0.4
 MESH = shape("mesh", "ball", file="meshes/blob.obj", normals="flat", scale=0.5, rotate=[20, 0, 30], translate=[0, 0, 0.6])
 CHECKER = '\n[textures.checker]\ntype = "checker"\neven = [0.8, 0.7, 0.2]\nodd = [0.1, 0.2, 0.6]\nscale = [{0}, {0}]\n'
 
-# The materials that Mitsuba supports too, without energy compensation, which it lacks.
+# Materials that Mitsuba supports too, without energy compensation, which Mitsuba lacks.
 GOLD = "eta = [0.143, 0.375, 1.442]\nk = [3.983, 2.386, 1.603]"
 SKY = '\n[environment]\nfile = "maps/lobes.hdr"\n'
 
 
-NO_MIRROR = 'type = "principled"\nmetallic = 0\nspecular = 0'
-PASSES = "transmission = 1\nroughness = 0\nior = 1"
+NO_SPECULAR = 'type = "principled"\nmetallic = 0\nspecular = 0'
+UNDEFLECTED = "transmission = 1\nroughness = 0\nior = 1"
 
 
 def rough(kind, roughness, keys):
@@ -179,9 +179,9 @@ SCENES = {
     # remaining lobes.
     "principled-metal": ball('type = "principled"\nroughness = 0.1\nbase_color = [0.9, 0.7, 0.4]'),
     "principled-brushed": ball('type = "principled"\nroughness = 0.1\nanisotropy = 0.15\nbase_color = [0.9, 0.7, 0.4]'),
-    "principled-ground": ball(f'{NO_MIRROR}\nbase_color = [0.8, 0.5, 0.2]'),
-    "principled-sheet": ball(f'{NO_MIRROR}\n{PASSES}\nbase_color = [0.8, 0.5, 0.9]'),
-    "principled-volume": ball(f'{NO_MIRROR}\n{PASSES}\nthickness = 1\nattenuation_color = [0.8, 0.3, 0.9]\nattenuation_distance = 0.6'),
+    "principled-ground": ball(f'{NO_SPECULAR}\nbase_color = [0.8, 0.5, 0.2]'),
+    "principled-sheet": ball(f'{NO_SPECULAR}\n{UNDEFLECTED}\nbase_color = [0.8, 0.5, 0.9]'),
+    "principled-volume": ball(f'{NO_SPECULAR}\n{UNDEFLECTED}\nthickness = 1\nattenuation_color = [0.8, 0.3, 0.9]\nattenuation_distance = 0.6'),
     "lens": head(CAMERA + "\naperture = 0.5\nfocus_distance = 3.2") + ENVIRONMENT + FLOOR + material("ball", GREY) + SHAPES + area_light(),
     "map": head() + SKY + FLOOR + material("ball", 'type = "diffuse"\ncolor = [0.7, 0.7, 0.7]') + SHAPES,
     "map-turned": head() + SKY + "scale = 0.5\nrotate = 130\n" + FLOOR + material("ball", 'type = "conductor"\ncolor = [0.9, 0.8, 0.7]') + SHAPES,
@@ -193,25 +193,25 @@ SCENES = {
 
 
 def blob(rows=24, seed=1, radii=(1, 1, 1), center=(0, 0, 0)):
-    """A bumpy closed mesh: vertices, and triangles in counter-clockwise order seen from outside."""
+    """Returns a bumpy closed mesh: its vertices, and its triangles in counter-clockwise order seen from outside."""
     def point(theta, phi):
         d = [math.sin(theta) * math.cos(phi), math.sin(theta) * math.sin(phi), math.cos(theta)]
         r = 0.85 + 0.1 * math.sin(5 * d[0] + 3 * d[1] + seed) + 0.05 * math.sin(9 * d[1] - 7 * d[2] + 2 * seed)
         return [c + r * a * x for c, a, x in zip(center, radii, d)]
     vertices = [point(0, 0)] + [point(math.pi * i / rows, math.pi * j / rows) for i in range(1, rows) for j in range(2 * rows)] + [point(math.pi, 0)]
-    at = lambda i, j: 0 if i == 0 else len(vertices) - 1 if i == rows else 1 + (i - 1) * 2 * rows + j % (2 * rows)
+    vertex_index = lambda i, j: 0 if i == 0 else len(vertices) - 1 if i == rows else 1 + (i - 1) * 2 * rows + j % (2 * rows)
     faces = []
     for i in range(rows):
         for j in range(2 * rows):
-            a, b, c, d = at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)
+            a, b, c, d = (vertex_index(*k) for k in ((i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)))
             faces += ([(a, b, c)] if i < rows - 1 else []) + ([(a, c, d)] if i else [])
     return vertices, faces
 
 
 def block(corners, height):
-    """A prism on the floor over the polygon of the corners (x, z); y is up."""
-    turn = sum(a[0] * b[1] - b[0] * a[1] for a, b in zip(corners, corners[1:] + corners[:1]))
-    corners = corners if turn < 0 else corners[::-1]  # counter-clockwise seen from above, with z pointing down the page
+    """Returns a prism on the floor over the polygon of the corners (x, z); y is up."""
+    signed_area = sum(a[0] * b[1] - b[0] * a[1] for a, b in zip(corners, corners[1:] + corners[:1]))
+    corners = corners if signed_area < 0 else corners[::-1]  # counter-clockwise seen from above, with z pointing down the page
     vertices = [[x, y, z] for y in (0, height) for x, z in corners]
     quads = [(4, 5, 6, 7), (3, 2, 1, 0), *((i, (i + 1) % 4, (i + 1) % 4 + 4, i + 4) for i in range(4))]
     return vertices, [t for a, b, c, d in quads for t in ((a, b, c), (a, c, d))]
@@ -239,8 +239,8 @@ def course(depth, *objects):
         "light_config": {"position": [0, 1.98, 0], "size": [0.5, 0.5], "radiance": [17, 12, 5]},
         "materials": [{"name": "grey", "type": "diffuse", "color": [0.725, 0.71, 0.68]}, {"name": "green", "type": "diffuse", "color": [0.14, 0.45, 0.091]},
                       {"name": "red", "type": "diffuse", "color": [0.63, 0.065, 0.05]}, {"name": "mirror", "type": "specular", "color": [0.95, 0.95, 0.95]}],
-        "objects": [{"obj_file_path": f"../assets/{name}.obj", "material_name": material, "translate": list(at), "scale": scale, "has_bvh": scale != 1}
-                    for name, material, at, scale in [(name, color, (0, 0, 0), 1) for name, color in walls] + list(objects)],
+        "objects": [{"obj_file_path": f"../assets/{name}.obj", "material_name": material, "translate": list(position), "scale": scale, "has_bvh": scale != 1}
+                    for name, material, position, scale in [(name, color, (0, 0, 0), 1) for name, color in walls] + list(objects)],
     }
 
 
@@ -255,17 +255,17 @@ def write_map(path, width=256):
     """Writes a pale sky with a bright, warm lobe and a cold one as an uncompressed Radiance file."""
     height = width // 2
     lobes = [((0.5, -0.7, 0.5), 30, (12, 10, 7)), ((-0.8, 0.1, 0.3), 8, (0.5, 0.9, 1.6))]
-    lobes = [([x / math.hypot(*to) for x in to], sharp, color) for to, sharp, color in lobes]
+    lobes = [([x / math.hypot(*axis) for x in axis], sharpness, color) for axis, sharpness, color in lobes]
     texels = bytearray()
     for row in range(height):
         polar = math.pi * (row + 0.5) / height
         for column in range(width):
-            turn = math.pi * (1 - 2 * (column + 0.5) / width)  # the centre is +x, the left half is towards +y
-            d = (math.sin(polar) * math.cos(turn), math.sin(polar) * math.sin(turn), math.cos(polar))
+            azimuth = math.pi * (1 - 2 * (column + 0.5) / width)  # the centre is +x, the left half is towards +y
+            d = (math.sin(polar) * math.cos(azimuth), math.sin(polar) * math.sin(azimuth), math.cos(polar))
             color = [0.15, 0.18, 0.22]
-            for to, sharp, light in lobes:
-                near = math.exp(sharp * (sum(a * b for a, b in zip(d, to)) - 1))
-                color = [c + near * l for c, l in zip(color, light)]
+            for axis, sharpness, light in lobes:
+                weight = math.exp(sharpness * (sum(a * b for a, b in zip(d, axis)) - 1))
+                color = [c + weight * l for c, l in zip(color, light)]
             _, exponent = math.frexp(max(color))
             texels += bytes(min(255, int(c * 256 / 2 ** exponent)) for c in color) + bytes([exponent + 128])
     path.parent.mkdir(parents=True, exist_ok=True)

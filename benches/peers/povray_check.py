@@ -5,13 +5,13 @@
     target/peers/venv/bin/python benches/peers/povray_check.py [--device lavapipe] [--scene scenes/cornell.toml]
 
 The scene is rendered at its own size with every `specular` set to white (POV-Ray's highlight has the light's colour),
-one sample at each pixel's centre and 16 light samples; by POV-Ray once with its `area_light` and once with a point
+one sample at each pixel's centre and 16 light samples. POV-Ray renders it once with `area_light` and once with a point
 light per light sample (povray_scenes.py documents the difference). Prints the percentage of pixels within 0.004 in
 every channel and the classes of the others; writes the scenes, the EXR images and difference-*.png to --out. Exit
-status 1 if either is below --goal.
+status 1 if either percentage is below --goal.
 
 A third renderer, an independent implementation of the formulas in numpy with float64, classifies the pixels and is
-compared with both; `--device none` compares only POV-Ray with it, without wgray.
+compared with both images; `--device none` compares only POV-Ray with numpy, without wgray.
 """
 import argparse
 import os
@@ -33,7 +33,7 @@ import scenes
 
 MISS, LIGHT = -1, -2
 CLASSES = {  # a pixel belongs to the first class that applies; colours of difference.png
-    "light": ((255, 220, 0), "the light, which POV-Ray's camera does not see"),
+    "light": ((255, 220, 0), "the light, which is invisible to POV-Ray's camera"),
     "edge": ((255, 0, 0), "within a pixel of another primitive"),
     "shadow": ((0, 120, 255), "penumbra: some light samples are occluded, here or a pixel away, and some are not"),
     "other": ((255, 0, 255), "none of these"),
@@ -41,7 +41,7 @@ CLASSES = {  # a pixel belongs to the first class that applies; colours of diffe
 
 
 def dots(a, b):
-    """Dot products of rows."""
+    """Returns the dot products of rows."""
     return a[..., 0] * b[..., 0] + a[..., 1] * b[..., 1] + a[..., 2] * b[..., 2]
 
 
@@ -102,7 +102,7 @@ class Numpy:
         return np.where(np.isnan(t), np.inf, t), normal
 
     def hit(self, o, d):
-        """Distance and primitive (or MISS) of the closest hits, and the normal functions of all primitives."""
+        """Returns the distance and primitive (or MISS) of the closest hits, and the normal functions of all primitives."""
         best, which, normals = np.full(d.shape[:-1], np.inf), np.full(d.shape[:-1], MISS), []
         for i, (intersect, row, _) in enumerate(self.primitives):
             t, normal = intersect(o, d, *row)
@@ -122,7 +122,7 @@ class Numpy:
         return np.array(s.position, float), d / np.linalg.norm(d, axis=-1, keepdims=True)
 
     def render(self, width, height, samples):
-        """Radiance, the visible primitive (or LIGHT, MISS) and the number of unoccluded light samples of each pixel."""
+        """Returns the radiance, the visible primitive (or LIGHT, MISS) and the number of unoccluded light samples of each pixel."""
         n_grid = int(round(samples ** .5))
         o, d = self.rays(width, height)
         t, which, normals = self.hit(o, d)
@@ -172,31 +172,32 @@ def read(path):
     return np.stack([channels[c].pixels.astype(np.float64) for c in "RGB"], -1)
 
 
-def beside(values):
-    """The mask of pixels with a different value in one of the eight neighbours."""
+def has_different_neighbor(values):
+    """Returns the mask of pixels with a different value in one of the eight neighbours."""
     a = np.pad(values, 1, mode="edge")
     h, w = values.shape
     return np.any([a[y:y + h, x:x + w] != values for y in range(3) for x in range(3)], axis=0)
 
 
-def compare(name, image, other, which, partly, tolerance, out=None):
-    difference = abs(image - other).max(-1)
-    off = ~(difference <= tolerance)  # true for NaN
-    print(f"{name}: {100 * (1 - off.mean()):.3f} % of {off.size} pixels within {tolerance}; "
+def compare(name, image, reference, visible, in_penumbra, tolerance, out=None):
+    difference = abs(image - reference).max(-1)
+    differs = ~(difference <= tolerance)  # true for NaN
+    print(f"{name}: {100 * (1 - differs.mean()):.3f} % of {differs.size} pixels within {tolerance}; "
           f"median difference {np.median(difference):.2e}, largest {difference.max():.3g}")
-    claims = {"light": which == LIGHT, "edge": beside(which), "shadow": partly | beside(partly), "other": np.ones_like(off)}
-    marked = np.repeat(np.clip(other, 0, 1).mean(-1, keepdims=True) ** (1 / 2.2) * 127, 3, -1)
-    left = off.copy()
+    classes = {"light": visible == LIGHT, "edge": has_different_neighbor(visible),
+               "shadow": in_penumbra | has_different_neighbor(in_penumbra), "other": np.ones_like(differs)}
+    marked = np.repeat(np.clip(reference, 0, 1).mean(-1, keepdims=True) ** (1 / 2.2) * 127, 3, -1)
+    unclassified = differs.copy()
     for kind, (colour, meaning) in CLASSES.items():
-        now = left & claims[kind]
-        left &= ~now
-        marked[now] = colour
-        where = f", the first at {tuple(int(v) for v in np.argwhere(now)[0][::-1])}" if now.any() else ""
-        print(f"    {kind:7} {now.sum():6}  {100 * now.mean():.3f} %  {meaning}{where}")
+        pixels = unclassified & classes[kind]
+        unclassified &= ~pixels
+        marked[pixels] = colour
+        location = f", the first at {tuple(int(v) for v in np.argwhere(pixels)[0][::-1])}" if pixels.any() else ""
+        print(f"    {kind:7} {pixels.sum():6}  {100 * pixels.mean():.3f} %  {meaning}{location}")
     if out:
         write_png(out, marked.astype(np.uint8))
         print(f"    marked in {os.path.relpath(out)}: " + ", ".join(f"{k} {v[0]}" for k, v in CLASSES.items()))
-    return 1 - off.mean()
+    return 1 - differs.mean()
 
 
 def write_png(path, pixels):
@@ -237,18 +238,18 @@ def main():
             sys.exit(f"POV-Ray failed:\n{done.stderr[-2000:]}")
         images[name] = read(f"{base}.exr")
     reference, which, seen = Numpy(scene).render(width, height, args.light_samples)
-    rest = which, (seen > 0) & (seen < args.light_samples * len(scene.lights)), args.tolerance
+    classification = which, (seen > 0) & (seen < args.light_samples * len(scene.lights)), args.tolerance
     ours, image = "numpy", reference
     if args.device != "none":
         subprocess.run([args.wgray, "render", variant, "--spp", "1", "--light-samples", str(args.light_samples), "--size",
                         f"{width}x{height}", "--device", args.device, "-q", "-o", out / "wgray.exr"], check=True)
         ours, image = "wgray", read(out / "wgray.exr")
-        compare("wgray against numpy", image, reference, *rest)
-    shares = {name: compare(f"{ours} against POV-Ray, {name}", image, theirs, *rest,
+        compare("wgray against numpy", image, reference, *classification)
+    shares = {name: compare(f"{ours} against POV-Ray, {name}", image, theirs, *classification,
                             out / f"difference-{name.replace(' ', '-')}.png") for name, theirs in images.items()}
     for name, share in shares.items():
         if not 100 * share >= args.goal:
-            sys.exit(f"{name}: only {100 * share:.3f} %, the goal is {args.goal:g} %")
+            sys.exit(f"{name}: {100 * share:.3f} % of the pixels agree; the goal is {args.goal:g} %")
 
 
 if __name__ == "__main__":

@@ -1,13 +1,14 @@
 #!/usr/bin/env python3
 """Writes a wgray scene for POV-Ray 3.7 to standard output: povray_scenes.py SCENE.toml LIGHT_SAMPLES [SIZE]
 
-Phong shading without distance falloff; lights are invisible to the camera. POV-Ray's Phong highlight has the light's
+Shading is Phong without distance falloff; lights are invisible to the camera. POV-Ray's Phong highlight has the light's
 colour, so the image is that of a scene whose materials have a white `specular`; ambient and diffuse colours must be
 equal.
 
-An area light is converted in one of two ways. POV-Ray's `area_light` is its fastest, used for timing. It multiplies the
-mean visibility by the mean shading, `mean(V) * mean(f)`, whereas wgray computes `mean(V * f)`: they differ in
-penumbrae. A point light per sample gives wgray's formula.
+An area light is converted in one of two ways. POV-Ray's `area_light` is the faster one and is used for timing. It
+multiplies the
+mean visibility by the mean shading, `mean(V) * mean(f)`, whereas wgray computes `mean(V * f)`: the images
+differ in penumbrae. A point light per sample gives wgray's formula.
 """
 import math
 import struct
@@ -33,33 +34,33 @@ def texture(material, ambient):
 
 
 def shape(s, ambient):
-    paint = texture(s.material, ambient)
+    pov_texture = texture(s.material, ambient)
     if isinstance(s, scenes.Plane):
-        return f"plane {{ {vec(s.normal)}, {scenes.dot(s.normal, s.point):.9g} {paint} }}"
+        return f"plane {{ {vec(s.normal)}, {scenes.dot(s.normal, s.point):.9g} {pov_texture} }}"
     if isinstance(s, scenes.Ellipsoid):
         matrix = ", ".join(f"{x:.9g}" for v in (s.a, s.b, s.c, s.center) for x in v)
-        return f"sphere {{ 0, 1 matrix <{matrix}> {paint} }}"
+        return f"sphere {{ 0, 1 matrix <{matrix}> {pov_texture} }}"
     if isinstance(s, scenes.Quad):
         corners = [add(s.center, scenes.scaled(s.u, i), scenes.scaled(s.v, j)) for i, j in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
         s = scenes.Triangles(corners, [(0, 1, 2), (0, 2, 3)], s.material)
     if isinstance(s, scenes.Mesh):
-        return mesh(s, paint)
+        return mesh(s, pov_texture)
     faces = " ".join(f"triangle {{ {', '.join(vec(s.vertices[i]) for i in face)} }}" for face in s.faces)
-    return f"mesh {{ {faces} {paint} }}"
+    return f"mesh {{ {faces} {pov_texture} }}"
 
 
-def mesh(s, paint):
-    """A `mesh2` of flat triangles, as wgray renders a file without normals."""
+def mesh(s, pov_texture):
+    """Returns a `mesh2` of flat triangles, as wgray renders a file without normals."""
     vertices, triangles = read_ply(s.file)
     rows = ", ".join(f"<{x:.9g},{y:.9g},{z:.9g}>" for x, y, z in vertices)
     faces = ", ".join(f"<{a},{b},{c}>" for a, b, c in triangles)
     columns = ", ".join(f"{s.to_world[i][j]:.9g}" for j in range(4) for i in range(3))
     return (f"mesh2 {{ vertex_vectors {{ {len(vertices)}, {rows} }} face_indices {{ {len(triangles)}, {faces} }} "
-            f"matrix <{columns}> {paint} }}")
+            f"matrix <{columns}> {pov_texture} }}")
 
 
 def read_ply(file):
-    """Vertices and triangles of a binary PLY file as examples/make_mesh.rs writes it."""
+    """Returns the vertices and triangles of a binary PLY file as examples/make_mesh.rs writes it."""
     with open(file, "rb") as f:
         header, _, body = f.read().partition(b"end_header\n")
     lines = header.decode("ascii").splitlines()

@@ -1,6 +1,6 @@
 """Reads wgray's scene files for other renderers.
 
-`load` supports the part of the format that the benchmark scenes use (docs/scene-format.md) and rejects the rest: scenes
+`load` supports the keys of docs/scene-format.md that the benchmark scenes use and rejects all others: scenes
 for the Phong integrator, with constant colours and rectangle lights, or, with `integrator="path"`, for the path tracer.
 """
 import json
@@ -61,7 +61,7 @@ class Checker:
 
 @dataclass
 class Quad:
-    """A rectangle, `center + s u + t v` with s and t in [-1, 1]; `color`: the color of a light, otherwise None."""
+    """A rectangle, `center + s u + t v` with s and t in [-1, 1]; `color`: the colour of a light, otherwise None."""
     center: list
     u: list
     v: list
@@ -79,7 +79,7 @@ class Disk:
 
 
 @dataclass
-class Point:
+class PointLight:
     position: list
     color: list
 
@@ -94,7 +94,7 @@ class SpotLight:
 
 
 @dataclass
-class Map:
+class EnvironmentMap:
     """An equirectangular environment map: the centre is +x, the upper edge +z; rotated about z by degrees."""
     file: str
     scale: float
@@ -102,7 +102,7 @@ class Map:
 
 
 @dataclass
-class Sun:
+class DirectionalLight:
     direction: list
     color: list
 
@@ -153,27 +153,27 @@ class Scene:
     lights: list = field(default_factory=list)
     integrator: str = "phong"
     height_seen: float | None = None  # for an orthographic camera
-    environment: list | Map | None = None
+    environment: list | EnvironmentMap | None = None
     lens: tuple | None = None  # diameter and focus distance
     max_depth: int = 8
     rr_depth: int = 5
     spp: int = 16
 
 
-def quad(row, **more):
+def quad(row, **attributes):
     n, t = unit(row["normal"]), row["tangent"]
     t = unit(sub(t, scaled(n, dot(n, t))))
-    return Quad(row["center"], scaled(t, row["size"][0] / 2), scaled(cross(n, t), row["size"][1] / 2), **more)
+    return Quad(row["center"], scaled(t, row["size"][0] / 2), scaled(cross(n, t), row["size"][1] / 2), **attributes)
 
 
 def product(a, b):
-    """The affine transform that applies b, then a; each is three rows of four numbers."""
+    """Returns the affine transform that applies b, then a; all are three rows of four numbers."""
     rows = [*b, [0, 0, 0, 1]]
     return [[sum(row[k] * rows[k][j] for k in range(4)) for j in range(4)] for row in a]
 
 
-def about(axis, degrees):
-    """Rodrigues' rotation formula."""
+def rotation(axis, degrees):
+    """Returns the rotation about an axis, by Rodrigues' formula."""
     x, y, z = unit(axis)
     c, s = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
     k = 1 - c
@@ -188,23 +188,23 @@ UP = {"x": [[0, 1, 0, 0], [0, 0, 1, 0], [1, 0, 0, 0]],
 
 
 def to_world(row, up):
-    """The transform of a mesh: up axis, then scale, rotation, translation, or the matrix instead of these three."""
+    """Returns the transform of a mesh: up axis, then scale, rotation, translation, or the matrix instead of these three."""
     if "matrix" in row:
         return product(row["matrix"][:3], UP[up])
     x, y, z = row["scale"] if isinstance(row.get("scale"), list) else [row.get("scale", 1)] * 3
-    turn = [[x, 0, 0, 0], [0, y, 0, 0], [0, 0, z, 0]]
+    transform = [[x, 0, 0, 0], [0, y, 0, 0], [0, 0, z, 0]]
     rotate = row.get("rotate", [0, 0, 0])
     if isinstance(rotate, dict):
-        turn = product(about(rotate["axis"], rotate["degrees"]), turn)
+        transform = product(rotation(rotate["axis"], rotate["degrees"]), transform)
     else:
         for axis, degrees in zip(([1, 0, 0], [0, 1, 0], [0, 0, 1]), rotate):
-            turn = product(about(axis, degrees), turn)
-    moved = [[*line[:3], by] for line, by in zip(turn, row.get("translate", [0, 0, 0]))]
+            transform = product(rotation(axis, degrees), transform)
+    moved = [[*line[:3], offset] for line, offset in zip(transform, row.get("translate", [0, 0, 0]))]
     return product(moved, UP[up])
 
 
 def color(path, row, key, textures, default=None):
-    """A colour of a material: three numbers, or a checker for the path tracer."""
+    """Returns a colour of a material: three numbers, or a checker for the path tracer."""
     value = row.get(key, default)
     if not isinstance(value, dict):
         return value
@@ -217,7 +217,7 @@ def color(path, row, key, textures, default=None):
 def material(path, row, textures, traced):
     kind = {"mirror": "conductor", "glass": "dielectric"}.get(row["type"], row["type"])
     if kind != "phong" and not traced:
-        raise ValueError(f"{path}: a material {row['type']!r}: other renderers support only phong here")
+        raise ValueError(f"{path}: material {row['type']!r}: other renderers support only phong without a path tracer")
     rough = kind in ("conductor", "dielectric", "principled")
     if "normal_map" in row or "metal" in row or isinstance(row.get("roughness"), dict):
         raise ValueError(f"{path}: other renderers support neither normal maps, roughness textures nor named metals")
@@ -225,54 +225,54 @@ def material(path, row, textures, traced):
         raise ValueError(f"{path}: a rough {kind}: other renderers lack this model")
     if rough and row.get("roughness", 0) != 0 and kind != "principled" and row.get("energy_compensation", True):
         raise ValueError(f"{path}: other renderers do not compensate for energy: energy_compensation must be false")
-    made = Material(kind, emission=color(path, row, "emission", textures))
+    result = Material(kind, emission=color(path, row, "emission", textures))
     if kind == "principled":
-        made.color, made.metallic = color(path, row, "base_color", textures, [1, 1, 1]), row.get("metallic", 1)
-        if made.metallic == 0 and row.get("specular") == 0:
-            return bare(path, row, made)
-        other = set(row) - {"type", "base_color", "metallic", "roughness", "anisotropy", "clearcoat", "clearcoat_roughness"}
-        if other:
-            raise ValueError(f"{path}: other renderers' principled does not support {', '.join(sorted(other))}")
-        across = row.get("roughness", 1) ** 2
-        made.alpha = (across + (1 - across) * row.get("anisotropy", 0) ** 2, across)
-        made.coat = (row.get("clearcoat", 0), row.get("clearcoat_roughness", 0))
-        return made
+        result.color, result.metallic = color(path, row, "base_color", textures, [1, 1, 1]), row.get("metallic", 1)
+        if result.metallic == 0 and row.get("specular") == 0:
+            return without_specular(path, row, result)
+        unsupported = set(row) - {"type", "base_color", "metallic", "roughness", "anisotropy", "clearcoat", "clearcoat_roughness"}
+        if unsupported:
+            raise ValueError(f"{path}: other renderers' principled does not support {', '.join(sorted(unsupported))}")
+        alpha = row.get("roughness", 1) ** 2
+        result.alpha = (alpha + (1 - alpha) * row.get("anisotropy", 0) ** 2, alpha)
+        result.coat = (row.get("clearcoat", 0), row.get("clearcoat_roughness", 0))
+        return result
     if rough:
         # The formula of glTF: mix(alpha, 1, anisotropy^2) along the tangent. Rotation by 90 degrees exchanges the two.
         alpha = row.get("roughness", 0) ** 2
-        along = alpha + (1 - alpha) * row.get("anisotropy", 0) ** 2 if alpha else 0
-        turn = row.get("anisotropy_rotation", 0)
-        if turn not in (0, 90):
+        tangent_alpha = alpha + (1 - alpha) * row.get("anisotropy", 0) ** 2 if alpha else 0
+        angle = row.get("anisotropy_rotation", 0)
+        if angle not in (0, 90):
             raise ValueError(f"{path}: other renderers support anisotropy rotations of 0 and 90 degrees")
-        made.alpha = (along, alpha) if turn == 0 else (alpha, along)
-        made.index = (row["eta"], row["k"]) if "eta" in row else None
-        made.thin = row.get("thin", False)
+        result.alpha = (tangent_alpha, alpha) if angle == 0 else (alpha, tangent_alpha)
+        result.index = (row["eta"], row["k"]) if "eta" in row else None
+        result.thin = row.get("thin", False)
     if kind == "phong":
-        plain = color(path, row, "color", textures)
-        made.ambient, made.diffuse, made.specular = (color(path, row, term, textures, plain) for term in ("ambient", "diffuse", "specular"))
-        made.shininess = row.get("shininess", 16)
+        default = color(path, row, "color", textures)
+        result.ambient, result.diffuse, result.specular = (color(path, row, term, textures, default) for term in ("ambient", "diffuse", "specular"))
+        result.shininess = row.get("shininess", 16)
     else:
-        made.color = color(path, row, "tint" if row["type"] in ("mirror", "glass") else "color", textures, [1, 1, 1])
-        made.ior, made.absorption = row.get("ior", 1), row.get("absorption")
-    if not traced and not all(isinstance(c, list) for c in (made.ambient, made.diffuse, made.specular)):
+        result.color = color(path, row, "tint" if row["type"] in ("mirror", "glass") else "color", textures, [1, 1, 1])
+        result.ior, result.absorption = row.get("ior", 1), row.get("absorption")
+    if not traced and not all(isinstance(c, list) for c in (result.ambient, result.diffuse, result.specular)):
         raise ValueError(f"{path}: other renderers support only constant colours here")
-    return made
+    return result
 
 
-def bare(path, row, made):
-    """A `principled` dielectric without specular reflection: its diffuse base, or full transmission without a base."""
-    known = {"type", "base_color", "metallic", "specular", "transmission", "thickness", "ior", "roughness", "attenuation_color", "attenuation_distance"}
-    passes, thick = row.get("transmission", 0), row.get("thickness", 0) > 0
-    straight = row.get("roughness", 1) == 0 and row.get("ior", 1.5) == 1
-    if set(row) - known or passes not in (0, 1) or (passes and not straight):
-        raise ValueError(f"{path}: of principled without reflection, other renderers support only the diffuse base and "
+def without_specular(path, row, result):
+    """Converts a `principled` dielectric without specular reflection: its diffuse base, or full transmission without a base."""
+    supported = {"type", "base_color", "metallic", "specular", "transmission", "thickness", "ior", "roughness", "attenuation_color", "attenuation_distance"}
+    transmission, is_solid = row.get("transmission", 0), row.get("thickness", 0) > 0
+    is_undeflected = row.get("roughness", 1) == 0 and row.get("ior", 1.5) == 1
+    if set(row) - supported or transmission not in (0, 1) or (transmission and not is_undeflected):
+        raise ValueError(f"{path}: other renderers support principled without reflection only as a diffuse base or with "
                          "undeflected transmission")
-    made.kind = "dielectric" if passes else "diffuse"
-    if passes:
-        made.thin = not thick
+    result.kind = "dielectric" if transmission else "diffuse"
+    if transmission:
+        result.thin = not is_solid
         if "attenuation_color" in row:
-            made.absorption = [-math.log(c) / row["attenuation_distance"] for c in row["attenuation_color"]]
-    return made
+            result.absorption = [-math.log(c) / row["attenuation_distance"] for c in row["attenuation_color"]]
+    return result
 
 
 def load(path, integrator="phong"):
@@ -318,13 +318,13 @@ def load(path, integrator="phong"):
         if row["type"] == "rectangle":
             scene.lights.append(quad(row, color=row["color"]))
         elif row["type"] == "point" and traced:
-            scene.lights.append(Point(row["position"], row["color"]))
+            scene.lights.append(PointLight(row["position"], row["color"]))
         elif row["type"] == "spot" and traced:
             if row.get("inner_angle", 0) != row["cone_angle"]:
                 raise ValueError(f"{path}: other renderers' spot lights fall off differently: inner_angle must be cone_angle")
             scene.lights.append(SpotLight(row["position"], row["direction"], row["color"], row["cone_angle"]))
         elif row["type"] == "directional" and traced:
-            scene.lights.append(Sun(row["direction"], row["color"]))
+            scene.lights.append(DirectionalLight(row["direction"], row["color"]))
         else:
             raise ValueError(f"{path}: other renderers do not support lights of type {row['type']!r} here")
     return scene
@@ -334,7 +334,7 @@ def environment(path, row):
     if set(row) - {"color", "file", "scale", "rotate"} or isinstance(row.get("rotate", 0), (list, dict)):
         raise ValueError(f"{path}: other renderers support only environments of one colour, or files rotated about z")
     if "file" in row:
-        return Map(os.path.join(os.path.dirname(os.path.abspath(path)), row["file"]), row.get("scale", 1), row.get("rotate", 0))
+        return EnvironmentMap(os.path.join(os.path.dirname(os.path.abspath(path)), row["file"]), row.get("scale", 1), row.get("rotate", 0))
     return [x * row.get("scale", 1) for x in row["color"]] if "color" in row else None
 
 
@@ -374,8 +374,8 @@ def course(path):
     materials = {row["name"]: Material(kinds[row["type"]], color=row["color"]) for row in text["materials"]}
     folder = os.path.dirname(os.path.abspath(path))
     for row in text["objects"]:
-        place = to_world({"scale": row.get("scale", 1), "translate": row.get("translate", [0, 0, 0])}, "z")
-        scene.shapes.append(Mesh(os.path.join(folder, row["obj_file_path"]), "flat", place, materials[row["material_name"]]))
+        transform = to_world({"scale": row.get("scale", 1), "translate": row.get("translate", [0, 0, 0])}, "z")
+        scene.shapes.append(Mesh(os.path.join(folder, row["obj_file_path"]), "flat", transform, materials[row["material_name"]]))
     scene.lights.append(quad({"center": light["position"], "size": light["size"], "normal": [0, -1, 0], "tangent": [1, 0, 0]},
                              color=light["radiance"]))
     return scene

@@ -5,11 +5,11 @@
 
 The first run installs PyPI's bpy, for Blender's OpenColorIO configuration, and opencolorio, OpenEXR, numpy and pypng
 into target/peers. wgray renders a card of N colours, from 2^-12 to 2^7, including greys, as a linear EXR and, with
-every view transform and two exposures, as 16-bit PNGs. The EXR's values are transformed for each PNG
+every view transform and two exposures, as 16-bit PNGs. The EXR's values are transformed for each PNG in two ways:
 
     formula   in numpy, by the published formula: the PNG must agree to 2e-5 everywhere, 1.3 steps of 16 bits
     Blender   by OpenColorIO with Blender's tables, which interpolate between at most 57 points per axis: the mean
-              difference must be at most 0.003, and 99 % of the values must agree to 0.03. It has no gamma22
+              difference must be at most 0.003, and 99 % of the values must agree to 0.03. Blender has no gamma22
 
 --figure renders the box of scenes/cornell-path.toml, three stops brighter, and twelve hues from 2^-4 to 2^5, under each
 transform.
@@ -38,19 +38,19 @@ import OpenEXR
 import png
 import PyOpenColorIO as ocio
 
-SIDE_BY_SIDE = 512
+CARD_WIDTH = 512
 
 
 def card(count):
-    """Linear colours, as rows of an image: greys, the corners of the RGB cube, random colours."""
+    """Returns linear colours as an image: greys, the corners of the RGB cube, random colours."""
     random = np.random.default_rng(1)
     stops = random.uniform(-12, 7, (count, 1))
     colors = random.uniform(0, 1, (count, 3)) ** random.choice([1, 4], (count, 1)) * 2.0**stops
-    greys = np.repeat(np.geomspace(2.0**-14, 2.0**7, SIDE_BY_SIDE)[:, None], 3, 1)
+    greys = np.repeat(np.geomspace(2.0**-14, 2.0**7, CARD_WIDTH)[:, None], 3, 1)
     corners = np.array([[r, g, b] for r in (0, 1) for g in (0, 1) for b in (0, 1)]) * 1.0
-    every = np.concatenate([greys, corners, corners * 8, colors])
-    every = every[: len(every) // SIDE_BY_SIDE * SIDE_BY_SIDE]
-    return every.reshape(-1, SIDE_BY_SIDE, 3).astype(np.float32)
+    all_colors = np.concatenate([greys, corners, corners * 8, colors])
+    all_colors = all_colors[: len(all_colors) // CARD_WIDTH * CARD_WIDTH]
+    return all_colors.reshape(-1, CARD_WIDTH, 3).astype(np.float32)
 
 
 SCENE = """image = {{ width = {width}, height = {height} }}
@@ -73,8 +73,8 @@ def srgb(light):
 
 def neutral(light):
     """Khronos PBR Neutral, as specified."""
-    least = light.min(1, keepdims=True)
-    light = light - np.where(least < 0.08, least - 6.25 * least**2, 0.04)
+    minimum = light.min(1, keepdims=True)
+    light = light - np.where(minimum < 0.08, minimum - 6.25 * minimum**2, 0.04)
     peak = light.max(1, keepdims=True)
     with np.errstate(divide="ignore", invalid="ignore"):
         shown = 1 - 0.24**2 / (peak + 0.24 - 0.76)
@@ -84,11 +84,12 @@ def neutral(light):
 
 
 def hsv(color):
-    most, least = color.max(1), color.min(1)
-    spread = np.where(most > least, most - least, 1)
+    maximum, minimum = color.max(1), color.min(1)
+    spread = np.where(maximum > minimum, maximum - minimum, 1)
     r, g, b = color.T
-    hue = np.select([most == r, most == g], [(g - b) / spread % 6, (b - r) / spread + 2], (r - g) / spread + 4) / 6
-    return np.where(most > least, hue, 0), np.where(most > 0, (most - least) / np.where(most > 0, most, 1), 0), most
+    hue = np.select([maximum == r, maximum == g], [(g - b) / spread % 6, (b - r) / spread + 2], (r - g) / spread + 4) / 6
+    saturation = np.where(maximum > 0, (maximum - minimum) / np.where(maximum > 0, maximum, 1), 0)
+    return np.where(maximum > minimum, hue, 0), saturation, maximum
 
 
 def rgb(hue, saturation, value):
@@ -100,12 +101,12 @@ def rgb(hue, saturation, value):
 
 
 def agx(light):
-    """AgX as in AgX_LUT_Gen for Blender (AgXBaseRec2020.py), clipped to Rec. 709; matrices of primaries and white."""
-    wide = np.array([[0.627403914, 0.329283038, 0.043313048], [0.069097292, 0.919540405, 0.011362303], [0.016391439, 0.088013308, 0.895595253]])
+    """AgX as in AgX_LUT_Gen for Blender (AgXBaseRec2020.py), clipped to Rec. 709. The matrices follow from primaries and white."""
+    to_rec2020 = np.array([[0.627403914, 0.329283038, 0.043313048], [0.069097292, 0.919540405, 0.011362303], [0.016391439, 0.088013308, 0.895595253]])
     inset = primaries_moved([2.13976149, -1.22827335, -3.05174246], [0.32965205, 0.28051336, 0.12475368])
     outset = np.linalg.inv(primaries_moved([0, 0, 0], [0.32317438, 0.28325605, 0.0374326]))
-    light = light @ wide.T @ inset.T
-    before = hsv(light)[0]
+    light = light @ to_rec2020.T @ inset.T
+    original_hue = hsv(light)[0]
     with np.errstate(divide="ignore"):
         x = np.clip((np.log2(light / 0.18) + 10) / 16.5, 0, 1)
     pivot, grey, slope, power = 10 / 16.5, 0.18 ** (1 / 2.4), 2.4, 1.5
@@ -116,30 +117,30 @@ def agx(light):
         half = scale * t / (1 + t**power) ** (1 / power)
         curve = np.where((x >= pivot) == above, grey + half if above else grey - half, curve)
     hue, saturation, value = hsv(np.clip(curve, 0, 1) ** 2.4)
-    hue = before + 0.4 * ((hue - before + 0.5) % 1 - 0.5)
-    return rgb(hue % 1, saturation, value) @ outset.T @ np.linalg.inv(wide).T
+    hue = original_hue + 0.4 * ((hue - original_hue + 0.5) % 1 - 0.5)
+    return rgb(hue % 1, saturation, value) @ outset.T @ np.linalg.inv(to_rec2020).T
 
 
-def primaries_moved(degrees, shares):
-    """The matrix to Rec. 2020 from its primaries, each rotated about the white point along the edges of the triangle by
+def primaries_moved(degrees, fractions):
+    """Returns the matrix to Rec. 2020 from its primaries, each rotated about the white point along the edges of the triangle by
     an angle, and moved towards the white point by a fraction (working_space.py of AgX_LUT_Gen)."""
     white, corners = np.array([0.3127, 0.3290]), np.array([[0.708, 0.292], [0.170, 0.797], [0.131, 0.046]])
     moved = []
-    for corner, degree, share in zip(corners, degrees, shares):
+    for corner, degree, fraction in zip(corners, degrees, fractions):
         angle = np.radians(degree)
-        turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-        moved.append(white + to_edge(corners - white, turn @ (corner - white)) * (1 - share))
+        rotation = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+        moved.append(white + to_edge(corners - white, rotation @ (corner - white)) * (1 - fraction))
     return np.linalg.inv(to_xyz(corners, white)) @ to_xyz(np.array(moved), white)
 
 
-def to_edge(corners, way):
-    """The distance to the triangle around the origin in a direction."""
-    reached = []
+def to_edge(corners, direction):
+    """Returns the vector in a direction from the origin to the edge of the triangle around it."""
+    distances = []
     for a, b in zip(corners, np.roll(corners, -1, axis=0)):
-        far, along = np.linalg.solve(np.array([way, a - b]).T, a)
-        if far > 0 and -1e-9 <= along <= 1 + 1e-9:
-            reached.append(far)
-    return min(reached) * way
+        distance, edge_position = np.linalg.solve(np.array([direction, a - b]).T, a)
+        if distance > 0 and -1e-9 <= edge_position <= 1 + 1e-9:
+            distances.append(distance)
+    return min(distances) * direction
 
 
 def to_xyz(corners, white):
@@ -158,7 +159,7 @@ BLENDER = {"srgb": "Standard", "agx": "AgX", "khronos-pbr-neutral": "Khronos PBR
 
 
 def blender(name, light):
-    """The transform of Blender's configuration."""
+    """Applies the transform of Blender's configuration."""
     (path,) = pathlib.Path(os.environ["WGRAY_VIEW_CHECK"]).glob("lib/python*/site-packages/bpy/*/datafiles/colormanagement/config.ocio")
     config = ocio.Config.CreateFromFile(str(path))
     view = ocio.DisplayViewTransform(src="Linear Rec.709", display="sRGB", view=BLENDER[name])
@@ -182,7 +183,7 @@ def render(args, folder, name, *options):
 
 
 def hues(stops):
-    """The TOML text of a chart: hues along the rows, stops along the columns."""
+    """Returns the TOML text of a chart: hues along the rows, stops along the columns."""
     head = "image = { width = 240, height = 120 }\n"
     head += 'camera = { type = "orthographic", position = [0, 0, 1], look_at = [0, 0, 0], up = [0, 1, 0], height = 12 }\n'
     text = head + 'render = { integrator = "path", max_depth = 0, pixel_samples = { pattern = "grid", count = 4 } }\n'
@@ -236,22 +237,22 @@ def main():
             for stops in (0, -1.25):
                 displayed = render(args, folder, "displayed.png", "--bit-depth", "16", "--view-transform", name, "--exposure", str(stops))
                 exposed = light * 2.0**stops
-                apart = np.abs(displayed - formula(exposed)).max()
-                row, good = [name, f"{stops}", f"{apart:.1e}"], apart < 2e-5
+                error = np.abs(displayed - formula(exposed)).max()
+                row, passes = [name, f"{stops}", f"{error:.1e}"], error < 2e-5
                 if name in BLENDER:
                     difference = np.abs(displayed - blender(name, exposed))
-                    mean, most = difference.mean(), np.quantile(difference, 0.99)
-                    row, good = [*row, f"{mean:.5f}", f"{most:.4f}"], good and mean < 0.003 and most < 0.03
+                    mean, percentile = difference.mean(), np.quantile(difference, 0.99)
+                    row, passes = [*row, f"{mean:.5f}", f"{percentile:.4f}"], passes and mean < 0.003 and percentile < 0.03
                 else:
                     row += ["", ""]
-                print("| " + " | ".join(row) + " |" + ("" if good else " WRONG"))
-                failed |= not good
-                for other, wrong in FORMULAS.items():
-                    for error in (0, 0.01):
-                        if (other, error) == (name, 0):
+                print("| " + " | ".join(row) + " |" + ("" if passes else " WRONG"))
+                failed |= not passes
+                for other_name, other_formula in FORMULAS.items():
+                    for extra_stops in (0, 0.01):
+                        if (other_name, extra_stops) == (name, 0):
                             continue
-                        if np.abs(displayed - wrong(exposed * 2.0**error)).max() < 2e-5:
-                            print(f"{name} passes for {other} with {error} stops more")
+                        if np.abs(displayed - other_formula(exposed * 2.0**extra_stops)).max() < 2e-5:
+                            print(f"{name} passes as {other_name} with {extra_stops} stops more")
                             failed = True
     sys.exit(failed)
 

@@ -1,4 +1,4 @@
-"""The works that `run` times."""
+"""The workloads that `run` times."""
 import dataclasses
 
 import generate
@@ -8,7 +8,7 @@ ALL = ("lavapipe", "mesa-backports", "cpu", "mitsuba", "povray")
 
 
 @dataclasses.dataclass
-class Work:
+class Workload:
     title: str
     scene: str  # a file of the repository, or the name of a scene in generate.py
     size: int = 512
@@ -20,17 +20,17 @@ class Work:
     spp: int = 16
 
     def generated(self):
-        """The generated scenes that the work needs."""
+        """Returns the names of the generated scenes that the workload needs."""
         if self.scene not in generate.SCENES:
             return []
         return [self.scene] + ([f"{self.scene}-tiny"] if self.kind == "build" else [])
 
-    def of_size(self, size):
+    def resized(self, size):
         title = self.title.replace(f"{self.size}x{self.size}", f"{size}x{size}")
         return dataclasses.replace(self, title=title, size=size)
 
     def rays(self, spp, light_samples):
-        """The number of nominal rays. A path counts as one ray."""
+        """Returns the number of nominal rays. A path counts as one ray."""
         return self.size ** 2 * spp * (1 if self.integrator == "path" else 1 + light_samples * self.lights)
 
 
@@ -41,23 +41,23 @@ PATHS = ("lavapipe", "mesa-backports", "cpu", "mitsuba", "cycles")
 
 
 def large(title, scene, renderers=NO_POVRAY):
-    return Work(f"{title}, 512x512", scene, renderers=renderers, repeats=1)
+    return Workload(f"{title}, 512x512", scene, renderers=renderers, repeats=1)
 
 
 def path(title, scene, size, kind="render"):
-    return Work(f"{title}, {size}x{size}", scene, size, kind, renderers=PATHS, integrator="path", spp=64, repeats=3 if kind == "render" else 1)
+    return Workload(f"{title}, {size}x{size}", scene, size, kind, renderers=PATHS, integrator="path", spp=64, repeats=3 if kind == "render" else 1)
 
 
 def build(title, scene):
-    return Work(f"reading and building {title}", scene, kind="build", renderers=("lavapipe", "mesa-backports", "cpu", "mitsuba"))
+    return Workload(f"reading and building {title}", scene, kind="build", renderers=("lavapipe", "mesa-backports", "cpu", "mitsuba"))
 
 
 SMALL = {
-    "cornell400": Work("assignment scene, 400x400", CORNELL, 400),
-    "cornell800": Work("assignment scene, 800x800", CORNELL, 800),
-    "ellipsoids": Work("20 ellipsoids, 3 lights, 400x400", ELLIPSOIDS, 400, lights=3),
-    "cold": Work("assignment scene, 400x400, whole process, caches empty", CORNELL, 400, "cold", repeats=1),
-    "cached": Work("assignment scene, 400x400, whole process, caches warm", CORNELL, 400, "cached", repeats=1),
+    "cornell400": Workload("assignment scene, 400x400", CORNELL, 400),
+    "cornell800": Workload("assignment scene, 800x800", CORNELL, 800),
+    "ellipsoids": Workload("20 ellipsoids, 3 lights, 400x400", ELLIPSOIDS, 400, lights=3),
+    "cold": Workload("assignment scene, 400x400, whole process, caches empty", CORNELL, 400, "cold", repeats=1),
+    "cached": Workload("assignment scene, 400x400, whole process, caches warm", CORNELL, 400, "cached", repeats=1),
 }
 LARGE = {
     "rock70k": large("rock of 69,312 triangles", "rock70k", ALL),
@@ -77,11 +77,11 @@ PATH = {
     "path-rock70k": path("paths around a rock of 69,312 triangles", "path-rock70k", 400),
     "path-cold": path("paths in the assignment scene, whole process, caches empty", CORNELL_PATH, 400, "cold"),
 }
-MATERIALS = {name: dataclasses.replace(work, renderers=NO_POVRAY) for name, work in {  # not supported by cycles_scenes.py
+MATERIALS = {name: dataclasses.replace(workload, renderers=NO_POVRAY) for name, workload in {  # not supported by cycles_scenes.py
     "spheres": path("a rough metal and a rough glass sphere under a map", "path-spheres", 400),
     "lamps1": path("a room with one area light", "path-lamps1", 400),
     "lamps1000": path("a room with 1,000 area lights", "path-lamps1000", 400),
     "principled70k": path("principled on a rock of 69,312 triangles", "path-principled70k", 400),
 }.items()}
-WORKS = SMALL | LARGE | PATH | MATERIALS
-SETS = {"small": list(SMALL), "large": list(LARGE), "paths": list(PATH), "materials": list(MATERIALS), "all": list(WORKS)}
+WORKLOADS = SMALL | LARGE | PATH | MATERIALS
+SETS = {"small": list(SMALL), "large": list(LARGE), "paths": list(PATH), "materials": list(MATERIALS), "all": list(WORKLOADS)}

@@ -14,13 +14,13 @@ fuzz_target!(|bytes: &[u8]| {
     }
     let words = binary.len() / 4;
     while choices.are_left() {
-        let at = choices.below(words) * 4;
+        let offset = choices.below(words) * 4;
         let special = [f32::NAN, f32::INFINITY, -3e38, 1e-40, 1e9, 0.0].map(f32::to_bits);
         let word = match choices.below(8) {
             i @ 0..6 => special[i],
             _ => choices.word(),
         };
-        binary[at..at + 4].copy_from_slice(&word.to_le_bytes());
+        binary[offset..offset + 4].copy_from_slice(&word.to_le_bytes());
     }
     let mut overrides = small_model();
     if animated {

@@ -4,8 +4,8 @@
 use libfuzzer_sys::fuzz_target;
 use serde_json::{Value, json};
 use wgray::image::{Format, Pending, SaveOptions, Target, save};
-use wgray_render::job::Parts;
 use wgray_fuzz::{Choices, changed, file};
+use wgray_render::job::Parts;
 
 fn header() -> Value {
     json!({
@@ -21,7 +21,7 @@ fn header() -> Value {
     })
 }
 
-fn written(header: &Value, pieces: &[[u32; 14]], data: &[u8]) -> Vec<u8> {
+fn encode_part(header: &Value, pieces: &[[u32; 14]], data: &[u8]) -> Vec<u8> {
     let text = header.to_string().into_bytes();
     let mut hashed = (text.len() as u32).to_le_bytes().to_vec();
     hashed.extend(&text);
@@ -34,11 +34,11 @@ fn written(header: &Value, pieces: &[[u32; 14]], data: &[u8]) -> Vec<u8> {
         piece.extend(blake3::keyed_hash(&key, &piece).as_bytes());
         let [x0, y0, x1, y1, fx0, fy0, fx1, fy1, _, _, _, _, flags, _] = words.map(u64::from);
         let pixels = |x0: u64, y0: u64, x1: u64, y1: u64| x1.saturating_sub(x0).saturating_mul(y1.saturating_sub(y0));
-        let form = 16 + if flags & 1 != 0 { 32 } else { 0 } + if flags & 2 != 0 { 64 } else { 0 };
+        let bytes_per_pixel = 16 + if flags & 1 != 0 { 32 } else { 0 } + if flags & 2 != 0 { 64 } else { 0 };
         let hits = if flags & 4 != 0 { pixels(x0, y0, x1, y1) } else { 0 };
         let bytes = pixels(fx0, fy0, fx1, fy1)
-            .saturating_mul(form)
-            .saturating_add(hits.saturating_mul(HIT));
+            .saturating_mul(bytes_per_pixel)
+            .saturating_add(hits.saturating_mul(FIRST_HIT_BYTES));
         let bytes = bytes.min(1 << 16) as usize;
         piece.extend((0..bytes).map(|i| data.get(i % data.len().max(1)).copied().unwrap_or(0)));
         piece.extend(blake3::keyed_hash(&key, &piece).as_bytes());
@@ -48,7 +48,7 @@ fn written(header: &Value, pieces: &[[u32; 14]], data: &[u8]) -> Vec<u8> {
 }
 
 /// Size of a first hit in bytes.
-const HIT: u64 = size_of::<wgray_render::records::FirstHit>() as u64;
+const FIRST_HIT_BYTES: u64 = size_of::<wgray_render::records::FirstHit>() as u64;
 
 fuzz_target!(|bytes: &[u8]| {
     let mut choices = Choices(bytes);
@@ -62,8 +62,8 @@ fuzz_target!(|bytes: &[u8]| {
     ];
     for _ in 0..choices.below(4) {
         let piece = choices.below(2);
-        let at = choices.below(14);
-        pieces[piece][at] = match choices.below(3) {
+        let word = choices.below(14);
+        pieces[piece][word] = match choices.below(3) {
             0 => choices.word(),
             _ => u32::from(choices.byte()),
         };
@@ -72,19 +72,19 @@ fuzz_target!(|bytes: &[u8]| {
         pieces.pop();
     }
     let ending = ["png", "exr", "jpg", "webp"][choices.below(4)];
-    let path = file("a.part", &written(&header, &pieces, choices.0));
+    let path = file("a.part", &encode_part(&header, &pieces, choices.0));
     if let Ok(parts) = Parts::open(&[path], false) {
         let layout = parts.layout();
-        let whole = layout.region;
+        let region = layout.region;
         let _ = parts.read(&mut |_| Ok(()));
         // The same checks as the command line performs before writing.
         let out = file(&format!("out.{ending}"), b"");
         let Some(format) = Format::of(&out) else { return };
-        if format.check_size(whole.width(), whole.height()).is_err() {
+        if format.check_size(region.width(), region.height()).is_err() {
             return;
         }
-        let found = wgray::image::files(&out, format, &layout.aovs);
-        let files = found
+        let paths = wgray::image::files(&out, format, &layout.aovs);
+        let files = paths
             .iter()
             .map(|path| Pending::start(wgray::image::Output::find(path)?));
         let Ok(files) = files.collect::<Result<Vec<_>, std::io::Error>>() else {

@@ -17,7 +17,7 @@ use wgray::{Device, Options, Overrides, Scene};
 pub use changed::changed;
 pub use everything::everything;
 
-/// Derives decisions from the input bytes; returns 0 once the bytes are used up.
+/// The unused input bytes, from which decisions are derived. Decisions are 0 once all bytes are used.
 pub struct Choices<'a>(pub &'a [u8]);
 
 impl Choices<'_> {
@@ -35,12 +35,12 @@ impl Choices<'_> {
 
     /// Returns a number below `count`, or 0 if `count` is 0.
     pub fn below(&mut self, count: usize) -> usize {
-        let wide = count > 256;
-        let number = u16::from_le_bytes([self.byte(), if wide { self.byte() } else { 0 }]);
+        let needs_two_bytes = count > 256;
+        let number = u16::from_le_bytes([self.byte(), if needs_two_bytes { self.byte() } else { 0 }]);
         usize::from(number) % count.max(1)
     }
 
-    /// Returns whether unused bytes are left.
+    /// Returns true if unused bytes are left.
     pub fn are_left(&self) -> bool {
         !self.0.is_empty()
     }
@@ -55,7 +55,7 @@ pub fn file(name: &str, bytes: &[u8]) -> PathBuf {
     path
 }
 
-/// Overrides for a small, fast render.
+/// Returns overrides for a small, fast render.
 pub fn small() -> Overrides {
     Overrides {
         size: Some((3, 2)),
@@ -65,7 +65,7 @@ pub fn small() -> Overrides {
     }
 }
 
-/// Like [`small`], for models. The environment is constant, because computing the tables of the studio environment
+/// Returns the overrides of [`small`] for models. The environment is constant, because computing the tables of the studio environment
 /// would dominate the time.
 pub fn small_model() -> Overrides {
     Overrides {
@@ -74,7 +74,7 @@ pub fn small_model() -> Overrides {
     }
 }
 
-/// Renders a scene on the CPU and asserts that there is no error.
+/// Renders a scene on the CPU; panics on an error.
 pub fn render(scene: &Scene) {
     let options = Options {
         device: Device::Cpu,
