@@ -1,6 +1,6 @@
 //! A rendered image in memory.
 
-use std::io;
+use std::io::{self, Seek, Write};
 use std::path::Path;
 
 use crate::device::DeviceInfo;
@@ -139,6 +139,56 @@ impl Picture {
         let targets = vec![Target { format, files }];
         image::save(targets, &self.layout, options, &mut |sink| sink(self.band()))?;
         Ok(())
+    }
+
+    /// Writes the image to a writer, for example a `Cursor<Vec<u8>>`. The layers are in an EXR;
+    /// [`Picture::write_layer_to`] writes them as PNG images.
+    ///
+    /// ```
+    /// # fn main() -> Result<(), wgray::Error> {
+    /// use wgray::image::{Format, SaveOptions};
+    ///
+    /// # let smaller = wgray::Overrides { size: Some((16, 16)), ..Default::default() };
+    /// # let scene = wgray::Scene::load_with("scenes/turntable.toml", &smaller)?;
+    /// let image = wgray::render(&scene, &wgray::Options::default())?;
+    /// let mut png = std::io::Cursor::new(Vec::new());
+    /// image.write_to(&mut png, Format::Png, &SaveOptions::default())?;
+    /// assert!(png.into_inner().starts_with(b"\x89PNG"));
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    ///
+    /// The image is too large for the format, or the writer fails.
+    pub fn write_to(&self, writer: impl Write + Seek, format: Format, options: &SaveOptions) -> Result<(), Error> {
+        let size = format.check_size(self.width(), self.height());
+        size.map_err(|rule| RenderError::Output(io::Error::new(io::ErrorKind::InvalidInput, rule)))?;
+        self.write_content(writer, (format, None), options)
+    }
+
+    /// Writes a layer as a PNG to a writer, as [`Picture::save`] does to `NAME.normal.png`.
+    ///
+    /// # Errors
+    ///
+    /// The image does not have the layer, or the writer fails.
+    pub fn write_layer_to(&self, layer: Aov, writer: impl Write + Seek, options: &SaveOptions) -> Result<(), Error> {
+        if !self.layout.aovs.contains(&layer) {
+            let rule = format!("the image does not have the layer {}", layer.name());
+            return Err(RenderError::Output(io::Error::new(io::ErrorKind::InvalidInput, rule)).into());
+        }
+        self.write_content(writer, (Format::Png, Some(layer)), options)
+    }
+
+    fn write_content(
+        &self,
+        writer: impl Write + Seek,
+        content: (Format, Option<Aov>),
+        options: &SaveOptions,
+    ) -> Result<(), Error> {
+        Ok(image::write_to(writer, content, &self.layout, options, &mut |sink| {
+            sink(self.band())
+        })?)
     }
 
     fn band(&self) -> Band<'_> {

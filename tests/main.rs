@@ -28,6 +28,7 @@ mod layers;
 mod layout;
 mod lens;
 mod loops;
+mod memory;
 mod meshes;
 mod model;
 mod mutations;

@@ -2,8 +2,7 @@
 
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
-use std::fs;
-use std::io::{self, Read as _};
+use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -15,7 +14,8 @@ use super::decode::{Channels, DecodeError, Format, Header, MAX_IMAGE_SIDE, decod
 use super::downsample::halved;
 use super::key_path::list;
 use super::texture::{Encoding, Image, Texels};
-use crate::mesh::{Mesh, in_other_case};
+use crate::file_system::{AssetSource, FileSystem, NoFiles, or_current};
+use crate::mesh::Mesh;
 use wgray_image::color::srgb_to_linear;
 
 /// Maximum size of a file in bytes.
@@ -44,6 +44,7 @@ pub struct Assets {
     pub meshes: BTreeMap<String, Arc<Mesh>>,
     /// True to report damage to a file as an error, instead of using a placeholder with a warning.
     pub strict: bool,
+    pub(super) file_system: FileSystem,
 }
 
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -64,10 +65,7 @@ impl Default for Assets {
 impl Assets {
     /// Returns the assets of a folder, without images in memory.
     pub fn beside(folder: &Path) -> Assets {
-        let folder = match folder.as_os_str().is_empty() {
-            true => Path::new("."),
-            false => folder,
-        };
+        let folder = or_current(folder);
         Assets {
             folder: folder.to_owned(),
             root: folder.to_owned(),
@@ -78,7 +76,32 @@ impl Assets {
             absent: BTreeMap::new(),
             meshes: BTreeMap::new(),
             strict: false,
+            file_system: FileSystem::Disk,
         }
+    }
+
+    /// Returns the assets of a source, without images in memory. `folder` is relative to the source.
+    pub fn from_source(source: impl AssetSource + 'static) -> Assets {
+        Assets {
+            folder: PathBuf::new(),
+            root: PathBuf::new(),
+            file_system: FileSystem::of(Arc::new(source)),
+            ..Assets::default()
+        }
+    }
+
+    /// Returns these assets with file names relative to another folder, which must also contain all files unless they
+    /// are in a source.
+    pub(super) fn in_folder(&self, folder: &Path) -> Assets {
+        let mut assets = Assets {
+            folder: folder.to_owned(),
+            ..self.clone()
+        };
+        if self.file_system.is_disk() {
+            assets.folder = or_current(folder).to_owned();
+            assets.root = assets.folder.clone();
+        }
+        assets
     }
 
     /// Returns the warning about damage to a file, which names the placeholder.
@@ -150,7 +173,7 @@ impl Assets {
                 )));
             }
             AssetKey::Memory(_) => return Ok(self.image_in_memory(file, encoding, fits)?),
-            AssetKey::File(path) => Cow::Owned(read(file, path)?),
+            AssetKey::File(path) => Cow::Owned(self.read(file, path)?),
             AssetKey::Encoded(name) => Cow::Borrowed(self.encoded.get(name).map_or(&[][..], |bytes| bytes)),
         };
         let is_named = matches!(key, AssetKey::File(_));
@@ -235,16 +258,16 @@ impl Assets {
         if self.encoded.contains_key(file) {
             return Ok(AssetKey::Encoded(file.to_owned()));
         }
-        let path = self.folder.join(file).canonicalize();
+        let path = self.file_system.canonical_file(&self.folder.join(file));
         let path = path.map_err(|error| {
-            let similar = in_other_case(&self.folder, file);
+            let similar = self.file_system.in_other_case(&self.folder, file);
             let similar = similar
                 .as_deref()
                 .map(|similar| similar.strip_prefix(&self.folder).unwrap_or(similar));
             let hint = similar.map_or_else(String::new, |name| format!("; did you mean {name:?}?"));
             Problem::damage(unreadable(self.display_name(file), &error) + &hint)
         })?;
-        let root = self.root.canonicalize().map_err(|error| {
+        let root = self.file_system.canonical_folder(&self.root).map_err(|error| {
             let root = self.root.display();
             format!("{file:?} must lie in the asset root, {root}, which cannot be found: {error}; check --asset-root")
         })?;
@@ -260,10 +283,41 @@ impl Assets {
                 ),
             }));
         }
-        if !path.is_file() {
+        if !self.file_system.is_file(&path) {
             return Err(Problem::new(format!("{file:?} must be a file")));
         }
         Ok(AssetKey::File(path))
+    }
+
+    fn read(&self, file: &str, path: &Path) -> Result<Vec<u8>, Problem> {
+        let read = self.file_system.read(path, MAX_FILE_BYTES);
+        read.map_err(|error| match error.kind() {
+            io::ErrorKind::FileTooLarge => {
+                Problem::new(format!("{file:?} must not be larger than {} MiB", MAX_FILE_BYTES >> 20))
+            }
+            _ => Problem::damage(unreadable(file, &error)),
+        })
+    }
+}
+
+impl Image {
+    /// Decodes a PNG, JPEG, WebP, KTX2, OpenEXR or Radiance HDR file in memory. `None` is the usual encoding of the
+    /// format: linear for OpenEXR and HDR, otherwise sRGB. Invalid texels of floats are clamped to 0 to 1e6.
+    ///
+    /// # Errors
+    ///
+    /// The file is damaged, or exceeds a limit on the size of images.
+    pub fn from_slice(bytes: &[u8], encoding: Option<Encoding>) -> Result<Image, Problem> {
+        const NAME: &str = "image";
+        if Format::of(bytes).is_none() {
+            let rule = "the image must be a PNG, JPEG, WebP, KTX2, EXR or HDR file";
+            return Err(Problem::damage(rule));
+        }
+        let mut assets = Assets::from_source(NoFiles);
+        assets.encoded.insert(NAME.to_owned(), Arc::from(bytes));
+        let key = AssetKey::Encoded(NAME.to_owned());
+        let decoded = assets.image(NAME, &key, Part::Colors(encoding), |_| Ok(()))?;
+        Ok(Arc::unwrap_or_clone(decoded.image))
     }
 }
 
@@ -364,22 +418,6 @@ fn check_name(file: &str, format: Format) -> Result<(), String> {
         )),
         _ => Ok(()),
     }
-}
-
-fn read(file: &str, path: &Path) -> Result<Vec<u8>, Problem> {
-    let mut bytes = Vec::new();
-    let too_large = || Problem::new(format!("{file:?} must not be larger than {} MiB", MAX_FILE_BYTES >> 20));
-    // Rejects most files that are too large without reading them.
-    if fs::metadata(path).is_ok_and(|metadata| metadata.len() > MAX_FILE_BYTES) {
-        return Err(too_large());
-    }
-    fs::File::open(path)
-        .and_then(|opened| opened.take(MAX_FILE_BYTES + 1).read_to_end(&mut bytes))
-        .map_err(|error| Problem::damage(unreadable(file, &error)))?;
-    if bytes.len() as u64 > MAX_FILE_BYTES {
-        return Err(too_large());
-    }
-    Ok(bytes)
 }
 
 fn unreadable(file: &str, error: &io::Error) -> String {

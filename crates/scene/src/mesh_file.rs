@@ -1,24 +1,23 @@
 //! Cache of the meshes that are in use.
 
 use std::collections::HashMap;
-use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError, Weak};
 use std::time::SystemTime;
 
+use crate::file_system::{FileStamp, FileSystem};
 use crate::mesh::{Mesh, MeshError, Normals};
 
 /// A version of a file, and the options of the reader.
 #[derive(PartialEq, Eq, Hash)]
 struct Key {
+    /// [`FileSystem::id`].
+    source: u64,
     path: PathBuf,
     length: u64,
     modified: SystemTime,
     normals: Option<Normals>,
 }
-
-/// Length and modification time.
-type FileStamp = Option<(u64, SystemTime)>;
 
 /// A mesh and the stamps of its MTL files.
 struct CachedMesh {
@@ -30,17 +29,17 @@ struct CachedMesh {
 static IN_USE: Mutex<Option<HashMap<Key, CachedMesh>>> = Mutex::new(None);
 
 /// Reads a mesh; returns the existing mesh if it is in use and its files have not changed.
-pub fn load(path: &Path, normals: Option<Normals>) -> Result<Arc<Mesh>, MeshError> {
-    let Some(key) = key(path, normals) else {
-        return Mesh::load(path, normals).map(Arc::new); // reports the error
+pub fn load(file_system: &FileSystem, path: &Path, normals: Option<Normals>) -> Result<Arc<Mesh>, MeshError> {
+    let Some(key) = key(file_system, path, normals) else {
+        return Mesh::load_from(file_system, path, normals).map(Arc::new); // reports the error
     };
-    if let Some(mesh) = cached_mesh(&key) {
+    if let Some(mesh) = cached_mesh(file_system, &key) {
         return Ok(mesh);
     }
     // The lock is not held while reading, because a thread of the reader may call this function for another scene.
-    let read = Arc::new(Mesh::load(path, normals)?);
-    let libraries = libraries(&read);
-    if let Some(mesh) = cached_mesh(&key) {
+    let read = Arc::new(Mesh::load_from(file_system, path, normals)?);
+    let libraries = libraries(file_system, &read);
+    if let Some(mesh) = cached_mesh(file_system, &key) {
         return Ok(mesh); // another thread was faster
     }
     let mut in_use = IN_USE.lock().unwrap_or_else(PoisonError::into_inner);
@@ -52,18 +51,19 @@ pub fn load(path: &Path, normals: Option<Normals>) -> Result<Arc<Mesh>, MeshErro
 }
 
 /// Returns the mesh if it is in use and its MTL files have not changed.
-fn cached_mesh(key: &Key) -> Option<Arc<Mesh>> {
+fn cached_mesh(file_system: &FileSystem, key: &Key) -> Option<Arc<Mesh>> {
     let mut in_use = IN_USE.lock().unwrap_or_else(PoisonError::into_inner);
     let in_use = in_use.get_or_insert_default();
     in_use.retain(|_, cached| cached.mesh.strong_count() > 0);
     let cached = in_use.get(key)?;
     let mesh = cached.mesh.upgrade()?;
-    (libraries(&mesh) == cached.libraries).then_some(mesh)
+    (libraries(file_system, &mesh) == cached.libraries).then_some(mesh)
 }
 
-fn key(path: &Path, normals: Option<Normals>) -> Option<Key> {
-    let (length, modified) = stamp(path)?;
+fn key(file_system: &FileSystem, path: &Path, normals: Option<Normals>) -> Option<Key> {
+    let (length, modified) = file_system.stamp(path)?;
     Some(Key {
+        source: file_system.id(),
         path: path.to_owned(),
         length,
         modified,
@@ -71,18 +71,19 @@ fn key(path: &Path, normals: Option<Normals>) -> Option<Key> {
     })
 }
 
-fn stamp(path: &Path) -> FileStamp {
-    let metadata = fs::metadata(path).ok()?;
-    Some((metadata.len(), metadata.modified().ok()?))
-}
-
-fn libraries(mesh: &Mesh) -> Vec<FileStamp> {
-    mesh.libraries.iter().map(|library| stamp(&library.file)).collect()
+fn libraries(file_system: &FileSystem, mesh: &Mesh) -> Vec<FileStamp> {
+    let files = mesh.libraries.iter().map(|library| &library.file);
+    files.map(|file| file_system.stamp(file)).collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::fs;
+
+    fn load(path: &Path, normals: Option<Normals>) -> Result<Arc<Mesh>, MeshError> {
+        super::load(&FileSystem::Disk, path, normals)
+    }
 
     const SMALL: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
 

@@ -15,7 +15,7 @@ use ::exr::prelude::{ReadChannels, ReadLayers, ReadSpecificChannel, f16};
 use rayon::prelude::*;
 
 use super::aov::Channel;
-use super::{Band, ExrType, Layout, Metadata, Pending, Pixels, SaveOptions, Sink};
+use super::{Band, ExrType, Layout, Metadata, Pixels, SaveOptions, Sink};
 use crate::error::RenderError;
 use crate::film::mean;
 
@@ -23,14 +23,11 @@ use crate::film::mean;
 /// part. The display window is the whole image, the data window is the region. Returns the number of finite values that
 /// became infinite.
 pub fn write(
-    files: &mut [Pending],
+    file: impl Write + Seek,
     layout: &Layout,
     options: &SaveOptions,
     render: &mut dyn FnMut(&mut Sink) -> Result<(), RenderError>,
 ) -> Result<u64, RenderError> {
-    let [file] = files else {
-        return Err(io::Error::other("an EXR is one file").into()); // unreachable: see `target::files`
-    };
     let columns = columns(layout);
     let header = header(layout, options, &columns);
     let mut too_large = 0;

@@ -1,7 +1,7 @@
 //! JPEG and WebP files, for thumbnails: 8 bits per channel. The encoders require the whole image in memory.
 
 use std::fs::File;
-use std::io::{self, BufReader, Cursor};
+use std::io::{self, BufReader, Cursor, Write};
 
 use ::image::codecs::jpeg::JpegEncoder;
 use ::image::codecs::webp::WebPEncoder;
@@ -10,7 +10,7 @@ use exif::experimental::Writer as ExifWriter;
 use exif::{Field, In, Tag, Value};
 use rayon::prelude::*;
 
-use super::{Band, Format, Layout, Metadata, Pending, SaveOptions, Sink};
+use super::{Band, Format, Layout, Metadata, SaveOptions, Sink};
 use crate::error::RenderError;
 use crate::film::mean;
 use wgray_image::memory::fallible;
@@ -20,15 +20,12 @@ const WEBP_ENCODER_BYTES: u64 = 12;
 
 /// Writes the radiance; in a JPEG, it is composited over black.
 pub fn write(
-    files: &mut [Pending],
+    mut file: impl Write,
     format: Format,
     layout: &Layout,
     options: &SaveOptions,
     render: &mut dyn FnMut(&mut Sink) -> Result<(), RenderError>,
 ) -> Result<(), RenderError> {
-    let [file] = files else {
-        return Err(io::Error::other("a JPEG or WebP image is a single file").into());
-    };
     let (width, height) = (layout.region.width(), layout.region.height());
     format.check_size(width, height).map_err(io::Error::other)?;
     let alpha = layout.alpha && format == Format::WebP;
@@ -55,12 +52,12 @@ pub fn write(
     let exif = exif(&options.metadata)?;
     let written = match format {
         Format::WebP => {
-            let mut encoder = WebPEncoder::new_lossless(file);
+            let mut encoder = WebPEncoder::new_lossless(&mut file);
             set_exif(&mut encoder, exif)?;
             encoder.write_image(&pixels, width, height, color)
         }
         _ => {
-            let mut encoder = JpegEncoder::new_with_quality(file, options.quality);
+            let mut encoder = JpegEncoder::new_with_quality(&mut file, options.quality);
             set_exif(&mut encoder, exif)?;
             encoder.write_image(&pixels, width, height, color)
         }

@@ -21,7 +21,7 @@ pub use exr::read_exr;
 pub use metadata::read_metadata;
 pub use png::in_memory;
 pub use save_options::{BitDepth, ExrCompression, ExrType, Metadata, SaveOptions};
-pub use target::{Format, Layers, SaveReport, Target, files, save};
+pub use target::{Format, Layers, SaveReport, Target, files, save, write_to};
 
 /// Contents of an image file.
 #[derive(Clone, Debug, PartialEq)]

@@ -8,7 +8,7 @@ use ::png::{
 };
 use rayon::prelude::*;
 
-use super::{Aov, Band, BitDepth, Layout, Metadata, Pending, SaveOptions, Sink, to_8_bits, to_16_bits};
+use super::{Aov, Band, BitDepth, Layout, Metadata, SaveOptions, Sink, to_8_bits, to_16_bits};
 use crate::error::RenderError;
 use crate::film::mean;
 use wgray_image::GAMMA;
@@ -46,17 +46,16 @@ fn encoder<W: Write>(file: W, (width, height): (u32, u32), color: ColorType, dep
     png
 }
 
-/// Writes the radiance to the first file, and each AOV to one of the other files.
-pub fn write(
-    files: &mut [Pending],
+/// Writes the radiance (`None`) or an AOV to each file.
+pub fn write<W: Write>(
+    files: impl IntoIterator<Item = (W, Option<Aov>)>,
     layout: &Layout,
     options: &SaveOptions,
     render: &mut dyn FnMut(&mut Sink) -> Result<(), RenderError>,
 ) -> Result<(), RenderError> {
     let depth = options.bit_depth;
     let mut writers = Vec::new();
-    let contents = [None].into_iter().chain(layout.aovs.iter().copied().map(Some));
-    for (file, content) in files.iter_mut().zip(contents) {
+    for (file, content) in files {
         let color = match layout.alpha && content.is_none() {
             true => ColorType::Rgba,
             false => ColorType::Rgb,

@@ -1,5 +1,6 @@
 //! Output of a render to several image files, which receive the same rows.
 
+use std::io::{Seek, Write};
 use std::path::{Path, PathBuf};
 
 use super::{Aov, Band, Layout, Pending, SaveOptions, Sink, exr, flat, png};
@@ -162,16 +163,47 @@ fn write(
         };
         write(other_targets, layout, options, report, &mut both_sinks, render)
     };
-    match format {
-        Format::Png => png::write(files, layout, &display_options, &mut render_nested),
-        Format::Exr => {
-            let too_large = exr::write(files, layout, options, &mut render_nested)?;
-            let name = files.first().map(|file| file.name().to_owned());
-            report
-                .too_large
-                .extend(name.filter(|_| too_large > 0).map(|name| (name, too_large)));
+    match (*format, files.as_mut_slice()) {
+        (Format::Png, files) => {
+            let contents = [None].into_iter().chain(layout.aovs.iter().copied().map(Some));
+            png::write(
+                files.iter_mut().zip(contents),
+                layout,
+                &display_options,
+                &mut render_nested,
+            )
+        }
+        (Format::Exr, [file]) => {
+            let too_large = exr::write(&mut *file, layout, options, &mut render_nested)?;
+            if too_large > 0 {
+                report.too_large.push((file.name().to_owned(), too_large));
+            }
             Ok(())
         }
-        Format::Jpeg | Format::WebP => flat::write(files, *format, layout, &display_options, &mut render_nested),
+        (format @ (Format::Jpeg | Format::WebP), [file]) => {
+            flat::write(file, format, layout, &display_options, &mut render_nested)
+        }
+        // Unreachable: see [`files`].
+        _ => Err(std::io::Error::other("images of this format have one file").into()),
+    }
+}
+
+/// Writes an image, or one of its layers as a PNG, to a writer.
+///
+/// # Errors
+///
+/// Errors of `render`, and [`RenderError::Output`] if the writer fails or the image is too large for the format.
+pub fn write_to(
+    writer: impl Write + Seek,
+    (format, layer): (Format, Option<Aov>),
+    layout: &Layout,
+    options: &SaveOptions,
+    render: &mut dyn FnMut(&mut Sink) -> Result<(), RenderError>,
+) -> Result<(), RenderError> {
+    let display_options = options.with_view(layout.view);
+    match format {
+        Format::Png => png::write([(writer, layer)], layout, &display_options, render),
+        Format::Exr => exr::write(writer, layout, options, render).map(|_| ()),
+        Format::Jpeg | Format::WebP => flat::write(writer, format, layout, &display_options, render),
     }
 }

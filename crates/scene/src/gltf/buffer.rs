@@ -85,7 +85,8 @@ impl Buffers {
                     let fault = |rule| GltfFault::key(format!("buffers[{i}].uri"), rule);
                     let path = folder.find(&name).map_err(|error| fault(error.into()))?;
                     let remaining = MAX_BUFFER_BYTES.saturating_sub(total);
-                    let bytes = uri::read(&path, remaining)
+                    let bytes = folder
+                        .read(&path, remaining)
                         .map_err(|error| fault(format!("{name:?} cannot be read: {error}")))?;
                     files.insert(path);
                     let size = bytes.len();

@@ -14,6 +14,7 @@ use super::error::{GltfError, GltfFault};
 use super::json::out_of_range;
 use super::uri::{self, Folder, UriError};
 use super::{extension, glb, json};
+use crate::file_system::{FileSystem, or_current};
 
 /// Maximum size of an image file in bytes.
 const MAX_IMAGE_BYTES: u64 = 512 << 20;
@@ -55,29 +56,33 @@ impl Document {
     /// # Errors
     ///
     /// The file cannot be read or is invalid, requires an unsupported extension, or has a missing or truncated buffer.
-    pub fn open(path: &Path, root: &Path, files: &mut BTreeSet<PathBuf>) -> Result<Document, GltfError> {
+    pub fn open(
+        path: &Path,
+        root: &Path,
+        file_system: &FileSystem,
+        files: &mut BTreeSet<PathBuf>,
+    ) -> Result<Document, GltfError> {
         files.insert(path.to_owned());
-        let file = uri::read(path, MAX_BUFFER_BYTES).map_err(|error| GltfError::Read {
-            path: path.to_owned(),
-            error,
-        })?;
-        Document::read(file, path, root, files).map_err(|fault| fault.of(path))
+        let file = file_system
+            .read(path, MAX_BUFFER_BYTES)
+            .map_err(|error| GltfError::Read {
+                path: path.to_owned(),
+                error,
+            })?;
+        let folder = Folder {
+            file_system: file_system.clone(),
+            folder: or_current(path.parent().unwrap_or(Path::new(""))).to_owned(),
+            root: or_current(root).to_owned(),
+        };
+        Document::read(file, path, folder, files).map_err(|fault| fault.of(path))
     }
 
     pub(super) fn read(
         file: Vec<u8>,
         path: &Path,
-        root: &Path,
+        folder: Folder,
         files: &mut BTreeSet<PathBuf>,
     ) -> Result<Document, GltfFault> {
-        let or_current = |path: &Path| match path.as_os_str().is_empty() {
-            true => PathBuf::from("."),
-            false => path.to_owned(),
-        };
-        let folder = Folder {
-            folder: or_current(path.parent().unwrap_or(Path::new(""))),
-            root: or_current(root),
-        };
         if file.is_empty() {
             return Err(GltfFault::file("the file is empty"));
         }
@@ -206,7 +211,7 @@ impl Document {
                     UriError::Absent(reason) => ImageFault::Missing(reason),
                     UriError::Invalid(rule) => ImageFault::Invalid(fault(rule)),
                 })?;
-                uri::read(&path, MAX_IMAGE_BYTES).map_err(|error| {
+                self.folder.read(&path, MAX_IMAGE_BYTES).map_err(|error| {
                     let reason = format!("{} cannot be read: {error}", super::error::quoted(name));
                     match error.kind() {
                         io::ErrorKind::FileTooLarge => ImageFault::Invalid(fault(reason)),

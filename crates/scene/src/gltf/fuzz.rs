@@ -6,6 +6,7 @@ use super::changed::changed;
 use super::everything::everything;
 use super::{ImportOptions, Imported, import};
 use crate::Selection;
+use crate::file_system::FileSystem;
 use crate::gltf::made::container;
 
 /// 64-bit xorshift, upper half (Marsaglia, "Xorshift RNGs", 2003).
@@ -76,7 +77,7 @@ fn read(bytes: &[u8], path: &std::path::Path) -> usize {
     let option_sets = [defaults, all_options];
     let imported = option_sets
         .iter()
-        .filter_map(|options| import(path, root, options, &mut BTreeSet::new()).ok());
+        .filter_map(|options| import(path, root, &FileSystem::Disk, options, &mut BTreeSet::new()).ok());
     imported.inspect(check).count()
 }
 

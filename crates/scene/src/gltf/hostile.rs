@@ -6,13 +6,20 @@ use std::collections::BTreeSet;
 use serde_json::{Value, json};
 
 use super::{ImportOptions, Imported, import};
+use crate::file_system::FileSystem;
 use crate::gltf::made::container;
 
 fn read(json: &Value, binary: &[u8]) -> Result<Imported, String> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.glb");
     std::fs::write(&path, container(json, binary)).unwrap();
-    let read = import(&path, folder.path(), &ImportOptions::default(), &mut BTreeSet::new());
+    let read = import(
+        &path,
+        folder.path(),
+        &FileSystem::Disk,
+        &ImportOptions::default(),
+        &mut BTreeSet::new(),
+    );
     read.map_err(|error| error.to_string().replace(&format!("{}: ", path.display()), ""))
 }
 

@@ -7,6 +7,8 @@ use serde_json::{Value, json};
 
 use super::document::Document;
 use super::error::GltfFault;
+use super::uri::Folder;
+use crate::file_system::FileSystem;
 
 pub fn container(json: &Value, binary: &[u8]) -> Vec<u8> {
     let mut text = json.to_string().into_bytes();
@@ -30,7 +32,11 @@ pub fn read(bytes: Vec<u8>) -> Result<Document, GltfFault> {
     Document::read(
         bytes,
         Path::new("/none/a.gltf"),
-        Path::new("/none"),
+        Folder {
+            file_system: FileSystem::Disk,
+            folder: "/none".into(),
+            root: "/none".into(),
+        },
         &mut BTreeSet::new(),
     )
 }

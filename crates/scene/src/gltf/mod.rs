@@ -36,10 +36,8 @@ mod uri;
 mod vertices;
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
-use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError, Weak};
-use std::time::SystemTime;
 
 use glam::{DAffine3, DMat3, DVec3};
 use rayon::prelude::*;
@@ -49,6 +47,7 @@ use self::document::Document;
 use self::materials::Materials;
 use self::mesh::{Key, Meshes};
 use self::node::{Nodes, Pose};
+use crate::file_system::{FileStamp, FileSystem};
 use crate::limits::TIMES;
 use crate::mesh::Mesh;
 use crate::{
@@ -218,19 +217,24 @@ pub fn unknown(kind: &str, selection: &Selection, names: &[Option<&str>]) -> Str
 }
 
 /// Imports a file. Returns the existing import if it is in use and its files have not changed.
-pub fn load(
+pub(crate) fn load(
     path: &Path,
     root: &Path,
+    file_system: &FileSystem,
     options: &ImportOptions,
     files: &mut BTreeSet<PathBuf>,
 ) -> Result<Arc<Imported>, GltfError> {
     static IN_USE: Mutex<Vec<CachedImport>> = Mutex::new(Vec::new());
-    let is_same_import =
-        |cached: &CachedImport| cached.path == path && cached.root == root && cached.options == *options;
+    let is_same_import = |cached: &CachedImport| {
+        let is_same_file = cached.path == path && cached.root == root && cached.source == file_system.id();
+        is_same_file && cached.options == *options
+    };
     {
         let mut in_use = IN_USE.lock().unwrap_or_else(PoisonError::into_inner);
         in_use.retain(|cached| cached.imported.strong_count() > 0);
-        let cached = in_use.iter().find(|cached| is_same_import(cached) && cached.is_fresh());
+        let cached = in_use
+            .iter()
+            .find(|cached| is_same_import(cached) && cached.is_fresh(file_system));
         if let Some(imported) = cached.and_then(|cached| cached.imported.upgrade()) {
             files.extend(imported.files.iter().cloned());
             return Ok(imported);
@@ -238,18 +242,21 @@ pub fn load(
     }
     let _span = tracing::debug_span!("gltf", path = %path.display()).entered();
     // The stamp is taken before reading, so that a change of the file during the import is noticed.
-    let old_stamp = stamp(path);
+    let old_stamp = file_system.stamp(path);
     let mut imported_files = BTreeSet::new();
-    let result = import(path, root, options, &mut imported_files);
+    let result = import(path, root, file_system, options, &mut imported_files);
     files.extend(imported_files.iter().cloned());
     let mut imported = result?;
-    let stamps = imported_files.iter().map(|file| (file.clone(), stamp(file)));
+    let stamps = imported_files
+        .iter()
+        .map(|file| (file.clone(), file_system.stamp(file)));
     let stamps = stamps.chain([(path.to_owned(), old_stamp)]).collect();
     imported.files = imported_files;
     let imported = Arc::new(imported);
     let mut in_use = IN_USE.lock().unwrap_or_else(PoisonError::into_inner);
     in_use.retain(|cached| !is_same_import(cached));
     in_use.push(CachedImport {
+        source: file_system.id(),
         path: path.to_owned(),
         root: root.to_owned(),
         options: options.clone(),
@@ -259,10 +266,9 @@ pub fn load(
     Ok(imported)
 }
 
-/// Length and modification time.
-type FileStamp = Option<(u64, SystemTime)>;
-
 struct CachedImport {
+    /// [`FileSystem::id`].
+    source: u64,
     path: PathBuf,
     root: PathBuf,
     options: ImportOptions,
@@ -271,25 +277,21 @@ struct CachedImport {
 }
 
 impl CachedImport {
-    fn is_fresh(&self) -> bool {
-        self.stamps
-            .iter()
-            .all(|(path, recorded)| recorded.is_some() && stamp(path) == *recorded)
+    fn is_fresh(&self, file_system: &FileSystem) -> bool {
+        let is_unchanged =
+            |(path, recorded): &(PathBuf, FileStamp)| recorded.is_some() && file_system.stamp(path) == *recorded;
+        self.stamps.iter().all(is_unchanged)
     }
-}
-
-fn stamp(path: &Path) -> FileStamp {
-    let metadata = fs::metadata(path).ok()?;
-    Some((metadata.len(), metadata.modified().ok()?))
 }
 
 fn import(
     path: &Path,
     root: &Path,
+    file_system: &FileSystem,
     options: &ImportOptions,
     files: &mut BTreeSet<PathBuf>,
 ) -> Result<Imported, GltfError> {
-    let document = Document::open(path, root, files)?;
+    let document = Document::open(path, root, file_system, files)?;
     let animations = document.animations(options)?;
     let mut poses: Vec<Pose> = document.json.nodes.iter().map(Pose::of).collect();
     let mut notes = Vec::new();

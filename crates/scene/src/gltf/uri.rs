@@ -1,8 +1,7 @@
 //! URIs in glTF files: data URIs (RFC 2397) and relative paths (specification, section 2.8).
 
 use std::borrow::Cow;
-use std::fs::{self, File};
-use std::io::{self, Read as _};
+use std::io;
 use std::path::{Path, PathBuf};
 
 use base64::Engine as _;
@@ -10,7 +9,7 @@ use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
 use percent_encoding::percent_decode_str;
 
 use super::error::quoted;
-use wgray_image::memory::fallible;
+use crate::file_system::FileSystem;
 
 /// Base64 with or without padding.
 const BASE64: GeneralPurpose = GeneralPurpose::new(
@@ -66,6 +65,7 @@ impl From<UriError> for String {
 
 #[derive(Clone, Debug)]
 pub(super) struct Folder {
+    pub file_system: FileSystem,
     /// Folder that paths are relative to.
     pub folder: PathBuf,
     /// Asset root: the folder that must contain all files.
@@ -93,14 +93,14 @@ impl Folder {
         if decoded.is_empty() {
             return Err("\"\" must be the path of a file".to_owned().into());
         }
-        let mut paths = names.iter().map(|name| self.folder.join(name).canonicalize());
+        let mut paths = (names.iter()).map(|name| self.file_system.canonical_file(&self.folder.join(name)));
         let first = paths.next().unwrap_or_else(|| Err(io::ErrorKind::NotFound.into()));
         let path = match first {
             Err(error) if error.kind() == io::ErrorKind::NotFound => paths.find_map(Result::ok).ok_or(error),
             first => first,
         };
         let path = path.map_err(|error| UriError::Absent(format!("{} cannot be read: {error}", quoted(uri))))?;
-        let root = self.root.canonicalize().map_err(|error| {
+        let root = self.file_system.canonical_folder(&self.root).map_err(|error| {
             let root = self.root.display();
             format!("{} must lie in {root}, which cannot be found: {error}", quoted(uri))
         })?;
@@ -108,10 +108,14 @@ impl Folder {
             let root = self.root.display();
             return Err(format!("{} must not leave the folder {root}", quoted(uri)).into());
         }
-        if !path.is_file() {
+        if !self.file_system.is_file(&path) {
             return Err(format!("{} must be a file", quoted(uri)).into());
         }
         Ok(path)
+    }
+
+    pub fn read(&self, path: &Path, max_bytes: u64) -> io::Result<Vec<u8>> {
+        self.file_system.read(path, max_bytes)
     }
 }
 
@@ -123,34 +127,10 @@ fn scheme(uri: &str) -> Option<&str> {
     is_scheme.then_some(scheme)
 }
 
-pub(super) fn read(path: &Path, max_bytes: u64) -> io::Result<Vec<u8>> {
-    // Checked before opening, because opening a pipe blocks until it has a writer.
-    if !fs::metadata(path)?.is_file() {
-        return Err(io::Error::new(io::ErrorKind::InvalidInput, "it must be a file"));
-    }
-    let file = File::open(path)?;
-    let metadata = file.metadata()?;
-    let too_large = || {
-        io::Error::new(
-            io::ErrorKind::FileTooLarge,
-            format!("it is larger than {max_bytes} bytes"),
-        )
-    };
-    if !metadata.is_file() || metadata.len() > max_bytes {
-        return Err(too_large());
-    }
-    let mut bytes = Vec::new();
-    fallible(|| bytes.try_reserve_exact(metadata.len() as usize))?;
-    file.take(max_bytes.saturating_add(1)).read_to_end(&mut bytes)?;
-    match bytes.len() as u64 > max_bytes {
-        true => Err(too_large()),
-        false => Ok(bytes),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::fs;
 
     #[test]
     fn data_uris_are_base64_or_percent_encoded() {
@@ -188,6 +168,7 @@ mod tests {
             fs::write(root.join(name), b"yes").unwrap();
         }
         let folder = Folder {
+            file_system: FileSystem::Disk,
             folder: root.clone(),
             root: root.clone(),
         };
@@ -203,7 +184,7 @@ mod tests {
             "../model/a b.bin",
         ] {
             let path = folder.find(uri).unwrap();
-            assert_eq!(read(&path, 3).unwrap(), b"yes", "{uri}");
+            assert_eq!(folder.read(&path, 3).unwrap(), b"yes", "{uri}");
         }
         let error_of = |uri: &str| String::from(folder.find(uri).unwrap_err());
         let outside = "must not leave the folder";
@@ -245,9 +226,10 @@ mod tests {
         assert!(error_of("").contains("path of a file"));
         assert!(error_of("sub%20dir").ends_with("must be a file"));
         assert!(error_of(".").ends_with("must be a file"));
-        assert!(read(&root.join("a b.bin"), 2).is_err());
-        assert!(read(&root, 9).is_err());
+        assert!(folder.read(&root.join("a b.bin"), 2).is_err());
+        assert!(folder.read(&root, 9).is_err());
         let wider_folder = Folder {
+            file_system: FileSystem::Disk,
             folder: root,
             root: temp_folder.path().to_owned(),
         };
@@ -266,6 +248,7 @@ mod tests {
         std::os::unix::fs::symlink("a.bin", root.join("in.bin")).unwrap();
         std::os::unix::fs::symlink("..", root.join("up")).unwrap();
         let folder = Folder {
+            file_system: FileSystem::Disk,
             folder: root.clone(),
             root: root.clone(),
         };
@@ -279,7 +262,7 @@ mod tests {
         let mkfifo_status = std::process::Command::new("mkfifo").arg(root.join("pipe")).status();
         if mkfifo_status.is_ok_and(|status| status.success()) {
             assert!(String::from(folder.find("pipe").unwrap_err()).ends_with("must be a file"));
-            assert!(read(&root.join("pipe"), 9).is_err());
+            assert!(folder.read(&root.join("pipe"), 9).is_err());
         }
     }
 }

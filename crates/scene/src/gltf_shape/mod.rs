@@ -133,7 +133,7 @@ impl ExpandedScene {
             ));
         };
         let choice = ImportOptions::of(gltf)?;
-        let read = load(&path, &self.assets.root, &choice, files);
+        let read = load(&path, &self.assets.root, &self.assets.file_system, &choice, files);
         let imported = read.map_err(|error| Problem::new(error.to_string())).at("file")?;
         let counts = [
             imported.instances.len(),

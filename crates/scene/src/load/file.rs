@@ -9,7 +9,7 @@ use crate::parse::{NOT_UTF8, encoding, syntax_error};
 use wgray_image::blocking_path;
 
 /// Maximum size of a scene file in bytes: far larger than handwritten files, far smaller than the available memory.
-const MAX_FILE_BYTES: u64 = 64 << 20;
+pub(super) const MAX_FILE_BYTES: u64 = 64 << 20;
 
 /// Returns the folder of a file.
 pub fn folder_of(path: &Path) -> &Path {
@@ -22,6 +22,11 @@ pub fn read_text(path: &Path) -> Result<String, SceneError> {
         path: path.to_owned(),
         error,
     })?;
+    decode_text(bytes, path)
+}
+
+/// Decodes UTF-8; `path` is the name of the file in messages.
+pub(super) fn decode_text(bytes: Vec<u8>, path: &Path) -> Result<String, SceneError> {
     String::from_utf8(bytes).map_err(|error| {
         let text = String::from_utf8_lossy(error.as_bytes());
         // Up to this byte, the lossy text is identical to the file.

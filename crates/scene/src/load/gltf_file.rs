@@ -6,7 +6,6 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::file::folder_of;
 use super::gltf_choice::GltfChoice;
 use super::model::{self, SIDE};
 use super::overrides::Overrides;
@@ -14,7 +13,7 @@ use crate::error::SceneError;
 use crate::framing::check_extent;
 use crate::gltf::{GltfError, ImportOptions, Imported, ImportedCamera, ModelContents, UPRIGHT, load};
 use crate::problem::Problem;
-use crate::{CameraDescription, Description, Framing, GltfDescription, Scene, Selection, framed};
+use crate::{Assets, CameraDescription, Description, Framing, GltfDescription, Scene, Selection, framed};
 
 /// Sine of the minimum angle to +z; views at smaller angles count as vertical.
 const VERTICAL: f64 = 1e-6;
@@ -45,6 +44,7 @@ impl Scene {
 /// Describes a glTF file as a scene. The caller must keep the import alive until the scene refers to the import.
 pub(crate) fn describe(
     path: &Path,
+    assets: &Assets,
     overrides: &Overrides,
     files: &mut BTreeSet<PathBuf>,
 ) -> Result<(Description, Arc<Imported>), SceneError> {
@@ -64,14 +64,16 @@ pub(crate) fn describe(
         variant,
         ..GltfDescription::new(file)
     };
-    let folder = folder_of(path);
-    let root = overrides.assets(folder, folder).root;
-    let canonical = path.canonicalize().map_err(|error| SceneError::Read {
-        path: path.to_owned(),
-        error,
-    })?;
+    let canonical = assets
+        .file_system
+        .canonical_file(path)
+        .map_err(|error| SceneError::Read {
+            path: path.to_owned(),
+            error,
+        })?;
     let choice = ImportOptions::of(&shape).map_err(SceneError::Override)?;
-    let imported = load(&canonical, &root, &choice, files).map_err(|error| overrides.gltf.error(error.at(path)))?;
+    let imported = load(&canonical, &assets.root, &assets.file_system, &choice, files);
+    let imported = imported.map_err(|error| overrides.gltf.error(error.at(path)))?;
     let presentation = &overrides.presentation;
     let camera = match view.is_some() || presentation.orbit.is_some() {
         true => None,

@@ -1,6 +1,7 @@
 //! Scene files and model files, loaded with overrides and validated to a [`Scene`].
 
 mod file;
+mod from_slice;
 mod gltf_choice;
 mod gltf_file;
 mod model;
@@ -10,6 +11,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 pub use self::file::{folder_of, read_bytes, read_text};
+pub use self::from_slice::{LoadOptions, SceneFormat};
 pub use self::gltf_choice::GltfChoice;
 use self::gltf_file::describe;
 pub use self::gltf_file::is_gltf;
@@ -23,7 +25,7 @@ use crate::key_path::KeyPath;
 use crate::note::Note;
 use crate::parse::{Places, invalid, is_json_scene, line_of_path};
 use crate::problem::{Problem, Problems};
-use crate::{Description, Scene};
+use crate::{Assets, Description, Scene};
 
 impl Scene {
     /// Loads and validates a scene file. The file name determines the format: `.json` is JSON, `.gltf` and `.glb` are
@@ -61,11 +63,12 @@ impl Scene {
         overrides: &Overrides,
         files: &mut BTreeSet<PathBuf>,
     ) -> Result<(Scene, Description), SceneError> {
+        let assets = Assets::beside(folder_of(path));
         if is_gltf(path) {
-            return load_gltf(path, overrides, files);
+            return load_gltf(path, &assets, overrides, files);
         }
         if model::is_mesh(path) {
-            return load_mesh(path, overrides, files);
+            return load_mesh(path, &assets, overrides, files);
         }
         model::check_format(path)?;
         let text = read_text(path)?;
@@ -95,10 +98,12 @@ impl Scene {
 
 fn load_gltf(
     path: &Path,
+    assets: &Assets,
     overrides: &Overrides,
     files: &mut BTreeSet<PathBuf>,
 ) -> Result<(Scene, Description), SceneError> {
-    let (mut description, _imported) = describe(path, overrides, files)?;
+    let assets = overrides.adjust(assets.clone());
+    let (mut description, _imported) = describe(path, &assets, overrides, files)?;
     let mut defines = Defines::new(&overrides.define);
     if !overrides.define.is_empty() {
         description = description.with_defines(&mut defines).map_err(SceneError::Override)?;
@@ -124,7 +129,6 @@ fn load_gltf(
             },
         })
     };
-    let assets = overrides.assets(folder_of(path), folder_of(path));
     let mut scene = overrides.finish(description.validate_and_list(&assets, files), invalid, |_| {})?;
     for note in &mut scene.notes {
         *note = std::mem::take(note).without_loaded_file(&name);
@@ -138,16 +142,17 @@ fn load_gltf(
 
 fn load_mesh(
     path: &Path,
+    assets: &Assets,
     overrides: &Overrides,
     files: &mut BTreeSet<PathBuf>,
 ) -> Result<(Scene, Description), SceneError> {
-    let (mut description, _mesh) = model::describe(path, overrides)?;
+    let assets = overrides.adjust(assets.clone());
+    let (mut description, _mesh) = model::describe(path, &assets, overrides)?;
     let mut defines = Defines::new(&overrides.define);
     if !overrides.define.is_empty() {
         description = description.with_defines(&mut defines).map_err(SceneError::Override)?;
     }
     overrides.apply(&mut description).map_err(SceneError::Override)?;
-    let assets = overrides.assets(folder_of(path), folder_of(path));
     let validated = description.validate_and_list(&assets, files);
     let invalid = |problems: Problems| match problems.define_error(&defines) {
         Some(error) => error,
@@ -181,6 +186,8 @@ pub struct PendingScene<'a> {
     folder: &'a Path,
     overrides: &'a Overrides,
     defines: Defines<'a>,
+    /// Images and meshes in memory, and the source of files.
+    assets: Assets,
     /// The description with the overrides applied.
     pub description: Description,
 }
@@ -201,6 +208,7 @@ impl<'a> PendingScene<'a> {
             folder,
             overrides,
             defines,
+            assets: Assets::default(),
             description,
         };
         pending.with_overrides()
@@ -225,6 +233,7 @@ impl<'a> PendingScene<'a> {
             folder,
             overrides,
             defines,
+            assets: Assets::default(),
             description: change.description,
         };
         // Overrides outside of the parts are still in effect, unless the rest of the file was parsed again.
@@ -232,6 +241,11 @@ impl<'a> PendingScene<'a> {
             pending = pending.with_overrides()?;
         }
         Ok((pending, Some(change.places)))
+    }
+
+    /// Uses the images, meshes and files of these assets.
+    fn with_assets(self, assets: Assets) -> PendingScene<'a> {
+        PendingScene { assets, ..self }
     }
 
     fn with_overrides(mut self) -> Result<PendingScene<'a>, SceneError> {
@@ -253,15 +267,15 @@ impl<'a> PendingScene<'a> {
             folder,
             overrides,
             defines,
+            assets,
             description,
         } = self;
         let is_json_scene = is_json_scene(Path::new(origin));
-        let root = if is_json_scene {
-            course::asset_root(folder)
-        } else {
-            folder.to_owned()
-        };
-        let assets = overrides.assets(folder, &root);
+        let mut assets = assets.in_folder(folder);
+        if is_json_scene && assets.file_system.is_disk() {
+            assets.root = course::asset_root(folder);
+        }
+        let assets = overrides.adjust(assets);
         let invalid = |problems| match is_json_scene {
             true => course::invalid(text, origin, problems, &defines),
             false => invalid(text, origin, problems, &defines),

@@ -9,12 +9,13 @@ use super::gltf_choice::GltfChoice;
 use super::overrides::Overrides;
 use crate::error::SceneError;
 use crate::framing::check_extent;
-use crate::mesh::{Mesh, MeshError};
+use crate::mesh::{Mesh, MeshError, MeshFormat};
 use crate::problem::Problem;
 use crate::validate::to_z_up;
 use crate::{
-    CameraDescription, Description, EnvironmentDescription, EnvironmentName, Framing, ImageDescription, Integrator,
-    MeshDescription, RenderDescription, SamplesDescription, ShapeDescription, Up, ViewTransform, framed, is_gltf,
+    Assets, CameraDescription, Description, EnvironmentDescription, EnvironmentName, Framing, ImageDescription,
+    Integrator, MeshDescription, RenderDescription, SamplesDescription, ShapeDescription, Up, ViewTransform, framed,
+    is_gltf,
 };
 
 /// Default of the longer side of the image in pixels.
@@ -26,10 +27,6 @@ const BACKGROUND: DVec3 = DVec3::splat(0.18);
 
 /// Maximum number of vertices for which the camera frames the vertices; for larger meshes it frames the bounding box.
 const MAX_POINTS: usize = 1 << 20;
-
-/// Extensions of mesh files with their usual up axis, because the formats do not define one: +y for OBJ and PLY, as in
-/// viewers, and +z for STL, as in 3D printing.
-const MESHES: [(&str, Up); 3] = [("obj", Up::Y), ("ply", Up::Y), ("stl", Up::Z)];
 
 /// Extensions of unsupported file types, with advice for the user.
 const UNSUPPORTED: [(&[&str], &str); 4] = [
@@ -52,7 +49,7 @@ const UNSUPPORTED: [(&[&str], &str); 4] = [
 
 /// Returns true if the file has the extension of a mesh file: `.obj`, `.ply` or `.stl`.
 pub fn is_mesh(name: &Path) -> bool {
-    up_axis(name).is_some()
+    MeshFormat::of(name).is_some()
 }
 
 /// Returns true if the file has the extension of a model: a glTF or mesh file, which needs no scene file.
@@ -65,10 +62,13 @@ fn has_extension(name: &Path, extension: &str) -> bool {
         .is_some_and(|found| found.eq_ignore_ascii_case(extension))
 }
 
-/// Returns the usual up axis of a mesh file.
-fn up_axis(name: &Path) -> Option<Up> {
-    let format = MESHES.into_iter().find(|(extension, _)| has_extension(name, extension));
-    format.map(|(_, up)| up)
+/// Returns the usual up axis of a mesh file, because the formats do not define one: +y for OBJ and PLY, as in viewers,
+/// and +z for STL, as in 3D printing.
+fn up_axis(format: MeshFormat) -> Up {
+    match format {
+        MeshFormat::Obj | MeshFormat::Ply => Up::Y,
+        MeshFormat::Stl => Up::Z,
+    }
 }
 
 /// Rejects files whose extension belongs to a format that cannot be a scene.
@@ -85,7 +85,11 @@ pub(super) fn check_format(path: &Path) -> Result<(), SceneError> {
 }
 
 /// Describes a mesh file as a scene. Also returns the mesh, which must be kept alive until the scene refers to it.
-pub(super) fn describe(path: &Path, overrides: &Overrides) -> Result<(Description, Arc<Mesh>), SceneError> {
+pub(super) fn describe(
+    path: &Path,
+    assets: &Assets,
+    overrides: &Overrides,
+) -> Result<(Description, Arc<Mesh>), SceneError> {
     let gltf_only = GltfChoice {
         view: None,
         ..overrides.gltf.clone()
@@ -94,17 +98,21 @@ pub(super) fn describe(path: &Path, overrides: &Overrides) -> Result<(Descriptio
         let rule = format!("only applies to glTF files, and {} is a mesh", path.display());
         return Err(SceneError::Override(Problem::of(option, rule)));
     }
-    let canonical = path.canonicalize().map_err(|error| SceneError::Read {
-        path: path.to_owned(),
-        error,
-    })?;
-    let mesh = crate::mesh_file::load(&canonical, None).map_err(|error| SceneError::Mesh(error.at(path)))?;
+    let canonical = assets
+        .file_system
+        .canonical_file(path)
+        .map_err(|error| SceneError::Read {
+            path: path.to_owned(),
+            error,
+        })?;
+    let mesh = crate::mesh_file::load(&assets.file_system, &canonical, None)
+        .map_err(|error| SceneError::Mesh(error.at(path)))?;
     if let (true, Some(damage)) = (overrides.strict, mesh.damage.first()) {
         return Err(SceneError::Mesh(damage.clone().of(path)));
     }
     let presentation = &overrides.presentation;
     let mut shape = MeshDescription {
-        up: up_axis(path).unwrap_or_default(),
+        up: MeshFormat::of(path).map(up_axis).unwrap_or_default(),
         material: None,
         ..MeshDescription::new("", path.file_name().unwrap_or_default().to_string_lossy())
     };

@@ -160,8 +160,16 @@ impl Overrides {
     /// Returns the file locations of a scene in `folder`. The files must be below `root`, or below the overridden root.
     pub fn assets(&self, folder: &Path, root: &Path) -> Assets {
         let mut assets = Assets::beside(folder);
-        if let Some(root) = self.asset_root.as_deref().or((root != folder).then_some(root)) {
+        if root != folder {
             assets.root = root.to_owned();
+        }
+        self.adjust(assets)
+    }
+
+    /// Applies the overrides of file locations.
+    pub(super) fn adjust(&self, mut assets: Assets) -> Assets {
+        if let Some(root) = &self.asset_root {
+            assets.root.clone_from(root);
         }
         let environment = self.environment.as_ref();
         let environment_file = environment.and_then(|environment| environment.file.clone());

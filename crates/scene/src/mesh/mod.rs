@@ -17,8 +17,7 @@ mod tokens;
 
 use std::any::Any;
 use std::collections::BTreeMap;
-use std::fs;
-use std::io::{self, Read as _};
+use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -31,6 +30,7 @@ pub use self::error::MeshError;
 use self::error::{Location, MeshFault};
 pub(crate) use self::raw_mesh::{RawMesh, unit};
 pub use self::tangents::{Tangents, VertexTangents};
+use crate::file_system::{FileSystem, NoFiles, or_current};
 use crate::note::Note;
 
 /// Maximum size of a mesh file in bytes.
@@ -197,55 +197,72 @@ impl Mesh {
     ///
     /// Damaged parts are skipped. [`Mesh::notes`] has warnings about them and about other defects.
     pub fn load(path: &Path, normals: Option<Normals>) -> Result<Mesh, MeshError> {
+        Mesh::load_from(&FileSystem::Disk, path, normals)
+    }
+
+    pub(crate) fn load_from(
+        file_system: &FileSystem,
+        path: &Path,
+        normals: Option<Normals>,
+    ) -> Result<Mesh, MeshError> {
         let _span = tracing::debug_span!("mesh", path = %path.display()).entered();
-        let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
-        let format = match extension.to_str() {
-            Some("obj") => Format::Obj,
-            Some("ply") => Format::Ply,
-            Some("stl") => Format::Stl,
-            _ => {
-                let rule = "the name of a mesh must end in .obj, .ply or .stl";
-                return Err(Location::File.fault(rule).of(path));
-            }
+        let Some(format) = MeshFormat::of(path) else {
+            let rule = "the name of a mesh must end in .obj, .ply or .stl";
+            return Err(Location::File.fault(rule).of(path));
         };
-        let read_error = |error| MeshError::Read {
-            path: path.to_owned(),
-            error,
-        };
-        let bytes = match read_file(path, MAX_FILE_BYTES).map_err(read_error)? {
-            Some(bytes) => bytes,
-            None => {
+        let bytes = (file_system.read(path, MAX_FILE_BYTES)).map_err(|error| match error.kind() {
+            io::ErrorKind::FileTooLarge => {
                 let rule = format!("must not be larger than {} GiB", MAX_FILE_BYTES >> 30);
-                return Err(Location::File.fault(rule).of(path));
+                Location::File.fault(rule).of(path)
             }
-        };
-        let (mut mesh, libraries, damage) = read(&bytes, format, normals).map_err(|fault| fault.of(path))?;
-        drop(bytes);
+            _ => MeshError::Read {
+                path: path.to_owned(),
+                error,
+            },
+        })?;
+        Mesh::read(file_system, path, &bytes, format, normals)
+    }
+
+    /// Reads a mesh from the bytes of a file, like [`Mesh::load`]. MTL files are not read.
+    ///
+    /// # Errors
+    ///
+    /// The bytes are not a mesh of this format. The path of the error is `mesh`.
+    pub fn from_slice(bytes: &[u8], format: MeshFormat, normals: Option<Normals>) -> Result<Mesh, MeshError> {
+        let no_files = FileSystem::of(Arc::new(NoFiles));
+        Mesh::read(&no_files, Path::new("mesh"), bytes, format, normals)
+    }
+
+    fn read(
+        file_system: &FileSystem,
+        path: &Path,
+        bytes: &[u8],
+        format: MeshFormat,
+        normals: Option<Normals>,
+    ) -> Result<Mesh, MeshError> {
+        let (mut mesh, libraries, damage) = read(bytes, format, normals).map_err(|fault| fault.of(path))?;
         mesh.damage = damage;
         for names in libraries {
-            mesh.load_libraries(path, &names);
+            mesh.load_libraries(file_system, path, &names);
         }
         Ok(mesh)
     }
 
     /// Reads the MTL files of a line: one file whose name may contain blanks, or several files.
-    fn load_libraries(&mut self, mesh: &Path, names: &str) {
-        let folder = match mesh.parent() {
-            Some(folder) if !folder.as_os_str().is_empty() => folder,
-            _ => Path::new("."),
-        };
-        if file_beside(folder, names).is_file() {
-            self.load_library(folder, names);
+    fn load_libraries(&mut self, file_system: &FileSystem, mesh: &Path, names: &str) {
+        let folder = or_current(mesh.parent().unwrap_or(Path::new("")));
+        if file_system.is_file(&file_system.resolve(folder, names)) {
+            self.load_library(file_system, folder, names);
         } else {
             let names = names.split(' ').take(obj::MAX_LIBRARIES);
-            names.for_each(|name| self.load_library(folder, name));
+            names.for_each(|name| self.load_library(file_system, folder, name));
         }
     }
 
     /// Reads an MTL file, or sets [`Library::problem`].
-    fn load_library(&mut self, folder: &Path, name: &str) {
+    fn load_library(&mut self, file_system: &FileSystem, folder: &Path, name: &str) {
         let mut library = Library {
-            file: file_beside(folder, name),
+            file: file_system.resolve(folder, name),
             ..Library::default()
         };
         // Each file is read once, and the number of files is limited.
@@ -253,7 +270,7 @@ impl Mesh {
         if is_known || self.libraries.len() >= obj::MAX_LIBRARIES {
             return;
         }
-        let read = read_library(folder, &library.file).and_then(|bytes| mtl::read(&bytes));
+        let read = read_library(file_system, folder, &library.file).and_then(|bytes| mtl::read(&bytes));
         match read {
             Ok(mtl::Mtl {
                 materials,
@@ -307,17 +324,43 @@ impl Mesh {
     }
 }
 
-#[derive(Clone, Copy)]
-enum Format {
+/// A format of mesh files.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum MeshFormat {
+    /// Wavefront OBJ.
     Obj,
+    /// PLY, as text or binary.
     Ply,
+    /// STL, as text or binary.
     Stl,
+}
+
+impl MeshFormat {
+    /// All formats.
+    pub const ALL: [MeshFormat; 3] = [MeshFormat::Obj, MeshFormat::Ply, MeshFormat::Stl];
+
+    /// Returns the extension of file names, in lower case.
+    pub const fn extension(self) -> &'static str {
+        match self {
+            MeshFormat::Obj => "obj",
+            MeshFormat::Ply => "ply",
+            MeshFormat::Stl => "stl",
+        }
+    }
+
+    /// Returns the format that the extension of a file name selects.
+    pub fn of(name: &Path) -> Option<MeshFormat> {
+        let extension = name.extension()?;
+        let mut formats = MeshFormat::ALL.into_iter();
+        formats.find(|format| extension.eq_ignore_ascii_case(format.extension()))
+    }
 }
 
 /// Returns the mesh, the names of its MTL files and the damage.
 fn read(
     bytes: &[u8],
-    format: Format,
+    format: MeshFormat,
     normals: Option<Normals>,
 ) -> Result<(Mesh, Vec<String>, Vec<MeshFault>), MeshFault> {
     if bytes.is_empty() {
@@ -325,12 +368,12 @@ fn read(
     }
     let uses_normals = matches!(normals, None | Some(Normals::File));
     let (mut raw, libraries) = match format {
-        Format::Obj => {
+        MeshFormat::Obj => {
             let obj = obj::read(&tokens::utf8(bytes), uses_normals)?;
             (obj.raw, obj.libraries)
         }
-        Format::Ply => (ply::read(bytes, uses_normals)?, Vec::new()),
-        Format::Stl => (stl::read(bytes, normals == Some(Normals::File))?, Vec::new()),
+        MeshFormat::Ply => (ply::read(bytes, uses_normals)?, Vec::new()),
+        MeshFormat::Stl => (stl::read(bytes, normals == Some(Normals::File))?, Vec::new()),
     };
     if let (true, Some(fault)) = (raw.triangles.is_empty(), raw.damages.first()) {
         return Err(fault.clone());
@@ -344,73 +387,16 @@ fn read(
     Ok((mesh, libraries, damage))
 }
 
-/// Reads a file; `None` if it is too large.
-fn read_file(path: &Path, max_bytes: u64) -> io::Result<Option<Vec<u8>>> {
-    // Checked before opening, because opening a pipe blocks until it has a writer.
-    let metadata = fs::metadata(path)?;
-    if !metadata.is_file() {
-        return Err(io::Error::other("it must be a file"));
-    }
-    if metadata.len() > max_bytes {
-        return Ok(None);
-    }
-    let mut bytes = Vec::with_capacity(metadata.len() as usize);
-    fs::File::open(path)?.take(max_bytes + 1).read_to_end(&mut bytes)?;
-    Ok(Some(bytes).filter(|bytes| bytes.len() as u64 <= max_bytes))
-}
-
 /// Reads an MTL file in the folder of the mesh.
-fn read_library(folder: &Path, file: &Path) -> Result<Vec<u8>, String> {
+fn read_library(file_system: &FileSystem, folder: &Path, file: &Path) -> Result<Vec<u8>, String> {
     let message = |error: io::Error| error.to_string();
-    let path = file.canonicalize().map_err(message)?;
-    if !path.starts_with(folder.canonicalize().map_err(message)?) {
+    let path = file_system.canonical_file(file).map_err(message)?;
+    if !path.starts_with(file_system.canonical_folder(folder).map_err(message)?) {
         return Err("it must be in the folder of the mesh".to_string());
     }
-    match read_file(&path, MAX_LIBRARY_BYTES).map_err(message)? {
-        Some(bytes) => Ok(bytes),
-        None => Err(format!("it must not be larger than {} MiB", MAX_LIBRARY_BYTES >> 20)),
-    }
-}
-
-/// Resolves a file name in a folder. If the file does not exist (for example, because the path is from another
-/// machine), tries the last path component, and then a case-insensitive match.
-pub(crate) fn file_beside(folder: &Path, name: &str) -> PathBuf {
-    let slashes = name.replace('\\', "/"); // Windows paths
-    let last = slashes.rsplit('/').next().unwrap_or(&slashes);
-    let candidates = [name, &slashes, last].map(|name| folder.join(name));
-    let [_, with_slashes, _] = &candidates;
-    let found = candidates.iter().find(|path| path.is_file()).cloned();
-    let found = found.or_else(|| in_other_case(folder, &slashes));
-    found
-        .or_else(|| in_other_case(folder, last))
-        .unwrap_or_else(|| with_slashes.clone())
-}
-
-/// Returns an existing file whose path matches, ignoring case.
-pub(crate) fn in_other_case(folder: &Path, path: &str) -> Option<PathBuf> {
-    let (parents, name) = path.rsplit_once('/').unwrap_or(("", path));
-    let mut folder = folder.to_owned();
-    for parent in parents.split('/').filter(|parent| !parent.is_empty()) {
-        let exact = folder.join(parent);
-        folder = match exact.is_dir() {
-            true => exact,
-            false => entry_in_other_case(&folder, parent, Path::is_dir)?,
-        };
-    }
-    entry_in_other_case(&folder, name, Path::is_file)
-}
-
-fn entry_in_other_case(folder: &Path, name: &str, accepts: fn(&Path) -> bool) -> Option<PathBuf> {
-    let folder = if folder.as_os_str().is_empty() {
-        Path::new(".")
-    } else {
-        folder
-    };
-    let name = name.to_lowercase();
-    let entries = fs::read_dir(folder).ok()?.filter_map(Result::ok);
-    let matches = entries.filter(|entry| entry.file_name().to_string_lossy().to_lowercase() == name);
-    matches
-        .map(|entry| folder.join(entry.file_name()))
-        .filter(|path| accepts(path))
-        .min()
+    let read = file_system.read(&path, MAX_LIBRARY_BYTES);
+    read.map_err(|error| match error.kind() {
+        io::ErrorKind::FileTooLarge => format!("it must not be larger than {} MiB", MAX_LIBRARY_BYTES >> 20),
+        _ => message(error),
+    })
 }

@@ -158,7 +158,7 @@ fn load(file: &str, normals: Option<Normals>, lookup: &mut SceneLookup) -> Check
     if !lookup.reads_files {
         return Ok(None);
     }
-    let mesh = mesh_file::load(&path, normals)
+    let mesh = mesh_file::load(&lookup.assets.file_system, &path, normals)
         .map_err(|error| Problem::new(error.to_string()))
         .at("file")?;
     if let (true, Some(damage)) = (lookup.assets.strict, mesh.damage.first()) {

@@ -16,7 +16,7 @@ use super::default_material::default_materials;
 use super::images::Images;
 use super::texture::image_texture;
 use super::{Checked, Problem, number, show};
-use crate::mesh::{Mesh, MtlMaterial, file_beside};
+use crate::mesh::{Mesh, MtlMaterial};
 
 /// Default values: `Kd` from Ramey, Rose and Tyerman, "MTL material format", 1995; the exponent is the default for
 /// materials of scene files.
@@ -78,7 +78,7 @@ impl<'a> SceneMaterials<'a> {
     ) -> Self {
         let folder = &images.assets.folder;
         SceneMaterials {
-            folder: folder.canonicalize().unwrap_or_else(|_| folder.clone()),
+            folder: (images.assets.file_system.canonical_folder(folder)).unwrap_or_else(|_| folder.clone()),
             names,
             materials,
             textures,
@@ -114,11 +114,12 @@ impl<'a> SceneMaterials<'a> {
         for library in &mesh.libraries {
             let maps = library.materials.iter().flat_map(MtlMaterial::maps);
             let maps: BTreeSet<&String> = maps.collect();
-            let maps = maps.into_iter().map(|map| beside(&library.file, map));
-            for path in maps.chain([library.file.clone()]) {
-                let path = self.images.assets.folder.join(self.display_path(&path));
-                self.files.insert(path);
-            }
+            let maps = maps.into_iter().map(|map| self.beside(&library.file, map));
+            let paths = maps.chain([library.file.clone()]);
+            let paths: Vec<PathBuf> = paths
+                .map(|path| self.images.assets.folder.join(self.display_path(&path)))
+                .collect();
+            self.files.extend(paths);
         }
     }
 
@@ -220,7 +221,7 @@ impl<'a> SceneMaterials<'a> {
         warnings.ignored(mtl);
         let map = mtl.diffuse_map.as_ref();
         let texture = map.and_then(|map| {
-            let found = self.map_texture(&beside(file, map), Part::Colors(None), has_uvs);
+            let found = self.map_texture(&self.beside(file, map), Part::Colors(None), has_uvs);
             warnings.texture_or_warning("map_Kd", found, "Kd is used instead")
         });
         let diffuse = texture.map_or(Color::Plain(diffuse), Color::Texture);
@@ -289,6 +290,12 @@ impl<'a> SceneMaterials<'a> {
         self.textures.push(texture);
         self.maps.insert((asset, part), self.textures.len() - 1);
         Ok(self.textures.len() - 1)
+    }
+
+    /// Returns the path of a file that an MTL file refers to.
+    fn beside(&self, library: &Path, name: &str) -> PathBuf {
+        let folder = library.parent().unwrap_or(Path::new(""));
+        self.images.assets.file_system.resolve(folder, name)
     }
 
     fn display_path<'p>(&self, path: &'p Path) -> &'p Path {
@@ -365,11 +372,6 @@ impl GroupMaterials {
             materials: vec![None; mesh.groups.len()],
         }
     }
-}
-
-/// Returns the path of a file that an MTL file refers to.
-fn beside(library: &Path, name: &str) -> PathBuf {
-    file_beside(library.parent().unwrap_or(Path::new("")), name)
 }
 
 /// Returns a path for messages: relative to the scene's folder if the file is inside.

@@ -6,6 +6,7 @@ use std::path::Path;
 
 use serde_json::{Value, json};
 
+use crate::file_system::FileSystem;
 use crate::gltf::document::Document;
 use crate::gltf::made::{container, json_of, read};
 
@@ -107,7 +108,7 @@ fn other_files_are_read_and_listed() {
     let path = folder.join("small.txt"); // detected by content
     fs::write(&path, json.to_string()).unwrap();
     let mut files = BTreeSet::new();
-    let document = Document::open(&path, &folder, &mut files).unwrap();
+    let document = Document::open(&path, &folder, &FileSystem::Disk, &mut files).unwrap();
     assert_eq!(document.indices(1).unwrap(), [0, 1, 2]);
     assert_eq!(*document.image_bytes(0).unwrap().unwrap(), *b"image");
     let error_of = |image: usize| {
@@ -136,13 +137,13 @@ fn other_files_are_read_and_listed() {
         assert!(names.contains(&name), "{names:?}");
     }
     // A wider asset root admits more files.
-    let document = Document::open(&path, temp_folder.path(), &mut BTreeSet::new()).unwrap();
+    let document = Document::open(&path, temp_folder.path(), &FileSystem::Disk, &mut BTreeSet::new()).unwrap();
     assert_eq!(*document.image_bytes(2).unwrap().unwrap(), *b"secret");
     // Too short, missing, and unreferenced buffers.
     fs::write(folder.join("the data.bin"), &binary[..47]).unwrap();
     let open_error = |json: &Value| {
         fs::write(&path, json.to_string()).unwrap();
-        Document::open(&path, &folder, &mut BTreeSet::new())
+        Document::open(&path, &folder, &FileSystem::Disk, &mut BTreeSet::new())
             .map(|_| ())
             .unwrap_err()
             .to_string()
@@ -159,9 +160,9 @@ fn other_files_are_read_and_listed() {
     json["meshes"] = json!([]);
     json["nodes"] = json!([{}]);
     fs::write(&path, json.to_string()).unwrap();
-    assert!(Document::open(&path, &folder, &mut BTreeSet::new()).is_ok());
+    assert!(Document::open(&path, &folder, &FileSystem::Disk, &mut BTreeSet::new()).is_ok());
     assert!(matches!(
-        Document::open(&folder, &folder, &mut BTreeSet::new())
+        Document::open(&folder, &folder, &FileSystem::Disk, &mut BTreeSet::new())
             .map(|_| ())
             .unwrap_err(),
         crate::gltf::error::GltfError::Read { .. }
