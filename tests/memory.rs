@@ -521,9 +521,15 @@ fn sources_have_only_their_files() {
         .with("./a/b.png", *b"x")
         .with("/c", *b"x")
         .with("../d", *b"x");
-    assert_eq!(files.names(), ["a/b.png"]);
     assert!(files.contains("a/b.png") && !files.contains("/c"));
     assert_eq!(format!("{files:?}"), "{\"a/b.png\": 1}");
     assert_eq!(NoFiles.read("a").unwrap_err().kind(), io::ErrorKind::NotFound);
-    assert!(NoFiles.names().is_empty() && !NoFiles.contains("a"));
+    assert!(!NoFiles.contains("a") && NoFiles.find_ignoring_case("a").is_none());
+    assert_eq!(files.find_ignoring_case("A/B.png").as_deref(), Some("a/b.png"));
+    let folder = FolderFiles::new(sources::path("."));
+    assert_eq!(
+        folder.find_ignoring_case("Scenes/cornell.TOML").as_deref(),
+        Some("scenes/cornell.toml")
+    );
+    assert_eq!(folder.find_ignoring_case("Scenes/none.toml"), None);
 }

@@ -28,10 +28,11 @@ pub trait AssetSource: Send + Sync {
         self.read(name).is_ok()
     }
 
-    /// Returns the names of all files, for references in which the case of letters differs. The default implementation
-    /// returns none.
-    fn names(&self) -> Vec<String> {
-        Vec::new()
+    /// Returns the name of the file whose name matches, ignoring the case of letters. The default implementation
+    /// returns `None`.
+    fn find_ignoring_case(&self, name: &str) -> Option<String> {
+        let _ = name;
+        None
     }
 }
 
@@ -87,8 +88,9 @@ impl AssetSource for MemoryFiles {
         self.files.contains_key(name)
     }
 
-    fn names(&self) -> Vec<String> {
-        self.files.keys().cloned().collect()
+    fn find_ignoring_case(&self, name: &str) -> Option<String> {
+        let name = name.to_lowercase();
+        self.files.keys().find(|other| other.to_lowercase() == name).cloned()
     }
 }
 
@@ -132,6 +134,12 @@ impl AssetSource for FolderFiles {
 
     fn contains(&self, name: &str) -> bool {
         self.path(name).is_ok_and(|path| path.is_file())
+    }
+
+    fn find_ignoring_case(&self, name: &str) -> Option<String> {
+        let path = in_other_case(&self.folder, name)?;
+        let name = source_name(path.strip_prefix(&self.folder).ok()?).ok()?;
+        self.contains(&name).then_some(name)
     }
 }
 
@@ -285,26 +293,32 @@ impl FileSystem {
 
     /// Returns an existing file whose path matches, ignoring case.
     pub fn in_other_case(&self, folder: &Path, path: &str) -> Option<PathBuf> {
-        if let FileSystem::Source(files) = self {
-            let lower_case = |path: &Path| Some(source_name(&normalized(path).ok()?).ok()?.to_lowercase());
-            let name = lower_case(&folder.join(path))?;
-            let names = files.source.names().into_iter();
-            return names
-                .filter(|other| other.to_lowercase() == name)
-                .min()
-                .map(PathBuf::from);
+        match self {
+            FileSystem::Disk => in_other_case(folder, path),
+            FileSystem::Source(files) => {
+                let name = source_name(&normalized(&folder.join(path)).ok()?).ok()?;
+                files.source.find_ignoring_case(&name).map(PathBuf::from)
+            }
         }
-        let (parents, name) = path.rsplit_once('/').unwrap_or(("", path));
-        let mut folder = folder.to_owned();
-        for parent in parents.split('/').filter(|parent| !parent.is_empty()) {
-            let exact = folder.join(parent);
-            folder = match exact.is_dir() {
-                true => exact,
-                false => entry_in_other_case(&folder, parent, Path::is_dir)?,
-            };
-        }
-        entry_in_other_case(&folder, name, Path::is_file)
     }
+
+    /// Returns the path of a folder, which is `.` instead of empty for the file system of the operating system.
+    pub fn folder<'p>(&self, path: &'p Path) -> &'p Path {
+        if self.is_disk() { or_current(path) } else { path }
+    }
+}
+
+fn in_other_case(folder: &Path, path: &str) -> Option<PathBuf> {
+    let (parents, name) = path.rsplit_once('/').unwrap_or(("", path));
+    let mut folder = folder.to_owned();
+    for parent in parents.split('/').filter(|parent| !parent.is_empty()) {
+        let exact = folder.join(parent);
+        folder = match exact.is_dir() {
+            true => exact,
+            false => entry_in_other_case(&folder, parent, Path::is_dir)?,
+        };
+    }
+    entry_in_other_case(&folder, name, Path::is_file)
 }
 
 /// Returns the path, or the current folder if the path is empty.

@@ -149,7 +149,8 @@ fn format_table(
 }
 
 /// Returns the path of a file relative to a folder; both paths are canonical.
-fn relative_path(folder: &Path, path: &Path) -> Option<String> {
+/// Returns the path relative to the folder, with `/` as separator; `None` if there is no such path in UTF-8.
+pub(super) fn relative_path(folder: &Path, path: &Path) -> Option<String> {
     let (folder, path): (Vec<_>, Vec<_>) = (folder.components().collect(), path.components().collect());
     let common = folder.iter().zip(&path).take_while(|(a, b)| a == b).count();
     let up = folder[common..].iter().map(|_| Some(".."));

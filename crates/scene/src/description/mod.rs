@@ -144,10 +144,10 @@ impl Description {
         self
     }
 
-    /// Returns the files of the scene, except images in memory.
+    /// Returns the files of the scene, except images and meshes in memory.
     pub(super) fn files_on_disk(&self, assets: &Assets) -> impl Iterator<Item = PathBuf> {
         let in_memory = |path: &PathBuf| {
-            let mut names = assets.images.keys();
+            let mut names = assets.images.keys().chain(assets.meshes.keys());
             names.any(|name| assets.folder.join(name) == *path)
         };
         self.files(&assets.folder).filter(move |path| !in_memory(path))

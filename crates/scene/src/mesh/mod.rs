@@ -30,7 +30,7 @@ pub use self::error::MeshError;
 use self::error::{Location, MeshFault};
 pub(crate) use self::raw_mesh::{RawMesh, unit};
 pub use self::tangents::{Tangents, VertexTangents};
-use crate::file_system::{FileSystem, NoFiles, or_current};
+use crate::file_system::{FileSystem, NoFiles};
 use crate::note::Note;
 
 /// Maximum size of a mesh file in bytes.
@@ -250,7 +250,7 @@ impl Mesh {
 
     /// Reads the MTL files of a line: one file whose name may contain blanks, or several files.
     fn load_libraries(&mut self, file_system: &FileSystem, mesh: &Path, names: &str) {
-        let folder = or_current(mesh.parent().unwrap_or(Path::new("")));
+        let folder = file_system.folder(mesh.parent().unwrap_or(Path::new("")));
         if file_system.is_file(&file_system.resolve(folder, names)) {
             self.load_library(file_system, folder, names);
         } else {

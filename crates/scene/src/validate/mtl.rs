@@ -2,6 +2,7 @@
 
 mod principled;
 
+use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -17,6 +18,7 @@ use super::images::Images;
 use super::texture::image_texture;
 use super::{Checked, Problem, number, show};
 use crate::mesh::{Mesh, MtlMaterial};
+use crate::write::relative_path;
 
 /// Default values: `Kd` from Ramey, Rose and Tyerman, "MTL material format", 1995; the exponent is the default for
 /// materials of scene files.
@@ -298,8 +300,16 @@ impl<'a> SceneMaterials<'a> {
         self.images.assets.file_system.resolve(folder, name)
     }
 
-    fn display_path<'p>(&self, path: &'p Path) -> &'p Path {
-        display_path(&self.folder, path)
+    /// Returns a path for messages and textures: relative to the scene's folder if the file is inside, or in a source.
+    fn display_path<'p>(&self, path: &'p Path) -> Cow<'p, Path> {
+        if let Ok(relative) = path.strip_prefix(&self.folder) {
+            return Cow::Borrowed(relative);
+        }
+        let relative = match self.images.assets.file_system.is_disk() {
+            true => None,
+            false => relative_path(&self.folder, path),
+        };
+        relative.map_or(Cow::Borrowed(path), |relative| Cow::Owned(relative.into()))
     }
 }
 
@@ -372,11 +382,6 @@ impl GroupMaterials {
             materials: vec![None; mesh.groups.len()],
         }
     }
-}
-
-/// Returns a path for messages: relative to the scene's folder if the file is inside.
-fn display_path<'p>(folder: &Path, path: &'p Path) -> &'p Path {
-    path.strip_prefix(folder).unwrap_or(path)
 }
 
 #[cfg(test)]
