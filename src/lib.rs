@@ -63,6 +63,7 @@
 #[doc = include_str!("../README.md")]
 struct Readme;
 
+mod cancel;
 #[cfg(feature = "cli")]
 pub mod cli;
 mod context;
@@ -74,10 +75,12 @@ pub mod image;
 mod open;
 mod options;
 mod picture;
+mod progressive;
 mod render;
 mod renderer;
 mod session;
 
+pub use cancel::CancelToken;
 pub use context::Context;
 pub use device::{Device, DeviceInfo};
 pub use error::Error;
@@ -85,6 +88,7 @@ pub use glam::DVec3;
 pub use image::{Aov, AovSource, Pixels};
 pub use options::Options;
 pub use picture::{Channel, Picture};
+pub use progressive::{ProgressiveRender, Status};
 pub use render::{Progressive, render, render_progressive};
 pub use scene::{Camera, Description, Overrides, Scene};
 pub use session::Session;

@@ -46,7 +46,7 @@ fn open(scene: &Scene, options: &Options) -> Result<OpenScene, Error> {
 
 pub(crate) fn render_with(renderer: Renderer, scene: &Scene, options: &Options) -> Result<Picture, Error> {
     let packed = Arc::clone(renderer.scene());
-    let mut prepared = RenderSetup::new(scene, &packed, renderer, options)?;
+    let mut prepared = RenderSetup::new(scene, renderer, options)?;
     let region = prepared.layout.region;
     let mut film = empty(region, packed.film_layout())?;
     let (split, most) = (WorkSplit::of(packed.film_layout()), prepared.renderer.largest_film());
@@ -95,7 +95,7 @@ pub(crate) fn render_progressive_with(
     watch: &mut dyn FnMut(&mut Progressive) -> Result<ControlFlow<()>, Error>,
 ) -> Result<Picture, Error> {
     let packed = Arc::clone(renderer.scene());
-    let mut prepared = RenderSetup::new(scene, &packed, renderer, options)?;
+    let mut prepared = RenderSetup::new(scene, renderer, options)?;
     let RenderSetup { renderer, hits, layout } = &mut prepared;
     let (split, order) = (WorkSplit::of(packed.film_layout()), Order::Pixels);
     let most = renderer.largest_film();
@@ -194,13 +194,16 @@ struct RenderSetup<'a> {
     layout: Layout,
 }
 
-impl<'a> RenderSetup<'a> {
-    fn new(
-        scene: &Scene,
-        packed: &Packed,
-        mut renderer: Renderer<'a>,
-        options: &Options,
-    ) -> Result<RenderSetup<'a>, Error> {
+/// The parts of an image that do not depend on its samples.
+pub(crate) struct ImageSetup {
+    /// First hits; empty if no layer needs them.
+    pub hits: Vec<FirstHit>,
+    pub layout: Layout,
+}
+
+impl ImageSetup {
+    pub(crate) fn new(scene: &Scene, renderer: &mut Renderer, options: &Options) -> Result<ImageSetup, Error> {
+        let packed = &Arc::clone(renderer.scene());
         let region = options.region(scene).map_err(Error::Option)?;
         let hits = match needs_first_hits(packed, &options.aovs) {
             true => renderer.work(|backend, _| job::first_hits(backend, region))?,
@@ -221,6 +224,13 @@ impl<'a> RenderSetup<'a> {
             max_samples: packed.sampling.pixel_samples,
             view: scene.view,
         };
+        Ok(ImageSetup { hits, layout })
+    }
+}
+
+impl<'a> RenderSetup<'a> {
+    fn new(scene: &Scene, mut renderer: Renderer<'a>, options: &Options) -> Result<RenderSetup<'a>, Error> {
+        let ImageSetup { hits, layout } = ImageSetup::new(scene, &mut renderer, options)?;
         Ok(RenderSetup { renderer, hits, layout })
     }
 
@@ -234,13 +244,13 @@ impl<'a> RenderSetup<'a> {
     }
 }
 
-fn empty(region: Region, form: FilmLayout) -> Result<Film, RenderError> {
+pub(crate) fn empty(region: Region, form: FilmLayout) -> Result<Film, RenderError> {
     job::check_memory(region.pixels().saturating_mul(form.bytes() as u64))?;
     Ok(Film::of(region, form))
 }
 
 /// Copies the rows of a band to the film of the whole image.
-fn copy_band(whole: &mut Film, band: &Film) {
+pub(crate) fn copy_band(whole: &mut Film, band: &Film) {
     let start = (band.region.y0 - whole.region.y0) as usize * whole.region.width() as usize;
     for (to, from) in whole.lists_mut().zip(band.lists()) {
         // Lists that this film layout does not include are empty.

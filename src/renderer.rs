@@ -146,6 +146,14 @@ impl OpenScene {
         self.engine.scene()
     }
 
+    pub fn info(&self) -> &DeviceInfo {
+        &self.info
+    }
+
+    pub fn progress(&self) -> Progress {
+        self.progress.clone()
+    }
+
     /// Edits the camera; the kernel must stay the same.
     ///
     /// # Errors
@@ -278,7 +286,7 @@ impl<'a> Renderer<'a> {
     }
 
     pub fn info(&self) -> &DeviceInfo {
-        &self.open.info
+        self.open.info()
     }
 
     /// Returns the packed scene.
@@ -292,7 +300,7 @@ impl<'a> Renderer<'a> {
     }
 
     pub fn progress(&self) -> Progress {
-        self.open.progress.clone()
+        self.open.progress()
     }
 
     /// Runs `work`, and repeats it after reopening a lost device. With [`Device::Auto`], the CPU takes over permanently

@@ -2,16 +2,20 @@
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
+use std::sync::mpsc::{self, Receiver, RecvTimeoutError};
+use std::time::Duration;
 
 use wgray_render::pack::{self, PackedShading};
 use wgray_render::records::Packed;
 use wgray_scene::{Camera, Scene};
 
+use crate::cancel::CancelToken;
 use crate::context::Context;
-use crate::error::Error;
+use crate::error::{Error, RenderError};
 use crate::options::Options;
 use crate::picture::Picture;
-use crate::render::{Progressive, render_progressive_with, render_with};
+use crate::progressive::ProgressiveRender;
+use crate::render::{ImageSetup, Progressive, render_progressive_with, render_with};
 use crate::renderer::{FaultHandler, OpenScene, Renderer, warnings};
 
 /// A scene to be rendered several times. The first render packs the scene (BVHs, textures, tables of the environment)
@@ -34,11 +38,9 @@ use crate::renderer::{FaultHandler, OpenScene, Renderer, warnings};
 pub struct Session {
     context: Context,
     scene: Arc<Scene>,
-    /// Packed materials, textures and environment; `None` before the first render.
-    shading: Option<PackedShading>,
-    /// The packed scene while no device is open for it.
-    packed: Option<Arc<Packed>>,
-    open: Option<OpenScene>,
+    state: SceneState,
+    /// A preparation that was cancelled, and goes on.
+    cancelled: Option<Receiver<(SceneState, Result<ImageSetup, Error>)>>,
 }
 
 impl Session {
@@ -47,9 +49,8 @@ impl Session {
         Session {
             context: context.clone(),
             scene: scene.into(),
-            shading: None,
-            packed: None,
-            open: None,
+            state: SceneState::default(),
+            cancelled: None,
         }
     }
 
@@ -65,40 +66,18 @@ impl Session {
     ///
     /// The driver of the device reports an error. The next render opens the device again.
     pub fn set_camera(&mut self, camera: Camera) -> Result<(), Error> {
+        self.drop_cancelled();
         let scene = Arc::make_mut(&mut self.scene);
         scene.camera = camera;
-        if let Some(open) = self.open.as_mut().filter(|open| keeps_kernel(open, &camera)) {
-            let edited = open.edit_camera(|packed| pack::set_camera(packed, scene));
-            if edited.is_err() {
-                self.close();
-            }
-            return Ok(edited?);
-        }
-        self.close();
-        if let (Some(mut packed), Some(shading)) = (self.packed.take(), &self.shading) {
-            if packed.origin == pack::origin(&camera) {
-                pack::set_camera(Arc::make_mut(&mut packed), &self.scene);
-            } else {
-                let texels = Arc::unwrap_or_clone(packed).textures.texels;
-                packed = Arc::new(pack::pack_with(&self.scene, shading, texels));
-            }
-            self.packed = Some(packed);
-        }
-        Ok(())
+        self.state.set_camera(scene)
     }
 
     /// Changes the scene. Materials, textures and the environment are packed again only if any of them differs, and the
     /// BVHs of meshes are built again only for other meshes (by `Arc` identity).
     pub fn set_scene(&mut self, scene: impl Into<Arc<Scene>>) {
+        self.drop_cancelled();
         let former = std::mem::replace(&mut self.scene, scene.into());
-        self.close();
-        match (&self.shading, self.packed.take()) {
-            (Some(shading), Some(packed)) if PackedShading::is_shared(&former, &self.scene) => {
-                let texels = Arc::unwrap_or_clone(packed).textures.texels;
-                self.packed = Some(Arc::new(pack::pack_with(&self.scene, shading, texels)));
-            }
-            _ => self.shading = None,
-        }
+        self.state.set_scene(&former, &self.scene);
     }
 
     /// Renders the scene. See [`render`](crate::render()).
@@ -127,28 +106,177 @@ impl Session {
         render_progressive_with(self.renderer(options, warnings())?, &scene, options, watch)
     }
 
+    /// Starts a render that is continued step by step: packs the scene, opens the device, compiles the kernel and
+    /// computes the first hits, if layers need them. No sample is rendered yet.
+    ///
+    /// This work runs on another thread, except on a thread of a rayon pool and on wasm32, where `cancel` is observed
+    /// before and after it. If it is cancelled, it continues in the background, and the next render uses the result.
+    ///
+    /// # Errors
+    ///
+    /// The errors of [`render`](crate::render()), and [`RenderError::Cancelled`].
+    pub fn start(&mut self, options: &Options, cancel: &CancelToken) -> Result<ProgressiveRender<'_>, Error> {
+        options.region(&self.scene).map_err(Error::Option)?;
+        let setup = self.prepare(options, cancel)?;
+        let open = self.state.open.as_mut().ok_or(RenderError::NoFilm)?; // not possible: `prepare` has opened it
+        ProgressiveRender::new(open, setup)
+    }
+
+    fn prepare(&mut self, options: &Options, cancel: &CancelToken) -> Result<ImageSetup, Error> {
+        if let Some(cancelled) = self.cancelled.take() {
+            // The result is for the current scene, possibly with other options.
+            self.receive(cancelled, cancel)?.ok();
+        }
+        if cancel.is_cancelled() {
+            return Err(RenderError::Cancelled.into());
+        }
+        let (context, scene, options) = (self.context.clone(), Arc::clone(&self.scene), options.clone());
+        let mut state = std::mem::take(&mut self.state);
+        let prepare = move || {
+            let setup = state.prepare(&context, &scene, &options);
+            (state, setup)
+        };
+        let is_pool_thread = rayon::current_thread_index().is_some();
+        if is_pool_thread || cfg!(target_family = "wasm") {
+            let (state, setup) = prepare();
+            self.state = state;
+            return match cancel.is_cancelled() {
+                true => Err(RenderError::Cancelled.into()),
+                false => setup,
+            };
+        }
+        let (sender, receiver) = mpsc::channel();
+        let dispatch = tracing::dispatcher::get_default(Clone::clone);
+        let span = tracing::Span::current();
+        std::thread::spawn(move || {
+            tracing::dispatcher::with_default(&dispatch, || {
+                let _entered = span.entered();
+                // The receiver is dropped if the scene has changed since.
+                let _ = sender.send(prepare());
+            });
+        });
+        self.receive(receiver, cancel)?
+    }
+
+    /// Waits for a preparation. The error is [`RenderError::Cancelled`].
+    fn receive(
+        &mut self,
+        receiver: Receiver<(SceneState, Result<ImageSetup, Error>)>,
+        cancel: &CancelToken,
+    ) -> Result<Result<ImageSetup, Error>, Error> {
+        const INTERVAL: Duration = Duration::from_millis(5);
+        loop {
+            match receiver.recv_timeout(INTERVAL) {
+                Ok((state, setup)) => {
+                    self.state = state;
+                    return Ok(setup);
+                }
+                Err(RecvTimeoutError::Timeout) if cancel.is_cancelled() => {
+                    self.cancelled = Some(receiver);
+                    return Err(RenderError::Cancelled.into());
+                }
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => panic!("the preparation of the render panicked"),
+            }
+        }
+    }
+
+    /// Takes the result of a cancelled preparation if it is complete; otherwise drops it.
+    fn drop_cancelled(&mut self) {
+        if let Some((state, _)) = self.cancelled.take().and_then(|receiver| receiver.try_recv().ok()) {
+            self.state = state;
+        }
+    }
+
     /// Packs the scene and opens the device, unless this has been done for the same options.
     pub(crate) fn renderer<'a>(
         &'a mut self,
         options: &Options,
+        on_fault: FaultHandler<'a>,
+    ) -> Result<Renderer<'a>, Error> {
+        if let Some(cancelled) = self.cancelled.take() {
+            self.receive(cancelled, &CancelToken::new())?.ok();
+        }
+        self.state.renderer(&self.context, &self.scene, options, on_fault)
+    }
+
+    /// Returns the scene, packed for these options.
+    pub(crate) fn packed(&mut self, options: &Options) -> Arc<Packed> {
+        self.state.packed(&self.scene, options)
+    }
+}
+
+/// The packed scene, and the device on which it is open.
+#[derive(Default)]
+struct SceneState {
+    /// Packed materials, textures and environment; `None` before the first render.
+    shading: Option<PackedShading>,
+    /// The packed scene while no device is open for it.
+    packed: Option<Arc<Packed>>,
+    open: Option<OpenScene>,
+}
+
+impl SceneState {
+    fn set_camera(&mut self, scene: &Scene) -> Result<(), Error> {
+        let camera = &scene.camera;
+        if let Some(open) = self.open.as_mut().filter(|open| keeps_kernel(open, camera)) {
+            let edited = open.edit_camera(|packed| pack::set_camera(packed, scene));
+            if edited.is_err() {
+                self.close();
+            }
+            return Ok(edited?);
+        }
+        self.close();
+        if let (Some(mut packed), Some(shading)) = (self.packed.take(), &self.shading) {
+            if packed.origin == pack::origin(camera) {
+                pack::set_camera(Arc::make_mut(&mut packed), scene);
+            } else {
+                let texels = Arc::unwrap_or_clone(packed).textures.texels;
+                packed = Arc::new(pack::pack_with(scene, shading, texels));
+            }
+            self.packed = Some(packed);
+        }
+        Ok(())
+    }
+
+    fn set_scene(&mut self, former: &Scene, scene: &Scene) {
+        self.close();
+        match (&self.shading, self.packed.take()) {
+            (Some(shading), Some(packed)) if PackedShading::is_shared(former, scene) => {
+                let texels = Arc::unwrap_or_clone(packed).textures.texels;
+                self.packed = Some(Arc::new(pack::pack_with(scene, shading, texels)));
+            }
+            _ => self.shading = None,
+        }
+    }
+
+    fn prepare(&mut self, context: &Context, scene: &Scene, options: &Options) -> Result<ImageSetup, Error> {
+        let mut renderer = self.renderer(context, scene, options, warnings())?;
+        ImageSetup::new(scene, &mut renderer, options)
+    }
+
+    fn renderer<'a>(
+        &'a mut self,
+        context: &Context,
+        scene: &Scene,
+        options: &Options,
         mut on_fault: FaultHandler<'a>,
     ) -> Result<Renderer<'a>, Error> {
-        let layers = options.needs_layers(&self.scene);
+        let layers = options.needs_layers(scene);
         let open = match self.open.take() {
             Some(open) if open.suits(options, layers) => open,
             other => {
                 self.open = other;
-                let packed = self.packed(options);
-                OpenScene::new(&self.context, packed, options, &mut on_fault)?
+                let packed = self.packed(scene, options);
+                OpenScene::new(context, packed, options, &mut on_fault)?
             }
         };
         self.packed = None;
         Ok(Renderer::new(self.open.insert(open), on_fault))
     }
 
-    /// Returns the scene, packed for these options.
-    pub(crate) fn packed(&mut self, options: &Options) -> Arc<Packed> {
-        let layers = options.needs_layers(&self.scene);
+    fn packed(&mut self, scene: &Scene, options: &Options) -> Arc<Packed> {
+        let layers = options.needs_layers(scene);
         if let Some(open) = &self.open
             && open.suits(options, layers)
         {
@@ -156,8 +284,8 @@ impl Session {
         }
         self.close();
         let packed = self.packed.get_or_insert_with(|| {
-            let (shading, texels) = PackedShading::of(&self.scene);
-            let packed = pack::pack_with(&self.scene, &shading, texels);
+            let (shading, texels) = PackedShading::of(scene);
+            let packed = pack::pack_with(scene, &shading, texels);
             self.shading = Some(shading);
             Arc::new(packed)
         });

@@ -228,7 +228,7 @@ fn film_of_samples(packed: &Packed, samples: u32) -> Film {
     cpu.film().expect("a film")
 }
 
-fn last_pass(bands: &mut Bands) -> Film {
+fn last_pass(bands: &mut Bands<impl CheckpointStore>) -> Film {
     let mut films = Vec::new();
     let mut output = |band: wgray_render::job::FinishedBand| {
         films.push(band.film);

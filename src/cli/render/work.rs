@@ -202,7 +202,7 @@ fn write_band(
 fn save_pass(
     plan: &Plan,
     renderer: &mut Renderer,
-    bands: &mut Bands,
+    bands: &mut Bands<&mut dyn CheckpointStore>,
     previews: &mut Previews,
     layout: &Layout,
 ) -> Result<Option<RenderTotals>, RenderError> {

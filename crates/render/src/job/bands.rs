@@ -36,8 +36,8 @@ pub type Watch<'a> = dyn FnMut(&mut dyn Backend, Region, f64) -> Result<Flow, Re
 
 /// Renders the bands of a region, from top to bottom. The measured speed determines the size of dispatches. Pieces from
 /// a checkpoint are not rendered again.
-pub struct Bands<'a> {
-    store: &'a mut dyn CheckpointStore,
+pub struct Bands<S> {
+    store: S,
     bands: VecDeque<Band>,
     samples: u32,
     /// True once joint rendering has ended, because it is complete or the time is up; `None` if bands are rendered one
@@ -45,6 +45,10 @@ pub struct Bands<'a> {
     joint_rendering_ended: Option<bool>,
     /// Samples per pixel at the end of the current pass, if the bands are rendered in passes ([`Bands::in_passes`]).
     pass_end: Option<u32>,
+    /// Target duration of a pass.
+    pass_duration: Duration,
+    /// True to keep the films of the last complete pass ([`Bands::last_pass`]).
+    keeps_last_pass: bool,
     steps: Steps,
     /// Samples over all pixels of the finished bands.
     finished_samples: f64,
@@ -122,7 +126,7 @@ const PASS_DURATION: Duration = Duration::from_secs(1);
 /// Minimum rows of a shortened band, without and with adaptive sampling, which adds two rows of neighbors.
 const MIN_ROWS: [u32; 2] = [16, 64];
 
-impl<'a> Bands<'a> {
+impl<S: CheckpointStore> Bands<S> {
     /// Splits a region into bands. Pieces of the store, which must lie in the region, become bands.
     pub fn new(
         region: Region,
@@ -130,8 +134,8 @@ impl<'a> Bands<'a> {
         split: &WorkSplit,
         order: Order,
         largest_film: u64,
-        store: &'a mut dyn CheckpointStore,
-    ) -> Bands<'a> {
+        store: S,
+    ) -> Bands<S> {
         let mut queue = VecDeque::new();
         let mut y = region.y0;
         let add_new = |queue: &mut VecDeque<Band>, y0: u32, y1: u32| {
@@ -154,6 +158,8 @@ impl<'a> Bands<'a> {
             samples,
             joint_rendering_ended: None,
             pass_end: None,
+            pass_duration: PASS_DURATION,
+            keeps_last_pass: false,
             steps: Steps::new(split, DISPATCH_DURATION, order),
             finished_samples: 0.0,
             total_samples: region.pixels() as f64 * f64::from(samples),
@@ -167,7 +173,7 @@ impl<'a> Bands<'a> {
     /// # Errors
     ///
     /// [`RenderError::Memory`] if the films do not fit.
-    pub fn as_a_whole(mut self, film_layout: FilmLayout) -> Result<Bands<'a>, RenderError> {
+    pub fn as_a_whole(mut self, film_layout: FilmLayout) -> Result<Bands<S>, RenderError> {
         check_memory(self.pixels().saturating_mul(film_layout.bytes() as u64))?;
         self.joint_rendering_ended = Some(false);
         Ok(self)
@@ -178,11 +184,56 @@ impl<'a> Bands<'a> {
     /// # Errors
     ///
     /// [`RenderError::Memory`] if the films do not fit.
-    pub fn in_passes(self, film_layout: FilmLayout) -> Result<Bands<'a>, RenderError> {
+    pub fn in_passes(self, film_layout: FilmLayout) -> Result<Bands<S>, RenderError> {
         check_memory(self.pixels().saturating_mul(2 * film_layout.bytes() as u64))?;
         let mut bands = self.as_a_whole(film_layout)?;
         bands.pass_end = Some(0);
+        bands.keeps_last_pass = true;
         Ok(bands)
+    }
+
+    /// Like [`Bands::as_a_whole`], for [`Bands::next_pass`] with passes of about this duration.
+    ///
+    /// # Errors
+    ///
+    /// [`RenderError::Memory`] if the films do not fit.
+    pub fn in_passes_of(self, pass_duration: Duration, film_layout: FilmLayout) -> Result<Bands<S>, RenderError> {
+        let mut bands = self.as_a_whole(film_layout)?;
+        bands.pass_end = Some(0);
+        bands.pass_duration = pass_duration;
+        Ok(bands)
+    }
+
+    /// Adds samples per pixel to a render in passes, which may be complete.
+    pub fn add_samples(&mut self, count: u32) {
+        self.total_samples *= f64::from(self.samples + count) / f64::from(self.samples);
+        self.samples += count;
+        if self.pass_end.is_some() {
+            self.joint_rendering_ended = Some(false);
+        }
+    }
+
+    /// Returns the requested samples per pixel; with adaptive sampling a maximum.
+    pub fn requested_samples(&self) -> u32 {
+        self.samples
+    }
+
+    /// Passes copies of the films in memory to `output`, from top to bottom, with all samples that they have.
+    pub fn films(&self, output: &mut dyn FnMut(Film)) {
+        for band in &self.bands {
+            if let State::InMemory(piece) = &band.state {
+                output(piece.film.clone().part(piece.region));
+            }
+        }
+    }
+
+    /// Returns the finished fraction of the samples, not counting incomplete passes: 0 to 1.
+    pub fn fraction(&self) -> f64 {
+        let totals = self.bands.iter().map(|band| band.sample_total(self.samples));
+        match self.total_samples > 0.0 {
+            true => ((self.finished_samples + totals.sum::<f64>()) / self.total_samples).min(1.0),
+            false => 1.0,
+        }
     }
 
     fn pixels(&self) -> u64 {
@@ -289,7 +340,7 @@ impl<'a> Bands<'a> {
     /// the copies of films, and every power of two ends a pass.
     fn end_of_pass(&self, samples: u32) -> u32 {
         let count = match self.bands.len() {
-            1 => (self.steps.speed().unwrap_or(0.0) * PASS_DURATION.as_secs_f64() / self.pixels() as f64) as u32,
+            1 => (self.steps.speed().unwrap_or(0.0) * self.pass_duration.as_secs_f64() / self.pixels() as f64) as u32,
             _ => samples / 4,
         };
         let power = (samples + 1).next_power_of_two();
@@ -468,7 +519,7 @@ impl<'a> Bands<'a> {
         }
         let band = &mut self.bands[i];
         let previous = std::mem::replace(&mut band.state, State::InMemory(piece));
-        if let (State::InMemory(previous), Some(_)) = (previous, self.pass_end) {
+        if let (State::InMemory(previous), true) = (previous, self.keeps_last_pass) {
             band.last_pass.get_or_insert(previous);
         }
         if is_due {

@@ -56,6 +56,32 @@ pub trait CheckpointStore {
     fn small_pieces(&self) -> bool;
 }
 
+impl<T: CheckpointStore + ?Sized> CheckpointStore for &mut T {
+    fn pieces(&self) -> Vec<StoredPiece> {
+        (**self).pieces()
+    }
+
+    fn load(&mut self, number: usize) -> Result<FilmPiece, RenderError> {
+        (**self).load(number)
+    }
+
+    fn keep(&mut self, piece: &FilmPiece) {
+        (**self).keep(piece);
+    }
+
+    fn sync(&mut self) {
+        (**self).sync();
+    }
+
+    fn interval(&self) -> Duration {
+        (**self).interval()
+    }
+
+    fn small_pieces(&self) -> bool {
+        (**self).small_pieces()
+    }
+}
+
 /// A store that keeps nothing. A render survives the loss of a device, but not the end of the process.
 #[derive(Debug)]
 pub struct NoCheckpoint;

@@ -1,0 +1,200 @@
+//! Rendering step by step, with an image at any time.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use wgray_render::backend::Backend;
+use wgray_render::film::{Film, FilmLayout};
+use wgray_render::job::{Bands, Flow, NoCheckpoint, Order, WorkSplit};
+use wgray_scene::Problem;
+
+use crate::cancel::CancelToken;
+use crate::error::{Error, RenderError};
+use crate::picture::Picture;
+use crate::render::{ImageSetup, copy_band, empty};
+use crate::renderer::{FaultHandler, OpenScene, Renderer, warnings};
+use wgray_image::Region;
+
+/// Target duration of a step.
+const STEP_DURATION: Duration = Duration::from_millis(250);
+
+/// Maximum number of samples per pixel.
+const MAX_SAMPLES: u32 = 65_536;
+
+/// The result of a step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Status {
+    /// Samples are left.
+    Running,
+    /// All samples are rendered.
+    Finished,
+    /// The token was cancelled. The samples of the incomplete step are kept, and the next step continues it.
+    Cancelled,
+}
+
+/// A render that is continued step by step; [`Session::start`](crate::Session::start) returns it.
+///
+/// All steps together give the bits of [`Session::render`](crate::Session::render), in spite of cancellations.
+///
+/// ```
+/// use wgray::{CancelToken, Context, Options, Scene, Session, Status};
+///
+/// # fn main() -> Result<(), wgray::Error> {
+/// # let smaller = wgray::Overrides { size: Some((16, 16)), ..Default::default() };
+/// # let scene = Scene::load_with("scenes/turntable.toml", &smaller)?;
+/// let cancel = CancelToken::new(); // `cancel.clone().cancel()` on another thread ends the loop
+/// let mut session = Session::new(&Context::new(), scene);
+/// let mut render = session.start(&Options::default(), &cancel)?;
+/// while render.step(&cancel)? == Status::Running {
+///     println!("{} samples per pixel", render.samples());
+///     let preview = render.snapshot();
+///     # assert_eq!(preview.width(), 16);
+/// }
+/// let image = render.finish();
+/// # assert_eq!(image.width(), 16);
+/// # Ok(())
+/// # }
+/// ```
+pub struct ProgressiveRender<'s> {
+    open: &'s mut OpenScene,
+    bands: Bands<NoCheckpoint>,
+    setup: ImageSetup,
+    film_layout: FilmLayout,
+}
+
+impl<'s> ProgressiveRender<'s> {
+    pub(crate) fn new(open: &'s mut OpenScene, setup: ImageSetup) -> Result<ProgressiveRender<'s>, Error> {
+        let packed = Arc::clone(open.scene());
+        let film_layout = packed.film_layout();
+        let split = WorkSplit::of(film_layout);
+        let largest_film = Renderer::new(open, warnings()).largest_film();
+        let bands = Bands::new(
+            setup.layout.region,
+            packed.sampling.pixel_samples,
+            &split,
+            Order::Pixels,
+            largest_film,
+            NoCheckpoint,
+        );
+        // For `snapshot`, which cannot fail.
+        drop(empty(setup.layout.region, film_layout)?);
+        Ok(ProgressiveRender {
+            open,
+            bands: bands.in_passes_of(STEP_DURATION, film_layout)?,
+            setup,
+            film_layout,
+        })
+    }
+
+    /// Renders one or more samples of every pixel, for about a quarter of a second if that is enough.
+    ///
+    /// # Errors
+    ///
+    /// The errors of [`render`](crate::render()). The samples of complete steps are kept, and the step can be repeated.
+    pub fn step(&mut self, cancel: &CancelToken) -> Result<Status, Error> {
+        if cancel.is_cancelled() {
+            return Ok(Status::Cancelled);
+        }
+        let progress = self.open.progress();
+        let on_fault = FaultHandler {
+            stopped: Box::new(|| cancel.is_cancelled()),
+            ..warnings()
+        };
+        let mut renderer = Renderer::new(self.open, on_fault);
+        let mut watch = |_: &mut dyn Backend, _: Region, _: f64| -> Result<Flow, RenderError> {
+            Ok((!cancel.is_cancelled()).into())
+        };
+        let bands = &mut self.bands;
+        let rendered = renderer.work(|backend, _| bands.next_pass(backend, &mut watch, &mut || progress.made()));
+        match rendered {
+            Ok(Some(samples)) if samples < bands.requested_samples() => Ok(Status::Running),
+            Ok(_) => Ok(Status::Finished),
+            Err(RenderError::Cancelled) => Ok(Status::Cancelled),
+            Err(error) => Err(error.into()),
+        }
+    }
+
+    /// Renders all samples that are left.
+    ///
+    /// # Errors
+    ///
+    /// The errors of [`ProgressiveRender::step`].
+    pub fn run(&mut self, cancel: &CancelToken) -> Result<Status, Error> {
+        loop {
+            match self.step(cancel)? {
+                Status::Running => {}
+                status => return Ok(status),
+            }
+        }
+    }
+
+    /// Returns the number of samples that every pixel has; with adaptive sampling, the number of samples up to which
+    /// every pixel was considered. Some pixels have more after a cancellation.
+    pub fn samples(&self) -> u32 {
+        self.bands.passed_samples()
+    }
+
+    /// Returns the finished fraction of the samples, 0 to 1.
+    pub fn fraction(&self) -> f64 {
+        self.bands.fraction()
+    }
+
+    /// Requests more samples per pixel than the scene does, after or before the others are finished. The total is at
+    /// most 65,536. The image is the same however the samples are added, but differs slightly from that of a scene with
+    /// the larger number: patterns are repeated with another seed, and textures keep the level of detail.
+    ///
+    /// # Errors
+    ///
+    /// The total is too large, or the scene uses adaptive sampling, whose error determines the number of samples.
+    pub fn add_samples(&mut self, count: u32) -> Result<(), Error> {
+        let total = u64::from(self.bands.requested_samples()) + u64::from(count);
+        let rule = match total {
+            _ if self.film_layout.adaptive => "cannot be added with adaptive sampling; lower its error".to_owned(),
+            total if total > u64::from(MAX_SAMPLES) => format!("{total} in total must be at most {MAX_SAMPLES}"),
+            _ => {
+                self.bands.add_samples(count);
+                self.setup.layout.max_samples = self.bands.requested_samples();
+                return Ok(());
+            }
+        };
+        Err(Error::Option(Problem::of("samples", rule)))
+    }
+
+    /// Returns the image with the samples rendered so far. Pixels without samples are black.
+    pub fn snapshot(&self) -> Picture {
+        let mut film = Film::of(self.setup.layout.region, self.film_layout);
+        self.copy_to(&mut film);
+        Picture {
+            film,
+            hits: self.setup.hits.clone(),
+            layout: self.setup.layout.clone(),
+            device: self.open.info().clone(),
+        }
+    }
+
+    /// Like [`ProgressiveRender::snapshot`], and uses the memory of an earlier snapshot of this render.
+    pub fn snapshot_into(&self, picture: &mut Picture) {
+        let layout = &self.setup.layout;
+        if picture.film.region != layout.region || picture.film.film_layout() != self.film_layout {
+            *picture = self.snapshot();
+            return;
+        }
+        for list in picture.film.lists_mut() {
+            list.fill(Default::default());
+        }
+        self.copy_to(&mut picture.film);
+        picture.hits.clone_from(&self.setup.hits);
+        picture.layout.clone_from(layout);
+        picture.device.clone_from(self.open.info());
+    }
+
+    fn copy_to(&self, film: &mut Film) {
+        self.bands.films(&mut |band| copy_band(film, &band));
+    }
+
+    /// Ends the render, and returns the image with the samples rendered so far.
+    pub fn finish(self) -> Picture {
+        self.snapshot()
+    }
+}
