@@ -53,8 +53,8 @@ fn ggx_albedo(alpha: f32, mu: f32) -> vec2f {
     return ggx_albedo_fit(alpha, mu / length, length);
 }
 
-// Approximates the albedo for two different alphas: masking uses the alpha along w, shadowing the root mean square. The
-// error is within 7 % if one alpha is 1 and the other is small, else within 2 %.
+// Approximates the albedo for two different alphas: masking uses the alpha along w, and shadowing uses the root mean
+// square of the two alphas. The error is within 7 % if one alpha is 1 and the other is small, else within 2 %.
 fn ggx_albedo_along(alpha: vec2f, w: vec3f) -> vec2f {
     let square = 0.5 * (alpha.x * alpha.x + alpha.y * alpha.y);
     let length = sqrt(square * (1.0 - w.z * w.z) + w.z * w.z);

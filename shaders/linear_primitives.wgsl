@@ -1,7 +1,8 @@
 // Shadow rays against primitives outside of the BVH. Only primitives that pass a cheap test are intersected, in a loop:
 // software Vulkan cannot skip a branch, but leaves a loop as soon as no lane needs another iteration.
 
-// Returns the mask of samples that primitives of a kind, from `range.x` up to but not including `range.y`, occlude.
+// Returns the mask of the samples that are occluded by primitives of a kind: those with indices in the half-open range
+// `range`.
 fn occluded_by(kind: u32, range: vec2u, surface: Surface, frustum: ShadowFrustum, light: Light, block: SampleBlock) -> u32 {
     var bits = 0u;
     for (var first = range.x; first < range.y; first += 32u) {

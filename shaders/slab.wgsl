@@ -57,7 +57,7 @@ fn ray_interval(origin: vec3f, min_direction: vec3f, max_direction: vec3f, pad: 
                select(zero, inverse_max, is_negative), select(zero, inverse_min, is_positive));
 }
 
-// Returns the earliest t at which any ray may enter a box, x, and the latest t at which any ray may leave, y.
+// Returns the earliest t at which any ray may enter a box (x), and the latest t at which any ray may leave the box (y).
 fn ray_interval_box(low: vec3f, high: vec3f, rays: RayInterval) -> vec2f {
     let a = low - rays.low_origin;
     let b = high - rays.high_origin;

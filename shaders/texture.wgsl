@@ -197,7 +197,7 @@ struct EvaluatedMaterial {
     coat_normal: vec3f,    // of the clearcoat
 }
 
-// Applies at most `lookups` textures.
+// Evaluates the textures and normal maps of a material, which has at most `lookups` textures.
 fn evaluate_material(prim: HitPrimitive, hit: Hit, material: Material, surface: Surface, hit_diff: HitDifferential, lookups: u32) -> EvaluatedMaterial {
     var shading = EvaluatedMaterial(material, surface.shading_normal, surface.shading_normal);
     if lookups == 0u {

@@ -28,7 +28,7 @@ pub struct DevicePlan {
 ///
 /// # Errors
 ///
-/// [`RenderError::NoDevice`] if no device fits.
+/// [`RenderError::NoDevice`] if no device matches the request.
 pub fn plan_device(scene: &Packed, device: &Device) -> Result<DevicePlan, RenderError> {
     let on_cpu = |why: String| DevicePlan {
         info: DeviceInfo::cpu(),

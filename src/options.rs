@@ -11,14 +11,14 @@ use crate::device::Device;
 /// The options of a render. Size, samples and seed belong to the scene; [`Overrides`](crate::Overrides) change them.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Options {
-    /// The device.
+    /// The device that renders.
     pub device: Device,
     /// The region to render; `None` renders the full image. The pixels are identical to those of the full image.
     pub crop: Option<Region>,
     /// The layers to render in addition to the radiance. Duplicates are ignored.
     pub aovs: Vec<Aov>,
-    /// Round quotients and square roots correctly in software, because the results of GPUs may be off by one unit in
-    /// the last place. Requires Vulkan; has no effect on the CPU.
+    /// Round quotients and square roots correctly in software, because results of GPUs may be wrong by one unit in the
+    /// last place. Requires Vulkan; has no effect on the CPU.
     pub exact_rounding: bool,
 }
 

@@ -21,9 +21,9 @@ use wgray_scene::Scene;
 /// averaged over samples.
 ///
 /// With [`Device::Auto`](crate::Device::Auto), the CPU renders if no adapter exists, or if the scene or image does not
-/// fit into its memory. With any device, the CPU renders if the driver truncates long loops and a single sample exceeds
-/// the limit. A lost device is re-opened a few times, to resume from the last finished part; if that fails,
-/// [`Device::Auto`](crate::Device::Auto) resumes on the CPU. `tracing` warnings give the reason, and
+/// fit into the adapter's memory. With any device, the CPU renders if the driver truncates long loops and a single
+/// sample exceeds the limit. A lost device is re-opened a few times, to resume from the last finished part; if
+/// re-opening fails, [`Device::Auto`](crate::Device::Auto) resumes on the CPU. `tracing` warnings give the reason, and
 /// [`Picture::device`] returns the device that rendered last.
 ///
 /// wgpu panics at some device losses. Such a panic is caught, but panic hooks observe it, and `panic = "abort"` aborts
@@ -49,14 +49,14 @@ pub(crate) fn render_with(renderer: Renderer, scene: &Scene, options: &Options) 
     let mut prepared = RenderSetup::new(scene, renderer, options)?;
     let region = prepared.layout.region;
     let mut film = empty(region, packed.film_layout())?;
-    let (split, most) = (WorkSplit::of(packed.film_layout()), prepared.renderer.largest_film());
+    let (split, largest_film) = (WorkSplit::of(packed.film_layout()), prepared.renderer.largest_film());
     let mut no_checkpoint = NoCheckpoint;
     let mut bands = Bands::new(
         region,
         packed.sampling.pixel_samples,
         &split,
         Order::Rows,
-        most,
+        largest_film,
         &mut no_checkpoint,
     );
     let progress = prepared.renderer.progress();
@@ -98,28 +98,28 @@ pub(crate) fn render_progressive_with(
     let mut prepared = RenderSetup::new(scene, renderer, options)?;
     let RenderSetup { renderer, hits, layout } = &mut prepared;
     let (split, order) = (WorkSplit::of(packed.film_layout()), Order::Pixels);
-    let most = renderer.largest_film();
+    let largest_film = renderer.largest_film();
     let mut no_checkpoint = NoCheckpoint;
     let mut bands = Bands::new(
         layout.region,
         packed.sampling.pixel_samples,
         &split,
         order,
-        most,
+        largest_film,
         &mut no_checkpoint,
     );
     let progress = renderer.progress();
-    let mut whole = empty(layout.region, packed.film_layout())?;
+    let mut full_film = empty(layout.region, packed.film_layout())?;
     let mut failed = None;
     let mut render_next = || {
         renderer.work(|backend, device| {
-            let mut look = |backend: &mut dyn Backend, band: Region, share: f64| {
+            let mut report_progress = |backend: &mut dyn Backend, band: Region, share: f64| {
                 let mut progress = Progressive {
                     share,
                     backend,
                     device,
                     band,
-                    whole: &mut whole,
+                    full_film: &mut full_film,
                     hits,
                     layout,
                 };
@@ -135,8 +135,8 @@ pub(crate) fn render_progressive_with(
                     }
                 }
             };
-            let band = bands.render_next(backend, &mut look, &mut || progress.made())?;
-            Ok(band.map(|band| copy_band(&mut whole, &band.film)))
+            let band = bands.render_next(backend, &mut report_progress, &mut || progress.made())?;
+            Ok(band.map(|band| copy_band(&mut full_film, &band.film)))
         })
     };
     let rendered = loop {
@@ -150,7 +150,7 @@ pub(crate) fn render_progressive_with(
         Some(error) => Err(error),
         None => {
             rendered?;
-            Ok(prepared.picture(whole))
+            Ok(prepared.picture(full_film))
         }
     }
 }
@@ -161,7 +161,7 @@ pub struct Progressive<'a> {
     backend: &'a mut dyn Backend,
     device: &'a DeviceInfo,
     band: Region,
-    whole: &'a mut Film,
+    full_film: &'a mut Film,
     hits: &'a [FirstHit],
     layout: &'a Layout,
 }
@@ -178,9 +178,9 @@ impl Progressive<'_> {
     ///
     /// The driver of the device reports an error or a loss.
     pub fn picture(&mut self) -> Result<Picture, Error> {
-        copy_band(self.whole, &self.backend.film()?.part(self.band));
+        copy_band(self.full_film, &self.backend.film()?.part(self.band));
         Ok(Picture {
-            film: self.whole.clone(),
+            film: self.full_film.clone(),
             hits: self.hits.to_vec(),
             layout: self.layout.clone(),
             device: self.device.clone(),
@@ -249,10 +249,10 @@ pub(crate) fn empty(region: Region, form: FilmLayout) -> Result<Film, RenderErro
     Ok(Film::of(region, form))
 }
 
-/// Copies the rows of a band to the film of the whole image.
-pub(crate) fn copy_band(whole: &mut Film, band: &Film) {
-    let start = (band.region.y0 - whole.region.y0) as usize * whole.region.width() as usize;
-    for (to, from) in whole.lists_mut().zip(band.lists()) {
+/// Copies the rows of a band to the film of the full image.
+pub(crate) fn copy_band(full_film: &mut Film, band: &Film) {
+    let start = (band.region.y0 - full_film.region.y0) as usize * full_film.region.width() as usize;
+    for (to, from) in full_film.lists_mut().zip(band.lists()) {
         // Lists that this film layout does not include are empty.
         if let Some(to) = to.get_mut(start..start + from.len()) {
             to.copy_from_slice(from);

@@ -221,7 +221,7 @@ fn same_first_hit(hit: &FirstHit, intersection: &Option<Intersection>) -> bool {
     // The angle u wraps around from 1 to 0, and is undefined at the poles.
     let close_modulo_1 = |a: f64, b: f64| close(a, b) || close((a - b).abs(), 1.0);
     let is_pole = (intersection.uv.y - 0.5).abs() > 0.49;
-    hit.shape as usize == intersection.shape
+    hit.shape as usize == intersection.object
         && close(f64::from(hit.depth), intersection.t)
         && (normal - intersection.normal).length() < 1e-4
         && (hit.shading_normal.as_dvec3() - intersection.shading_normal).length() < 1e-4

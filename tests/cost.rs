@@ -64,7 +64,7 @@ const KINDS: [(&str, &str); 13] = [
         "triangles",
         "[[shapes]]\ntype = 'triangle'\nmaterial = 'first'\nvertices = [[{x}, {y}, {z}], [9, {y}, {z}], [{x}, 9, {y}]]",
     ),
-    // For each triangle, all other triangles are on the same side.
+    // All other triangles are on the same side of the plane of a triangle.
     (
         "triangles on a slope",
         "[[shapes]]\ntype = 'triangle'\nmaterial = 'first'\nvertices = [[{x}, {y}, {x}], [9, {y}, 9], [9, 9, 9]]",

@@ -657,7 +657,7 @@ fn alpha(random: &Random) -> Vec2 {
     random.pick(&[Vec2::splat(x), Vec2::new(x, component())])
 }
 
-/// Returns a vector of length 0.1 or more.
+/// Returns a vector of a length above 0.1.
 fn vector(random: &Random) -> DVec3 {
     loop {
         let v = DVec3::from_array([(); 3].map(|()| random.between(-1.0, 1.0)));

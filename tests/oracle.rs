@@ -39,14 +39,14 @@ pub enum Flaw {
 
 pub struct Oracle<'a> {
     scene: &'a Description,
-    solids: Vec<Solid>,
+    surfaces: Vec<Surface>,
     flaw: Flaw,
 }
 
-struct Solid {
+struct Surface {
     form: Form,
-    /// Index in the order shapes, instances, lights.
-    shape: usize,
+    /// Index of the scene object, in the order shapes, instances, lights.
+    object: usize,
     /// `None` for lights.
     material: Option<String>,
 }
@@ -91,7 +91,8 @@ struct Facet {
 
 pub struct Intersection {
     pub t: f64,
-    pub shape: usize,
+    /// Index of the scene object, in the order shapes, instances, lights.
+    pub object: usize,
     /// The outward geometric normal.
     pub normal: DVec3,
     pub uv: DVec2,
@@ -101,29 +102,29 @@ pub struct Intersection {
     terminator_offsets: [DVec3; 2],
     /// The corners of the triangle on a mesh.
     corners: Option<[DVec3; 3]>,
-    solid: usize,
+    surface: usize,
 }
 
 impl<'a> Oracle<'a> {
     pub fn new(scene: &'a Description, flaw: Flaw) -> Oracle<'a> {
-        let mut solids = Vec::new();
-        for (shape, description) in scene.shapes.iter().enumerate() {
+        let mut surfaces = Vec::new();
+        for (object, description) in scene.shapes.iter().enumerate() {
             let (material, forms) = forms(description, flaw);
-            let solid = |form| Solid {
+            let surface = |form| Surface {
                 form,
-                shape,
+                object,
                 material: Some(material.clone()),
             };
-            solids.extend(forms.into_iter().map(solid));
+            surfaces.extend(forms.into_iter().map(surface));
         }
-        for (number, instance) in scene.instances.iter().enumerate() {
-            solids.push(Solid {
+        for (i, instance) in scene.instances.iter().enumerate() {
+            surfaces.push(Surface {
                 form: mesh(instance, &scene.meshes[&instance.mesh], flaw),
-                shape: scene.shapes.len() + number,
+                object: scene.shapes.len() + i,
                 material: instance.material.clone(),
             });
         }
-        for (number, light) in scene.lights.iter().enumerate() {
+        for (i, light) in scene.lights.iter().enumerate() {
             if let LightDescription::Rectangle(light) = light {
                 let form = flat(
                     light.center,
@@ -132,14 +133,14 @@ impl<'a> Oracle<'a> {
                     Some(light.size),
                     flaw,
                 );
-                solids.push(Solid {
+                surfaces.push(Surface {
                     form,
-                    shape: scene.shapes.len() + scene.instances.len() + number,
+                    object: scene.shapes.len() + scene.instances.len() + i,
                     material: None,
                 });
             }
         }
-        Oracle { scene, solids, flaw }
+        Oracle { scene, surfaces, flaw }
     }
 
     /// Renders all pixels. For every pattern, samples are at the cell centers of square grids.
@@ -216,34 +217,34 @@ impl<'a> Oracle<'a> {
 
     fn nearest(&self, origin: DVec3, direction: DVec3) -> Option<Intersection> {
         let mut nearest: Option<(f64, usize, Option<&Facet>)> = None;
-        for (i, solid) in self.solids.iter().enumerate() {
-            for (t, facet) in crossings(&solid.form, origin, direction) {
+        for (i, surface) in self.surfaces.iter().enumerate() {
+            for (t, facet) in crossings(&surface.form, origin, direction) {
                 if t > 0.0 && nearest.is_none_or(|(nearer, ..)| t < nearer) {
                     nearest = Some((t, i, facet));
                 }
             }
         }
         let (t, i, facet) = nearest?;
-        let shape = self.solids[i].shape;
+        let object = self.surfaces[i].object;
         let point = origin + direction * t;
         if let Some(facet) = facet {
             return Some(Intersection {
                 t,
-                shape,
-                solid: i,
+                object,
+                surface: i,
                 ..facet.intersection(point, self.flaw)
             });
         }
-        let (normal, uv) = normal_and_uv(&self.solids[i].form, point);
+        let (normal, uv) = normal_and_uv(&self.surfaces[i].form, point);
         Some(Intersection {
             t,
-            shape,
+            object,
             normal,
             uv,
             shading_normal: normal,
             terminator_offsets: [DVec3::ZERO; 2],
             corners: None,
-            solid: i,
+            surface: i,
         })
     }
 
@@ -253,9 +254,9 @@ impl<'a> Oracle<'a> {
         let Some(intersection) = self.nearest(origin, direction) else {
             return render.background;
         };
-        let Some(material) = &self.solids[intersection.solid].material else {
-            let shapes = self.scene.shapes.len() + self.scene.instances.len();
-            return light_color(&self.scene.lights[intersection.shape - shapes]);
+        let Some(material) = &self.surfaces[intersection.surface].material else {
+            let first_light = self.scene.shapes.len() + self.scene.instances.len();
+            return light_color(&self.scene.lights[intersection.object - first_light]);
         };
         let point = origin + direction * intersection.t;
         let is_front = intersection.normal.dot(direction) < 0.0;
@@ -422,20 +423,20 @@ impl<'a> Oracle<'a> {
         }
     }
 
-    /// Returns true if a shape other than the mesh triangle `excluded` occludes the ray. Lights do not occlude.
+    /// Returns true if a surface other than the mesh triangle `excluded` occludes the ray. Lights do not occlude.
     fn is_occluded(&self, origin: DVec3, direction: DVec3, distance: f64, excluded: Option<[DVec3; 3]>) -> bool {
         let max_t = distance * (1.0 - self.scene.render.shadow_epsilon.max(1e-5));
         let transparent = self.scene.render.shadows == Shadows::Transparent;
         let glass = |name: &String| matches!(self.scene.materials[name], MaterialDescription::Glass(_));
-        let occludes = |solid: &&Solid| {
-            solid
+        let occludes = |surface: &&Surface| {
+            surface
                 .material
                 .as_ref()
                 .is_some_and(|name| !(transparent && glass(name)))
         };
-        let shapes = self.solids.iter().filter(occludes);
-        shapes
-            .flat_map(|solid| crossings(&solid.form, origin, direction))
+        let occluders = self.surfaces.iter().filter(occludes);
+        occluders
+            .flat_map(|surface| crossings(&surface.form, origin, direction))
             .any(|(t, facet)| {
                 t > 0.0 && t < max_t && (excluded.is_none() || excluded != facet.map(|facet| facet.corners))
             })
@@ -636,7 +637,7 @@ fn mesh(i: &InstanceDescription, file: &MeshFileDescription, flaw: Flaw) -> Form
 }
 
 impl Facet {
-    /// Returns the hit at a point; the caller sets `t`, `shape` and `solid`.
+    /// Returns the hit at a point; the caller sets `t`, `object` and `surface`.
     fn intersection(&self, point: DVec3, flaw: Flaw) -> Intersection {
         let [a, b, c] = self.corners;
         // Barycentric coordinates as area ratios.
@@ -660,13 +661,13 @@ impl Facet {
         }
         Intersection {
             t: 0.0,
-            shape: 0,
+            object: 0,
             normal: self.normal,
             uv,
             shading_normal,
             terminator_offsets,
             corners: Some(self.corners),
-            solid: 0,
+            surface: 0,
         }
     }
 }

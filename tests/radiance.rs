@@ -134,8 +134,8 @@ fn a_sphere_under_directional_light_casts_a_disk() {
     }
 }
 
-/// Returns large shapes of every kind. `dark_or_lit` adds a small shape above them, because a shape with no other
-/// shapes on one side casts no shadow.
+/// Returns a large shape of each kind, at these heights. `dark_or_lit` adds a small shape above them, because the
+/// renderer culls shadow casters that have no other shape on one of their sides.
 fn covers(heights: [f64; 4]) -> [String; 4] {
     let [a, b, c, d] = heights;
     [

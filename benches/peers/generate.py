@@ -248,7 +248,7 @@ SCENES = {  # name: the function that returns the scene's text, and the mesh or 
 
 
 class Scenes:
-    """The scenes in a folder. The scene NAME-tiny is NAME with a mesh of 12 triangles instead of its own."""
+    """The scenes in a folder. The scene NAME-tiny is the scene NAME with a mesh of 12 triangles instead of the original mesh."""
 
     def __init__(self, folder, make_mesh=""):
         self.folder, self.make_mesh = pathlib.Path(folder), make_mesh

@@ -92,7 +92,7 @@ def bsdf(material, traced, exact):
 
 
 def unbounded_color(value):
-    """Returns three numbers that may exceed 1 as a Mitsuba texture."""
+    """Returns a Mitsuba texture of three numbers, which may exceed 1."""
     return {"type": "rgb", "value": value}
 
 

@@ -61,7 +61,7 @@ pub fn end(size: usize) -> ! {
     wgray_image::remove_temporary_files();
     line.print();
     #[cfg(unix)]
-    // SAFETY: `_exit` ends the process without running any of its code.
+    // SAFETY: `_exit` ends the process without running any more of its code.
     unsafe {
         libc::_exit(7)
     }
@@ -70,20 +70,20 @@ pub fn end(size: usize) -> ! {
 }
 
 /// Size in bytes of the signal stack that the standard library maps for each thread.
-const SIGNAL_STACK: usize = 8192;
+const SIGNAL_STACK_BYTES: usize = 8192;
 
-/// Ends the program in the same way if there is no memory for a thread's signal stack. The standard library maps this
+/// Ends the program with exit code 7 if there is no memory for a thread's signal stack. The standard library maps this
 /// stack without the allocator, and panics on failure.
-pub fn catch_signal_stacks() {
-    let before = std::panic::take_hook();
+pub fn catch_signal_stack_failures() {
+    let previous_hook = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |panic| {
         if panic
             .location()
-            .is_some_and(|place| place.file().ends_with("stack_overflow.rs"))
+            .is_some_and(|location| location.file().ends_with("stack_overflow.rs"))
         {
-            end(SIGNAL_STACK);
+            end(SIGNAL_STACK_BYTES);
         }
-        before(panic);
+        previous_hook(panic);
     }));
 }
 
@@ -119,8 +119,8 @@ impl Line {
 impl fmt::Write for Line {
     fn write_str(&mut self, text: &str) -> fmt::Result {
         let end = self.len + text.len();
-        let room = self.bytes.get_mut(self.len..end).ok_or(fmt::Error)?;
-        room.copy_from_slice(text.as_bytes());
+        let destination = self.bytes.get_mut(self.len..end).ok_or(fmt::Error)?;
+        destination.copy_from_slice(text.as_bytes());
         self.len = end;
         Ok(())
     }

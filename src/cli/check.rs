@@ -50,7 +50,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         Some(folder) => Shaders::read(folder)?,
         None => Shaders::built_in(),
     };
-    let overrides = args.options.over(Overrides {
+    let overrides = args.options.add_to(Overrides {
         asset_root: args.asset_root.clone(),
         define: args.define.clone(),
         ..Overrides::default()
@@ -72,7 +72,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
                     escape_control(&format!("{}: ok: {summary}", path.display()))
                 );
             }
-            Ok(_) => {} // the reader of standard output has closed it
+            Ok(_) => {} // the reader has closed standard output
             Err(error) => {
                 super::report(&error, super::exit_code(&error));
                 code.get_or_insert(ExitCode::from(super::exit_code(&error)));
@@ -81,14 +81,14 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     }
     Ok(match code {
         Some(code) => code,
-        None => super::ended(printed, ExitCode::SUCCESS),
+        None => super::finish_output(printed, ExitCode::SUCCESS),
     })
 }
 
 fn check(path: &Path, overrides: &Overrides, #[cfg(feature = "gpu")] shaders: &Shaders) -> anyhow::Result<String> {
     let scene = super::load(path, overrides)?;
-    let invisible = scene.visibility_warnings().into_iter().map(Note::from);
-    for note in scene.notes.iter().cloned().chain(invisible) {
+    let warnings = scene.visibility_warnings().into_iter().map(Note::from);
+    for note in scene.notes.iter().cloned().chain(warnings) {
         log::print(Level::Warning, &super::located(path, &note));
     }
     let frames = check_path(&scene)?;
@@ -147,7 +147,7 @@ fn camera(scene: &Scene) -> Option<String> {
     match (scene.camera.projection, scene.camera.lens) {
         (Projection::Panorama, _) => Some("panorama".to_owned()),
         (_, Some(lens)) => {
-            let (width, focus) = (short(2.0 * lens.radius), short(lens.focus));
+            let (width, focus) = (rounded(2.0 * lens.radius), rounded(lens.focus));
             Some(format!("lens {width} wide, focused at {focus}"))
         }
         _ => None,
@@ -176,6 +176,6 @@ fn count(n: usize, noun: &str) -> String {
 }
 
 /// Rounds a length to four significant digits.
-fn short(x: f64) -> f64 {
+fn rounded(x: f64) -> f64 {
     format!("{x:.3e}").parse().unwrap_or(x)
 }

@@ -17,12 +17,12 @@ pub struct Args {
 pub fn run(args: &Args) -> ExitCode {
     let mut text = Vec::new();
     clap_complete::generate(args.shell, &mut command(), "wgray", &mut text);
-    super::ended(io::stdout().lock().write_all(&text), ExitCode::SUCCESS)
+    super::finish_output(io::stdout().lock().write_all(&text), ExitCode::SUCCESS)
 }
 
 /// Returns the command line definition, extended by completions that the arguments do not define.
 fn command() -> Command {
-    let all = below(super::Cli::command());
+    let all = with_completions(super::Cli::command());
     let names: Vec<String> = all
         .get_subcommands()
         .map(|command| command.get_name().to_owned())
@@ -33,12 +33,12 @@ fn command() -> Command {
 }
 
 /// Adds the completions of a command and its subcommands.
-fn below(command: Command) -> Command {
-    command.mut_args(offered).mut_subcommands(below)
+fn with_completions(command: Command) -> Command {
+    command.mut_args(complete_arg).mut_subcommands(with_completions)
 }
 
 /// Completes device names, and file names only for arguments that are paths.
-fn offered(arg: Arg) -> Arg {
+fn complete_arg(arg: Arg) -> Arg {
     if arg.get_id() == "device" {
         return arg.value_parser(PossibleValuesParser::new(["auto", "gpu", "cpu"]));
     }

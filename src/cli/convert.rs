@@ -12,10 +12,10 @@ use clap::ValueHint;
 
 use super::log::{self, Level};
 use super::numbers::samples;
-use super::outputs::keep_inputs;
+use super::outputs::protect_inputs;
 use super::render::parse_size;
 use super::scene_options::SceneOptions;
-use super::{Usage, plain};
+use super::{Usage, cli_error};
 
 #[derive(Debug, clap::Args)]
 #[command(after_help = super::EXIT_CODES)]
@@ -59,7 +59,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         return Err(Usage(rule).into());
     }
     let output = Output::find(&args.output).map_err(RenderError::Output)?;
-    let overrides = args.options.over(Overrides {
+    let overrides = args.options.add_to(Overrides {
         size: args.size,
         pixel_samples: args.pixel_samples,
         asset_root: args.asset_root.clone(),
@@ -67,12 +67,12 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         ..Overrides::default()
     });
     let loaded = Scene::load_described(&args.scene, &overrides);
-    let (scene, description) = loaded.map_err(|error| plain(error.into()))?;
+    let (scene, description) = loaded.map_err(|error| cli_error(error.into()))?;
     for note in &scene.notes {
         log::print(Level::Warning, &super::located(&args.scene, note));
     }
     let inputs = [std::slice::from_ref(&args.scene), &scene.files].concat();
-    keep_inputs("--output", &output, &inputs, "choose another name")?;
+    protect_inputs("--output", &output, &inputs, "choose another name")?;
     if !args.force && output.path().is_some_and(Path::exists) {
         let name = args.output.display();
         return Err(Usage(format!(
@@ -84,26 +84,27 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let folder = (output.path().and_then(Path::parent))
         .unwrap_or(Path::new("."))
         .to_owned();
-    let before = args.scene.parent().unwrap_or(Path::new("."));
+    let scene_folder = args.scene.parent().unwrap_or(Path::new("."));
     let description = description
-        .in_folder(before, &folder)
+        .in_folder(scene_folder, &folder)
         .map_err(|error| anyhow!("{}: {error}", args.scene.display()))?;
     let text = description.to_toml()?;
-    let root = folder.canonicalize().map_err(RenderError::Output)?;
-    let needed_root = common_root(&description, &root);
+    let canonical = folder.canonicalize().map_err(RenderError::Output)?;
+    let needed_root = common_root(&description, &canonical);
     let mut file = Pending::start(output).map_err(RenderError::Output)?;
-    let head = format!(
+    let header = format!(
         "# {}, as a scene. Omitted keys have their defaults.\n\n",
         name_of(&args.scene)
     );
     let written = file
-        .write_all(head.as_bytes())
+        .write_all(header.as_bytes())
         .and_then(|()| file.write_all(text.as_bytes()));
     written.and_then(|()| file.finish()).map_err(RenderError::Output)?;
-    if let Some(needed) = needed_root {
+    if let Some(root) = needed_root {
         let (name, folder) = (args.output.display(), folder.display());
-        let option = quoted(&from_here(&needed).to_string_lossy());
-        let text = format!("{name}: refers to files outside of {folder}; pass --asset-root {option} to render it");
+        let option = quoted(&from_current_dir(&root).to_string_lossy());
+        let text =
+            format!("{name}: refers to files outside of {folder}; pass --asset-root {option} to render the scene");
         log::print(Level::Note, &text);
     }
     Ok(ExitCode::SUCCESS)
@@ -116,22 +117,22 @@ fn common_root(description: &Description, folder: &Path) -> Option<PathBuf> {
     if outside.is_empty() {
         return None;
     }
-    let holds_all = |root: &&Path| outside.iter().all(|file| file.starts_with(root));
-    folder.ancestors().find(holds_all).map(Path::to_owned)
+    let contains_all = |root: &&Path| outside.iter().all(|file| file.starts_with(root));
+    folder.ancestors().find(contains_all).map(Path::to_owned)
 }
 
 /// Returns a path to the folder: relative if it is the current folder, a descendant or an ancestor, else absolute.
-fn from_here(folder: &Path) -> PathBuf {
-    let Ok(here) = std::env::current_dir().and_then(|here| here.canonicalize()) else {
+fn from_current_dir(folder: &Path) -> PathBuf {
+    let Ok(current) = std::env::current_dir().and_then(|current| current.canonicalize()) else {
         return folder.to_owned();
     };
-    if folder == here {
+    if folder == current {
         return PathBuf::from(".");
     }
-    if let Ok(below) = folder.strip_prefix(&here) {
+    if let Ok(below) = folder.strip_prefix(&current) {
         return below.to_owned();
     }
-    match here.strip_prefix(folder) {
+    match current.strip_prefix(folder) {
         Ok(rest) => rest.components().map(|_| "..").collect(),
         Err(_) => folder.to_owned(),
     }

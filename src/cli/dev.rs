@@ -16,7 +16,7 @@ use wgray_render::gpu::AdapterChoice;
 
 use super::Usage;
 use super::log::{self, Facts, Level};
-use super::outputs::keep_inputs;
+use super::outputs::protect_inputs;
 use super::render::parse_size;
 use super::scene_options::SceneOptions;
 
@@ -78,7 +78,7 @@ pub struct Args {
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let sources = Sources {
         scene: args.scene,
-        overrides: args.options.over(Overrides {
+        overrides: args.options.add_to(Overrides {
             size: args.size,
             asset_root: args.asset_root,
             define: args.define,
@@ -114,7 +114,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     };
     let editor = editor(&args.editor)?;
     let terminal = Terminal::new();
-    let watching = format!("Watching {}", watched(&sources));
+    let watching = format!("Watching {}", watched_paths(&sources));
     let session = Session::start(Settings {
         sources,
         device,
@@ -133,7 +133,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let Some(listener) = listener else {
         Terminal::new().line("", &format!("Writing {}", args.out.unwrap_or_default().display()));
         loop {
-            std::thread::park(); // until the user interrupts
+            std::thread::park(); // until the user interrupts the program
         }
     };
     let address = listener.address()?;
@@ -185,23 +185,23 @@ fn editor(template: &str) -> anyhow::Result<Option<String>> {
     }
     let refuse = |rule: &str| Err(Usage(format!("--editor: {template}: {rule}")).into());
     let (scheme, rest) = template.split_once(':').unwrap_or(("", template));
-    let letters = scheme.chars().all(|c| c.is_ascii_alphanumeric() || "+-.".contains(c));
-    if !scheme.starts_with(|c: char| c.is_ascii_alphabetic()) || !letters {
+    let has_valid_chars = scheme.chars().all(|c| c.is_ascii_alphanumeric() || "+-.".contains(c));
+    if !scheme.starts_with(|c: char| c.is_ascii_alphabetic()) || !has_valid_chars {
         return refuse("must start with the URL scheme of an editor, such as vscode:, or be off");
     }
     if NON_EDITOR_SCHEMES
         .iter()
-        .any(|known| scheme.eq_ignore_ascii_case(known))
+        .any(|reserved| scheme.eq_ignore_ascii_case(reserved))
     {
         return refuse(&format!("{scheme}: is not the URL scheme of an editor"));
     }
     if rest.contains(|c: char| c.is_whitespace() || c.is_control()) {
         return refuse("must not contain white space");
     }
-    let unknown = ["{file}", "{line}", "{column}"]
+    let without_placeholders = ["{file}", "{line}", "{column}"]
         .iter()
-        .fold(rest.to_string(), |rest, known| rest.replace(known, ""));
-    if unknown.contains(['{', '}']) || !rest.contains("{file}") {
+        .fold(rest.to_string(), |rest, placeholder| rest.replace(placeholder, ""));
+    if without_placeholders.contains(['{', '}']) || !rest.contains("{file}") {
         return refuse("must contain {file}, may contain {line} and {column}, and must not contain other braces");
     }
     Ok(Some(template.to_string()))
@@ -218,26 +218,26 @@ fn check_output(out: &Path, sources: &Sources, loaded: Option<&Scene>) -> anyhow
         return Err(Usage(format!("--out: {}: must be a regular file", out.display())).into());
     };
     let text = std::fs::read_to_string(&sources.scene).unwrap_or_default(); // empty for a binary file
-    let described = Description::parse(&text, &sources.scene.display().to_string()).ok();
+    let description = Description::parse(&text, &sources.scene.display().to_string()).ok();
     let folder = sources.scene.parent().unwrap_or(Path::new(""));
-    let named = described.iter().flat_map(|described| described.files(folder));
-    let named = named.chain(loaded.iter().flat_map(|scene| scene.files.iter().cloned()));
+    let referenced = description.iter().flat_map(|description| description.files(folder));
+    let referenced = referenced.chain(loaded.iter().flat_map(|scene| scene.files.iter().cloned()));
     let scene = std::iter::once(sources.scene.clone());
-    let inputs: Vec<PathBuf> = scene.chain(named).chain(sources.shader_files()).collect();
-    keep_inputs("--out", &output, &inputs, "choose another name")?;
+    let inputs: Vec<PathBuf> = scene.chain(referenced).chain(sources.shader_files()).collect();
+    protect_inputs("--out", &output, &inputs, "choose another name")?;
     Ok(path.to_owned())
 }
 
 /// Returns the folder of the shaders; `None` for the built-in shaders.
-fn shaders(given: Option<PathBuf>) -> anyhow::Result<Option<PathBuf>> {
-    match given {
+fn shaders(requested: Option<PathBuf>) -> anyhow::Result<Option<PathBuf>> {
+    match requested {
         Some(folder) if folder.is_dir() => Ok(Some(folder)),
         Some(folder) => Err(Usage(format!("--shaders: {}: is not a folder", folder.display())).into()),
         None => Ok(Some(PathBuf::from("shaders")).filter(|folder| folder.join("kernels/render.wgsl").is_file())),
     }
 }
 
-fn watched(sources: &Sources) -> String {
+fn watched_paths(sources: &Sources) -> String {
     let scene = sources.scene.display();
     match &sources.shaders {
         Some(folder) => format!("{scene} and {}", folder.join("").display()),
@@ -257,9 +257,9 @@ const BOLD: &str = "1";
 
 impl Terminal {
     fn new() -> Terminal {
-        let wanted = std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty());
+        let allows_color = std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty());
         Terminal {
-            colored: wanted && io::stderr().is_terminal(),
+            colored: allows_color && io::stderr().is_terminal(),
         }
     }
 
@@ -282,17 +282,17 @@ impl Terminal {
             }
             Report::Finished { seconds } => self.line("", &format!("Finished after another {}", time(*seconds))),
             Report::Note(note) => self.line("", &format!("note: {note}")),
-            Report::Smaller([width, height], [less_wide, less_high]) => self.line(
+            Report::Smaller([width, height], [shown_width, shown_height]) => self.line(
                 "",
                 &format!(
-                    "{width} x {height} is too large to display; showing {less_wide} x {less_high}. Use wgray render for the \
+                    "{width} x {height} is too large to display; showing {shown_width} x {shown_height}. Use wgray render for the \
                      full size"
                 ),
             ),
-            Report::Saved(what, Ok(())) => self.line(GREEN, &format!("Saved {what} to the scene file")),
-            Report::Saved(what, Err(error)) => self.line(RED, &format!("Cannot save {what}: {error}")),
-            Report::UndoRedo(what, Ok(())) => self.line(GREEN, what),
-            Report::UndoRedo(what, Err(error)) => self.line(RED, &format!("{what}: failed: {error}")),
+            Report::Saved(name, Ok(())) => self.line(GREEN, &format!("Saved {name} to the scene file")),
+            Report::Saved(name, Err(error)) => self.line(RED, &format!("Cannot save {name}: {error}")),
+            Report::UndoRedo(action, Ok(())) => self.line(GREEN, action),
+            Report::UndoRedo(action, Err(error)) => self.line(RED, &format!("{action}: failed: {error}")),
         }
     }
 
@@ -321,14 +321,14 @@ impl Terminal {
             .marked_line()
             .map(|excerpt| self.marked(&excerpt))
             .unwrap_or_default();
-        say(&format!("{} {head}\n{excerpt}", clock()));
+        write(&format!("{} {head}\n{excerpt}", clock()));
     }
 
     /// Returns the excerpt with the error underlines in red.
     fn marked(self, excerpt: &str) -> String {
         let lines = excerpt.lines().map(|line| match line.find('^') {
-            Some(at) if !line.starts_with(char::is_numeric) => {
-                format!("{}{}\n", &line[..at], self.painted(RED, &line[at..]))
+            Some(start) if !line.starts_with(char::is_numeric) => {
+                format!("{}{}\n", &line[..start], self.painted(RED, &line[start..]))
             }
             _ => format!("{line}\n"),
         });
@@ -340,7 +340,7 @@ impl Terminal {
             let level = if color == RED { Level::Error } else { Level::Info };
             return log::print(level, text);
         }
-        say(&format!("{} {}\n", clock(), self.painted(color, text)));
+        write(&format!("{} {}\n", clock(), self.painted(color, text)));
     }
 
     fn painted(self, color: &str, text: &str) -> String {
@@ -352,17 +352,22 @@ impl Terminal {
     }
 }
 
-fn say(text: &str) {
+fn write(text: &str) {
     let _ = io::stderr().lock().write_all(text.as_bytes()); // a failure to write to standard error cannot be reported
 }
 
 /// Returns the time of day in UTC.
 fn clock() -> String {
-    let since = SystemTime::now()
+    let seconds = SystemTime::now()
         .duration_since(SystemTime::UNIX_EPOCH)
         .unwrap_or_default()
         .as_secs();
-    format!("{:02}:{:02}:{:02}", since / 3600 % 24, since / 60 % 60, since % 60)
+    format!(
+        "{:02}:{:02}:{:02}",
+        seconds / 3600 % 24,
+        seconds / 60 % 60,
+        seconds % 60
+    )
 }
 
 fn time(seconds: f64) -> String {
@@ -379,16 +384,16 @@ mod tests {
 
     #[test]
     fn links_open_editors_and_nothing_else() {
-        for good in [
+        for valid in [
             "vscode://file/{file}:{line}:{column}",
             "vscode-insiders://file/{file}:{line}",
             "idea://open?file={file}&line={line}",
             "txmt://open?url=file://{file}",
         ] {
-            assert_eq!(editor(good).unwrap().as_deref(), Some(good));
+            assert_eq!(editor(valid).unwrap().as_deref(), Some(valid));
         }
         assert_eq!(editor("off").unwrap(), None);
-        for bad in [
+        for invalid in [
             "",
             "vscode",
             "javascript:alert({file})",
@@ -406,7 +411,7 @@ mod tests {
             "vscode://file/{path}",
             "vscode://file/{file}{",
         ] {
-            let error = editor(bad).expect_err(bad).to_string();
+            let error = editor(invalid).expect_err(invalid).to_string();
             assert!(error.starts_with("--editor: "), "{error}");
         }
     }

@@ -7,7 +7,7 @@ use std::process::ExitCode;
 use wgray_render::gpu::{self, FloatControls, GpuInfo};
 
 pub fn run() -> ExitCode {
-    super::ended(list(&mut io::stdout().lock()), ExitCode::SUCCESS)
+    super::finish_output(list(&mut io::stdout().lock()), ExitCode::SUCCESS)
 }
 
 #[cfg(feature = "gpu")]

@@ -6,9 +6,9 @@ use std::str::FromStr;
 
 use crate::cli::Usage;
 
-/// Largest frame number, and maximum number of frames; the number is limited because all file names are checked before
-/// rendering.
+/// Largest frame number.
 pub const MAX_NUMBER: u32 = 999_999_999;
+/// Maximum number of frames. It is limited because all file names are checked before rendering.
 const MAX_COUNT: usize = 100_000;
 
 /// Frame numbers in the order given, without duplicates: `5`, `1-10`, `1-10:2`, `1-3,7`.
@@ -27,10 +27,10 @@ impl FromStr for Frames {
 
     fn from_str(text: &str) -> Result<Frames, String> {
         let mut frames = Vec::new();
-        let mut known = BTreeSet::new();
+        let mut seen = BTreeSet::new();
         for part in text.split(',') {
             for frame in range(part.trim())? {
-                if known.insert(frame) {
+                if seen.insert(frame) {
                     frames.push(frame);
                 }
                 if frames.len() > MAX_COUNT {
@@ -44,14 +44,14 @@ impl FromStr for Frames {
 
 /// Parses `A`, `A-B` or `A-B:STEP`.
 fn range(text: &str) -> Result<impl Iterator<Item = u32>, String> {
-    let (ends, step) = match text.split_once(':') {
-        Some((ends, step)) => (ends, Some(number(step)?)),
+    let (bounds, step) = match text.split_once(':') {
+        Some((bounds, step)) => (bounds, Some(number(step)?)),
         None => (text, None),
     };
-    let (first, last) = match ends.split_once('-') {
+    let (first, last) = match bounds.split_once('-') {
         Some((first, last)) => (number(first)?, number(last)?),
-        None if step.is_some() => return Err(format!("{text} needs a range before the step, such as {ends}-100:2")),
-        None => (number(ends)?, number(ends)?),
+        None if step.is_some() => return Err(format!("{text} needs a range before the step, such as {bounds}-100:2")),
+        None => (number(bounds)?, number(bounds)?),
     };
     if first > last {
         return Err(format!("{text} must be in ascending order, {last}-{first}"));
@@ -77,11 +77,11 @@ pub struct Frame {
     /// The frame number; `None` if `--frames` is not given.
     pub number: Option<u32>,
     /// Position in the run, counted from 1, and the number of frames.
-    pub place: (usize, usize),
+    pub position: (usize, usize),
 }
 
 impl Frame {
-    /// Returns the images of a run: one per frame, or a single image if `frames` is `None`.
+    /// Returns the frames of a run: a single frame without a number if `frames` is `None`.
     pub fn all(frames: Option<&Frames>) -> Vec<Frame> {
         let numbers = match frames {
             Some(frames) => frames.0.iter().copied().map(Some).collect(),
@@ -89,17 +89,20 @@ impl Frame {
         };
         let frame = |(i, number): (usize, &Option<u32>)| Frame {
             number: *number,
-            place: (i + 1, numbers.len()),
+            position: (i + 1, numbers.len()),
         };
         numbers.iter().enumerate().map(frame).collect()
     }
 
-    pub fn one(number: Option<u32>) -> Frame {
-        Frame { number, place: (1, 1) }
+    pub fn single(number: Option<u32>) -> Frame {
+        Frame {
+            number,
+            position: (1, 1),
+        }
     }
 
     /// Replaces a group of `#` in the file name with the frame number, zero-padded to the length of the group. If there
-    /// are several frames, the name must contain a group, so that names differ. Error messages contain `option`.
+    /// are several frames, the name must contain a group, so that the names differ. Error messages contain `option`.
     pub fn name(&self, option: &str, pattern: &Path) -> Result<PathBuf, Usage> {
         let Some(number) = self.number else {
             return Ok(pattern.to_owned());
@@ -107,7 +110,7 @@ impl Frame {
         let error = |rule: &str| Err(Usage(format!("{option}: {}: {rule}", pattern.display())));
         let name = pattern.file_name().unwrap_or_default();
         let has_mark = name.as_encoded_bytes().contains(&b'#');
-        let count = self.place.1;
+        let count = self.position.1;
         if !has_mark && count == 1 {
             return Ok(pattern.to_owned());
         }
@@ -130,9 +133,9 @@ impl Frame {
 
     /// Returns a label if this is one of several frames.
     pub fn label(&self) -> Option<String> {
-        let (place, count) = self.place;
+        let (position, count) = self.position;
         let number = self.number.filter(|_| count > 1)?;
-        Some(format!("frame {number} ({place} of {count})"))
+        Some(format!("frame {number} ({position} of {count})"))
     }
 }
 
@@ -146,7 +149,7 @@ mod tests {
 
     #[test]
     fn frames_are_lists_of_ranges_with_steps() {
-        for (text, wanted) in [
+        for (text, expected) in [
             ("5", vec![5]),
             ("0", vec![0]),
             ("007", vec![7]),
@@ -161,7 +164,7 @@ mod tests {
             ("7,1-3, 2-4", vec![7, 1, 2, 3, 4]),
             ("999999998-999999999", vec![999_999_998, 999_999_999]),
         ] {
-            assert_eq!(frames(text).unwrap(), wanted, "{text}");
+            assert_eq!(frames(text).unwrap(), expected, "{text}");
         }
         assert_eq!(frames("1-100000").unwrap().len(), 100_000);
         assert_eq!(frames("0-999999999:10000").unwrap().len(), 100_000);
@@ -197,16 +200,16 @@ mod tests {
 
     #[test]
     fn number_signs_are_replaced_by_the_frame_number() {
-        let one = |number, count| Frame {
+        let frame = |number, count| Frame {
             number: Some(number),
-            place: (1, count),
+            position: (1, count),
         };
         let name = |frame: Frame, pattern: &str| {
             let name = frame.name("--output", Path::new(pattern));
             name.map(|name| name.display().to_string())
                 .map_err(|error| error.to_string())
         };
-        for (number, pattern, wanted) in [
+        for (number, pattern, expected) in [
             (7, "out.####.png", "out.0007.png"),
             (7, "#.png", "7.png"),
             (12345, "##", "12345"),
@@ -214,22 +217,22 @@ mod tests {
             (3, "-###", "-003"),
             (3, "é#.png", "é3.png"),
         ] {
-            assert_eq!(name(one(number, 2), pattern).unwrap(), wanted);
-            assert_eq!(name(one(number, 1), pattern).unwrap(), wanted);
+            assert_eq!(name(frame(number, 2), pattern).unwrap(), expected);
+            assert_eq!(name(frame(number, 1), pattern).unwrap(), expected);
         }
-        let bad = "--output: a#/out.png: needs # for the frame number, such as out.####.png, with 2 frames";
-        assert_eq!(name(one(1, 2), "a#/out.png").unwrap_err(), bad);
-        assert_eq!(name(one(1, 1), "a#/out.png").unwrap(), "a#/out.png");
-        assert!(name(one(1, 2), "-").is_err());
+        let message = "--output: a#/out.png: needs # for the frame number, such as out.####.png, with 2 frames";
+        assert_eq!(name(frame(1, 2), "a#/out.png").unwrap_err(), message);
+        assert_eq!(name(frame(1, 1), "a#/out.png").unwrap(), "a#/out.png");
+        assert!(name(frame(1, 2), "-").is_err());
         assert!(
-            name(one(1, 2), "a#b#")
+            name(frame(1, 2), "a#b#")
                 .unwrap_err()
                 .ends_with("must have a single group of #")
         );
-        let none = Frame {
+        let without_number = Frame {
             number: None,
-            place: (1, 1),
+            position: (1, 1),
         };
-        assert_eq!(name(none, "a#b##").unwrap(), "a#b##");
+        assert_eq!(name(without_number, "a#b##").unwrap(), "a#b##");
     }
 }

@@ -35,9 +35,9 @@ const OPTIONS: [(&str, &str); 21] = [
 ];
 
 /// Extensions that suggest an omitted subcommand `render`.
-const SCENES: [&str; 7] = ["toml", "json", "gltf", "glb", "obj", "ply", "stl"];
+const SCENE_EXTENSIONS: [&str; 7] = ["toml", "json", "gltf", "glb", "obj", "ply", "stl"];
 
-/// Maximum characters of a quoted argument.
+/// Maximum length of a quoted argument, in characters.
 const MAX_WORD_LEN: usize = 200;
 
 /// Adds a hint to the error, and escapes and shortens quoted arguments.
@@ -58,14 +58,14 @@ pub fn improve(mut error: clap::Error) -> clap::Error {
         let Some(ContextValue::String(word)) = error.get(kind) else {
             continue;
         };
-        let shown = escape_control(word);
-        let shown = match shown.chars().count() {
-            0..=MAX_WORD_LEN => shown.into_owned(),
-            _ => shown.chars().take(MAX_WORD_LEN).chain("...".chars()).collect(),
+        let escaped = escape_control(word);
+        let quoted = match escaped.chars().count() {
+            0..=MAX_WORD_LEN => escaped.into_owned(),
+            _ => escaped.chars().take(MAX_WORD_LEN).chain("...".chars()).collect(),
         };
-        if shown != *word {
-            error.insert(kind, ContextValue::String(shown));
-            error.remove(ContextKind::Suggested); // the suggestion repeats the unescaped word
+        if quoted != *word {
+            error.insert(kind, ContextValue::String(quoted));
+            error.remove(ContextKind::Suggested); // the suggestion repeats the unescaped argument
         }
     }
     error
@@ -88,7 +88,7 @@ fn hint(error: &clap::Error) -> Option<String> {
         ErrorKind::InvalidSubcommand => {
             let word = word(ContextKind::InvalidSubcommand)?;
             let extension = Path::new(word).extension()?.to_str()?.to_lowercase();
-            SCENES
+            SCENE_EXTENSIONS
                 .contains(&extension.as_str())
                 .then(|| format!("to render it, use 'wgray render {word}'"))
         }

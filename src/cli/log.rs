@@ -57,7 +57,7 @@ pub type Facts = Map<String, Value>;
 static JSON: AtomicBool = AtomicBool::new(false);
 
 /// Sets the format of messages.
-pub fn choose(format: Format) {
+pub fn set_format(format: Format) {
     JSON.store(format == Format::Json, Ordering::Relaxed);
 }
 
@@ -67,7 +67,7 @@ pub fn is_json() -> bool {
 }
 
 /// Returns the message format that the arguments request, even if the command line is invalid.
-pub fn asked(arguments: impl Iterator<Item = std::ffi::OsString>) -> Format {
+pub fn requested_format(arguments: impl Iterator<Item = std::ffi::OsString>) -> Format {
     let mut format = Format::default();
     let mut arguments = arguments.take_while(|argument| argument != "--");
     while let Some(argument) = arguments.next() {
@@ -76,8 +76,8 @@ pub fn asked(arguments: impl Iterator<Item = std::ffi::OsString>) -> Format {
             Some(option) => option.strip_prefix("--log-format=").map(str::to_owned),
             None => None,
         };
-        if let Some(asked) = value.and_then(|value| Format::from_str(&value, false).ok()) {
-            format = asked;
+        if let Some(requested) = value.and_then(|value| Format::from_str(&value, false).ok()) {
+            format = requested;
         }
     }
     format
@@ -116,8 +116,8 @@ pub fn print_with(level: Level, message: &str, facts: Facts) {
     write(&serde_json::to_string(&line).unwrap_or_default());
 }
 
-/// Prints text that continues the previous message. JSON messages carry this information in their fields, so nothing is
-/// printed.
+/// Prints text that continues the previous message. Prints nothing in JSON format, because the message has a field with
+/// this text.
 pub fn print_continuation(text: &str) {
     if !is_json() {
         write(&escape_control_in_lines(text));
@@ -143,7 +143,7 @@ pub fn install_panic_hook() {
 pub fn print_events() {
     use tracing_subscriber::filter::{LevelFilter, Targets};
     use tracing_subscriber::prelude::*;
-    let ours = Targets::new()
+    let targets = Targets::new()
         .with_target("wgray", LevelFilter::DEBUG)
         .with_default(LevelFilter::WARN);
     let lines = (!is_json()).then(|| {
@@ -153,18 +153,18 @@ pub fn print_events() {
             .without_time()
             .with_ansi(io::stderr().is_terminal())
     });
-    let objects = is_json().then_some(Objects);
+    let objects = is_json().then_some(JsonLayer);
     tracing_subscriber::registry()
         .with(lines)
         .with(objects)
-        .with(ours)
+        .with(targets)
         .init();
 }
 
 /// Writes events as JSON.
-struct Objects;
+struct JsonLayer;
 
-impl<S: Subscriber + for<'a> LookupSpan<'a>> Layer<S> for Objects {
+impl<S: Subscriber + for<'a> LookupSpan<'a>> Layer<S> for JsonLayer {
     fn on_new_span(&self, attributes: &Attributes<'_>, id: &Id, context: Context<'_, S>) {
         let mut fields = Fields::default();
         attributes.record(&mut fields);
@@ -200,34 +200,34 @@ impl<S: Subscriber + for<'a> LookupSpan<'a>> Layer<S> for Objects {
 struct Fields(Facts);
 
 impl Fields {
-    fn put(&mut self, field: &Field, value: impl Into<Value>) {
+    fn insert(&mut self, field: &Field, value: impl Into<Value>) {
         self.0.insert(field.name().to_owned(), value.into());
     }
 }
 
 impl Visit for Fields {
     fn record_f64(&mut self, field: &Field, value: f64) {
-        self.put(field, value);
+        self.insert(field, value);
     }
 
     fn record_i64(&mut self, field: &Field, value: i64) {
-        self.put(field, value);
+        self.insert(field, value);
     }
 
     fn record_u64(&mut self, field: &Field, value: u64) {
-        self.put(field, value);
+        self.insert(field, value);
     }
 
     fn record_bool(&mut self, field: &Field, value: bool) {
-        self.put(field, value);
+        self.insert(field, value);
     }
 
     fn record_str(&mut self, field: &Field, value: &str) {
-        self.put(field, value);
+        self.insert(field, value);
     }
 
     fn record_debug(&mut self, field: &Field, value: &dyn fmt::Debug) {
-        self.put(field, format!("{value:?}"));
+        self.insert(field, format!("{value:?}"));
     }
 }
 
@@ -237,11 +237,11 @@ mod tests {
 
     #[test]
     fn the_format_is_found_in_an_invalid_command_line() {
-        let asked = |line: &str| asked(line.split(' ').map(Into::into));
-        assert_eq!(asked("render --log-format json --bad"), Format::Json);
-        assert_eq!(asked("--log-format=json --log-format text"), Format::Text);
-        assert_eq!(asked("--log-format xml"), Format::Text);
-        assert_eq!(asked("check -- --log-format json"), Format::Text);
-        assert_eq!(asked("check --log-format"), Format::Text);
+        let format = |line: &str| requested_format(line.split(' ').map(Into::into));
+        assert_eq!(format("render --log-format json --bad"), Format::Json);
+        assert_eq!(format("--log-format=json --log-format text"), Format::Text);
+        assert_eq!(format("--log-format xml"), Format::Text);
+        assert_eq!(format("check -- --log-format json"), Format::Text);
+        assert_eq!(format("check --log-format"), Format::Text);
     }
 }

@@ -27,10 +27,10 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let mut program = super::with_all_options(Cli::command()).disable_help_subcommand(true);
     program.build(); // sets the full names of the subcommands
     if let Some(folder) = &args.output {
-        std::fs::create_dir_all(folder).map_err(|error| not_written(folder, &error))?;
+        std::fs::create_dir_all(folder).map_err(|error| output_error(folder, &error))?;
         for command in std::iter::once(&program).chain(program.get_subcommands()) {
             let path = folder.join(format!("{}.1", name_of(command)));
-            write(&path, &page(command, &program)?).map_err(|error| not_written(&path, &error))?;
+            write(&path, &page(command, &program)?).map_err(|error| output_error(&path, &error))?;
         }
         return Ok(ExitCode::SUCCESS);
     }
@@ -42,7 +42,10 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         })?,
     };
     let text = page(command, &program)?;
-    Ok(super::ended(io::stdout().lock().write_all(&text), ExitCode::SUCCESS))
+    Ok(super::finish_output(
+        io::stdout().lock().write_all(&text),
+        ExitCode::SUCCESS,
+    ))
 }
 
 fn write(path: &Path, text: &[u8]) -> io::Result<()> {
@@ -51,7 +54,7 @@ fn write(path: &Path, text: &[u8]) -> io::Result<()> {
     file.finish()
 }
 
-fn not_written(path: &Path, error: &io::Error) -> RenderError {
+fn output_error(path: &Path, error: &io::Error) -> RenderError {
     RenderError::Output(io::Error::new(error.kind(), format!("{}: {error}", path.display())))
 }
 
@@ -75,33 +78,33 @@ fn page(command: &Command, program: &Command) -> io::Result<Vec<u8>> {
         man.render_subcommands_section(&mut text)?;
     }
     man.render_options_section(&mut text)?;
-    let mut rest = Roff::default();
+    let mut sections = Roff::default();
     let codes = command.get_after_help().unwrap_or_default().to_string();
-    rest.control("SH", ["EXIT STATUS"]);
+    sections.control("SH", ["EXIT STATUS"]);
     for paragraph in codes.trim_start_matches("Exit codes: ").split("\n\n") {
-        rest.control("PP", []).text([roman(paragraph)]);
+        sections.control("PP", []).text([roman(paragraph)]);
     }
     if name == "wgray" || name == "wgray-render" {
         for (section, entries) in [("ENVIRONMENT", ENVIRONMENT), ("FILES", FILES)] {
-            rest.control("SH", [section]);
+            sections.control("SH", [section]);
             for (term, meaning) in entries {
-                rest.control("TP", []).text([bold(*term)]).text([roman(*meaning)]);
+                sections.control("TP", []).text([bold(*term)]).text([roman(*meaning)]);
             }
         }
     }
-    rest.control("SH", ["EXAMPLES"]);
+    sections.control("SH", ["EXAMPLES"]);
     for (purpose, line) in examples(name) {
-        rest.control("PP", []).text([roman(format!("{purpose}:"))]);
-        rest.control("RS", ["4"]).text([bold(line)]).control("RE", []);
+        sections.control("PP", []).text([roman(format!("{purpose}:"))]);
+        sections.control("RS", ["4"]).text([bold(line)]).control("RE", []);
     }
-    rest.control("SH", ["SEE ALSO"]);
+    sections.control("SH", ["SEE ALSO"]);
     let all = std::iter::once(program).chain(program.get_subcommands()).map(name_of);
     let others: Vec<String> = all
         .filter(|other| *other != name)
         .map(|other| format!("{other}(1)"))
         .collect();
-    rest.text([roman(others.join(", "))]);
-    rest.to_writer(&mut text)?;
+    sections.text([roman(others.join(", "))]);
+    sections.to_writer(&mut text)?;
     Ok(text)
 }
 

@@ -11,7 +11,7 @@ use wgray_render::job::Parts;
 
 use super::frames::{self, Frame};
 use super::log::{self, Level};
-use super::numbers::whole;
+use super::numbers::integer;
 use super::outputs::{Files, LayerPolicy, Outputs};
 use super::picture_options::PictureOptions;
 use super::{Interrupted, Usage, signal};
@@ -27,7 +27,7 @@ pub struct Args {
     parts: Vec<PathBuf>,
 
     /// Replace # in output names with the number N: out.####.png becomes out.0007.png
-    #[arg(long, value_name = "N", value_parser = whole::<u32>(0..=frames::MAX_NUMBER))]
+    #[arg(long, value_name = "N", value_parser = integer::<u32>(0..=frames::MAX_NUMBER))]
     frame: Option<u32>,
 
     #[command(flatten)]
@@ -38,12 +38,12 @@ pub struct Args {
     quiet: bool,
 }
 
-/// Joins the parts into the image and its layers, byte-identical to a single render.
+/// Joins the parts into the image and its layers, byte-identical to the files of a single render.
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
-    let frame = Frame::one(args.frame);
-    let named = args.pictures.output.iter().map(|output| frame.name("--output", output));
+    let frame = Frame::single(args.frame);
+    let output_names = args.pictures.output.iter().map(|output| frame.name("--output", output));
     let pictures = PictureOptions {
-        output: named.collect::<Result<_, _>>()?,
+        output: output_names.collect::<Result<_, _>>()?,
         ..args.pictures.clone()
     };
     let files = files(&args.parts)?;
@@ -59,9 +59,9 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let outputs = Outputs::find(&pictures, first, (&layout.aovs, LayerPolicy::Available), None)?;
     outputs.check(&files, None)?;
     outputs.check_size(layout.region)?;
-    let begun = outputs.begin().map_err(RenderError::Output)?;
+    let open_outputs = outputs.open().map_err(RenderError::Output)?;
     let stop = signal::stop().context("signal handler")?;
-    let Files::Pictures(targets) = begun.files else {
+    let Files::Pictures(targets) = open_outputs.files else {
         return Ok(ExitCode::SUCCESS); // unreachable: merge does not write parts
     };
     let options = args.pictures.save_options(parts.metadata());

@@ -60,22 +60,22 @@ impl RenderMetadata {
         }
     }
 
-    /// Returns the metadata that is independent of the device.
-    pub fn lasting(&self) -> Metadata {
+    /// Returns the metadata without the device and the driver.
+    pub fn without_device(&self) -> Metadata {
         self.metadata.clone()
     }
 
-    /// Returns the metadata of an image with fewer samples than requested; see [`RenderMetadata::on`].
-    pub fn partial(&self, device: &DeviceInfo, reproducible: bool, (samples, of): (u32, u32)) -> Metadata {
-        let mut metadata = self.on(device, reproducible);
+    /// Like [`RenderMetadata::with_device`], for an image with fewer samples than requested.
+    pub fn partial(&self, device: &DeviceInfo, reproducible: bool, (samples, requested): (u32, u32)) -> Metadata {
+        let mut metadata = self.with_device(device, reproducible);
         metadata
             .pairs
-            .push((PARTIAL.to_owned(), format!("{samples} of {of} samples")));
+            .push((PARTIAL.to_owned(), format!("{samples} of {requested} samples")));
         metadata
     }
 
-    /// Returns the metadata; includes the device unless `--reproducible` is given.
-    pub fn on(&self, device: &DeviceInfo, reproducible: bool) -> Metadata {
+    /// Returns the metadata, with the device and the driver unless `--reproducible` is given.
+    pub fn with_device(&self, device: &DeviceInfo, reproducible: bool) -> Metadata {
         let mut metadata = self.metadata.clone();
         if !reproducible {
             let pairs = [("device", &device.name), ("driver", &device.driver)];

@@ -98,7 +98,7 @@ enum Command {
     Dev(Box<dev::Args>),
 }
 
-/// A signal ended the work.
+/// A signal ended the command.
 #[derive(Debug, thiserror::Error)]
 #[error("interrupted by {}", signal::name(*.0))]
 struct Interrupted(i32);
@@ -120,9 +120,9 @@ pub fn main() -> ExitCode {
         Ok(cli) => cli,
         Err(error) => return explain(&hints::improve(error)),
     };
-    log::choose(cli.log_format);
+    log::set_format(cli.log_format);
     log::install_panic_hook();
-    allocator::catch_signal_stacks();
+    allocator::catch_signal_stack_failures();
     let threads = match &cli.command {
         Command::Render(args) => args.threads,
         _ => None,
@@ -132,7 +132,7 @@ pub fn main() -> ExitCode {
         _ => None,
     };
     prepare_environment(threads);
-    signal::file_size_limit_is_an_error();
+    signal::ignore_file_size_signal();
     wgray_image::panic_guard::install_quiet_hook(); // panics caused by a lost device are converted to errors
     let result = start_threads(threads).and_then(|()| match cli.command {
         Command::Render(args) => render::run(*args, start),
@@ -183,9 +183,9 @@ fn with_all_options(command: clap::Command) -> clap::Command {
 
 /// Prints the help, the version, or a command line error.
 fn explain(error: &clap::Error) -> ExitCode {
-    log::choose(log::asked(std::env::args_os()));
+    log::set_format(log::requested_format(std::env::args_os()));
     if !error.use_stderr() {
-        return ended(error.print(), ExitCode::SUCCESS);
+        return finish_output(error.print(), ExitCode::SUCCESS);
     }
     if !log::is_json() {
         let _ = error.print(); // a failure to print cannot be reported either
@@ -200,7 +200,7 @@ fn explain(error: &clap::Error) -> ExitCode {
     ExitCode::from(2)
 }
 
-/// Sets environment variables for drivers. Must run before other threads are started.
+/// Sets environment variables for drivers. Must be called before other threads are started.
 fn prepare_environment(threads: Option<u16>) {
     let set = |name: &str, value: &std::ffi::OsStr| {
         // SAFETY: the process has only this thread so far.
@@ -215,7 +215,7 @@ fn prepare_environment(threads: Option<u16>) {
     }
 }
 
-/// Starts the global thread pool. Without this check rayon would panic if threads cannot be started.
+/// Starts the global thread pool. Returns an error if threads cannot be started; otherwise rayon would panic later.
 fn start_threads(threads: Option<u16>) -> anyhow::Result<()> {
     let count = threads.map_or(0, usize::from); // 0: all
     let pool = rayon::ThreadPoolBuilder::new().num_threads(count);
@@ -224,7 +224,7 @@ fn start_threads(threads: Option<u16>) -> anyhow::Result<()> {
 
 /// Loads a scene file with the overrides.
 fn load(path: &Path, overrides: &Overrides) -> anyhow::Result<Scene> {
-    Scene::load_with(path, overrides).map_err(|error| plain(error.into()))
+    Scene::load_with(path, overrides).map_err(|error| cli_error(error.into()))
 }
 
 /// Formats a warning about a scene with its location, in the same form as errors: the file, and the line if known.
@@ -235,10 +235,10 @@ fn located(path: &Path, note: &Note) -> String {
     }
 }
 
-/// Converts an error of the library, replacing field names by names of command line options.
-fn plain(error: Error) -> anyhow::Error {
+/// Converts an error of the library. Names of fields are replaced by names of command line options.
+fn cli_error(error: Error) -> anyhow::Error {
     match error {
-        Error::Option(problem) | Error::Scene(SceneError::Override(problem)) => option(&problem).into(),
+        Error::Option(problem) | Error::Scene(SceneError::Override(problem)) => option_error(&problem).into(),
         Error::Render(error) => error.into(),
         Error::Scene(error) => error.into(),
         error => error.into(),
@@ -246,10 +246,10 @@ fn plain(error: Error) -> anyhow::Error {
 }
 
 /// Converts an invalid option value into a usage error.
-fn option(problem: &Problem) -> Usage {
+fn option_error(problem: &Problem) -> Usage {
     let key = problem.key.to_string();
     let (name, rest) = key.split_once('.').unwrap_or((&key, ""));
-    let place = if rest.is_empty() {
+    let sub_key = if rest.is_empty() {
         String::new()
     } else {
         format!(" {rest}")
@@ -264,7 +264,7 @@ fn option(problem: &Problem) -> Usage {
         ("adaptive", "") => " (--pixel-pattern sobol)", // the value itself has been validated
         _ => "",
     };
-    Usage(format!("--{name}{place}: {}{hint}", problem.message))
+    Usage(format!("--{name}{sub_key}: {}{hint}", problem.message))
 }
 
 /// Prints an error.
@@ -278,9 +278,9 @@ fn report(error: &anyhow::Error, code: u8) {
             let numbers = [("line", place.line), ("column", place.column)];
             let texts = [("file", place.file), ("key", place.key)];
             let texts = texts.map(|(name, text)| (name, text.map(Value::from)));
-            let all = numbers.map(|(name, number)| (name, number.map(Value::from)));
-            let known = all.into_iter().chain(texts);
-            facts.extend(known.filter_map(|(name, value)| Some((name.to_owned(), value?))));
+            let numbers = numbers.map(|(name, number)| (name, number.map(Value::from)));
+            let fields = numbers.into_iter().chain(texts);
+            facts.extend(fields.filter_map(|(name, value)| Some((name.to_owned(), value?))));
             log::print_with(Level::Error, &error.to_string(), facts);
         }
         if let Some(more) = more {
@@ -329,7 +329,7 @@ fn facts_of<const N: usize>(facts: [(&str, Value); N]) -> Facts {
 }
 
 /// Returns the exit code of a command after its output was printed. A closed pipe is not a failure, but a full disk is.
-fn ended(printed: io::Result<()>, code: ExitCode) -> ExitCode {
+fn finish_output(printed: io::Result<()>, code: ExitCode) -> ExitCode {
     match printed.and_then(|()| io::stdout().flush()) {
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
             let facts = facts_of([("exit_code", NOT_WRITTEN.into())]);

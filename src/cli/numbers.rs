@@ -1,9 +1,9 @@
-//! Parsers of whole numbers.
+//! Parsers of integers.
 
 use std::ops::RangeInclusive;
 
-/// Returns a parser of whole numbers in a range.
-pub fn whole<T: TryFrom<u32>>(range: RangeInclusive<u32>) -> impl Fn(&str) -> Result<T, String> + Clone {
+/// Returns a parser of integers in a range.
+pub fn integer<T: TryFrom<u32>>(range: RangeInclusive<u32>) -> impl Fn(&str) -> Result<T, String> + Clone {
     move |text| {
         let number = text.parse().ok().filter(|number| range.contains(number));
         let number = number.and_then(|number: u32| T::try_from(number).ok());

@@ -55,7 +55,7 @@ impl Files {
     }
 }
 
-/// Decides whether every layer must be written.
+/// Decides whether the layers must be written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LayerPolicy {
     /// At least one output must support the layers.
@@ -72,7 +72,7 @@ impl Outputs {
     pub fn find(
         options: &PictureOptions,
         default: &Path,
-        (aovs, layered): (&[Aov], LayerPolicy),
+        (aovs, layer_policy): (&[Aov], LayerPolicy),
         stats: Option<&Path>,
     ) -> anyhow::Result<Outputs> {
         let paths = match options.output.as_slice() {
@@ -86,25 +86,23 @@ impl Outputs {
                 let message = "--output: -: standard output is a terminal; redirect it with > FILE or | COMMAND";
                 return Err(Usage(message.to_owned()).into());
             }
-            forbid_ending("--output", path, &picture, "toml", "names a scene")?;
+            forbid_ending("--output", path, &picture, "toml", "scenes")?;
             found.push((path, picture));
         }
         let formats = formats(&found, options.format)?;
         options.check(&formats)?;
-        if let LayerPolicy::Requested = layered {
+        if let LayerPolicy::Requested = layer_policy {
             check_layers(aovs, &found, &formats)?;
         }
         let mut pictures = Vec::new();
         for ((path, picture), format) in found.into_iter().zip(formats) {
-            let beside = match picture.is_file() {
+            let separate_aovs = match picture.is_file() {
                 true => aovs,
                 false => &[],
             };
             let mut files = vec![("--output".to_owned(), picture)];
-            for (aov, path) in beside
-                .iter()
-                .zip(image::files(path, format, beside).into_iter().skip(1))
-            {
+            let aov_files = image::files(path, format, separate_aovs).into_iter().skip(1);
+            for (aov, path) in separate_aovs.iter().zip(aov_files) {
                 files.push((format!("--aov {}", aov.name()), output(&path)?));
             }
             pictures.push(Picture { format, files });
@@ -115,18 +113,19 @@ impl Outputs {
             stats: stats.map(find_stats).transpose()?,
         };
         if options.output.is_empty() {
-            outputs.keep_files_of_others()?;
+            outputs.protect_foreign_files()?;
         }
         Ok(outputs)
     }
 
-    fn keep_files_of_others(&self) -> Result<(), Usage> {
+    /// Rejects existing files that wgray did not write.
+    fn protect_foreign_files(&self) -> Result<(), Usage> {
         let mut files = self.pictures.iter().flat_map(|picture| &picture.files);
-        let of_others = |(_, output): &&(String, Output)| {
+        let is_foreign = |(_, output): &&(String, Output)| {
             let path = output.path().filter(|path| path.exists());
             path.is_some_and(|path| image::read_metadata(path).is_none())
         };
-        match files.find(of_others) {
+        match files.find(is_foreign) {
             Some((_, output)) => Err(Usage(format!(
                 "{} exists and was not written by wgray; name the output with -o",
                 output.name()
@@ -136,9 +135,9 @@ impl Outputs {
     }
 
     pub fn find_part(options: &PictureOptions, stats: Option<&Path>) -> anyhow::Result<Outputs> {
-        let ends = |path: &Path| path.extension().is_some_and(|end| end.eq_ignore_ascii_case(PART));
+        let is_part = |path: &Path| path.extension().is_some_and(|end| end.eq_ignore_ascii_case(PART));
         let path = match options.output.as_slice() {
-            [path] if ends(path) => path,
+            [path] if is_part(path) => path,
             _ => {
                 let rule = "--tile: needs exactly one -o NAME.part, to be joined by wgray merge";
                 return Err(Usage(rule.to_owned()).into());
@@ -182,10 +181,10 @@ impl Outputs {
                 option => (option, output, "choose another name with --output"),
             });
         let part = self.part.iter().map(|part| ("--output", part, "choose another name"));
-        let mut before: Vec<(&str, &Output)> = Vec::new();
+        let mut checked: Vec<(&str, &Output)> = Vec::new();
         for (option, output, remedy) in part.chain(pictures).chain(stats).chain(checkpoint) {
-            keep_inputs(option, output, inputs, remedy)?;
-            if let Some((other, _)) = before.iter().find(|(_, other)| other.is_same(output)) {
+            protect_inputs(option, output, inputs, remedy)?;
+            if let Some((other, _)) = checked.iter().find(|(_, other)| other.is_same(output)) {
                 let name = output.name();
                 return Err(Usage(match option == *other {
                     true => format!("{option}: {name} is given twice"),
@@ -193,7 +192,7 @@ impl Outputs {
                 })
                 .into());
             }
-            before.push((option, output));
+            checked.push((option, output));
         }
         Ok(())
     }
@@ -203,19 +202,19 @@ impl Outputs {
     pub fn exist(&self) -> bool {
         let exists = |output: &Output| output.path().is_some_and(Path::is_file);
         let mut pictures = self.pictures.iter().flat_map(|picture| &picture.files);
-        let figures = self.stats.iter().filter(|stats| stats.is_file());
-        self.part.iter().chain(figures).all(exists)
+        let stats = self.stats.iter().filter(|stats| stats.is_file());
+        self.part.iter().chain(stats).all(exists)
             && pictures.all(|(_, output)| exists(output) && output.path().is_some_and(is_finished))
     }
 
-    /// Returns the images that can be rewritten because they are files: the format, the image and its layers.
+    /// Returns the images that previews can rewrite because they are files: the format, the image and its layers.
     pub fn rewritable(&self) -> io::Result<Vec<(Format, Vec<Output>)>> {
         let pictures = self.pictures.iter().filter(|picture| picture.is_rewritable());
-        let again = |Picture { format, files }: &Picture| {
+        let reopened = |Picture { format, files }: &Picture| {
             let files = files.iter().map(|(_, output)| output.again());
             Ok((*format, files.collect::<io::Result<_>>()?))
         };
-        pictures.map(again).collect()
+        pictures.map(reopened).collect()
     }
 
     /// Rejects `--preview` if no image is written to a regular file.
@@ -257,7 +256,7 @@ impl Outputs {
 
     /// Opens all destinations. Opening a pipe blocks until it has a reader, so signals must still end the program
     /// immediately.
-    pub fn begin(mut self) -> io::Result<OpenOutputs> {
+    pub fn open(mut self) -> io::Result<OpenOutputs> {
         let pictures = self.pictures.iter_mut().flat_map(|picture| &mut picture.files);
         for output in pictures
             .map(|(_, output)| output)
@@ -297,23 +296,23 @@ fn find_checkpoint(path: &Path) -> anyhow::Result<Output> {
     Ok(checkpoint)
 }
 
-/// Rejects names that are probably unintended.
+/// Rejects names of scenes, parts, models and images, which are probably unintended.
 fn forbid_pictures(option: &str, path: &Path, output: &Output) -> Result<(), Usage> {
-    forbid_ending(option, path, output, "toml", "names a scene")?;
-    forbid_ending(option, path, output, PART, "names a part")?;
+    forbid_ending(option, path, output, "toml", "scenes")?;
+    forbid_ending(option, path, output, PART, "parts of images")?;
     let mut models = ["gltf", "glb"].into_iter();
-    models.try_for_each(|ending| forbid_ending(option, path, output, ending, "names a model"))?;
+    models.try_for_each(|ending| forbid_ending(option, path, output, ending, "models"))?;
     let mut pictures = ["png", "exr", "jpg", "jpeg", "webp"].into_iter();
-    pictures.try_for_each(|ending| forbid_ending(option, path, output, ending, "names an image"))
+    pictures.try_for_each(|ending| forbid_ending(option, path, output, ending, "images"))
 }
 
-pub fn keep_inputs(option: &str, output: &Output, inputs: &[PathBuf], remedy: &str) -> Result<(), Usage> {
+pub fn protect_inputs(option: &str, output: &Output, inputs: &[PathBuf], remedy: &str) -> Result<(), Usage> {
     let Some(input) = inputs.iter().find(|input| output.is_input(input)) else {
         return Ok(());
     };
-    let plain = |path: &str| path.strip_prefix("./").unwrap_or(path).to_owned();
+    let without_dot = |path: &str| path.strip_prefix("./").unwrap_or(path).to_owned();
     let (name, input) = (output.name(), input.display().to_string());
-    Err(Usage(if plain(name) == plain(&input) {
+    Err(Usage(if without_dot(name) == without_dot(&input) {
         format!("{option}: {name} is an input of the scene; {remedy}")
     } else {
         format!("{option}: {name} is the same file as {input}, an input of the scene; {remedy}")
@@ -378,14 +377,14 @@ fn check_layers(aovs: &[Aov], pictures: &[(&Path, Output)], formats: &[Format]) 
     Err(Usage(message))
 }
 
-fn forbid_ending(option: &str, path: &Path, output: &Output, ending: &str, why: &str) -> Result<(), Usage> {
-    let ends = |path: &Path| path.extension().is_some_and(|end| end.eq_ignore_ascii_case(ending));
-    match ends(path) || output.path().is_some_and(ends) {
+fn forbid_ending(option: &str, path: &Path, output: &Output, ending: &str, kind: &str) -> Result<(), Usage> {
+    let has_ending = |path: &Path| path.extension().is_some_and(|end| end.eq_ignore_ascii_case(ending));
+    match has_ending(path) || output.path().is_some_and(has_ending) {
         false => Ok(()),
         true => {
             let name = output.name();
             Err(Usage(format!(
-                "{option}: {name}: must not end in .{ending} or link to such a file, which {why}"
+                "{option}: {name}: must not end in .{ending} or link to such a file: .{ending} files are {kind}"
             )))
         }
     }

@@ -7,9 +7,9 @@ use crate::scene::{ViewSettings, ViewTransform};
 use clap::builder::{PossibleValuesParser, TypedValueParser as _};
 
 use super::Usage;
-use super::numbers::whole;
+use super::numbers::integer;
 
-/// The options as parsed.
+/// Options for output images.
 #[derive(Clone, Debug, clap::Args)]
 #[command(next_help_heading = "Output images")]
 pub struct PictureOptions {
@@ -22,11 +22,11 @@ pub struct PictureOptions {
     pub exposure: Option<f64>,
 
     /// Use gamma22, srgb, agx or khronos-pbr-neutral; not for EXR
-    #[arg(long, value_name = "NAME", value_parser = named(ViewTransform::ALL, ViewTransform::name), hide_possible_values = true)]
+    #[arg(long, value_name = "NAME", value_parser = name_parser(ViewTransform::ALL, ViewTransform::name), hide_possible_values = true)]
     pub view_transform: Option<ViewTransform>,
 
     /// Set the format of outputs without a known extension
-    #[arg(long, value_name = "FORMAT", value_parser = named(Format::ALL, Format::name), hide_short_help = true)]
+    #[arg(long, value_name = "FORMAT", value_parser = name_parser(Format::ALL, Format::name), hide_short_help = true)]
     pub format: Option<Format>,
 
     /// Set the bits per channel of a PNG [default: 8]
@@ -34,15 +34,15 @@ pub struct PictureOptions {
     pub bit_depth: Option<BitDepth>,
 
     /// Set the channel type of an EXR [default: float]
-    #[arg(long, value_name = "TYPE", value_parser = named(ExrType::ALL, ExrType::name), hide_short_help = true)]
+    #[arg(long, value_name = "TYPE", value_parser = name_parser(ExrType::ALL, ExrType::name), hide_short_help = true)]
     pub exr_type: Option<ExrType>,
 
     /// Set the lossless compression of an EXR [default: zip]
-    #[arg(long, value_name = "METHOD", value_parser = named(ExrCompression::ALL, ExrCompression::name), hide_short_help = true)]
+    #[arg(long, value_name = "METHOD", value_parser = name_parser(ExrCompression::ALL, ExrCompression::name), hide_short_help = true)]
     pub exr_compression: Option<ExrCompression>,
 
     /// Set the quality of a JPEG, 1 to 100 [default: 90]
-    #[arg(long, value_name = "N", value_parser = whole::<u8>(1..=100), hide_short_help = true)]
+    #[arg(long, value_name = "N", value_parser = integer::<u8>(1..=100), hide_short_help = true)]
     pub quality: Option<u8>,
 
     /// Omit device and driver names, so that equal scenes give equal files
@@ -71,9 +71,9 @@ impl PictureOptions {
     }
 
     /// Warns about values that exceeded the range of a format.
-    pub fn warn(&self, saved: &SaveReport, say: &mut dyn FnMut(&str)) {
+    pub fn warn(&self, saved: &SaveReport, log: &mut dyn FnMut(&str)) {
         for (name, count) in &saved.too_large {
-            say(&format!(
+            log(&format!(
                 "{name}: {count} values exceed 65504, the maximum of 16 bits, and were written as infinity; use --exr-type float"
             ));
         }
@@ -82,17 +82,17 @@ impl PictureOptions {
     /// Rejects options that apply to none of the outputs.
     pub fn check(&self, formats: &[Format]) -> Result<(), Usage> {
         use Format::{Exr, Jpeg, Png, WebP};
-        let shown = &[Png, Jpeg, WebP][..];
+        let display_formats = &[Png, Jpeg, WebP][..];
         let options = [
-            ("--view-transform", self.view_transform.is_some(), shown),
-            ("--exposure", self.exposure.is_some(), shown),
+            ("--view-transform", self.view_transform.is_some(), display_formats),
+            ("--exposure", self.exposure.is_some(), display_formats),
             ("--bit-depth", self.bit_depth.is_some(), &[Png]),
             ("--exr-type", self.exr_type.is_some(), &[Exr]),
             ("--exr-compression", self.exr_compression.is_some(), &[Exr]),
             ("--quality", self.quality.is_some(), &[Jpeg]),
         ];
-        let unused = |(_, given, users): &(&str, bool, &[Format])| {
-            *given && !users.iter().any(|format| formats.contains(format))
+        let unused = |(_, is_set, users): &(&str, bool, &[Format])| {
+            *is_set && !users.iter().any(|format| formats.contains(format))
         };
         match options.into_iter().find(unused) {
             None => Ok(()),
@@ -105,14 +105,14 @@ impl PictureOptions {
     }
 }
 
-/// Returns a parser that accepts one of these names.
-pub fn named<T: Clone + Send + Sync + 'static, const N: usize>(
+/// Returns a parser of these names.
+pub fn name_parser<T: Clone + Send + Sync + 'static, const N: usize>(
     all: [T; N],
     name: fn(T) -> &'static str,
 ) -> impl clap::builder::TypedValueParser<Value = T> {
-    PossibleValuesParser::new(all.clone().map(name)).try_map(move |given| {
-        let found = all.iter().find(|value| name((*value).clone()) == given);
-        found.cloned().ok_or(format!("unknown name: {given}"))
+    PossibleValuesParser::new(all.clone().map(name)).try_map(move |text| {
+        let found = all.iter().find(|value| name((*value).clone()) == text);
+        found.cloned().ok_or(format!("unknown name: {text}"))
     })
 }
 

@@ -11,7 +11,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use super::facts_of;
 use super::log::{self, Level};
 
-/// The display of progress.
+/// Form of the progress display.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Mode {
     // A bar on a terminal; otherwise a line every ten seconds. JSON messages use the intervals of Plain.
@@ -23,12 +23,12 @@ pub enum Mode {
     None,
 }
 
-/// Duration of work before the bar appears.
-const PATIENCE: Duration = Duration::from_secs(1);
+/// Time before the bar appears.
+const BAR_DELAY: Duration = Duration::from_secs(1);
 /// Interval between lines.
 const INTERVAL: Duration = Duration::from_secs(10);
 /// Time before the first estimate: the first pixels are rarely representative.
-const SETTLING: Duration = Duration::from_secs(3);
+const ESTIMATE_DELAY: Duration = Duration::from_secs(3);
 /// Number of steps of the bar.
 const STEPS: f64 = 1000.0;
 
@@ -41,7 +41,7 @@ pub struct Progress {
     frame: Option<u32>,
     start: Instant,
     /// The initial fraction; above 0 if the render was resumed from a checkpoint.
-    first: Option<f64>,
+    first_fraction: Option<f64>,
     /// The tenths (or hundredths) that were completed when the last line was printed, and the time of this line.
     printed: (u32, Instant),
 }
@@ -70,7 +70,7 @@ impl Progress {
             label: label.map(|label| format!("{label}: ")).unwrap_or_default(),
             frame,
             start,
-            first: None,
+            first_fraction: None,
             printed: (0, start),
         }
     }
@@ -78,15 +78,15 @@ impl Progress {
     /// Reports the fraction of the work that is done, from 0 to 1.
     pub fn update(&mut self, fraction: f64) {
         let elapsed = self.start.elapsed();
-        let first = *self.first.get_or_insert(fraction);
-        let remaining = remaining(elapsed, first, fraction);
+        let first_fraction = *self.first_fraction.get_or_insert(fraction);
+        let remaining = remaining(elapsed, first_fraction, fraction);
         match &mut self.display {
-            // With several frames, short ones have a bar too.
-            Display::Bar(bar) if elapsed > PATIENCE || !self.label.is_empty() => {
+            // With several frames, short frames have a bar too.
+            Display::Bar(bar) if elapsed > BAR_DELAY || !self.label.is_empty() => {
                 let bar = bar.get_or_insert_with(|| new_bar(elapsed, &self.label));
                 bar.set_position((fraction * STEPS) as u64);
                 if let Some(remaining) = remaining {
-                    bar.set_message(format!(", about {} left", text_of(remaining)));
+                    bar.set_message(format!(", about {} left", format_duration(remaining)));
                 }
             }
             Display::Lines { at_tenths } => {
@@ -110,7 +110,7 @@ impl Progress {
     fn print(&self, fraction: f64, remaining: Option<Duration>) {
         let seconds = self.start.elapsed().as_secs_f64();
         let width = if log::is_json() { 0 } else { 3 }; // aligns the lines
-        let left = remaining.map(|remaining| format!(", about {} left", text_of(remaining)));
+        let left = remaining.map(|remaining| format!(", about {} left", format_duration(remaining)));
         let line = format!(
             "{}{:width$.0} % done after {seconds:.1} s{}",
             self.label,
@@ -128,16 +128,16 @@ impl Progress {
 }
 
 /// Estimates the remaining time from the mean speed so far; `None` while the estimate would be unreliable.
-fn remaining(elapsed: Duration, first: f64, fraction: f64) -> Option<Duration> {
-    let done = fraction - first;
-    if elapsed < SETTLING || done < 0.01 || fraction >= 1.0 {
+fn remaining(elapsed: Duration, first_fraction: f64, fraction: f64) -> Option<Duration> {
+    let done = fraction - first_fraction;
+    if elapsed < ESTIMATE_DELAY || done < 0.01 || fraction >= 1.0 {
         return None;
     }
     Duration::try_from_secs_f64(elapsed.as_secs_f64() * (1.0 - fraction) / done).ok()
 }
 
 /// Returns a duration in at most two units: `45 s`, `3 m 20 s`, `2 h 5 m`.
-fn text_of(duration: Duration) -> String {
+fn format_duration(duration: Duration) -> String {
     let seconds = duration.as_secs_f64().ceil() as u64;
     match seconds {
         0..60 => format!("{seconds} s"),
@@ -154,16 +154,16 @@ impl Drop for Progress {
     }
 }
 
-/// Runs work whose progress cannot be measured. On a terminal, the name and the elapsed time of the work are shown
-/// after a second.
-pub fn named<T>(mode: Mode, name: &'static str, work: impl FnOnce() -> T) -> T {
+/// Runs work whose progress cannot be measured. On a terminal, a spinner with the name of the work and the elapsed time
+/// appears after a second.
+pub fn with_spinner<T>(mode: Mode, name: &'static str, work: impl FnOnce() -> T) -> T {
     if mode != Mode::Auto || log::is_json() || !std::io::stderr().is_terminal() {
         return work();
     }
     let (done, ended) = mpsc::channel::<()>();
     let watch = thread::Builder::new().spawn(move || {
-        if ended.recv_timeout(PATIENCE) == Err(RecvTimeoutError::Timeout) {
-            let bar = ProgressBar::new_spinner().with_elapsed(PATIENCE);
+        if ended.recv_timeout(BAR_DELAY) == Err(RecvTimeoutError::Timeout) {
+            let bar = ProgressBar::new_spinner().with_elapsed(BAR_DELAY);
             bar.set_style(spinner_style());
             bar.set_message(name);
             bar.enable_steady_tick(Duration::from_millis(100));
@@ -214,7 +214,7 @@ mod tests {
     #[test]
     fn durations_have_two_units() {
         for (seconds, text) in [(0.2, "1 s"), (59.0, "59 s"), (60.0, "1 m 0 s"), (7325.0, "2 h 2 m")] {
-            assert_eq!(text_of(Duration::from_secs_f64(seconds)), text);
+            assert_eq!(format_duration(Duration::from_secs_f64(seconds)), text);
         }
     }
 }

@@ -1,13 +1,13 @@
-//! Options that configure a scene or model file, shared by all commands that read scenes.
+//! Scene options, shared by all commands that read scenes.
 
 use crate::scene::{
     Background, EnvironmentDescription, GltfChoice, Orbit, Overrides, Presentation, Scene, Selection, UpAxis, View,
 };
 use clap::ValueHint;
 
-use super::picture_options::named;
+use super::picture_options::name_parser;
 
-/// The options as parsed.
+/// Options that configure a scene or model file.
 #[derive(Clone, Debug, Default, clap::Args)]
 #[command(next_help_heading = "Scene")]
 pub struct SceneOptions {
@@ -30,7 +30,7 @@ pub struct SceneOptions {
     gltf: GltfOptions,
 }
 
-/// The options for a model file without a scene.
+/// Options for a model file that is rendered without a scene file.
 #[derive(Clone, Debug, Default, clap::Args)]
 #[command(next_help_heading = "Scene")]
 struct PresentationOptions {
@@ -51,12 +51,12 @@ struct PresentationOptions {
     ground: bool,
 }
 
-/// The options for models.
+/// Options for a view of a model, and for the contents of a glTF file.
 #[derive(Clone, Debug, Default, clap::Args)]
 #[command(next_help_heading = "Scene")]
 struct GltfOptions {
     /// Frame a model: corner, front, back, left, right, top, bottom or iso
-    #[arg(long, help_heading = None::<&'static str>, display_order = 3, value_name = "VIEW", value_parser = named(View::ALL, View::name), hide_possible_values = true)]
+    #[arg(long, help_heading = None::<&'static str>, display_order = 3, value_name = "VIEW", value_parser = name_parser(View::ALL, View::name), hide_possible_values = true)]
     view: Option<View>,
 
     /// Use this camera of a glTF file, counted from 0
@@ -92,7 +92,7 @@ impl SceneOptions {
     }
 
     /// Adds these options to the values that override the scene.
-    pub fn over(&self, overrides: Overrides) -> Overrides {
+    pub fn add_to(&self, overrides: Overrides) -> Overrides {
         Overrides {
             environment: self.environment.clone(),
             background: self.background,

@@ -5,5 +5,5 @@ use std::process::ExitCode;
 
 pub fn run() -> ExitCode {
     let schema = crate::scene::schema();
-    super::ended(io::stdout().lock().write_all(schema.as_bytes()), ExitCode::SUCCESS)
+    super::finish_output(io::stdout().lock().write_all(schema.as_bytes()), ExitCode::SUCCESS)
 }

@@ -11,7 +11,8 @@ use signal_hook::flag;
 pub struct Stop {
     /// The last signal, or 0.
     signal: Arc<AtomicUsize>,
-    asked: Arc<AtomicBool>,
+    /// True after the first signal.
+    requested: Arc<AtomicBool>,
 }
 
 impl Stop {
@@ -44,13 +45,13 @@ pub fn stop() -> io::Result<Stop> {
 }
 
 /// Like [`stop`], with another exit code for SIGTERM.
-fn stop_with(terminated: Option<u8>) -> io::Result<Stop> {
+fn stop_with(sigterm_code: Option<u8>) -> io::Result<Stop> {
     let stop = Stop::default();
     for signal in [SIGINT, SIGTERM, HANG_UP] {
         if !is_ignored(signal) {
-            let code = terminated.filter(|_| signal == SIGTERM).unwrap_or(exit_code(signal));
-            flag::register_conditional_shutdown(signal, code.into(), Arc::clone(&stop.asked))?;
-            flag::register(signal, Arc::clone(&stop.asked))?;
+            let code = sigterm_code.filter(|_| signal == SIGTERM).unwrap_or(exit_code(signal));
+            flag::register_conditional_shutdown(signal, code.into(), Arc::clone(&stop.requested))?;
+            flag::register(signal, Arc::clone(&stop.requested))?;
             flag::register_usize(signal, Arc::clone(&stop.signal), signal.unsigned_abs() as usize)?;
         }
     }
@@ -60,22 +61,22 @@ fn stop_with(terminated: Option<u8>) -> io::Result<Stop> {
 /// Signal handlers that end the program immediately. After [`Signals::defer`], the handlers only record the signal.
 pub struct Signals {
     /// The exit code after SIGTERM, if it differs from 143.
-    terminated: Option<u8>,
-    /// True while SIGTERM ends the program with the code of `terminated`.
-    ends: Arc<AtomicBool>,
+    sigterm_code: Option<u8>,
+    /// True while SIGTERM ends the program immediately, with `sigterm_code`.
+    is_immediate: Arc<AtomicBool>,
     stop: Option<Stop>,
 }
 
 impl Signals {
     /// Registers handlers that end the program immediately.
-    pub fn immediate(terminated: Option<u8>) -> io::Result<Signals> {
-        let ends = Arc::new(AtomicBool::new(true));
-        if let Some(code) = terminated.filter(|_| !is_ignored(SIGTERM)) {
-            flag::register_conditional_shutdown(SIGTERM, code.into(), Arc::clone(&ends))?;
+    pub fn immediate(sigterm_code: Option<u8>) -> io::Result<Signals> {
+        let is_immediate = Arc::new(AtomicBool::new(true));
+        if let Some(code) = sigterm_code.filter(|_| !is_ignored(SIGTERM)) {
+            flag::register_conditional_shutdown(SIGTERM, code.into(), Arc::clone(&is_immediate))?;
         }
         Ok(Signals {
-            terminated,
-            ends,
+            sigterm_code,
+            is_immediate,
             stop: None,
         })
     }
@@ -87,9 +88,9 @@ impl Signals {
     pub fn defer(&mut self) -> io::Result<&Stop> {
         let stop = match self.stop.take() {
             Some(stop) => stop,
-            None => stop_with(self.terminated)?,
+            None => stop_with(self.sigterm_code)?,
         };
-        self.ends.store(false, Ordering::Relaxed);
+        self.is_immediate.store(false, Ordering::Relaxed);
         Ok(self.stop.insert(stop))
     }
 }
@@ -99,8 +100,8 @@ const HANG_UP: i32 = signal_hook::consts::SIGHUP;
 #[cfg(not(unix))]
 const HANG_UP: i32 = SIGTERM; // SIGHUP does not exist
 
-/// Makes writing beyond the file size limit (`ulimit -f`) an error instead of a signal.
-pub fn file_size_limit_is_an_error() {
+/// Ignores the signal for writing beyond the file size limit (`ulimit -f`), so that the write returns an error.
+pub fn ignore_file_size_signal() {
     #[cfg(unix)]
     // SAFETY: no handler runs for the signal, and no other thread exists yet.
     unsafe {
@@ -111,7 +112,7 @@ pub fn file_size_limit_is_an_error() {
 #[cfg(unix)]
 fn is_ignored(signal: i32) -> bool {
     let mut action = std::mem::MaybeUninit::<libc::sigaction>::zeroed();
-    // SAFETY: nothing is changed; the current action is written to a value of the right type, for which zeros are
+    // SAFETY: the call changes nothing; it writes the current action to a value of the right type, for which zeros are
     // valid.
     unsafe {
         libc::sigaction(signal, std::ptr::null(), action.as_mut_ptr());

@@ -35,11 +35,11 @@ pub struct Stats {
     /// later frames.
     pub setup_s: f64,
     pub render_s: f64,
-    /// Seconds from the same point in time until the image is written.
+    /// Seconds until the image is written, counted like `setup_s`.
     pub total_s: f64,
     /// Camera rays of the image.
     pub camera_rays: u64,
-    /// Fraction of the samples not read from a checkpoint.
+    /// Fraction of the samples that were rendered, not read from a checkpoint.
     pub fraction_rendered: f64,
     /// The former name of `fraction_rendered`, until 0.3.
     #[serde(rename = "share_rendered")]

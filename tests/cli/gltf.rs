@@ -382,7 +382,9 @@ fn a_conversion_keeps_its_input_and_uses_relative_paths() {
         result
             .stderr
             .starts_with("note: sub/box.toml: refers to files outside of ")
-            && result.stderr.ends_with("/sub; pass --asset-root . to render it\n"),
+            && result
+                .stderr
+                .ends_with("/sub; pass --asset-root . to render the scene\n"),
         "{}",
         result.stderr
     );
@@ -484,7 +486,9 @@ fn a_conversion_prints_the_asset_root_to_pass() {
     let result = folder.run(&["convert", "a dir/models/box.glb", "-o", "a dir/scenes/new/box.toml"]);
     assert_eq!(result.code, 0, "{}", result.stderr);
     assert!(
-        result.stderr.ends_with("pass --asset-root 'a dir' to render it\n"),
+        result
+            .stderr
+            .ends_with("pass --asset-root 'a dir' to render the scene\n"),
         "{}",
         result.stderr
     );

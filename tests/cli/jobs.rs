@@ -294,12 +294,12 @@ fn checkpoints_of_other_jobs_are_rejected() {
     assert_eq!(run(&resume).code, 0, "a missing checkpoint is not created");
     assert_eq!(folder.read("c"), checkpoint, "the same job gives another file");
     for (name, rule) in [
-        ("small.toml", "which names a scene"),
-        ("out.png", "which names an image"),
+        ("small.toml", ".toml files are scenes"),
+        ("out.png", ".png files are images"),
         ("-", "must be a regular file"),
         ("/dev/null", "must be a regular file"),
-        ("x.toml", "which names a scene"),
-        ("x.part", "which names a part"),
+        ("x.toml", ".toml files are scenes"),
+        ("x.part", ".part files are parts of images"),
     ] {
         assert_rejected(&["--checkpoint", name, "--resume"], rule);
     }
@@ -671,7 +671,7 @@ fn parts_merge_to_the_same_image() {
         (&["render", "small.toml", "--tile", "8/7", "-o", "x.part"], "--tile"),
         (
             &["render", "small.toml", "--tile", "1/7", "-o", "x.part"],
-            "parts consist of whole rows, and the image has 6",
+            "the number of parts must not exceed the number of rows, 6",
         ),
         (&["render", "small.toml", "-o", "x.part"], "names a part"),
     ] {

@@ -135,7 +135,7 @@ fn no_input_is_replaced() {
     );
     fs::copy(folder.path("small.toml"), folder.path("scene.png")).unwrap();
     assert_rejected(&folder, &["scene.png"], 2, &format!("scene.png {foreign_rule}"));
-    // An EXR contains its layers: no separate file collides.
+    // An EXR contains its layers, so no separate layer file can collide.
     folder.run_quietly(&[
         "render",
         "tiles.toml",
@@ -189,7 +189,7 @@ fn no_output_is_written_twice() {
         (&["--stats", "Q.EXR"], "--stats: Q.EXR: must not end in .exr"),
         (
             &["--stats", "other.toml"],
-            "--stats: other.toml: must not end in .toml or link to such a file, which names a",
+            "--stats: other.toml: must not end in .toml or link to such a file: .toml files are scenes",
         ),
         (
             &["-o", "other.toml", "--format", "exr"],

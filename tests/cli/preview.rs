@@ -195,7 +195,7 @@ fn a_second_signal_ends_at_once() {
     let child = start(&folder, &["-o", "out.exr", "--device", "cpu"]);
     wait_for(&folder, "out.exr");
     std::thread::sleep(Duration::from_millis(500));
-    // SIGSTOP makes all signals pending before the program continues.
+    // While the program is stopped, signals stay pending. The program then receives all of them at once.
     send("-STOP", &child);
     std::thread::sleep(Duration::from_millis(100));
     let before = folder.read("out.exr");
@@ -237,7 +237,7 @@ fn files_with_more_samples_stay() {
     let result = wait_for_end(child);
     let (samples, _) = partial(&folder.path("new.exr")).expect("a mark");
     assert!(has_pixels_of(&folder, "new.exr", samples, &[]));
-    let fewer_samples = "has 60000 samples per pixel; a preview with fewer does not replace it";
+    let fewer_samples = "has 60000 samples per pixel; a preview with fewer samples does not replace it";
     let foreign = "was not written by wgray; a preview does not replace it, but the complete image will";
     let notes = files.map(|file| match file {
         "other.png" => format!("note: {file}: {foreign}\n"),
@@ -280,7 +280,7 @@ fn files_with_more_samples_stay() {
         (result.code, result.stderr.as_str()),
         (
             0,
-            "note: a.png: has 2 samples per pixel; a preview with fewer does not replace it\n"
+            "note: a.png: has 2 samples per pixel; a preview with fewer samples does not replace it\n"
         )
     );
 }

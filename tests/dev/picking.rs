@@ -42,7 +42,7 @@ f 5 6 7 8
 const MTL: &str = "newmtl bark\nKd 0.4 0.2 0.1\nnewmtl leaf\nKd 0.1 0.5 0.1\n";
 
 fn wait_for_view(session: &TestSession) -> std::sync::Arc<SceneView> {
-    session.wait("a scene", |session| session.inner.seen.borrow().clone())
+    session.wait("a scene", |session| session.inner.scene_views.borrow().clone())
 }
 
 fn groups(object: &Object) -> Vec<&str> {

@@ -284,7 +284,7 @@ fn values_overridden_by_options_cannot_be_set() {
         files.read("scene.toml"),
         SCENE.replace("[0, 0, 0.5]\nradius", "[0, 0, 0.75]\nradius")
     );
-    let view = session.inner.seen.borrow().clone().unwrap();
+    let view = session.inner.scene_views.borrow().clone().unwrap();
     let field = view.object("shapes[0]", None).groups[0]
         .fields
         .iter()

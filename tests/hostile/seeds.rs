@@ -32,7 +32,7 @@ pub enum ReadCommand {
     Scene,
     /// `wgray render` of a scene that consists of [`START`] and this text.
     Named(&'static str),
-    /// `wgray render` as for `Named`, then `wgray diff`.
+    /// `wgray render` of a scene as for `Named`, then `wgray diff` of the file.
     Picture(&'static str),
     Checkpoint,
     Part,

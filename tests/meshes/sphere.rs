@@ -133,7 +133,8 @@ fn a_fine_triangle_mesh_approximates_a_sphere() {
         (0, 0, 0),
         "{result:?}"
     );
-    // Control: a coarse mesh violates these bounds; with vertex normals it satisfies the bounds for its own size.
+    // Control: a coarse flat-shaded mesh violates the bounds of the fine mesh. With vertex normals, the coarse mesh
+    // satisfies the bounds for its own inner radius.
     let coarse = Form::icosphere(2);
     let coarse_counts = classify(&coarse, fine_inner, "flat");
     assert!(

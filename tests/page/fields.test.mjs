@@ -112,7 +112,7 @@ test("a half-typed number stays while other controls come and go", async () => {
   assert.deepEqual(page.errors, []);
 });
 
-test("a half-typed number of a shader stays while sliders come and go, and sliders take their ranges from the file", async () => {
+test("a half-typed value of a shader override stays while sliders are added and removed, and sliders have the ranges in the file", async () => {
   const page = await open(browser, studio);
   const sent = await recordChanges(page);
   const level = number(page, "level");
@@ -359,10 +359,10 @@ test("the sample count of a grid steps from one square number to the next", asyn
   await error.waitFor({ state: "hidden" });
   await page.locator("#notice").waitFor({ state: "hidden" });
   await waitForCount(9);
-  await page.locator("#most-samples").fill("1.5");
+  await page.locator("#max-samples").fill("1.5");
   await page.keyboard.press("Enter");
   await page.locator("#notice.bad", { hasText: "must be a whole number from 1 to 65,536, not 1.5" }).waitFor();
-  assert.equal(await page.locator("#most-samples").inputValue(), "");
+  assert.equal(await page.locator("#max-samples").inputValue(), "");
   // Other patterns accept any count.
   await box(page, "render.pixel_samples.pattern").selectOption("sobol");
   await waitForText('pattern = "sobol", count = 9');

@@ -280,12 +280,12 @@ test("the image is compared with its earlier state, with a kept image and with f
 test("rendering can be paused, limited, reduced in resolution and saved as files", async () => {
   studio.edit("scene.toml", "count = 4 }\nlight", "count = 64 }\nlight");
   const page = await open(browser, studio);
-  await page.fill("#most-samples", "5");
-  await page.press("#most-samples", "Enter");
+  await page.fill("#max-samples", "5");
+  await page.press("#max-samples", "Enter");
   await waitUntilSettled(page);
   await page.locator("#samples", { hasText: /^5 of 5$/ }).waitFor();
-  await page.fill("#most-samples", "");
-  await page.press("#most-samples", "Enter");
+  await page.fill("#max-samples", "");
+  await page.press("#max-samples", "Enter");
   await page.locator("#samples", { hasText: /^64 of 64$/ }).waitFor();
   await page.selectOption("#preview", "4");
   await page.waitForFunction(() => document.getElementById("panels").dataset.sent === "30x23");
@@ -393,7 +393,7 @@ test("a drag is shown at an interactive rate to one viewer and to eleven viewers
     assert.ok(gaps.length > 10 && median < 150, `${median} ms between two frames`);
   };
   await drag();
-  // Ten more viewers, which draw nothing.
+  // Opens ten more viewers, which draw nothing.
   await page.evaluate(() => {
     const viewers = Array.from({ length: 10 }, () => ({ frames: 0 }));
     const opened = viewers.map((viewer) => new Promise((resolve) => {

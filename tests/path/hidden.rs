@@ -60,7 +60,7 @@ fn only_mirrors_show_camera_invisible_emitters() {
             let bright = uncovered().filter(|i| hidden[*i][0] > 3.0).count();
             assert!(
                 bright > 3,
-                "{mode:?}, {integrator}: {bright} pixels of the mirror show the emitter"
+                "{mode:?}, {integrator}: only {bright} pixels of the mirror show the emitter"
             );
             // Behind the hidden emitter, the camera sees the wall.
             let center = 12 * 24 + 12;

@@ -55,7 +55,7 @@ fn area(polygon: &[DVec2]) -> f64 {
     fan.sum::<f64>().abs() / 2.0
 }
 
-/// Clips to a strip along an axis.
+/// Clips a polygon to the strip between two positions along an axis.
 fn clip_to_strip(polygon: &[DVec2], axis: DVec2, from: f64, to: f64) -> Vec<DVec2> {
     clip(&clip(polygon, axis, to), -axis, -from)
 }

@@ -13,12 +13,12 @@ pub enum BadPixel {
 impl BadPixel {
     /// Returns the worst kind of invalid value among `values`; `None` if all values are valid.
     pub fn of(values: &[f32]) -> Option<BadPixel> {
-        let faults = [
+        let kinds = [
             (BadPixel::Nan, values.iter().any(|v| v.is_nan())),
             (BadPixel::Infinite, values.iter().any(|v| v.is_infinite())),
             (BadPixel::Negative, values.iter().any(|v| *v < 0.0)),
         ];
-        faults.into_iter().find(|(_, found)| *found).map(|(fault, _)| fault)
+        kinds.into_iter().find(|(_, found)| *found).map(|(kind, _)| kind)
     }
 
     pub fn color(self) -> [u8; 3] {
@@ -42,7 +42,7 @@ pub struct BadPixels {
     pub infinite: usize,
     /// Pixels with a negative value but no NaN and no infinite value.
     pub negative: usize,
-    /// The location of one invalid pixel per tile.
+    /// The locations of invalid pixels, at most one per tile.
     pub places: Vec<[u32; 2]>,
 }
 

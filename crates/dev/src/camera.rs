@@ -156,12 +156,12 @@ pub fn moved(camera: &CameraDescription, camera_move: Move) -> CameraDescription
     let right = (-offset).cross(up).normalize();
     match camera_move {
         Move::Orbit(x, y) => {
-            let turned = DQuat::from_axis_angle(up, -x) * offset;
+            let rotated_offset = DQuat::from_axis_angle(up, -x) * offset;
             let right = DQuat::from_axis_angle(up, -x) * right;
-            let angle = turned.angle_between(up);
+            let angle = rotated_offset.angle_between(up);
             // A higher viewpoint has a smaller angle to the vertical.
             let new_angle = (angle - y).clamp(MIN_POLE_ANGLE, std::f64::consts::PI - MIN_POLE_ANGLE);
-            position = look_at + DQuat::from_axis_angle(right, new_angle - angle) * turned;
+            position = look_at + DQuat::from_axis_angle(right, new_angle - angle) * rotated_offset;
         }
         Move::Pan(x, y) => {
             let upwards = right.cross(-offset).normalize();
@@ -210,15 +210,15 @@ const DOLLY_RANGE: [f64; 2] = [0.01, 1000.0];
 /// Dollies like [`moved`], but within bounds. At the near bound, the look-at point moves together with the camera; at
 /// the far bound, the camera stops.
 pub fn dollied(camera: &CameraDescription, amount: f64, file: &CameraDescription) -> CameraDescription {
-    let size = |camera: &CameraDescription| match camera {
+    let extent = |camera: &CameraDescription| match camera {
         CameraDescription::Orthographic(c) => c.height,
         camera => {
             let Pose { position, look_at, .. } = pose(camera);
             position.distance(look_at)
         }
     };
-    let [near, far] = DOLLY_RANGE.map(|factor| factor * size(file));
-    let current = size(camera);
+    let [near, far] = DOLLY_RANGE.map(|factor| factor * extent(file));
+    let current = extent(camera);
     let requested = current * (-amount).exp();
     let clamped = requested.max(near.min(current)).min(far.max(current));
     let dollied = moved(camera, Move::Dolly((current / clamped).ln()));

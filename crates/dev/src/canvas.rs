@@ -50,6 +50,7 @@ pub struct Canvas {
     cpu: Film,
     /// The first hits of the rows rendered so far, top row first.
     hits: Vec<FirstHit>,
+    /// True once the image has a result that can be shown.
     shown: bool,
     limits: Limits,
 }
@@ -109,7 +110,7 @@ impl Canvas {
     }
 
     /// Returns whether this scene is being rendered.
-    pub fn shows(&self, scene: &Packed) -> bool {
+    pub fn renders(&self, scene: &Packed) -> bool {
         scene.camera == self.camera && scene.same_but_camera(&self.scene)
     }
 
@@ -174,11 +175,11 @@ impl Canvas {
 
     fn first_scale(&self) -> u32 {
         let pixels = f64::from(self.camera.width) * f64::from(self.camera.height);
-        let affordable = self
+        let affordable_pixels = self
             .steps
             .speed()
             .map_or(COARSE_PIXELS, |speed| speed * COARSE_DURATION.as_secs_f64());
-        ((pixels / affordable.max(1.0)).sqrt().ceil() as u32)
+        ((pixels / affordable_pixels.max(1.0)).sqrt().ceil() as u32)
             .next_power_of_two()
             .min(MAX_SCALE)
             .max(self.final_scale)
@@ -228,7 +229,7 @@ impl Canvas {
         [self.camera.width.div_ceil(scale), self.camera.height.div_ceil(scale)]
     }
 
-    /// Returns true until the stage has a result that can be shown.
+    /// Returns true until the image has a result that can be shown.
     pub fn is_new(&self) -> bool {
         !self.shown
     }
@@ -255,11 +256,11 @@ impl Canvas {
 
     fn step_hits(&mut self, view: View) -> Result<bool, RenderError> {
         let [width, height] = self.final_size();
-        let first = (self.hits.len() / width as usize) as u32;
-        let rows = (HITS_PER_DISPATCH / width).max(1).min(height - first);
+        let first_row = (self.hits.len() / width as usize) as u32;
+        let rows = (HITS_PER_DISPATCH / width).max(1).min(height - first_row);
         let strip = Region {
-            y0: first,
-            y1: first + rows,
+            y0: first_row,
+            y1: first_row + rows,
             ..Region::whole(width, height)
         };
         self.hits.extend(self.gpu.first_hits(strip)?);
@@ -358,12 +359,12 @@ impl Canvas {
 
     /// Returns the current and the final number of samples per pixel.
     pub fn samples(&self) -> (u32, u32) {
-        let so_far = if self.stage.scale == self.final_scale {
+        let samples = if self.stage.scale == self.final_scale {
             self.steps.samples()
         } else {
             0
         };
-        (so_far, self.scene.sampling.pixel_samples.min(self.limits.samples))
+        (samples, self.scene.sampling.pixel_samples.min(self.limits.samples))
     }
 
     /// Returns the number of samples per second; `None` while it is unknown.

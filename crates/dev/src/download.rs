@@ -46,7 +46,7 @@ pub fn exr_file(frame: &Frame) -> io::Result<Vec<u8>> {
             .filter_map(|channel| {
                 let samples = match channel {
                     Channel::Float(_, value) => FlatSamples::F32(hits.iter().map(value).collect()),
-                    Channel::Whole(_, value) => FlatSamples::U32(hits.iter().map(value).collect()),
+                    Channel::Integer(_, value) => FlatSamples::U32(hits.iter().map(value).collect()),
                     Channel::ShadingNormal(_, part) => {
                         FlatSamples::F32(hits.iter().map(|hit| hit.shading_normal[*part]).collect())
                     }

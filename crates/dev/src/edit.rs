@@ -50,7 +50,7 @@ pub fn edited_in(pieces: &Pieces, path: &KeyPath, value: Option<&Value>) -> Resu
 pub struct Layout<'a>(Document<&'a str>);
 
 impl<'a> Layout<'a> {
-    /// Parses a text, if it is TOML.
+    /// Parses a text; returns `None` if the text is not TOML.
     pub fn of(text: &'a str) -> Option<Layout<'a>> {
         Document::parse(text).ok().map(Layout)
     }
@@ -164,9 +164,9 @@ fn edits(text: &str, path: &KeyPath, value: Option<&Value>) -> Result<Vec<Edit>,
             replacement(old, new, &mut edits).ok_or(NO_LOCATION)?;
             Ok(edits)
         }
-        (Some(new), [Segment::Key(key), below @ ..]) => {
+        (Some(new), [Segment::Key(key), sub_path @ ..]) => {
             let mut new_value = literal(new);
-            for segment in below.iter().rev() {
+            for segment in sub_path.iter().rev() {
                 let Segment::Key(key) = segment else {
                     return Err("is not in the scene".to_owned());
                 };
@@ -204,20 +204,20 @@ fn replacement(old: &ParsedValue, new: &Value, edits: &mut Vec<Edit>) -> Option<
 fn addition(text: &str, node_path: &NodePath, path: &[Segment], key: &str, value: &str) -> Result<Edit, String> {
     let node = *node_path.nodes.last().ok_or(NO_LOCATION)?;
     // A table of dotted keys repeats the same prefix before each key.
-    let dots = node_path.nodes.iter().rev().take_while(|node| node.is_dotted()).count();
-    let prefix = KeyPath(path[path.len() - dots..].to_vec()).exact();
-    let dot = if dots > 0 { "." } else { "" };
+    let dotted_tables = node_path.nodes.iter().rev().take_while(|node| node.is_dotted()).count();
+    let prefix = KeyPath(path[path.len() - dotted_tables..].to_vec()).exact();
+    let dot = if dotted_tables > 0 { "." } else { "" };
     let statement = format!("{prefix}{dot}{key} = {value}");
     let is_root = node_path.nodes.len() == 1;
     match node {
         Node::Value(ParsedValue::InlineTable(table)) => {
-            let mut last = None;
-            cover(&mut last, node);
+            let mut extent = None;
+            cover(&mut extent, node);
             let values = table.iter().filter_map(|(_, value)| value.span());
-            Ok(match (values.map(|span| span.end).max(), dots) {
+            Ok(match (values.map(|span| span.end).max(), dotted_tables) {
                 (Some(end), 0) => (end..end, format!(", {statement}")),
                 (Some(_), _) => {
-                    let end = last.ok_or(NO_LOCATION)?.end;
+                    let end = extent.ok_or(NO_LOCATION)?.end;
                     (end..end, format!(", {statement}"))
                 }
                 (None, _) => {
@@ -278,9 +278,9 @@ fn insert_after_line(text: &str, offset: usize, line: &str) -> Edit {
 /// Returns the start of the line that contains the byte `offset`, after a byte-order mark.
 pub fn line_start(text: &str, offset: usize) -> usize {
     let start = text[..offset].rfind('\n').map_or(0, |newline| newline + 1);
-    let mark = '\u{feff}'.len_utf8();
+    let bom_len = '\u{feff}'.len_utf8();
     if start == 0 && text.starts_with('\u{feff}') {
-        mark.min(offset)
+        bom_len.min(offset)
     } else {
         start
     }
@@ -363,7 +363,7 @@ fn body_range(table: &Table) -> Option<Range<usize>> {
     range
 }
 
-/// Extends `range` by everything that belongs to a node.
+/// Extends `range` by the keys and values of a node.
 fn cover(range: &mut Option<Range<usize>>, node: Node) {
     match node {
         Node::Value(value) => match value.as_inline_table().filter(|table| table.is_dotted()) {

@@ -63,7 +63,11 @@ impl Guard {
         if let Ok(address) = address.parse::<IpAddr>() {
             return !self.loopback || address.is_loopback();
         }
-        name.eq_ignore_ascii_case("localhost") || self.name.as_ref().is_some_and(|own| name.eq_ignore_ascii_case(own))
+        name.eq_ignore_ascii_case("localhost")
+            || self
+                .name
+                .as_ref()
+                .is_some_and(|server| name.eq_ignore_ascii_case(server))
     }
 }
 

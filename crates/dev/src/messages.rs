@@ -88,7 +88,7 @@ pub enum Command {
     View(View),
     /// Sets the gain of the difference in [`View::Compare`].
     Gain(f32),
-    /// Marks invalid pixels.
+    /// Shows or hides the marks of invalid pixels.
     Marks(bool),
     /// Moves a slider of the shaders.
     Slide {
@@ -106,7 +106,7 @@ pub enum Command {
     /// Overrides exposure, transform and false colors.
     #[serde(rename = "look")]
     DisplaySettings(DisplayOverrides),
-    /// Pauses after the first image of a change.
+    /// Starts or ends the pause: while paused, only the first image of a change is rendered.
     Pause(bool),
     /// Renders the image again.
     Restart,
@@ -190,8 +190,8 @@ pub struct State {
     pub samples: (Option<NonZeroU32>, u32),
     /// The scale of the preview.
     pub preview: Preview,
-    /// The images to compare with, besides the CPU's: whether an image from before the last change exists, and the
-    /// name of the reference.
+    /// The images that can be compared with, besides the CPU's image: whether an image from before the last change
+    /// exists, and the name of the reference.
     pub comparable: (bool, Option<String>),
     /// The reason if the selected comparison cannot be shown.
     pub no_comparison: Option<String>,
@@ -235,8 +235,8 @@ pub struct Notice {
 }
 
 pub enum Event {
-    /// The files changed: the new state, the time when the change was noticed, and the number of writes by this session
-    /// up to that time.
+    /// The files changed. Contains the new state, the time when the change was noticed, and the number of writes by
+    /// this session up to that time.
     Files(Box<Snapshot>, Instant, u64),
     /// Changed files of the scene are being read, or turned out to be unchanged.
     Reading(bool),

@@ -130,7 +130,7 @@ impl SceneView {
 
     /// Returns the object with this name; `material` comes first among its materials.
     pub fn object(&self, name: &str, material: Option<&str>) -> Object {
-        let (own, imported) = match material {
+        let (file_material, imported) = match material {
             Some(name) if self.loaded.description.materials.contains_key(name) => (material, None),
             _ => (None, material),
         };
@@ -138,7 +138,7 @@ impl SceneView {
         Object {
             material: material.map(str::to_owned),
             note,
-            ..self.with_groups(name, own)
+            ..self.with_groups(name, file_material)
         }
     }
 
@@ -403,9 +403,9 @@ fn name_of_shape(loaded: &Loaded, index: usize) -> (String, Option<String>) {
         "render".to_owned() // unreachable: every imported object is from a file
     };
     let imported = |file: usize| loaded.scene.imported.get(file);
-    let own_shapes = description.shapes.len() - gltf.len();
+    let file_shapes = description.shapes.len() - gltf.len();
     let note = "The object is part of a glTF file, which is read-only here. Run `wgray convert` for an editable scene.";
-    if index < own_shapes {
+    if index < file_shapes {
         let mut shapes = description
             .shapes
             .iter()
@@ -415,7 +415,7 @@ fn name_of_shape(loaded: &Loaded, index: usize) -> (String, Option<String>) {
         return (format!("shapes[{file_index}]"), None);
     }
     let Some(light) = index.checked_sub(loaded.scene.shapes.len()) else {
-        let instance = index - own_shapes;
+        let instance = index - file_shapes;
         return match instance.checked_sub(description.instances.len()) {
             None => (format!("instances[{instance}]"), None),
             Some(imported_index) => {

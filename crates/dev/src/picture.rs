@@ -197,7 +197,7 @@ pub struct Frame {
     pub pictures: Vec<Vec<u8>>,
     /// The pixel values of the images.
     pub content: Content,
-    /// The names for the indices in the values.
+    /// The names of the shapes and materials that the values refer to by index.
     pub names: Names,
     /// The display settings.
     pub display: DisplaySettings,
@@ -357,14 +357,19 @@ fn values<const N: usize>(name: &'static str, values: [f32; N]) -> Vec<(&'static
 }
 
 /// Returns the differences multiplied by `gain`; any difference yields at least a visible minimum.
-fn amplified(gpu: &Pixels, cpu: &Pixels, gain: f32) -> Vec<u8> {
+fn amplified(first: &Pixels, second: &Pixels, gain: f32) -> Vec<u8> {
     const MIN_DIFFERENCE: f32 = 0.2;
-    let pairs: Vec<_> = gpu.colors.iter().copied().zip(cpu.colors.iter().copied()).collect();
-    bytes(&pairs, |(gpu, cpu)| {
-        if gpu.map(f32::to_bits) == cpu.map(f32::to_bits) {
+    let pairs: Vec<_> = first
+        .colors
+        .iter()
+        .copied()
+        .zip(second.colors.iter().copied())
+        .collect();
+    bytes(&pairs, |(first, second)| {
+        if first.map(f32::to_bits) == second.map(f32::to_bits) {
             return Vec3::ZERO;
         }
-        let difference = (Vec3::from(*gpu) - Vec3::from(*cpu)).abs() * gain;
+        let difference = (Vec3::from(*first) - Vec3::from(*second)).abs() * gain;
         // NaN counts as the largest difference.
         let difference = Vec3::select(difference.is_nan_mask(), Vec3::ONE, difference);
         if difference.max_element() < MIN_DIFFERENCE {

@@ -56,27 +56,27 @@ impl Reference {
         })
     }
 
-    /// Returns the pixels at the size `sent`; `None` if the size of the reference is not `full_size`.
-    pub fn at(&self, full_size: [u32; 2], sent: [u32; 2]) -> Option<Pixels> {
+    /// Returns the pixels at a displayed size; `None` if the size of the reference is not `full_size`.
+    pub fn at(&self, full_size: [u32; 2], size: [u32; 2]) -> Option<Pixels> {
         let Pixels { width, height, .. } = *self.pixels;
         if [width, height] != full_size {
             return None;
         }
-        if sent == full_size {
+        if size == full_size {
             return Some((*self.pixels).clone());
         }
         let scaled = ScaledImage {
-            from: sent,
+            from: size,
             to: full_size,
         };
         let color = |i: u32| {
-            let index = scaled.index(i % sent[0], i / sent[0])?;
+            let index = scaled.index(i % size[0], i / size[0])?;
             self.pixels.colors.get(index).copied()
         };
         Some(Pixels {
-            width: sent[0],
-            height: sent[1],
-            colors: (0..sent[0] * sent[1]).map(|i| color(i).unwrap_or_default()).collect(),
+            width: size[0],
+            height: size[1],
+            colors: (0..size[0] * size[1]).map(|i| color(i).unwrap_or_default()).collect(),
         })
     }
 }
@@ -146,7 +146,7 @@ mod tests {
     }
 
     #[test]
-    fn a_png_is_decoded_to_the_light_that_it_displays() {
+    fn a_png_is_decoded_to_the_displayed_light() {
         for transform in [ViewTransform::Gamma22, ViewTransform::Srgb] {
             let view = ViewSettings {
                 transform,

@@ -83,7 +83,7 @@ impl Listener {
             state: session.state.clone(),
             frames: session.frames.clone(),
             times: session.times.clone(),
-            scene_views: session.seen.clone(),
+            scene_views: session.scene_views.clone(),
             send_command: Arc::new(session.commands()),
             submit_reference: Arc::new(session.references()),
             viewer_slots: Arc::new(Semaphore::new(MAX_VIEWERS)),

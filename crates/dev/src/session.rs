@@ -51,7 +51,7 @@ pub struct Session {
     /// The timings of kernels and stages.
     pub times: Times,
     /// The scene and the camera for queries, once a scene is loaded.
-    pub seen: watch::Receiver<Option<Arc<SceneView>>>,
+    pub scene_views: watch::Receiver<Option<Arc<SceneView>>>,
     viewers: Viewers,
     watch: Option<Watch>,
     thread: Option<JoinHandle<()>>,
@@ -88,7 +88,7 @@ pub enum StartError {
     /// The scene file does not exist.
     #[error("{0}: cannot be read: {1}")]
     NoScene(PathBuf, std::io::Error),
-    /// There is no device.
+    /// No device is available.
     #[error(transparent)]
     Device(#[from] RenderError),
     /// The operating system does not allow watching files.
@@ -104,7 +104,7 @@ impl Session {
     ///
     /// # Errors
     ///
-    /// There is no device, the scene file does not exist, or the operating system reports an error.
+    /// No device is available, the scene file does not exist, or the operating system reports an error.
     pub fn start(settings: Settings) -> Result<Session, StartError> {
         let Settings {
             sources,
@@ -135,7 +135,7 @@ impl Session {
         })?;
         let (state_sender, state) = watch::channel(Arc::default());
         let (frame_sender, frames) = watch::channel(None);
-        let (scene_sender, seen) = watch::channel(None);
+        let (scene_sender, scene_views) = watch::channel(None);
         let count = Arc::new(AtomicUsize::new(0));
         let viewer_count = (only_for_viewers && out.is_none()).then(|| count.clone());
         let channels = SessionChannels {
@@ -161,7 +161,7 @@ impl Session {
             state,
             frames,
             times,
-            seen,
+            scene_views,
             watch: Some(watch),
             thread: Some(thread),
         })
@@ -314,9 +314,13 @@ mod tests {
         assert_eq!(problem, Some("device"), "the device was not lost");
 
         // The device is lost while a kernel with invalid shaders is compiled: the session uses the last good shaders.
-        let good = Shaders::built_in().text("kernels/render.wgsl").to_string();
+        let valid_code = Shaders::built_in().text("kernels/render.wgsl").to_string();
         session.events.send(Event::Lose).unwrap();
-        fs::write(path("shaders/kernels/render.wgsl"), good.replace("= sum;", "= sun;")).unwrap();
+        fs::write(
+            path("shaders/kernels/render.wgsl"),
+            valid_code.replace("= sum;", "= sun;"),
+        )
+        .unwrap();
         wait("the shader's error", || {
             session
                 .state
@@ -332,7 +336,7 @@ mod tests {
             Some(finished(&session, third)).filter(|(_, pixels)| *pixels == expected)
         });
         assert_eq!(after_error, expected);
-        fs::write(path("shaders/kernels/render.wgsl"), good).unwrap();
+        fs::write(path("shaders/kernels/render.wgsl"), valid_code).unwrap();
         wait("no error", || session.state.borrow().problems.is_empty().then_some(()));
     }
 

@@ -1,4 +1,4 @@
-//! The files of a session, read in their current state.
+//! The files of a session, and their current states.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -112,7 +112,7 @@ pub fn differ_only_in_layers(a: &Constants, b: &Constants) -> bool {
 pub struct Snapshot {
     pub scene: Result<Arc<Loaded>, Vec<Diagnostic>>,
     pub shaders: Result<Arc<Shaders>, Box<Diagnostic>>,
-    /// Time spent on reading the files, and on packing the scene.
+    /// Time spent on reading the files, and time spent on packing the scene.
     pub durations: [Duration; 2],
     /// All files of the scene, and their states: the scene is read again if a state changes.
     pub files: Vec<(PathBuf, FileStamp)>,
@@ -125,7 +125,7 @@ pub enum FileStamp {
     /// The file cannot be read.
     Absent,
     Content(Vec<u8>),
-    Changed(u64, Option<SystemTime>),
+    Metadata(u64, Option<SystemTime>),
 }
 
 impl FileStamp {
@@ -133,7 +133,7 @@ impl FileStamp {
         match self {
             FileStamp::Absent => 0,
             FileStamp::Content(bytes) => bytes.len() as u64,
-            FileStamp::Changed(size, _) => *size,
+            FileStamp::Metadata(size, _) => *size,
         }
     }
 }
@@ -141,8 +141,8 @@ impl FileStamp {
 impl Sources {
     /// Returns the states of models, meshes and textures in the snapshot, and their current states.
     pub fn assets(&self, snapshot: &Snapshot) -> [Vec<FileStamp>; 2] {
-        let texts = usize::from(!is_model(&self.scene));
-        let files = || snapshot.files.iter().skip(texts);
+        let text_files = usize::from(!is_model(&self.scene));
+        let files = || snapshot.files.iter().skip(text_files);
         let old = files().map(|(_, stamp)| stamp.clone()).collect();
         [old, files().map(|(path, _)| self.stamp(path)).collect()]
     }
@@ -261,7 +261,7 @@ impl Sources {
             return read_bytes(path).map_or(FileStamp::Absent, FileStamp::Content);
         }
         fs::metadata(path).map_or(FileStamp::Absent, |data| {
-            FileStamp::Changed(data.len(), data.modified().ok())
+            FileStamp::Metadata(data.len(), data.modified().ok())
         })
     }
 

@@ -45,7 +45,7 @@ pub struct Time {
     pub last: f64,
     /// The median of the last measurements, in seconds.
     pub median: f64,
-    /// The fraction of the last second, from 0 to 1; above 1 if several threads work at the same stage.
+    /// The fraction of the last second spent in the kernel or stage; above 1 if several threads work at the same stage.
     pub share: f64,
     /// Samples of a kernel's last dispatch.
     pub samples: u64,
@@ -56,8 +56,9 @@ pub struct Time {
 #[derive(Debug)]
 struct TimeRecord {
     time: Time,
-    last: VecDeque<Duration>,
-    /// End time and duration of the last measurements.
+    /// Durations of the last measurements, for the median.
+    durations: VecDeque<Duration>,
+    /// End time and duration of the measurements in the last second, for the share.
     ended: VecDeque<(Instant, Duration)>,
 }
 
@@ -96,10 +97,10 @@ impl Times {
         if let Some(dispatch) = dispatch {
             (record.time.samples, record.time.by_device) = (dispatch.samples, dispatch.by_device);
         }
-        record.last.push_back(duration);
+        record.durations.push_back(duration);
         record.ended.push_back((Instant::now(), duration));
-        while record.last.len() > MEDIAN_COUNT {
-            record.last.pop_front();
+        while record.durations.len() > MEDIAN_COUNT {
+            record.durations.pop_front();
         }
         let has_old = |ended: &VecDeque<(Instant, Duration)>| {
             ended.len() > MAX_RECENT || ended.front().is_some_and(|(end, _)| end.elapsed() > WINDOW)
@@ -133,20 +134,20 @@ impl TimeRecord {
                 samples: 0,
                 by_device: false,
             },
-            last: VecDeque::new(),
+            durations: VecDeque::new(),
             ended: VecDeque::new(),
         }
     }
 
     fn timing(&self, now: Instant) -> Time {
-        let mut last: Vec<Duration> = self.last.iter().copied().collect();
-        last.sort();
+        let mut durations: Vec<Duration> = self.durations.iter().copied().collect();
+        durations.sort();
         let seconds_in_window = |(end, duration): &(Instant, Duration)| {
             let since_start = WINDOW.saturating_sub(now.saturating_duration_since(*end));
             (*duration).min(since_start).as_secs_f64()
         };
         Time {
-            median: last.get(last.len() / 2).map_or(0.0, Duration::as_secs_f64),
+            median: durations.get(durations.len() / 2).map_or(0.0, Duration::as_secs_f64),
             share: self.ended.iter().map(seconds_in_window).sum::<f64>() / WINDOW.as_secs_f64(),
             ..self.time.clone()
         }

@@ -106,7 +106,8 @@ enum Reply<'a> {
     Object(Box<Object>),
     Objects(ObjectList),
     /// The number of an accepted command: [`messages::State::executed`] reaches this number after the command.
-    Asked(u64),
+    #[serde(rename = "asked")]
+    Accepted(u64),
     #[serde(rename = "refused")]
     Refusal(String),
     Times(&'a [Time]),
@@ -144,7 +145,7 @@ async fn receive(
             Ok(Request::Question(question)) => answer(question, shared).await,
             Ok(Request::Command(command)) => {
                 let busy = || Reply::Refusal("busy: the command was dropped".to_string());
-                (shared.send_command)(command).map_or_else(busy, Reply::Asked)
+                (shared.send_command)(command).map_or_else(busy, Reply::Accepted)
             }
             Err(error) => Reply::Refusal(format!("not understood: {error}")),
         };
@@ -169,9 +170,9 @@ async fn send(
     let mut in_flight = VecDeque::new();
     let mut last_state: Option<Instant> = None;
     loop {
-        let has_room = in_flight.len() < MAX_FRAMES_IN_FLIGHT;
+        let can_send_frame = in_flight.len() < MAX_FRAMES_IN_FLIGHT;
         let pause = last_state.map_or(Duration::ZERO, |last| STATE_INTERVAL.saturating_sub(last.elapsed()));
-        let must_pause = !has_room && !pause.is_zero();
+        let must_pause = !can_send_frame && !pause.is_zero();
         let message = tokio::select! {
             biased;
             reply = answers.recv() => text(&reply?)?,
@@ -189,7 +190,7 @@ async fn send(
             }
             () = sleep(pause), if must_pause => continue,
             _ = ping.tick() => Message::Ping(Vec::new().into()),
-            changed = frames.changed(), if has_room => {
+            changed = frames.changed(), if can_send_frame => {
                 changed.ok()?;
                 let Some(frame) = frames.borrow_and_update().clone() else { continue };
                 in_flight.push_back(frame.header.number);

@@ -37,10 +37,10 @@ const LARGE_BYTES: u64 = 1 << 20;
 pub struct Writes {
     pub count: u64,
     /// The scene after the last change, and its files, until the watcher uses them as its last state.
-    pub known: Option<KnownScene>,
+    pub written_scene: Option<WrittenScene>,
 }
 
-pub type KnownScene = (Arc<Loaded>, Vec<(PathBuf, FileStamp)>);
+pub type WrittenScene = (Arc<Loaded>, Vec<(PathBuf, FileStamp)>);
 
 enum Wake {
     /// The content of a file may have changed.
@@ -126,11 +126,11 @@ fn run(
         };
         let woken = Instant::now();
         let mut next = Ok(wake);
-        let mut names = false;
+        let mut names_changed = false;
         loop {
             match next {
                 Ok(Wake::Content) => {}
-                Ok(Wake::Names) => names = true,
+                Ok(Wake::Names) => names_changed = true,
                 Err(RecvTimeoutError::Timeout) => break,
                 Ok(Wake::Stop) | Err(RecvTimeoutError::Disconnected) => return,
             }
@@ -151,17 +151,17 @@ fn run(
                 let [_, current] = sources.assets(&last);
                 current
             }) {
-                Some(names_changed) => names |= names_changed,
+                Some(changed) => names_changed |= changed,
                 None => return,
             }
         }
-        if names {
+        if names_changed {
             folders.forget(); // a folder may have been replaced by a new one of the same name
         }
         folders.follow(sources, &last);
         let count = {
             let mut writes = writes.lock().unwrap_or_else(PoisonError::into_inner);
-            if let Some((scene, files)) = writes.known.take() {
+            if let Some((scene, files)) = writes.written_scene.take() {
                 (last.scene, last.files) = (Ok(scene), files);
             }
             writes.count
@@ -193,11 +193,11 @@ fn run(
 /// the watch ends.
 fn wait_settled(wakes: &Receiver<Wake>, mut old: Vec<FileStamp>, stamps: impl Fn() -> Vec<FileStamp>) -> Option<bool> {
     let start = Instant::now();
-    let (mut last_change, mut names) = (start, false);
+    let (mut last_change, mut names_changed) = (start, false);
     loop {
         match wakes.recv_timeout(WRITE_SETTLE_TIME.saturating_sub(last_change.elapsed())) {
             Ok(Wake::Stop) | Err(RecvTimeoutError::Disconnected) => return None,
-            Ok(Wake::Names) => names = true,
+            Ok(Wake::Names) => names_changed = true,
             Ok(Wake::Content) | Err(RecvTimeoutError::Timeout) => {}
         }
         // An event may come from a different file in these folders.
@@ -205,10 +205,10 @@ fn wait_settled(wakes: &Receiver<Wake>, mut old: Vec<FileStamp>, stamps: impl Fn
         if new != old {
             (old, last_change) = (new, Instant::now());
         } else if last_change.elapsed() >= WRITE_SETTLE_TIME {
-            return Some(names);
+            return Some(names_changed);
         }
         if start.elapsed() >= MAX_WRITE_SETTLE_TIME {
-            return Some(names);
+            return Some(names_changed);
         }
     }
 }

@@ -33,7 +33,7 @@ const OUTSET_INVERSE: [[f64; 3]; 3] = [
 ];
 
 /// Middle gray.
-const MIDDLE: f64 = 0.18;
+const MIDDLE_GRAY: f64 = 0.18;
 /// Dynamic range of the curve, in stops below and above middle gray.
 const STOPS_BELOW: f64 = 10.0;
 const STOPS_ABOVE: f64 = 6.5;
@@ -47,15 +47,15 @@ const HUE: f64 = 0.4;
 
 /// Returns linear display light, possibly out of gamut, for linear scene light >= 0.
 pub(super) fn agx(light: Rgb) -> Rgb {
-    let light = *INWARDS * DVec3::from(light);
-    let shown = light.map(|value| curve(log_position(value)).powf(POWER));
-    let shown = with_hue(shown, mix_hues(hue(light), hue(shown), HUE));
-    (*OUTWARDS * shown).into()
+    let light = *TO_CURVE_SPACE * DVec3::from(light);
+    let displayed = light.map(|value| curve(log_position(value)).powf(POWER));
+    let displayed = with_hue(displayed, mix_hues(hue(light), hue(displayed), HUE));
+    (*FROM_CURVE_SPACE * displayed).into()
 }
 
 /// Linear Rec. 709 to the space of the curve, and back.
-static INWARDS: LazyLock<DMat3> = LazyLock::new(|| matrix(INSET) * matrix(TO_REC2020));
-static OUTWARDS: LazyLock<DMat3> = LazyLock::new(|| (matrix(OUTSET_INVERSE) * matrix(TO_REC2020)).inverse());
+static TO_CURVE_SPACE: LazyLock<DMat3> = LazyLock::new(|| matrix(INSET) * matrix(TO_REC2020));
+static FROM_CURVE_SPACE: LazyLock<DMat3> = LazyLock::new(|| (matrix(OUTSET_INVERSE) * matrix(TO_REC2020)).inverse());
 
 fn matrix(rows: [[f64; 3]; 3]) -> DMat3 {
     DMat3::from_cols_array_2d(&rows).transpose()
@@ -63,13 +63,13 @@ fn matrix(rows: [[f64; 3]; 3]) -> DMat3 {
 
 /// Logarithmic position of a value in the dynamic range, 0 to 1.
 fn log_position(value: f64) -> f64 {
-    let stops = (value / MIDDLE).log2(); // -inf for 0
+    let stops = (value / MIDDLE_GRAY).log2(); // -inf for 0
     ((stops + STOPS_BELOW) / (STOPS_BELOW + STOPS_ABOVE)).clamp(0.0, 1.0)
 }
 
 /// Sigmoid from (0, 0) to (1, 1), steepest at middle gray; middle gray is a fixed point.
 fn curve(x: f64) -> f64 {
-    let Halves { below, above } = &*HALVES;
+    let BranchScales { below, above } = &*BRANCH_SCALES;
     let (middle, gray) = pivot();
     match x >= middle {
         true => (gray + branch(x - middle, *above)).min(1.0),
@@ -82,21 +82,21 @@ fn pivot() -> (f64, f64) {
     (STOPS_BELOW / (STOPS_BELOW + STOPS_ABOVE), *GRAY)
 }
 
-static GRAY: LazyLock<f64> = LazyLock::new(|| MIDDLE.powf(1.0 / POWER));
+static GRAY: LazyLock<f64> = LazyLock::new(|| MIDDLE_GRAY.powf(1.0 / POWER));
 
 /// Scales of the two branches of the curve, below and above middle gray.
-struct Halves {
+struct BranchScales {
     below: f64,
     above: f64,
 }
 
-static HALVES: LazyLock<Halves> = LazyLock::new(|| {
+static BRANCH_SCALES: LazyLock<BranchScales> = LazyLock::new(|| {
     let scale = |width: f64, height: f64| {
         let scaled_width = SLOPE * width;
         (scaled_width.powf(-BEND) * ((scaled_width / height).powf(BEND) - 1.0)).powf(-1.0 / BEND)
     };
     let (middle, gray) = pivot();
-    Halves {
+    BranchScales {
         below: scale(middle, gray),
         above: scale(1.0 - middle, 1.0 - gray),
     }

@@ -62,7 +62,7 @@ impl Pending {
         let name = output.name().to_owned();
         let spool = match output.destination {
             Destination::File { path, existing } => {
-                beside(&path).map(|file| Spool::Named(file, path, existing.map(|(_, permissions)| permissions)))
+                create_beside(&path).map(|file| Spool::Named(file, path, existing.map(|(_, permissions)| permissions)))
             }
             Destination::Special { file: Some(file), .. } => spool_anonymously(file),
             Destination::Special { path, file: None, .. } => open(&path).and_then(spool_anonymously),
@@ -106,10 +106,10 @@ impl Pending {
                 file.persist(path)?;
                 Ok(())
             }
-            Spool::Anonymous(mut file, mut to) => {
+            Spool::Anonymous(mut file, mut target) => {
                 file.seek(SeekFrom::Start(0))?;
-                io::copy(&mut file, &mut to)?;
-                to.flush()
+                io::copy(&mut file, &mut target)?;
+                target.flush()
             }
         });
         result.map_err(|error| with_name(&self.name, &error))
@@ -143,7 +143,7 @@ impl Seek for Pending {
     }
 }
 
-fn spool_anonymously(to: File) -> io::Result<Spool> {
+fn spool_anonymously(target: File) -> io::Result<Spool> {
     let folder = std::env::temp_dir();
     let spool = tempfile::tempfile_in(&folder).map_err(|error| {
         let folder = folder.display();
@@ -152,7 +152,7 @@ fn spool_anonymously(to: File) -> io::Result<Spool> {
             format!("cannot create a temporary file in {folder} (TMPDIR): {error}"),
         )
     });
-    Ok(Spool::Anonymous(spool?, to))
+    Ok(Spool::Anonymous(spool?, target))
 }
 
 /// Maximum part of the target's name in a temporary name, in bytes.
@@ -199,7 +199,7 @@ const RANDOM_LEN: usize = 6;
 /// # Errors
 ///
 /// The folder cannot be written.
-pub fn beside(path: &Path) -> io::Result<NamedTempFile> {
+pub fn create_beside(path: &Path) -> io::Result<NamedTempFile> {
     let folder = path.parent().unwrap_or(Path::new("."));
     let name = TemporaryName::of(path);
     remove_stale(folder, &name);

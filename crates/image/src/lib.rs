@@ -19,7 +19,7 @@ mod view;
 
 pub use complete::is_complete;
 pub use difference::{Difference, difference};
-pub use file::{Pending, beside, remove_stale_beside};
+pub use file::{Pending, create_beside, remove_stale_beside};
 pub use output::Output;
 pub use pixels::Pixels;
 pub use region::Region;

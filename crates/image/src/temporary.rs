@@ -28,8 +28,8 @@ pub(super) fn register(path: &Path) {
 
 /// Removes the registered files, without allocating.
 pub fn remove_temporary_files() {
-    const ATTEMPTS: usize = 1000;
-    for _ in 0..ATTEMPTS {
+    const MAX_ATTEMPTS: usize = 1000;
+    for _ in 0..MAX_ATTEMPTS {
         let names = match NAMES.try_lock() {
             Ok(names) => names,
             Err(TryLockError::Poisoned(names)) => names.into_inner(),

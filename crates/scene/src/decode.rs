@@ -98,7 +98,7 @@ pub(super) enum DecodeError {
     Channels(Channels),
 }
 
-/// The channels of an EXR file that has no supported channels.
+/// The channels of an EXR file without supported channels, for the error message.
 pub(super) struct Channels {
     /// The channel names in all layers.
     pub names: Vec<String>,

@@ -1,23 +1,23 @@
 //! Ranges of the values of scene files, for validation (`validate`) and the JSON Schema (`schema`).
 
-pub(super) const COORDINATES: (f64, f64) = (-FARTHEST, FARTHEST);
+pub(super) const COORDINATES: (f64, f64) = (-MAX_COORDINATE, MAX_COORDINATE);
 /// Maximum absolute coordinate.
-pub(super) const FARTHEST: f64 = 1e9;
+pub(super) const MAX_COORDINATE: f64 = 1e9;
 pub(super) const LENGTHS: (f64, f64) = (1e-9, 1e9);
 /// Range of color components.
-pub(super) const COLORS: (f64, f64) = (0.0, BRIGHTEST);
+pub(super) const COLORS: (f64, f64) = (0.0, MAX_COLOR);
 /// Maximum component of a color.
-pub(super) const BRIGHTEST: f64 = 1e6;
-pub(super) const SHARES: (f64, f64) = (0.0, 1.0);
+pub(super) const MAX_COLOR: f64 = 1e6;
+pub(super) const FRACTIONS: (f64, f64) = (0.0, 1.0);
 /// Rotation angles in degrees.
-pub(super) const TURNS: (f64, f64) = (-360.0, 360.0);
+pub(super) const ROTATIONS: (f64, f64) = (-360.0, 360.0);
 
 /// Maximum number of pixels along a side of the image, and of samples.
-pub(super) const MOST: u32 = 65_536;
+pub(super) const MAX_COUNT: u32 = 65_536;
 /// Minimum number of samples for an error estimate.
 pub(super) const MIN_ADAPTIVE_SAMPLES: u32 = 2;
 /// Maximum number of bounces of a path.
-pub(super) const DEEPEST: u32 = 1024;
+pub(super) const MAX_DEPTH: u32 = 1024;
 /// Maximum contributions of a sample.
 pub(super) const CLAMPS: (f64, f64) = (1e-6, 1e6);
 /// Offsets of ray origins above a surface, relative to the largest coordinate of the surface point.

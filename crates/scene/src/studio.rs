@@ -19,7 +19,7 @@ const EDGE: f64 = 0.15;
 
 /// A rectangular emitter at a distance of 1.
 struct Emitter {
-    /// Direction to the center; any length.
+    /// Direction to the center, not normalized.
     towards: DVec3,
     /// Half of the width, and half of the height.
     half: [f64; 2],

@@ -130,7 +130,7 @@ impl Frustum {
             ..
         } = scene.camera;
         let (width, height) = (f64::from(scene.width), f64::from(scene.height));
-        // The filter extends beyond the image; one more pixel allows for rounding errors.
+        // The filter reaches beyond the image by its radius; one more pixel covers rounding errors.
         let margin = 2.0 * (scene.render.filter.radius + 1.0);
         let extents = |half: f64| (half * (width + margin) / height, half * (height + margin) / height);
         // At depth d, a ray through a lens with radius r and focus distance f is at most r (1 + d / f) from the central

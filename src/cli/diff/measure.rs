@@ -17,14 +17,14 @@ pub fn measure(
 ) -> (LayerReport, Option<Flip>) {
     let found = layer.difference(b.width, b.height, threshold);
     let has_colors = layer.name == COLOR && a.colors().is_some() && b.colors().is_some();
-    let is_wanted = |metric: Metric| metrics.contains(&metric) && has_colors;
+    let is_requested = |metric: Metric| metrics.contains(&metric) && has_colors;
     let is_same = found.different == 0;
-    let ssim = match (is_wanted(Metric::Ssim), is_same) {
+    let ssim = match (is_requested(Metric::Ssim), is_same) {
         (true, true) => Some(1.0),
         (true, false) => compare::ssim(a, b),
         (false, _) => None,
     };
-    let (flip, map) = match (is_wanted(Metric::Flip), is_same, step) {
+    let (flip, map) = match (is_requested(Metric::Flip), is_same, step) {
         (true, true, None) => (Some(0.0), None),
         (true, ..) => {
             let flip = compare::flip(a, b, ppd, step);
@@ -33,14 +33,14 @@ pub fn measure(
         (false, ..) => (None, None),
     };
     let pixels = b.pixels();
-    let plain = |metric: Metric, value: f64| metrics.contains(&metric).then_some(Number(value));
+    let if_requested = |metric: Metric, value: f64| metrics.contains(&metric).then_some(Number(value));
     let report = LayerReport {
         name: layer.name.clone(),
         channels: layer.channels.iter().map(|(name, ..)| (*name).to_owned()).collect(),
         pixels: pixels as u64,
         different: found.different,
         first: found.first.map(Into::into),
-        largest: plain(
+        largest: if_requested(
             Metric::Largest,
             found.largest.as_ref().map_or(0.0, |largest| largest.difference),
         ),
@@ -48,10 +48,10 @@ pub fn measure(
             true => found.largest.map(Into::into),
             false => None,
         },
-        share: plain(Metric::Share, found.beyond as f64 / pixels as f64),
-        rmse: plain(Metric::Rmse, found.rmse),
-        rel_mse: plain(Metric::RelMse, found.rel_mse),
-        psnr: plain(Metric::Psnr, found.psnr),
+        share: if_requested(Metric::Share, found.beyond as f64 / pixels as f64),
+        rmse: if_requested(Metric::Rmse, found.rmse),
+        rel_mse: if_requested(Metric::RelMse, found.rel_mse),
+        psnr: if_requested(Metric::Psnr, found.psnr),
         ssim: ssim.map(Number),
         flip: flip.map(Number),
         not_finite: match found.first_non_finite {

@@ -47,11 +47,11 @@ impl Metric {
     }
 
     /// Returns whether the metric needs red, green and blue.
-    pub fn is_of_colors(self) -> bool {
+    pub fn needs_colors(self) -> bool {
         matches!(self, Metric::Ssim | Metric::Flip)
     }
 
-    fn is_likeness(self) -> bool {
+    fn is_similarity(self) -> bool {
         matches!(self, Metric::Psnr | Metric::Ssim)
     }
 
@@ -92,7 +92,7 @@ impl Limit {
 
     /// Returns "above" or "below" if a value is worse than the limit.
     pub fn exceeded(self, value: f64) -> Option<&'static str> {
-        match self.metric.is_likeness() {
+        match self.metric.is_similarity() {
             true => (!(value >= self.worst)).then_some("below"),
             false => (!(value <= self.worst)).then_some("above"),
         }
@@ -109,10 +109,10 @@ mod tests {
         assert_eq!(Limit::parse("rmse=0"), limit(Metric::Rmse, 0.0));
         assert_eq!(Limit::parse("ssim=-1"), limit(Metric::Ssim, -1.0));
         assert_eq!(Limit::parse("psnr=-3.5"), limit(Metric::Psnr, -3.5));
-        for wrong in [
+        for invalid in [
             "rmse", "rmse=", "rmse=-1", "rmse=nan", "psnr=inf", "flip=1.1", "ssim=2", "mse=1", "=1",
         ] {
-            assert!(Limit::parse(wrong).is_err(), "{wrong}");
+            assert!(Limit::parse(invalid).is_err(), "{invalid}");
         }
     }
 

@@ -27,8 +27,8 @@ docs/golden-pictures.md defines the metrics.";
 
 /// Exit code if the images differ.
 const DIFFER: u8 = 5;
-/// Maximum number of pixels for which FLIP is computed by default. It takes a microsecond per pixel, several for linear
-/// images.
+/// Maximum number of pixels for which FLIP is computed by default. FLIP takes one microsecond per pixel of a display
+/// image, and several per pixel of a linear image.
 const MAX_FLIP_PIXELS: u64 = 1 << 24;
 
 #[derive(Debug, clap::Args)]
@@ -103,22 +103,22 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if args.a.as_os_str() == "-" && args.b.as_os_str() == "-" {
         return Err(Usage("-: only one of the images can be standard input".to_owned()).into());
     }
-    let out = args.out.as_deref().map(|path| find_out(path, &args)).transpose()?;
+    let out = args.out.as_deref().map(|path| find_output(path, &args)).transpose()?;
     let (a, b) = (read(&args.a)?, read(&args.b)?);
     let mut report = Report::new([&args.a, &args.b].map(|path| name(path)), &a, &b);
-    let (mut a, mut b) = alike(a, b, &mut report)?;
-    choose(&args.layers, &mut a, &mut b)?;
+    let (mut a, mut b) = to_same_kind(a, b, &mut report)?;
+    select_layers(&args.layers, &mut a, &mut b)?;
     let mut shown = None;
     if (a.width, a.height, a.position) == (b.width, b.height, b.position) {
         let (layers, only_a, only_b) = compare::layers(&a, &b);
         report.set_only(&only_a, &only_b);
-        let asked: Vec<Metric> = args
+        let requested: Vec<Metric> = args
             .metrics
             .iter()
             .copied()
             .chain(args.fail.iter().map(|limit| limit.metric))
             .collect();
-        if let Some(metric) = asked.iter().find(|metric| metric.is_of_colors())
+        if let Some(metric) = requested.iter().find(|metric| metric.needs_colors())
             && !(has_colors(&a) && has_colors(&b))
         {
             return Err(Usage(format!(
@@ -127,18 +127,18 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             .into());
         }
         let ppd = args.ppd.unwrap_or(compare::PIXELS_PER_DEGREE);
-        let metrics = wanted(&args, &b, &asked, &mut report);
-        // The first layer that differs.
-        let mut best: Option<(usize, Option<Flip>)> = None;
+        let metrics = select_metrics(&args, &b, &requested, &mut report);
+        // The first layer that differs, or the first layer if none differs.
+        let mut displayed: Option<(usize, Option<Flip>)> = None;
         for (i, layer) in layers.iter().enumerate() {
             let step = out.is_some().then(|| compare::step(&b));
             let (found, flip) = measure(layer, &a, &b, &metrics, args.threshold, ppd, step);
-            if best.is_none() || found.is_different() && !report.is_different() {
-                best = Some((i, flip));
+            if displayed.is_none() || found.is_different() && !report.is_different() {
+                displayed = Some((i, flip));
             }
             report.layers.push(found);
         }
-        shown = best.and_then(|(i, flip)| Some((layers.get(i)?.clone(), flip)));
+        shown = displayed.and_then(|(i, flip)| Some((layers.get(i)?.clone(), flip)));
         report.metrics = metrics;
     }
     report.judge(&args.fail, args.threshold);
@@ -172,7 +172,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         true => ExitCode::SUCCESS,
         false => ExitCode::from(DIFFER),
     };
-    Ok(super::ended(printed, code))
+    Ok(super::finish_output(printed, code))
 }
 
 fn name(path: &Path) -> String {
@@ -192,30 +192,30 @@ fn has_colors(picture: &Picture) -> bool {
 
 /// Converts a linear image to display values if the other image has display values. Display images without alpha are
 /// opaque.
-fn alike(a: Picture, b: Picture, report: &mut Report) -> anyhow::Result<(Picture, Picture)> {
-    let mut shown = |linear: Picture, bits: u8, name: String| -> anyhow::Result<Picture> {
+fn to_same_kind(a: Picture, b: Picture, report: &mut Report) -> anyhow::Result<(Picture, Picture)> {
+    let mut to_display = |linear: Picture, bits: u8, name: String| -> anyhow::Result<Picture> {
         let displayed = linear
             .displayed(bits)
             .ok_or_else(|| anyhow::anyhow!("{name}: has no color channels (R, G and B, or Y) to compare with a PNG"))?;
-        let left: Vec<&str> = linear.channels.iter().map(|channel| channel.name.as_str()).collect();
-        let left: Vec<&str> = left.into_iter().filter(|name| layer_of(name) != COLOR).collect();
-        let left = match left.is_empty() {
+        let names = linear.channels.iter().map(|channel| channel.name.as_str());
+        let omitted: Vec<&str> = names.filter(|name| layer_of(name) != COLOR).collect();
+        let omitted = match omitted.is_empty() {
             true => String::new(),
-            false => format!("; not compared: {}", left.join(" ")),
+            false => format!("; not compared: {}", omitted.join(" ")),
         };
         report.notes.push(format!(
-            "{name}: linear; converted to a PNG with {bits} bits and gamma22 for the comparison{left}"
+            "{name}: linear; converted to a PNG with {bits} bits and gamma22 for the comparison{omitted}"
         ));
         Ok(displayed)
     };
     let (a, b) = match (a.kind, b.kind) {
         (Kind::Linear, Kind::Display { bits }) => {
             let name = report.a.clone();
-            (shown(a, bits, name)?, b)
+            (to_display(a, bits, name)?, b)
         }
         (Kind::Display { bits }, Kind::Linear) => {
             let name = report.b.clone();
-            (a, shown(b, bits, name)?)
+            (a, to_display(b, bits, name)?)
         }
         _ => (a, b),
     };
@@ -228,48 +228,48 @@ fn alike(a: Picture, b: Picture, report: &mut Report) -> anyhow::Result<(Picture
 }
 
 /// Removes layers that were not requested.
-fn choose(layers: &[String], a: &mut Picture, b: &mut Picture) -> Result<(), Usage> {
+fn select_layers(layers: &[String], a: &mut Picture, b: &mut Picture) -> Result<(), Usage> {
     if layers.is_empty() {
         return Ok(());
     }
-    let mut known: Vec<String> = Vec::new();
+    let mut available: Vec<String> = Vec::new();
     for channel in a.channels.iter().chain(&b.channels) {
         let layer = layer_of(&channel.name).to_owned();
-        if !known.contains(&layer) {
-            known.push(layer);
+        if !available.contains(&layer) {
+            available.push(layer);
         }
     }
-    if let Some(unknown) = layers.iter().find(|layer| !known.contains(layer)) {
-        let known = known.join(", ");
+    if let Some(unknown) = layers.iter().find(|layer| !available.contains(layer)) {
+        let available = available.join(", ");
         return Err(Usage(format!(
-            "--layers: {unknown}: must be a layer of the images: {known}"
+            "--layers: {unknown}: must be a layer of the images: {available}"
         )));
     }
     for picture in [a, b] {
-        let is_asked = |name: &str| layers.iter().any(|layer| layer == layer_of(name));
-        picture.channels.retain(|channel| is_asked(&channel.name));
+        let is_requested = |name: &str| layers.iter().any(|layer| layer == layer_of(name));
+        picture.channels.retain(|channel| is_requested(&channel.name));
     }
     Ok(())
 }
 
 /// Returns the metrics to compute.
-fn wanted(args: &Args, picture: &Picture, asked: &[Metric], report: &mut Report) -> Vec<Metric> {
+fn select_metrics(args: &Args, picture: &Picture, requested: &[Metric], report: &mut Report) -> Vec<Metric> {
     let is_large = picture.pixels() as u64 > MAX_FLIP_PIXELS;
-    let is_wanted = |metric: &Metric| match args.metrics.is_empty() {
-        false => asked.contains(metric),
-        true => asked.contains(metric) || *metric != Metric::Flip || !is_large,
+    let is_selected = |metric: &Metric| match args.metrics.is_empty() {
+        false => requested.contains(metric),
+        true => requested.contains(metric) || *metric != Metric::Flip || !is_large,
     };
-    let wanted: Vec<Metric> = METRICS.into_iter().filter(is_wanted).collect();
-    if args.metrics.is_empty() && !wanted.contains(&Metric::Flip) {
+    let selected: Vec<Metric> = METRICS.into_iter().filter(is_selected).collect();
+    if args.metrics.is_empty() && !selected.contains(&Metric::Flip) {
         report
             .notes
             .push("flip: omitted for an image this large; pass --metrics flip to compute it".to_owned());
     }
-    wanted
+    selected
 }
 
 /// Returns the output, which must be a PNG and replace neither input.
-fn find_out<'a>(path: &'a Path, args: &Args) -> anyhow::Result<(Output, &'a Path)> {
+fn find_output<'a>(path: &'a Path, args: &Args) -> anyhow::Result<(Output, &'a Path)> {
     let name = path.display();
     if path.as_os_str() == "-" {
         return Err(Usage("--out: -: standard output receives the report; choose a file".to_owned()).into());
@@ -295,21 +295,21 @@ fn find_out<'a>(path: &'a Path, args: &Args) -> anyhow::Result<(Output, &'a Path
 
 fn write(output: Output, a: &Picture, b: &Picture, layer: &Layer, flip: Option<Flip>) -> Result<(), RenderError> {
     let shown = compare::show(a, b, layer, flip.and_then(|flip| flip.map));
-    let plain = |error: EncodingError| match error {
+    let io_error = |error: EncodingError| match error {
         EncodingError::IoError(error) => error,
-        other => io::Error::other(other),
+        error => io::Error::other(error),
     };
     let mut pending = Pending::start(output)?;
     let mut png = Encoder::new(&mut pending, shown.width as u32, shown.height as u32);
     png.set_color(ColorType::Rgb);
     png.set_depth(BitDepth::Eight);
     png.set_compression(Compression::Fast);
-    let mut writer = png.write_header().map_err(plain)?;
-    let mut stream = writer.stream_writer().map_err(plain)?;
+    let mut writer = png.write_header().map_err(io_error)?;
+    let mut stream = writer.stream_writer().map_err(io_error)?;
     for y in 0..shown.height {
         stream.write_all(&shown.row(y))?;
     }
-    stream.finish().map_err(plain)?;
-    writer.finish().map_err(plain)?;
+    stream.finish().map_err(io_error)?;
+    writer.finish().map_err(io_error)?;
     Ok(pending.finish()?)
 }

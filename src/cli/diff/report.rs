@@ -3,7 +3,7 @@
 use std::fmt;
 
 use serde::{Serialize, Serializer};
-use wgray_image::compare::{LargestDifference, Picture, PixelCoord, Values};
+use wgray_image::compare::{LargestDifference, NonFiniteCounts, Picture, PixelCoord};
 
 use super::metric::{Limit, METRICS, Metric};
 
@@ -15,7 +15,7 @@ pub struct Report {
     pub b: String,
     size_a: [u32; 2],
     size_b: [u32; 2],
-    /// Positions of the images' top left pixels in the whole image.
+    /// Positions of the images' top left pixels in the full image.
     #[serde(skip)]
     positions: [(i32, i32); 2],
     /// True if the exit code is 0.
@@ -107,8 +107,8 @@ pub struct NotFinite {
     first: PixelReport,
 }
 
-impl From<(Values, Values, PixelCoord)> for NotFinite {
-    fn from((a, b, first): (Values, Values, PixelCoord)) -> Self {
+impl From<(NonFiniteCounts, NonFiniteCounts, PixelCoord)> for NotFinite {
+    fn from((a, b, first): (NonFiniteCounts, NonFiniteCounts, PixelCoord)) -> Self {
         NotFinite {
             nan_a: a.nan,
             nan_b: b.nan,
@@ -146,29 +146,29 @@ impl Serialize for Number {
 impl fmt::Display for Number {
     /// Formats the number with six significant digits, and integers with all digits.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let size = self.0.abs();
-        if size == 0.0 || !size.is_finite() {
+        let magnitude = self.0.abs();
+        if magnitude == 0.0 || !magnitude.is_finite() {
             return write!(f, "{}", self.0);
         }
         // Shape numbers are integers up to 2^32 - 1, which stands for the background.
-        let is_whole = size.fract() == 0.0 && size < 1e15;
-        let text = if (1e-4..1e9).contains(&size) || is_whole {
-            let decimals = (5 - size.log10().floor() as i32).max(0) as usize;
-            short(&format!("{:.decimals$}", self.0)).to_owned()
+        let is_integer = magnitude.fract() == 0.0 && magnitude < 1e15;
+        let text = if (1e-4..1e9).contains(&magnitude) || is_integer {
+            let decimals = (5 - magnitude.log10().floor() as i32).max(0) as usize;
+            without_trailing_zeros(&format!("{:.decimals$}", self.0)).to_owned()
         } else {
             let text = format!("{:.5e}", self.0);
             let (digits, exponent) = text.split_once('e').unwrap_or((&text, "0"));
-            format!("{}e{exponent}", short(digits))
+            format!("{}e{exponent}", without_trailing_zeros(digits))
         };
         // Rounding must not turn a fraction into an integer.
-        match size < 1e6 && self.0.fract() != 0.0 && text.parse::<i64>().is_ok() {
+        match magnitude < 1e6 && self.0.fract() != 0.0 && text.parse::<i64>().is_ok() {
             true => write!(f, "{}", self.0),
             false => f.write_str(&text),
         }
     }
 }
 
-fn short(digits: &str) -> &str {
+fn without_trailing_zeros(digits: &str) -> &str {
     match digits.contains('.') {
         true => digits.trim_end_matches('0').trim_end_matches('.'),
         false => digits,
@@ -196,7 +196,7 @@ impl LayerReport {
 
     fn line(&self, metric: Metric) -> Option<String> {
         let value = Number(self.value(metric)?);
-        let at = match &self.largest_at {
+        let location = match &self.largest_at {
             Some(LargestReport { x, y, channel, a, b }) => {
                 format!(" in {channel} at ({x}, {y}): {} instead of {}", Number(*a), Number(*b))
             }
@@ -207,7 +207,7 @@ impl LayerReport {
                 format!("{} of {} pixels, the first at {first}", self.different, self.pixels)
             }
             (Metric::Different, None) => format!("0 of {} pixels", self.pixels),
-            (Metric::Largest, _) => format!("{value}{at}"),
+            (Metric::Largest, _) => format!("{value}{location}"),
             (Metric::Psnr, _) => format!("{value} dB"),
             _ => value.to_string(),
         })
@@ -277,12 +277,12 @@ impl Report {
                 let value = layer.value(limit.metric);
                 if let Some((value, word)) = value.and_then(|value| Some((value, limit.exceeded(value)?))) {
                     let (name, metric) = (&layer.name, limit.metric);
-                    let over = match metric {
+                    let condition = match metric {
                         Metric::Share if threshold > 0.0 => format!(" over {}", Number(threshold)),
                         _ => String::new(),
                     };
                     fails.push(format!(
-                        "{name}: {metric}{over} {} is {word} {}",
+                        "{name}: {metric}{condition} {} is {word} {}",
                         Number(value),
                         Number(limit.worst)
                     ));
@@ -335,7 +335,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_have_six_digits_and_are_not_rounded_to_whole_ones() {
+    fn numbers_have_six_digits_and_are_not_rounded_to_integers() {
         let text = |value: f64| Number(value).to_string();
         assert_eq!(text(0.0), "0");
         assert_eq!(text(1.0), "1");

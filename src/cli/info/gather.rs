@@ -17,7 +17,7 @@ use super::kernel::features;
 
 type Counts = BTreeMap<&'static str, u64>;
 
-/// Angles are in degrees, memory in bytes.
+/// The output of `wgray info`. Angles are in degrees, and memory is in bytes.
 #[derive(Debug, Serialize)]
 pub struct Info {
     pub scene: String,
@@ -171,9 +171,9 @@ pub struct Device {
 
 impl Info {
     pub fn of(path: &Path, scene: &Scene, packed: &Packed, plan: &DevicePlan) -> Info {
-        let whole = Region::whole(scene.width, scene.height);
+        let full = Region::whole(scene.width, scene.height);
         let split = WorkSplit::of(packed.film_layout());
-        let films: Vec<u64> = bands(whole, &split, u64::MAX).map(|band| band.pixels()).collect();
+        let films: Vec<u64> = bands(full, &split, u64::MAX).map(|band| band.pixels()).collect();
         let film = films.iter().max().unwrap_or(&0) * packed.film_layout().bytes() as u64;
         let kernel = kernel(packed, plan);
         Info {
@@ -195,9 +195,18 @@ impl Info {
                 .bounds()
                 .map(|(low, high)| [low, high].map(|corner| corner.to_array())),
             shapes: shapes(scene, packed),
-            materials: Kinds::of(scene.materials.iter().map(|material| reflection(&material.reflection))),
+            materials: Kinds::of(
+                scene
+                    .materials
+                    .iter()
+                    .map(|material| reflection_name(&material.reflection)),
+            ),
             material_names: scene.material_names.clone(),
-            textures: scene.textures.iter().map(|texture| textured(&texture.kind)).collect(),
+            textures: scene
+                .textures
+                .iter()
+                .map(|texture| texture_info(&texture.kind))
+                .collect(),
             lights: lights(scene, packed),
             models: scene.models().cloned().collect(),
             memory: Memory {
@@ -244,33 +253,33 @@ fn camera(camera: &Camera, path: Option<&CameraPath>) -> CameraInfo {
 }
 
 fn shapes(scene: &Scene, packed: &Packed) -> Shapes {
-    let mut known = HashSet::new();
-    let (mut mesh_triangles, mut instanced_triangles, mut others) = (0, 0, 0);
+    let mut meshes = HashSet::new();
+    let (mut mesh_triangles, mut instanced_triangles, mut other_triangles) = (0, 0, 0);
     for shape in &scene.shapes {
         match &shape.geometry {
             Geometry::Mesh { mesh, .. } => {
                 let count = mesh.triangles.len() as u64;
                 instanced_triangles += count;
-                if known.insert(Arc::as_ptr(mesh)) {
+                if meshes.insert(Arc::as_ptr(mesh)) {
                     mesh_triangles += count;
                 }
             }
-            Geometry::Triangles(all) => others += all.len() as u64,
+            Geometry::Triangles(triangles) => other_triangles += triangles.len() as u64,
             _ => {}
         }
     }
     Shapes {
         kinds: Kinds::of(scene.shapes.iter().map(|shape| shape.geometry.name())),
-        meshes: known.len() as u64,
+        meshes: meshes.len() as u64,
         mesh_triangles,
         instanced_triangles,
         old_instanced_triangles: instanced_triangles,
-        triangles: instanced_triangles + others,
+        triangles: instanced_triangles + other_triangles,
         primitives: packed.primitives.len() as u64,
     }
 }
 
-fn reflection(reflection: &Reflection) -> &'static str {
+fn reflection_name(reflection: &Reflection) -> &'static str {
     match reflection {
         Reflection::Phong { .. } => "phong",
         Reflection::Mirror { .. } => "mirror",
@@ -282,23 +291,23 @@ fn reflection(reflection: &Reflection) -> &'static str {
     }
 }
 
-fn textured(kind: &TextureKind) -> TextureInfo {
-    let plain = |kind| TextureInfo {
+fn texture_info(kind: &TextureKind) -> TextureInfo {
+    let without_image = |kind| TextureInfo {
         kind,
         size: None,
         texels: None,
     };
     match kind {
-        TextureKind::Constant(_) => plain("constant"),
-        TextureKind::Checker { .. } => plain("checker"),
-        TextureKind::Lines { .. } => plain("grid"),
+        TextureKind::Constant(_) => without_image("constant"),
+        TextureKind::Checker { .. } => without_image("checker"),
+        TextureKind::Lines { .. } => without_image("grid"),
         TextureKind::Image { image, .. } => TextureInfo {
             size: Some([image.width, image.height]),
             texels: Some(match image.texels {
                 Texels::Bytes(..) => "8 bits",
                 Texels::Floats(_) => "floats",
             }),
-            ..plain("image")
+            ..without_image("image")
         },
     }
 }
@@ -334,37 +343,37 @@ fn scene_on_device(_: &DevicePlan) -> Option<u64> {
 
 fn kernel(packed: &Packed, plan: &DevicePlan) -> Kernel {
     let features = features(packed);
-    let those = |wanted: bool| {
-        let all = features.iter().filter(move |(_, has)| *has == wanted);
-        all.map(|(name, _)| *name).collect()
+    let names = |used: bool| {
+        let matching = features.iter().filter(move |(_, is_used)| *is_used == used);
+        matching.map(|(name, _)| *name).collect()
     };
-    let plain = Kernel {
+    let uncompiled = Kernel {
         compiled: false,
         entry: None,
         baked: None,
         lines: None,
-        uses: those(true),
-        leaves_out: those(false),
+        uses: names(true),
+        leaves_out: names(false),
         constants: packed.specialization.constants().into_iter().collect(),
     };
-    with_adapter(plain, plan)
+    with_adapter(uncompiled, plan)
 }
 
 #[cfg(feature = "gpu")]
-fn with_adapter(plain: Kernel, plan: &DevicePlan) -> Kernel {
+fn with_adapter(uncompiled: Kernel, plan: &DevicePlan) -> Kernel {
     match &plan.adapter {
-        None => plain,
+        None => uncompiled,
         Some((_, kernel)) => Kernel {
             compiled: true,
             entry: Some(kernel.entry),
             baked: Some(kernel.baked),
             lines: Some(kernel.lines),
-            ..plain
+            ..uncompiled
         },
     }
 }
 
 #[cfg(not(feature = "gpu"))]
-fn with_adapter(plain: Kernel, _: &DevicePlan) -> Kernel {
-    plain
+fn with_adapter(uncompiled: Kernel, _: &DevicePlan) -> Kernel {
+    uncompiled
 }

@@ -60,7 +60,7 @@ pub struct Args {
 }
 
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
-    let overrides = args.options.over(Overrides {
+    let overrides = args.options.add_to(Overrides {
         size: args.size,
         pixel_samples: args.pixel_samples,
         asset_root: args.asset_root.clone(),
@@ -75,7 +75,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         true => format!("{}\n", serde_json::to_string_pretty(&info)?),
         false => escape_control_in_lines(&show::table(&info, args.verbose)).into_owned(),
     };
-    Ok(super::ended(
+    Ok(super::finish_output(
         io::stdout().lock().write_all(text.as_bytes()),
         ExitCode::SUCCESS,
     ))

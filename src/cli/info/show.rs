@@ -85,13 +85,13 @@ fn camera(info: &Info) -> String {
     let (position, look_at) = (point(&camera.position), point(&camera.look_at));
     let mut text = format!("{} at {position}, looking at {look_at}", camera.kind);
     if let Some(fov) = camera.fov {
-        let _ = write!(text, ", vertical field of view {} degrees", short(fov));
+        let _ = write!(text, ", vertical field of view {} degrees", rounded(fov));
     }
     if let Some(height) = camera.height {
-        let _ = write!(text, ", height {}", short(height));
+        let _ = write!(text, ", height {}", rounded(height));
     }
     if let (Some(aperture), Some(focus)) = (camera.aperture, camera.focus_distance) {
-        let _ = write!(text, "; lens {} wide, focused at {}", short(aperture), short(focus));
+        let _ = write!(text, "; lens {} wide, focused at {}", rounded(aperture), rounded(focus));
     }
     if let Some([first, last]) = camera.frames {
         let _ = write!(text, "; moves from frame {first} to {last}");
@@ -103,7 +103,7 @@ fn bounds(info: &Info) -> String {
     let Some([low, high]) = &info.bounds else {
         return "none (no shapes other than planes)".to_owned();
     };
-    let size = [0, 1, 2].map(|axis| short(high[axis] - low[axis]).to_string());
+    let size = [0, 1, 2].map(|axis| rounded(high[axis] - low[axis]).to_string());
     format!("{} to {}, size {}", point(low), point(high), size.join(" x "))
 }
 
@@ -213,14 +213,14 @@ fn kernel(table: &mut Table, info: &Info) {
 }
 
 /// Lists the first names, with indices if options accept indices.
-fn list<'a>(names: impl ExactSizeIterator<Item = Option<&'a str>>, numbered: bool) -> String {
+fn list<'a>(names: impl ExactSizeIterator<Item = Option<&'a str>>, indexed: bool) -> String {
     let more = names.len().saturating_sub(MAX_LISTED);
-    let one = |(i, name): (usize, Option<&str>)| match (name, numbered) {
+    let item = |(i, name): (usize, Option<&str>)| match (name, indexed) {
         (Some(name), true) => format!("{i} {name:?}"),
         (Some(name), false) => name.to_owned(),
         (None, _) => format!("{i} (unnamed)"),
     };
-    let mut listed: Vec<String> = names.enumerate().take(MAX_LISTED).map(one).collect();
+    let mut listed: Vec<String> = names.enumerate().take(MAX_LISTED).map(item).collect();
     if more > 0 {
         listed.push(format!("and {more} more"));
     }
@@ -268,12 +268,12 @@ fn count(n: u64, noun: &str) -> String {
 }
 
 fn point(point: &[f64; 3]) -> String {
-    let numbers = point.map(|x| short(x).to_string());
+    let numbers = point.map(|x| rounded(x).to_string());
     format!("[{}]", numbers.join(", "))
 }
 
 /// Rounds to six significant digits.
-fn short(x: f64) -> f64 {
+fn rounded(x: f64) -> f64 {
     format!("{x:.5e}").parse().unwrap_or(x)
 }
 

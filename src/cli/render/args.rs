@@ -14,13 +14,13 @@ use wgray_render::job::Tile;
 
 use crate::cli::Usage;
 use crate::cli::frames::{Frame, Frames};
-use crate::cli::numbers::{bounces, samples, whole};
+use crate::cli::numbers::{bounces, integer, samples};
 use crate::cli::outputs::{LayerPolicy, Outputs};
-use crate::cli::picture_options::{PictureOptions, named};
+use crate::cli::picture_options::{PictureOptions, name_parser};
 use crate::cli::progress::Mode;
 use crate::cli::scene_options::SceneOptions;
 
-/// The arguments as parsed. Options that `-h` leaves to `--help` have `hide_short_help`.
+/// Arguments of `wgray render`. `-h` omits the options with `hide_short_help`.
 #[derive(Debug, clap::Args)]
 #[command(after_help = crate::cli::EXIT_CODES)]
 #[command(allow_negative_numbers = true)] // report negative numbers as out of range
@@ -41,14 +41,14 @@ pub struct Args {
     pub device: String,
 
     /// Use integrator phong (direct light) or path (global illumination)
-    #[arg(long, display_order = 5, value_name = "NAME", value_parser = named(Integrator::ALL, Integrator::name), hide_possible_values = true)]
+    #[arg(long, display_order = 5, value_name = "NAME", value_parser = name_parser(Integrator::ALL, Integrator::name), hide_possible_values = true)]
     pub integrator: Option<Integrator>,
 
     /// Stop after TIME (30, 90s, 1.5m, 2h) and write the samples taken so far
     #[arg(long, display_order = 6, value_name = "TIME", value_parser = parse_duration, conflicts_with = "tile")]
     pub time_limit: Option<Duration>,
 
-    /// Also write the image as it grows; Ctrl+C writes the last whole pass
+    /// Also write intermediate images; Ctrl+C writes the last complete pass
     #[arg(long, display_order = 7, conflicts_with = "tile")]
     pub preview: bool,
 
@@ -84,11 +84,11 @@ pub struct Args {
     pub light_samples: Option<u32>,
 
     /// Set the sampling pattern within a pixel
-    #[arg(long, help_heading = "Sampling", value_name = "PATTERN", value_parser = named(Pattern::ALL, Pattern::name), hide_short_help = true)]
+    #[arg(long, help_heading = "Sampling", value_name = "PATTERN", value_parser = name_parser(Pattern::ALL, Pattern::name), hide_short_help = true)]
     pub pixel_pattern: Option<Pattern>,
 
     /// Set the seed of all random numbers
-    #[arg(long, help_heading = "Sampling", value_name = "N", value_parser = whole::<u32>(0..=u32::MAX))]
+    #[arg(long, help_heading = "Sampling", value_name = "N", value_parser = integer::<u32>(0..=u32::MAX))]
     pub seed: Option<u32>,
 
     /// Render frames such as 5, 1-10 or 1-10:2, numbered by # in names
@@ -96,7 +96,7 @@ pub struct Args {
     pub frames: Option<Frames>,
 
     /// Render N frames of a camera that orbits the scene
-    #[arg(long, help_heading = "Animation", value_name = "N", value_parser = whole::<u32>(1..=100_000))]
+    #[arg(long, help_heading = "Animation", value_name = "N", value_parser = integer::<u32>(1..=100_000))]
     pub turntable: Option<u32>,
 
     /// Play glTF animations at F frames per second [default: 24 with --frames]
@@ -111,7 +111,7 @@ pub struct Args {
     pub pictures: PictureOptions,
 
     /// Also write layers, such as depth,normal, into an EXR or beside a PNG
-    #[arg(long, help_heading = "Output images", value_name = "LAYERS", value_delimiter = ',', value_parser = named(Aov::ALL, Aov::name), hide_possible_values = true)]
+    #[arg(long, help_heading = "Output images", value_name = "LAYERS", value_delimiter = ',', value_parser = name_parser(Aov::ALL, Aov::name), hide_possible_values = true)]
     pub aov: Vec<Aov>,
 
     /// Render only the columns x0 to x1 - 1 and the rows y0 to y1 - 1
@@ -135,7 +135,7 @@ pub struct Args {
     pub tile: Option<Tile>,
 
     /// Exit with CODE after a lost device or SIGTERM, so that a farm retries
-    #[arg(long, help_heading = LONG_RENDERS, value_name = "CODE", value_parser = whole::<u8>(9..=125), hide_short_help = true)]
+    #[arg(long, help_heading = LONG_RENDERS, value_name = "CODE", value_parser = integer::<u8>(9..=125), hide_short_help = true)]
     pub requeue_exit: Option<u8>,
 
     /// Write timings and counts as JSON; - is standard output
@@ -147,7 +147,7 @@ pub struct Args {
     pub progress: Mode,
 
     /// Use N threads for the CPU and software Vulkan [default: all]
-    #[arg(long, help_heading = LONG_RENDERS, value_name = "N", value_parser = whole::<u16>(1..=1024), hide_short_help = true)]
+    #[arg(long, help_heading = LONG_RENDERS, value_name = "N", value_parser = integer::<u16>(1..=1024), hide_short_help = true)]
     pub threads: Option<u16>,
 
     /// Round in software for identical bits on more GPUs (slower, Vulkan only)
@@ -181,42 +181,42 @@ impl Args {
     }
 
     /// Returns the progress mode; --quiet disables progress.
-    pub fn shown_progress(&self) -> Mode {
+    pub fn progress_mode(&self) -> Mode {
         if self.quiet { Mode::None } else { self.progress }
     }
 
-    /// Returns the frames to render: one without a number unless frames are requested.
+    /// Returns the frames to render: a single frame without a number unless frames are requested.
     pub fn frames(&self) -> Vec<Frame> {
-        let around = self.turntable.map(Frames::first);
-        Frame::all(self.frames.as_ref().or(around.as_ref()))
+        let turntable = self.turntable.map(Frames::first);
+        Frame::all(self.frames.as_ref().or(turntable.as_ref()))
     }
 
     /// Returns the frames per second if the frames play the animations of a glTF file.
     pub fn fps(&self, scene: &Scene) -> Result<Option<f64>, Usage> {
-        let refused = |rule: &str| Err(Usage(format!("--fps: {rule}")));
+        let error = |rule: &str| Err(Usage(format!("--fps: {rule}")));
         // A scene file that includes a model sets the animation time itself.
         let is_animated = scene.has_animations() && is_gltf(&self.scene);
         match self.fps {
-            Some(_) if self.frames.is_none() && self.turntable.is_none() => refused("needs --frames or --turntable"),
-            Some(_) if !is_animated => refused("only applies to glTF files with animations"),
+            Some(_) if self.frames.is_none() && self.turntable.is_none() => error("needs --frames or --turntable"),
+            Some(_) if !is_animated => error("only applies to glTF files with animations"),
             Some(fps) => Ok(Some(fps)),
             None => {
-                let plays = self.frames.is_some() && self.turntable.is_none() && !self.options.has_time();
-                Ok((plays && is_animated).then_some(FPS))
+                let plays_frames = self.frames.is_some() && self.turntable.is_none() && !self.options.has_time();
+                Ok((plays_frames && is_animated).then_some(FPS))
             }
         }
     }
 
-    /// Returns the destinations of a frame: its images or part, and its statistics.
+    /// Returns the destinations of a frame: the images or the part, and the statistics.
     pub fn outputs(&self, frame: Frame) -> anyhow::Result<Outputs> {
-        let named = |output: &PathBuf| frame.name("--output", output);
+        let output_name = |output: &PathBuf| frame.name("--output", output);
         let pictures = PictureOptions {
-            output: self.pictures.output.iter().map(named).collect::<Result<_, _>>()?,
+            output: self.pictures.output.iter().map(output_name).collect::<Result<_, _>>()?,
             ..self.pictures.clone()
         };
         let stats = match &self.stats {
-            Some(stream) if stream.as_os_str() == "-" => Some(stream.clone()),
-            Some(file) => Some(frame.name("--stats", file)?),
+            Some(path) if path.as_os_str() == "-" => Some(path.clone()),
+            Some(path) => Some(frame.name("--stats", path)?),
             None => None,
         };
         match self.tile {
@@ -251,7 +251,7 @@ impl Args {
 
     /// Returns the values that override the scene.
     pub fn overrides(&self) -> Overrides {
-        self.options.over(Overrides {
+        self.options.add_to(Overrides {
             size: self.size,
             pixel_samples: self.pixel_samples,
             light_samples: self.light_samples,

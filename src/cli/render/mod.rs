@@ -1,4 +1,4 @@
-//! `wgray render`: renders a scene to one image or several.
+//! `wgray render`: renders a scene to one or several images.
 
 mod args;
 mod once_log;
@@ -28,7 +28,7 @@ use super::log::{self, Level};
 use super::outputs::Outputs;
 use super::signal::{Signals, Stop};
 use super::stats::Stats;
-use super::{Interrupted, Usage, facts_of, located, plain, progress};
+use super::{Interrupted, Usage, cli_error, facts_of, located, progress};
 
 pub use args::{Args, parse_size};
 
@@ -44,7 +44,7 @@ pub fn run(args: Args, start: Instant) -> anyhow::Result<ExitCode> {
             skipped += 1;
             continue;
         }
-        job.go_to(frame)?;
+        job.select_frame(frame)?;
         let plan = Plan::resolve(&args, &mut job.session, &job.log, frame, start)?;
         outputs.check_size(plan.region())?;
         if let Some(part) = outputs.part().filter(|_| exists) {
@@ -58,7 +58,7 @@ pub fn run(args: Args, start: Instant) -> anyhow::Result<ExitCode> {
                 format!("{name}: is damaged, or belongs to another scene or other options; rendering it again");
             job.log.log(Level::Note, &message);
         }
-        picture(&plan, &mut job.session, outputs, &mut signals, start)?;
+        render_image(&plan, &mut job.session, outputs, &mut signals, start)?;
         start = Instant::now();
     }
     if skipped > 0 {
@@ -82,7 +82,7 @@ impl<'a> Job<'a> {
         if args.verbose {
             log::print_events();
         }
-        if args.shown_progress() == progress::Mode::Openjd && log::is_json() {
+        if args.progress_mode() == progress::Mode::Openjd && log::is_json() {
             let rule = "openjd cannot be combined with --log-format json";
             return Err(Usage(format!("--progress: {rule}")).into());
         }
@@ -93,8 +93,8 @@ impl<'a> Job<'a> {
         let scene = read(args, &log)?;
         let fps = args.fps(&scene)?;
         check(args, &scene, frames.iter().map(|(frame, outputs)| (frame, outputs)))?;
-        let opaque = frames.iter().find_map(|(_, outputs)| outputs.without_alpha());
-        if let (true, Some(name)) = (scene.render.alpha, opaque) {
+        let jpeg = frames.iter().find_map(|(_, outputs)| outputs.without_alpha());
+        if let (true, Some(name)) = (scene.render.alpha, jpeg) {
             let note =
                 format!("{name}: JPEG has no alpha; the transparent background is black (use .png, .webp or .exr)");
             log.log_once(Level::Warning, &note);
@@ -108,7 +108,7 @@ impl<'a> Job<'a> {
         })
     }
 
-    fn go_to(&mut self, frame: Frame) -> anyhow::Result<()> {
+    fn select_frame(&mut self, frame: Frame) -> anyhow::Result<()> {
         if let Some((number, fps)) = frame.number.zip(self.fps) {
             let mut overrides = self.args.overrides();
             overrides.gltf.time = Some(f64::from(number) / fps);
@@ -123,8 +123,8 @@ impl<'a> Job<'a> {
         }
         if let Some(number) = frame.number {
             let camera = self.session.scene().camera_at(number.into());
-            let camera = camera.map_err(|error| plain(error.into()))?;
-            self.session.set_camera(camera).map_err(plain)?;
+            let camera = camera.map_err(|error| cli_error(error.into()))?;
+            self.session.set_camera(camera).map_err(cli_error)?;
         }
         Ok(())
     }
@@ -133,18 +133,20 @@ impl<'a> Job<'a> {
 /// Reads the scene and prints its warnings.
 fn read(args: &Args, log: &OnceLog) -> anyhow::Result<Scene> {
     let (path, overrides) = (&args.scene, args.overrides());
-    let scene = progress::named(args.shown_progress(), "reading the scene", || {
+    let scene = progress::with_spinner(args.progress_mode(), "reading the scene", || {
         super::load(path, &overrides)
     })?;
-    let still = match is_model(path) {
+    let rule = match is_model(path) {
         true => "no animation: all frames are equal",
         false => "no camera.path: all frames are equal",
     };
-    let moves = scene.camera_path.is_some() || args.fps(&scene)?.is_some();
-    let still = (args.frames.is_some() && !moves).then_some(still);
-    let others = scene.visibility_warnings().into_iter().map(Note::from);
-    let others = others.chain(still.map(Note::from));
-    for note in scene.notes.iter().cloned().chain(others) {
+    let is_animated = scene.camera_path.is_some() || args.fps(&scene)?.is_some();
+    let warning = (args.frames.is_some() && !is_animated).then_some(rule);
+    let warnings = scene
+        .visibility_warnings()
+        .into_iter()
+        .chain(warning.map(str::to_owned));
+    for note in scene.notes.iter().cloned().chain(warnings.map(Note::from)) {
         log.log_once(Level::Warning, &located(path, &note));
     }
     Ok(scene)
@@ -160,34 +162,36 @@ fn check<'a>(args: &Args, scene: &Scene, frames: impl Iterator<Item = (&'a Frame
         if args.preview {
             outputs.check_preview()?;
         }
-        let kept = checkpoint.as_deref().map(|path| (path.to_string_lossy(), path));
-        let kept = kept.iter().map(|(name, path)| ("--checkpoint", &**name, *path));
-        for (option, name, path) in outputs.files().chain(kept) {
+        let checkpoint = checkpoint.as_deref().map(|path| (path.to_string_lossy(), path));
+        let checkpoint = checkpoint.iter().map(|(name, path)| ("--checkpoint", &**name, *path));
+        for (option, name, path) in outputs.files().chain(checkpoint) {
             if let Some(other) = files.insert(path.to_owned(), frame.number) {
-                let [this, other] = [frame.number, other].map(Option::unwrap_or_default);
+                let [number, other] = [frame.number, other].map(Option::unwrap_or_default);
                 let rule = format!(
-                    "{option}: {name}: frames {other} and {this} would be written to this file; add # to the name"
+                    "{option}: {name}: frames {other} and {number} would be written to this file; add # to the name"
                 );
                 return Err(Usage(rule).into());
             }
         }
         if let Some(number) = frame.number {
-            scene.camera_at(number.into()).map_err(|error| plain(error.into()))?;
+            scene
+                .camera_at(number.into())
+                .map_err(|error| cli_error(error.into()))?;
         }
     }
     Ok(())
 }
 
 /// Renders an image or a part. From the first image on, signals are deferred: they end the command after cleanup.
-fn picture(
+fn render_image(
     plan: &Plan,
     session: &mut Session,
     outputs: Outputs,
     signals: &mut Signals,
     start: Instant,
 ) -> anyhow::Result<()> {
-    let before = signals.deferred().cloned();
-    let mut checkpoint = plan.open_checkpoint(before.as_ref())?;
+    let deferred = signals.deferred().cloned();
+    let mut checkpoint = plan.open_checkpoint(deferred.as_ref())?;
     let mut no_checkpoint = NoCheckpoint;
     let store: &mut dyn CheckpointStore = match &mut checkpoint {
         Some(checkpoint) => checkpoint,
@@ -199,7 +203,7 @@ fn picture(
         true => Some(Previews::new(outputs.rewritable().map_err(RenderError::Output)?)),
         false => None,
     };
-    let outputs = outputs.begin().map_err(RenderError::Output)?;
+    let outputs = outputs.open().map_err(RenderError::Output)?;
     let stop = signals.defer().context("signal handler")?;
     if let Some(signal) = stop.signal() {
         return Err(Interrupted(signal).into());
@@ -216,7 +220,8 @@ fn picture(
                 checkpoint.name().display()
             ),
             None if plan.preview => "the samples taken so far were not written".to_owned(),
-            None => "no image was written; --preview keeps the image so far, --checkpoint FILE the progress".to_owned(),
+            None => "no image was written; --preview saves the image so far, --checkpoint FILE saves the progress"
+                .to_owned(),
         };
         plan.log.log(Level::Note, &note);
     }
@@ -276,7 +281,7 @@ fn interrupted(error: anyhow::Error, stop: &Stop) -> anyhow::Error {
 fn stats(plan: &Plan, device: &DeviceInfo, totals: &RenderTotals, setup: f64, total: f64) -> Stats {
     let (region, scene) = (plan.region(), &plan.scene);
     let render = totals.time.as_secs_f64();
-    let rays_now = totals.camera_rays as f64 * totals.fraction_rendered;
+    let rendered_rays = totals.camera_rays as f64 * totals.fraction_rendered;
     Stats {
         frame: plan.frame.number,
         device: device.name.clone(),
@@ -296,6 +301,6 @@ fn stats(plan: &Plan, device: &DeviceInfo, totals: &RenderTotals, setup: f64, to
         fraction_rendered: totals.fraction_rendered,
         former_fraction_rendered: totals.fraction_rendered,
         shadow_rays: None,
-        nominal_mrays_per_s: Stats::nominal(rays_now, scene.light_samples(), render),
+        nominal_mrays_per_s: Stats::nominal(rendered_rays, scene.light_samples(), render),
     }
 }

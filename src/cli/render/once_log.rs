@@ -5,14 +5,14 @@ use std::collections::BTreeSet;
 
 use crate::cli::log::{Facts, Level, print, print_with};
 
-/// Remembers printed lines.
+/// Prints messages, and remembers the lines of `log_once`.
 pub struct OnceLog {
     quiet: bool,
     lines: RefCell<BTreeSet<String>>,
 }
 
 impl OnceLog {
-    /// Prints nothing if `quiet`.
+    /// With `quiet`, nothing is printed.
     pub fn new(quiet: bool) -> OnceLog {
         OnceLog {
             quiet,

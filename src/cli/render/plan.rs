@@ -25,7 +25,7 @@ use crate::cli::metadata::RenderMetadata;
 use crate::cli::picture_options::PictureOptions;
 use crate::cli::progress::{self, Mode};
 use crate::cli::signal::Stop;
-use crate::cli::{Interrupted, Usage, option, plain};
+use crate::cli::{Interrupted, Usage, cli_error, option_error};
 
 /// The settings of a render, except its destinations.
 pub struct Plan<'a> {
@@ -35,7 +35,7 @@ pub struct Plan<'a> {
     pub tile: Option<(Tile, Region)>,
     pub options: Options,
     pub deadline: Option<Instant>,
-    /// Write the image as it grows.
+    /// Write intermediate images.
     pub preview: bool,
     pub checkpoint: Option<PathBuf>,
     checkpoint_interval: Duration,
@@ -49,7 +49,7 @@ pub struct Plan<'a> {
 }
 
 impl<'a> Plan<'a> {
-    /// Resolves the settings of one image, which was started at `start`.
+    /// Resolves the settings of one image, whose render began at `start`.
     pub fn resolve(
         args: &Args,
         session: &mut Session,
@@ -58,18 +58,18 @@ impl<'a> Plan<'a> {
         start: Instant,
     ) -> anyhow::Result<Self> {
         let scene = &Arc::clone(session.scene());
-        let early = [("--time-limit", args.time_limit.is_some()), ("--preview", args.preview)];
-        for (option, _) in early.into_iter().filter(|(_, given)| *given) {
+        let early_stops = [("--time-limit", args.time_limit.is_some()), ("--preview", args.preview)];
+        for (option, _) in early_stops.into_iter().filter(|(_, is_set)| *is_set) {
             can_end_early(option, scene)?;
         }
         let options = args.rendering();
-        let picture = options.region(scene).map_err(|problem| option(&problem))?;
+        let picture = options.region(scene).map_err(|problem| option_error(&problem))?;
         let tile = match args.tile {
             None => None,
             Some(tile) => Some((tile, rows(tile, picture)?)),
         };
-        let progress = args.shown_progress();
-        let packed = progress::named(progress, "preparing geometry, textures and lights", || {
+        let progress = args.progress_mode();
+        let packed = progress::with_spinner(progress, "preparing geometry, textures and lights", || {
             session.packed(&options)
         });
         Ok(Plan {
@@ -108,21 +108,21 @@ impl<'a> Plan<'a> {
         }
     }
 
-    /// Returns true if the file is the complete part of this render.
+    /// Returns true if the file is the complete part of the image that this render would write.
     pub fn is_done(&self, path: &Path) -> bool {
         let (Some((tile, _)), Ok((identity, found))) = (self.tile, job::read_part(path)) else {
             return false;
         };
         let layout = self.layout(f32::from_bits(found.middle_depth));
-        identity == self.identity() && found == PartHeader::of(tile, &layout, self.metadata.lasting())
+        identity == self.identity() && found == PartHeader::of(tile, &layout, self.metadata.without_device())
     }
 
     pub fn identity(&self) -> Identity {
         Identity::of(&self.scene, self.picture, self.options.exact_rounding)
     }
 
-    /// Opens the checkpoint, if requested; waits while another process uses it. A part has the same checkpoint as an
-    /// image that is cropped to the rows of the part.
+    /// Opens the checkpoint, if requested; waits while another process uses the file. A part has the same checkpoint as
+    /// an image that is cropped to the rows of the part.
     pub fn open_checkpoint<'b>(&'b self, stop: Option<&'b Stop>) -> anyhow::Result<Option<Checkpoint<'b>>> {
         let Some(path) = &self.checkpoint else {
             return Ok(None);
@@ -130,15 +130,15 @@ impl<'a> Plan<'a> {
         // If signals are not deferred (`stop` is `None`), a signal terminates the process immediately, so there is
         // nothing to check.
         let signal = move || stop.and_then(Stop::signal);
-        let opening = CheckpointOptions {
+        let options = CheckpointOptions {
             path: path.clone(),
             resume: self.resume,
             interval: self.checkpoint_interval,
             wait: Box::new(move || signal().is_none() && self.deadline.is_none_or(|end| Instant::now() < end)),
-            report: Box::new(|what| self.log.log(Level::Warning, what)),
+            report: Box::new(|message| self.log.log(Level::Warning, message)),
         };
         let identity = Identity::of(&self.scene, self.region(), self.options.exact_rounding);
-        match Checkpoint::open(opening, identity, self.scene.film_layout()) {
+        match Checkpoint::open(options, identity, self.scene.film_layout()) {
             Ok(checkpoint) => Ok(Some(checkpoint)),
             Err(error @ CheckpointError::Busy(_)) => Err(match signal() {
                 Some(signal) => Interrupted(signal).into(),
@@ -163,10 +163,10 @@ impl<'a> Plan<'a> {
             }),
             stopped: Box::new(|| stop.signal().is_some()),
         };
-        let renderer = progress::named(self.progress, "opening the device and compiling kernels", || {
+        let renderer = progress::with_spinner(self.progress, "opening the device and compiling kernels", || {
             session.renderer(&self.options, on_fault)
         });
-        let renderer = renderer.map_err(plain)?;
+        let renderer = renderer.map_err(cli_error)?;
         if let Some(why) = renderer.why() {
             info!("{why}");
         }
@@ -176,7 +176,7 @@ impl<'a> Plan<'a> {
 
 fn rows(tile: Tile, picture: Region) -> Result<Region, Usage> {
     let rule = format!(
-        "--tile: {tile}: parts consist of whole rows, and the image has {}",
+        "--tile: {tile}: the number of parts must not exceed the number of rows, {}",
         picture.height()
     );
     tile.rows(picture).ok_or(Usage(rule))

@@ -1,4 +1,4 @@
-//! `--preview`: the image as it grows, written to the files of the complete image.
+//! `--preview`: intermediate images, written to the files of the complete image.
 
 use std::io;
 use std::time::{Duration, Instant};
@@ -22,7 +22,7 @@ impl Previews {
         Previews { images, last: None }
     }
 
-    /// Returns true if the image should be written after these samples per pixel.
+    /// Returns true if the image should be written after this number of samples per pixel.
     pub fn is_due(&self, samples: u32) -> bool {
         samples.is_power_of_two() && self.last.is_none_or(|last| last.elapsed() >= INTERVAL)
     }
@@ -44,7 +44,7 @@ impl Previews {
         Ok(targets)
     }
 
-    pub fn written(&mut self) {
+    pub fn record_write(&mut self) {
         self.last = Some(Instant::now());
     }
 }
@@ -54,7 +54,7 @@ fn reason_to_keep(file: &Output, samples: u32) -> Option<String> {
     let path = file.path().filter(|path| path.exists())?;
     let reason = match samples_of(path) {
         Some(existing) if existing <= samples => return None,
-        Some(existing) => format!("has {existing} samples per pixel; a preview with fewer does not replace it"),
+        Some(existing) => format!("has {existing} samples per pixel; a preview with fewer samples does not replace it"),
         None => "was not written by wgray; a preview does not replace it, but the complete image will".to_owned(),
     };
     Some(format!("{}: {reason}", file.name()))

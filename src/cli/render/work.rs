@@ -19,9 +19,9 @@ use crate::cli::signal::Stop;
 
 #[derive(Default)]
 pub struct RenderTotals {
-    /// Excludes the writing of files.
+    /// Render time without the writing of files.
     pub time: Duration,
-    /// Camera rays of the image, and the fraction of them that was rendered in this run, not read from a checkpoint.
+    /// Camera rays of the image, and the fraction of these rays that this run traced, not read from a checkpoint.
     pub camera_rays: u64,
     pub fraction_rendered: f64,
     /// Number of pixels with non-finite values.
@@ -56,7 +56,7 @@ pub fn write(
     let layout = plan.layout(middle_depth);
     let mut totals = RenderTotals::new(plan.scene.sampling.pixel_samples);
     let name = files.name().unwrap_or_default().to_owned();
-    let metadata = plan.metadata.on(renderer.info(), plan.pictures.reproducible);
+    let metadata = plan.metadata.with_device(renderer.info(), plan.pictures.reproducible);
     let mut fill = |sink: &mut Sink| {
         let previews = previews.as_mut().map(|previews| (previews, &layout));
         render(plan, renderer, store, stop, &mut totals, previews, sink)
@@ -90,7 +90,7 @@ fn write_part(
     let Some((tile, _)) = plan.tile else {
         return Ok(());
     };
-    let header = PartHeader::of(tile, layout, plan.metadata.lasting());
+    let header = PartHeader::of(tile, layout, plan.metadata.without_device());
     job::write_part(file, &plan.identity(), &header, fill)
 }
 
@@ -106,12 +106,12 @@ fn render(
 ) -> Result<(), RenderError> {
     let mut progress = Progress::new(plan.progress, plan.frame.label(), plan.frame.number);
     let (scene, samples) = (&plan.scene, plan.scene.sampling.pixel_samples);
-    let (split, most) = (WorkSplit::of(scene.film_layout()), renderer.largest_film());
+    let (split, largest_film) = (WorkSplit::of(scene.film_layout()), renderer.largest_film());
     let order = match plan.deadline.is_some() || previews.is_some() {
         true => Order::Pixels,
         false => Order::Rows,
     };
-    let mut bands = Bands::new(plan.region(), samples, &split, order, most, store);
+    let mut bands = Bands::new(plan.region(), samples, &split, order, largest_film, store);
     if previews.is_some() {
         bands = bands.in_passes(scene.film_layout())?;
     } else if plan.deadline.is_some() {
@@ -120,11 +120,11 @@ fn render(
     let begin = Instant::now();
     let mut watch = |_: &mut dyn Backend, _: Region, fraction: f64| {
         let now = Instant::now();
-        let of_time = plan.deadline.map_or(0.0, |end| {
-            let all = end.saturating_duration_since(begin).as_secs_f64();
-            (now.duration_since(begin).as_secs_f64() / all).min(1.0)
+        let time_fraction = plan.deadline.map_or(0.0, |end| {
+            let limit = end.saturating_duration_since(begin).as_secs_f64();
+            (now.duration_since(begin).as_secs_f64() / limit).min(1.0)
         });
-        progress.update(fraction.max(of_time));
+        progress.update(fraction.max(time_fraction));
         Ok(match plan.deadline {
             _ if stop.signal().is_some() => Flow::Cancel,
             Some(end) if now >= end => Flow::TimeIsUp,
@@ -134,8 +134,8 @@ fn render(
     if let Some((previews, layout)) = previews {
         loop {
             let start = Instant::now();
-            let made = renderer.progress();
-            let pass = renderer.work(|backend, _| bands.next_pass(backend, &mut watch, &mut || made.made()));
+            let attempt = renderer.progress();
+            let pass = renderer.work(|backend, _| bands.next_pass(backend, &mut watch, &mut || attempt.made()));
             totals.time += start.elapsed();
             match pass {
                 Ok(Some(count)) if count < samples => {
@@ -146,7 +146,7 @@ fn render(
                 Ok(_) => break,
                 Err(RenderError::Cancelled) if plan.checkpoint.is_none() => {
                     if bands.passed_samples() == 0 {
-                        let note = "no sample of every pixel was complete, so there is no image yet";
+                        let note = "some pixels have no complete sample yet, so no image was written";
                         plan.log.log(Level::Note, note);
                     } else if let Some(partial) = save_pass(plan, renderer, &mut bands, previews, layout)? {
                         let time = totals.time;
@@ -160,8 +160,8 @@ fn render(
     }
     loop {
         let start = Instant::now();
-        let made = renderer.progress();
-        let next = renderer.work(|backend, _| bands.render_next(backend, &mut watch, &mut || made.made()));
+        let attempt = renderer.progress();
+        let next = renderer.work(|backend, _| bands.render_next(backend, &mut watch, &mut || attempt.made()));
         totals.time += start.elapsed();
         let Some(band) = next? else {
             totals.fraction_rendered = bands.fraction_rendered();
@@ -224,7 +224,7 @@ fn save_pass(
         }
         Ok(())
     });
-    previews.written();
+    previews.record_write();
     match saved {
         Ok(()) => Ok(Some(totals).filter(|totals| !totals.partial.is_empty())),
         Err(error @ (RenderError::Output(_) | RenderError::Memory(_))) => {

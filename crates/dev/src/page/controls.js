@@ -48,11 +48,11 @@ function pairOf(field, label, slider, change) {
     range.value = format(x === undefined ? range.min : position(x));
     range.setAttribute("aria-valuetext", format(x));
   };
-  const use = (x) => {
+  const onValue = (x) => {
     setNumber(x);
     change(x);
   };
-  const show = numberField(box, field, () => [current], use);
+  const show = numberField(box, field, () => [current], onValue);
   if (range) {
     range.setAttribute("aria-label", `${label}, slider`);
     range.addEventListener("input", () => {
@@ -129,12 +129,12 @@ function numbersOf(field, labels, change) {
   let current = [];
   const boxes = labels.map((label) => numberBox(field, label));
   const showNumber = boxes.map((box, i) => {
-    const use = (x) => {
+    const onValue = (x) => {
       current = boxes.map((box, j) => current[j] ?? (Number.isFinite(box.valueAsNumber) ? box.valueAsNumber : 0));
       current[i] = x;
       change([...current], i);
     };
-    return numberField(box, field, () => current, use);
+    return numberField(box, field, () => current, onValue);
   });
   const show = (list) => {
     current = [...list];

@@ -34,14 +34,14 @@ function stepOf({ kind, unit, range }, list) {
   return range && range[1] - range[0] <= 2 ? 0.01 : 0.1;
 }
 
-// Makes a box the editor of a field's number. `numbers()` returns the list that contains the number. `use(x)` is called
-// with a new value on Enter or when the box loses the focus, unless the text is empty or not a number. Returns a
+// Makes a box the editor of a field's number. `numbers()` returns the list that contains the number. `onValue(x)` is
+// called with a new value on Enter or when the box loses the focus, unless the text is empty or not a number. Returns a
 // function that shows a value unless the user is typing.
-export function numberField(box, field, numbers, use) {
+export function numberField(box, field, numbers, onValue) {
   let last;
   const setValue = (x) => {
     last = x;
-    use(x);
+    onValue(x);
   };
   box.classList.add("number");
   box.addEventListener("input", () => (typing = box));
@@ -66,7 +66,7 @@ export function forget(part) {
   if (typing && part.contains(typing)) typing = null;
 }
 
-// By default, the wheel changes a focused number box. Here, the wheel always scrolls.
+// By default, the wheel changes the value of a focused number box. This handler makes the wheel scroll instead.
 export function setUpWheel() {
   document.addEventListener("wheel", (event) => {
     const box = event.target;
@@ -80,8 +80,8 @@ export function setUpWheel() {
   }, { passive: false });
 }
 
-// Makes a box respond to drags and step keys. See `numberField` for `numbers()` and `use(x)`.
-function addSteps(box, field, numbers, use) {
+// Makes a box respond to drags and step keys. See `numberField` for `numbers()` and `onValue(x)`.
+function addSteps(box, field, numbers, onValue) {
   let press = null; // the state of the pointer press in progress
   let step = 0; // step size while a key is held: constant although the number's magnitude changes
   const current = () => (Number.isFinite(box.valueAsNumber) ? box.valueAsNumber : 0);
@@ -90,7 +90,7 @@ function addSteps(box, field, numbers, use) {
     if (box.value !== "" && next === current()) return;
     forget(box);
     box.value = format(next);
-    use(next);
+    onValue(next);
   };
   box.title = HINT;
   box.addEventListener("keydown", (event) => {

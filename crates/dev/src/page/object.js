@@ -103,8 +103,8 @@ function showUndo({ undo, redo, undo_blocked }) {
 // Writes a value, or only element `i` of a list, so that changes of other elements by other viewers are kept. The next
 // change is sent after the previous change was executed, so that a slider never gets ahead of the file.
 function write(field, value, i, note) {
-  const isPart = i !== undefined && valueOf(field) !== undefined;
-  const set = { path: isPart ? `${field.path}[${i}]` : field.path, value: isPart ? value[i] : value, gesture };
+  const isElement = i !== undefined && valueOf(field) !== undefined;
+  const set = { path: isElement ? `${field.path}[${i}]` : field.path, value: isElement ? value[i] : value, gesture };
   waiting.set(`${set.path} ${gesture}`, { field: field.path, set, note, number: null });
   if (!sending) send();
 }

@@ -24,10 +24,10 @@ export class Picture {
     this.pins = []; // pinned pixels, which are marked
     this.gain = 1;
     this.layout = "side"; // layout of a comparison
-    this.wiped = 0.5; // position of a wipe's divider, 0 to 1
+    this.dividerPosition = 0.5; // position of a wipe's divider, 0 to 1
     this.swapped = false; // whether a flicker shows the second image
     this.motion = new Motion();
-    this.wheeled = 0; // time of the last wheel event
+    this.lastWheelTime = 0; // time of the last wheel event
     // Scale in screen pixels per image pixel, or null to fit the image to the panel; and the image point at a panel's
     // center.
     this.scale = null;
@@ -53,11 +53,11 @@ export class Picture {
   // Selects the layout of a comparison: "side", "wipe", "flicker" or "difference".
   arrange(layout) {
     this.layout = layout;
-    const only = { wipe: "first", flicker: "first", difference: "difference" }[layout]; // the only visible part
+    const visiblePart = { wipe: "first", flicker: "first", difference: "difference" }[layout]; // undefined: all parts
     const focused = this.panels.find((panel) => panel.canvas === document.activeElement);
     for (const panel of this.panels) {
       const isCompared = panel.part !== "picture";
-      panel.figure.hidden = !panel.image || (isCompared && only !== undefined && panel.part !== only);
+      panel.figure.hidden = !panel.image || (isCompared && visiblePart !== undefined && panel.part !== visiblePart);
       if (isCompared) panel.caption(this.#caption(panel.part));
     }
     if (focused?.figure.hidden) this.#visible()?.canvas.focus({ preventScroll: true });
@@ -85,7 +85,7 @@ export class Picture {
 
   // Moves the divider of a wipe.
   wipe(position) {
-    this.wiped = Math.min(1, Math.max(0, position));
+    this.dividerPosition = Math.min(1, Math.max(0, position));
     this.#schedule();
   }
 
@@ -126,10 +126,10 @@ export class Picture {
     if (!panel || !this.header) return;
     const old = this.#view(panel);
     point ??= [panel.canvas.clientWidth / 2, panel.canvas.clientHeight / 2];
-    const fixed = [(point[0] - old.left) / old.scale, (point[1] - old.top) / old.scale];
+    const anchor = [(point[0] - old.left) / old.scale, (point[1] - old.top) / old.scale];
     this.scale = Math.min(MAX_SCALE, Math.max(Math.min(1, old.fit) / 4, scale));
     const half = [panel.canvas.clientWidth / 2, panel.canvas.clientHeight / 2];
-    this.middle = fixed.map((v, i) => v - (point[i] - half[i]) / this.scale);
+    this.middle = anchor.map((v, i) => v - (point[i] - half[i]) / this.scale);
     this.#schedule();
   }
 
@@ -205,7 +205,7 @@ export class Picture {
   // Draws the second image to the right of the divider.
   #drawWipe(context, canvas, view, second) {
     const { width, height } = this.header;
-    const x = this.wiped * canvas.clientWidth - view.left;
+    const x = this.dividerPosition * canvas.clientWidth - view.left;
     context.save();
     context.beginPath();
     context.rect(x, -view.top, canvas.clientWidth, canvas.clientHeight);
@@ -218,7 +218,7 @@ export class Picture {
   // Returns whether a pointer is at the divider of a wipe.
   #isAtDivider(panel, event) {
     const grip = GRIP_DISTANCE[event.pointerType] ?? GRIP_DISTANCE.mouse;
-    return panel.part === "first" && this.#isWiping() && Math.abs(event.offsetX - this.wiped * panel.canvas.clientWidth) <= grip;
+    return panel.part === "first" && this.#isWiping() && Math.abs(event.offsetX - this.dividerPosition * panel.canvas.clientWidth) <= grip;
   }
 
   #listen(panel) {
@@ -281,7 +281,7 @@ export class Picture {
 
   #dragDivider(panel, x) {
     this.wipe(x / panel.canvas.clientWidth);
-    this.wiping(this.wiped);
+    this.wiping(this.dividerPosition);
   }
 
   #drag(panel, tool, dx, dy) {
@@ -329,8 +329,8 @@ export class Picture {
     } else if (this.tool() === "fly") {
       this.motion.speed = Math.min(100, Math.max(0.01, this.motion.speed * ZOOM_FACTOR ** -lines));
     } else {
-      if (event.timeStamp - this.wheeled > GESTURE_PAUSE) sendCommand("grab");
-      this.wheeled = event.timeStamp;
+      if (event.timeStamp - this.lastWheelTime > GESTURE_PAUSE) sendCommand("grab");
+      this.lastWheelTime = event.timeStamp;
       this.motion.pending.dolly -= lines * 0.1;
       this.#schedule();
     }

@@ -11,7 +11,7 @@ export function setUpRender(onKey, showNotice) {
   element("pause").addEventListener("click", pause);
   onKey(" ", pause);
   element("restart").addEventListener("click", () => sendCommand("restart"));
-  element("most-samples").addEventListener("change", ({ target }) => {
+  element("max-samples").addEventListener("change", ({ target }) => {
     const { value, valueAsNumber: count, validity } = target;
     const isNone = value === "" && !validity.badInput;
     if (isNone || (Number.isInteger(count) && count >= 1 && count <= MAX_SAMPLES)) {
@@ -30,7 +30,7 @@ export function setUpRender(onKey, showNotice) {
     element("pause").textContent = state.paused ? "Resume" : "Pause";
     element("pause").title = state.paused ? "Resume rendering (Space)" : "Pause rendering (Space)";
     const [max, sceneSamples] = state.samples;
-    const field = element("most-samples");
+    const field = element("max-samples");
     if (document.activeElement !== field) field.value = max ?? "";
     field.placeholder = sceneSamples || "all";
     element("preview").value = state.preview;

@@ -96,15 +96,15 @@ function numberOf(slider) {
   const range = make("input", { type: "range" });
   const box = make("input", { type: "number", step: "any" });
   box.setAttribute("aria-label", `${slider.name}, as a number`);
-  const use = (value) => {
+  const onValue = (value) => {
     last = value;
     slide(slider, value);
   };
   range.addEventListener("input", () => {
     show(range.valueAsNumber);
-    use(range.valueAsNumber);
+    onValue(range.valueAsNumber);
   });
-  const show = numberField(box, field, () => [last], use);
+  const show = numberField(box, field, () => [last], onValue);
   const update = ({ min, max, value }) => {
     field.range = [min, max];
     last = value;

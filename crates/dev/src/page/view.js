@@ -170,11 +170,11 @@ function drawHistogram(header = lastHeader) {
   context.globalCompositeOperation = "source-over";
   context.fillStyle = style.color;
   context.fillRect(Math.round(x(white)), 0, Math.max(1, ratio), canvas.height);
-  const above = Math.max(...above_white) / Math.max(1, header.sent[0] * header.sent[1]);
+  const clipped = Math.max(...above_white) / Math.max(1, header.sent[0] * header.sent[1]);
   const stop = (bin) => power(first + Math.floor(bin / of_a_stop));
   const isUsed = counts[0].map((_, bin) => counts.some((channel) => channel[bin] > 0));
   const [low, high] = [isUsed.indexOf(true), isUsed.lastIndexOf(true)];
   const range = low < 0 ? "No light" : `Range ${stop(low)} to ${stop(high + of_a_stop)}`;
-  text.textContent = `${range}; ${(100 * above).toFixed(1)}% clipped`;
+  text.textContent = `${range}; ${(100 * clipped).toFixed(1)}% clipped`;
   canvas.setAttribute("aria-label", `Histogram: ${text.textContent}`);
 }

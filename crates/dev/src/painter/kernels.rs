@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use super::{ATTEMPTS, Painter, Running};
+use super::{MAX_ATTEMPTS, Painter, Running};
 use crate::build::{BuildResult, guarded};
 use crate::canvas::Canvas;
 use crate::diagnostic::Diagnostic;
@@ -183,7 +183,7 @@ impl Painter {
         self.first_valid_request = self.requests + 1;
         self.rejected.clear(); // another device may accept them
         self.failures += 1;
-        if let Some((loaded, shaders)) = self.target().filter(|_| self.failures <= ATTEMPTS) {
+        if let Some((loaded, shaders)) = self.target().filter(|_| self.failures <= MAX_ATTEMPTS) {
             self.request(&loaded, shaders, Instant::now());
         }
         self.publish();

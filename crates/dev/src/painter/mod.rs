@@ -39,10 +39,10 @@ use wgray_render::gpu::sliders::Slider;
 use wgray_scene::CameraDescription;
 
 /// Minimum time between frames while an image is refined. At most a tenth of the time is spent on making frames.
-const BETWEEN_FRAMES: Duration = Duration::from_millis(100);
+const FRAME_INTERVAL: Duration = Duration::from_millis(100);
 /// Maximum number of successive attempts to open a device without rendering an image.
-const ATTEMPTS: u32 = 3;
-const GAIN: f32 = 256.0;
+const MAX_ATTEMPTS: u32 = 3;
+const DEFAULT_GAIN: f32 = 256.0;
 
 pub struct Painter {
     sources: Sources,
@@ -172,7 +172,7 @@ impl Painter {
             shaders: sources.shaders.as_ref().map(|folder| folder.display().to_string()),
             device: format!("{}, {}", device.info.name, device.info.driver),
             read_only: sources.read_only(),
-            gain: GAIN,
+            gain: DEFAULT_GAIN,
             editor,
             ..State::default()
         };
@@ -208,7 +208,7 @@ impl Painter {
             files: Vec::new(),
             view: View::default(),
             times,
-            gain: GAIN,
+            gain: DEFAULT_GAIN,
             marks: true,
             display_overrides: DisplayOverrides::default(),
             limits: Limits::default(),
@@ -316,7 +316,7 @@ impl Painter {
 
     fn show_files(&mut self, noticed: Instant, display_changed: bool) {
         self.failures = 0;
-        self.keep_view();
+        self.replace_unavailable_view();
         self.synchronize((noticed, true));
         self.upload_sliders((noticed, true));
         // If only the display settings changed, shows the current image again. The first image of a new rendering is
@@ -392,7 +392,7 @@ impl Painter {
         let packed = self.packed(&loaded);
         let (view, times) = (self.shown_view(), self.times.clone());
         let Some(running) = &mut self.running else { return };
-        if running.canvas.shows(&packed) {
+        if running.canvas.renders(&packed) {
             if !self.restart_pending {
                 self.change = None;
             }
@@ -464,7 +464,7 @@ impl Painter {
             .for_each(|dispatch| self.times.record_dispatch(dispatch));
         match stepped {
             Ok(show) => {
-                let is_due = self.last_frame.elapsed() > BETWEEN_FRAMES.max(10 * self.frame_cost);
+                let is_due = self.last_frame.elapsed() > FRAME_INTERVAL.max(10 * self.frame_cost);
                 if show || (is_due && !running.canvas.is_new()) {
                     self.show();
                 }

@@ -62,7 +62,7 @@ impl Painter {
         }
     }
 
-    /// Switches to the parked kernel if it has these shaders and constants. Returns whether it has.
+    /// Switches to the parked kernel if it has these shaders and constants. Returns whether the kernel was switched.
     pub(super) fn unpark(&mut self, shaders: &Arc<Shaders>, constants: &Constants) -> bool {
         let matches = |parked: &Running| parked.shaders == *shaders && parked.constants == *constants;
         let is_match = self.parked.as_ref().is_some_and(matches);
@@ -83,7 +83,7 @@ impl Painter {
             running.canvas.change_view(view)
         });
         // If the scene or the camera changed, the image restarts immediately.
-        let is_current = packed.is_some_and(|packed| running.canvas.shows(&packed));
+        let is_current = packed.is_some_and(|packed| running.canvas.renders(&packed));
         match result {
             Ok(()) => {
                 self.record_change(change);

@@ -12,7 +12,7 @@ impl Painter {
         let kernel = |painter: &Painter| painter.loaded.as_ref().map(|loaded| painter.constants(loaded));
         let before = kernel(self);
         self.view = view;
-        self.keep_view();
+        self.replace_unavailable_view();
         let view = self.shown_view();
         if let Some(running) = &mut self.running {
             running.halted = false;
@@ -35,7 +35,7 @@ impl Painter {
     }
 
     /// Falls back to the color view if the scene does not provide the selected view.
-    pub(super) fn keep_view(&mut self) {
+    pub(super) fn replace_unavailable_view(&mut self) {
         if self.loaded.is_none() {
             return;
         }

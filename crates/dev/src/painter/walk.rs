@@ -18,14 +18,14 @@ const MAX_STEPS: usize = 256;
 #[derive(Default)]
 pub struct CameraHistory {
     back: Vec<CameraDescription>,
-    forth: Vec<CameraDescription>,
+    forward: Vec<CameraDescription>,
     /// True if the next move belongs to the current step.
     in_step: bool,
 }
 
 impl CameraHistory {
     pub fn steps(&self) -> [bool; 2] {
-        [!self.back.is_empty(), !self.forth.is_empty()]
+        [!self.back.is_empty(), !self.forward.is_empty()]
     }
 
     /// Ends the current step: the next move starts a new one.
@@ -35,7 +35,7 @@ impl CameraHistory {
 
     fn push(&mut self, camera: &CameraDescription) {
         if !std::mem::replace(&mut self.in_step, true) {
-            self.forth.clear();
+            self.forward.clear();
             if self.back.len() == MAX_STEPS {
                 self.back.remove(0);
             }
@@ -123,14 +123,14 @@ impl Painter {
         }
     }
 
-    pub(super) fn retrace(&mut self, forth: bool) {
+    pub(super) fn retrace(&mut self, forward: bool) {
         let Some(current) = self.current_camera().cloned() else {
             return;
         };
         let history = &mut self.camera_history;
-        let (from, to) = match forth {
-            true => (&mut history.forth, &mut history.back),
-            false => (&mut history.back, &mut history.forth),
+        let (from, to) = match forward {
+            true => (&mut history.forward, &mut history.back),
+            false => (&mut history.back, &mut history.forward),
         };
         let Some(camera) = from.pop() else { return };
         history.in_step = false;
@@ -161,7 +161,7 @@ impl Painter {
         let file_camera = self.loaded.as_ref().map(|loaded| &loaded.camera);
         self.camera = Some(camera).filter(|camera| Some(camera) != file_camera);
         self.restart_pending = true;
-        self.comparison.before = None; // it shows the scene from another viewpoint
+        self.comparison.before = None; // the image shows the scene from another viewpoint
         if let Some(running) = &mut self.running {
             running.halted = false;
         }

@@ -206,7 +206,7 @@ impl Painter {
         {
             let mut writes = self.writes.lock().unwrap_or_else(PoisonError::into_inner);
             writes.count += 1;
-            writes.known = (!self.files.is_empty()).then(|| (Arc::clone(&written), self.files.clone()));
+            writes.written_scene = (!self.files.is_empty()).then(|| (Arc::clone(&written), self.files.clone()));
         }
         self.set_scene(Ok(written))
     }

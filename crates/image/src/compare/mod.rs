@@ -11,6 +11,6 @@ mod ssim;
 pub use color_map::color;
 pub use flip::{Flip, Map, PIXELS_PER_DEGREE, flip};
 pub use picture::{Channel, Kind, Picture, Plane, Unreadable};
-pub use plain::{COLOR, Difference, LargestDifference, Layer, PixelCoord, Values, layer_of, layers};
+pub use plain::{COLOR, Difference, LargestDifference, Layer, NonFiniteCounts, PixelCoord, layer_of, layers};
 pub use show::{ErrorImage, show, step};
 pub use ssim::ssim;

@@ -32,21 +32,21 @@ pub struct PixelCoord {
 
 /// Counts of non-finite values.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Values {
+pub struct NonFiniteCounts {
     /// Number of NaNs.
     pub nan: u64,
     /// Number of infinities of either sign.
     pub infinite: u64,
 }
 
-impl Values {
+impl NonFiniteCounts {
     fn count(&mut self, value: f64) {
         self.nan += u64::from(value.is_nan());
         self.infinite += u64::from(value.is_infinite());
     }
 
     /// Returns the number of non-finite values.
-    pub fn all(self) -> u64 {
+    pub fn total(self) -> u64 {
         self.nan + self.infinite
     }
 }
@@ -86,9 +86,9 @@ pub struct Difference {
     /// maximum magnitude in the second image, or 1 if the maximum is 0.
     pub psnr: f64,
     /// Non-finite values of the first image.
-    pub a: Values,
+    pub a: NonFiniteCounts,
     /// Non-finite values of the second image.
-    pub b: Values,
+    pub b: NonFiniteCounts,
     /// The first pixel with a non-finite value in either image.
     pub first_non_finite: Option<PixelCoord>,
 }
@@ -147,8 +147,8 @@ struct DifferenceSums {
     squares: f64,
     relative: f64,
     peak: f64,
-    a: Values,
-    b: Values,
+    a: NonFiniteCounts,
+    b: NonFiniteCounts,
     first_non_finite: Option<usize>,
 }
 

@@ -79,7 +79,8 @@ impl ValidKernel {
         self.exact_entry(kernel.entry_point, &constants.constants(), rounding, controls)
     }
 
-    /// Returns the SPIR-V of any compute entry point with these overrides, executed exactly as written.
+    /// Returns the SPIR-V of any compute entry point with these overrides. The arithmetic is executed exactly as
+    /// written.
     pub fn exact_entry(
         &self,
         entry: &str,

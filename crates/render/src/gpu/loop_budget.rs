@@ -2,8 +2,8 @@
 
 use crate::records::{MAX_PATH_LEAVES, Packed, SAMPLE_BLOCK};
 
-/// Iterations of all loops after which Mesa 22.3's llvmpipe ends every loop of an invocation. An iteration counts if
-/// any lane needs it.
+/// Number of iterations, summed over all loops of an invocation, after which Mesa 22.3's llvmpipe ends every loop. An
+/// iteration counts if any lane executes the iteration.
 const MAX_ITERATIONS: f64 = 65_535.0;
 /// Estimated number of primitives that may occlude a block of light samples.
 const CANDIDATES: f64 = 4.0;

@@ -408,7 +408,7 @@ fn create(path: &Path, header: &Header) -> io::Result<(File, Key, u64)> {
 }
 
 fn temporary(path: &Path, header: &Header) -> io::Result<(NamedTempFile, Key, u64)> {
-    let mut temporary = wgray_image::beside(path)?;
+    let mut temporary = wgray_image::create_beside(path)?;
     let (key, end) = pieces_file::write_header(temporary.as_file_mut(), header)?;
     Ok((temporary, key, end))
 }

@@ -17,9 +17,9 @@ pub struct Identity {
     pub version: String,
     /// Hash of the shader files.
     pub shaders: String,
-    /// Hash of the packed scene, including overriding options.
+    /// Hash of the packed scene, in which options have overridden values of the scene file.
     pub scene: String,
-    /// Width and height of the whole image.
+    /// Width and height of the full image.
     pub picture: [u32; 2],
     /// Rendered pixels: x0, y0, x1, y1.
     pub region: [u32; 4],

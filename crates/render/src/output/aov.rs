@@ -56,7 +56,7 @@ pub enum Channel {
     /// A float of the first hit.
     Float(&'static str, fn(&FirstHit) -> f32),
     /// An integer of the first hit.
-    Whole(&'static str, fn(&FirstHit) -> u32),
+    Integer(&'static str, fn(&FirstHit) -> u32),
     /// A component of a layer's mean.
     Mean(&'static str, Layer, usize),
     /// A component of the shading normal: of the mean if the film has layers, otherwise of the first hit.
@@ -71,21 +71,21 @@ impl Channel {
     /// Returns the name in OpenEXR files.
     pub fn name(&self) -> &'static str {
         match self {
-            Channel::Float(name, _) | Channel::Whole(name, _) | Channel::Count(name) => name,
+            Channel::Float(name, _) | Channel::Integer(name, _) | Channel::Count(name) => name,
             Channel::Mean(name, ..) | Channel::ShadingNormal(name, _) | Channel::Variance(name, _) => name,
         }
     }
 
     /// Returns true if the values are integers.
     pub fn is_whole(&self) -> bool {
-        matches!(self, Channel::Whole(..) | Channel::Count(_))
+        matches!(self, Channel::Integer(..) | Channel::Count(_))
     }
 
     /// Returns the bytes of a band's pixel `i`.
     pub fn bytes(&self, band: Band, i: usize) -> [u8; 4] {
         match self {
             Channel::Float(_, value) => value(&band.hits[i]).to_ne_bytes(),
-            Channel::Whole(_, value) => value(&band.hits[i]).to_ne_bytes(),
+            Channel::Integer(_, value) => value(&band.hits[i]).to_ne_bytes(),
             Channel::Mean(_, layer, component) => band.film.layer(*layer, i)[*component].to_ne_bytes(),
             Channel::ShadingNormal(_, component) if band.film.has_layers() => {
                 band.film.layer(Layer::Normal, i)[*component].to_ne_bytes()
@@ -158,7 +158,7 @@ impl Aov {
 
     const fn row(self) -> Row {
         use AovSource::{Adaptive, FirstHit, Samples};
-        use Channel::{Count, Float, Mean, ShadingNormal, Variance, Whole};
+        use Channel::{Count, Float, Integer, Mean, ShadingNormal, Variance};
         const fn row(name: &'static str, source: AovSource, channels: &'static [Channel]) -> Row {
             Row { name, source, channels }
         }
@@ -200,8 +200,8 @@ impl Aov {
                 FirstHit,
                 &[Float("uv.U", |hit| hit.uv.x), Float("uv.V", |hit| hit.uv.y)],
             ),
-            Aov::Primitive => row("primitive", FirstHit, &[Whole("primitive.ID", |hit| hit.primitive)]),
-            Aov::Instance => row("instance", FirstHit, &[Whole("instance.ID", |hit| hit.shape)]),
+            Aov::Primitive => row("primitive", FirstHit, &[Integer("primitive.ID", |hit| hit.primitive)]),
+            Aov::Instance => row("instance", FirstHit, &[Integer("instance.ID", |hit| hit.shape)]),
             Aov::Barycentric => row(
                 "barycentric",
                 FirstHit,

@@ -73,8 +73,8 @@ fn glass_albedo_aniso(index: f32, alpha: Vec2, wo: Vec3, facets: &[Vec2]) -> f32
     (sum / facets.len() as f64) as f32
 }
 
-/// Returns the single-scattering albedo of reflection with Schlick's Fresnel term, F0 x + F90 y: reference for
-/// `ggx_albedo`.
+/// Computes by quadrature the factors of F0 and F90 in the single-scattering albedo of reflection with Schlick's
+/// Fresnel term. `ggx_albedo` is a fit of the same factors for isotropic lobes.
 fn schlick_albedo(alpha: Vec2, wo: Vec3, facets: &[Vec2]) -> DVec2 {
     let mut sum = DVec2::ZERO;
     for u in facets {

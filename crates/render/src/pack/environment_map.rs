@@ -121,8 +121,8 @@ fn pack_map(environment: &EnvironmentImage, texels: &mut Vec<u32>) -> Option<Pac
     })
 }
 
-/// Partition of the cells into at most [`ENVIRONMENT_BLOCKS`] x [`ENVIRONMENT_BLOCKS`] blocks. Sides are powers of two,
-/// except at the right and lower edges.
+/// Partition of the cells into at most [`ENVIRONMENT_BLOCKS`] x [`ENVIRONMENT_BLOCKS`] blocks. The sides of blocks are
+/// powers of two, except at the right and lower edges.
 struct Grid {
     width: usize,
     height: usize,

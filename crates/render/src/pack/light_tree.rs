@@ -108,7 +108,7 @@ pub struct TreeEmitter {
     pub intensity: f64,
     /// PDF of samples by area, times the probability of selecting the tree.
     pub density: f64,
-    /// 0 for a light, else 1 + mesh instance.
+    /// 0 for a light, else 1 + the index of the mesh instance.
     pub instance: u32,
     /// Index of the light, or of the triangle in its mesh.
     pub index: u32,

@@ -77,7 +77,7 @@ pub(crate) fn primitive(kind: u32, center: DVec3, columns: DMat3, material: u32,
         anchor = (center + columns * local_point).as_vec3();
         middle = to_local * (center - anchor.as_dvec3());
     }
-    // The level of a cylinder is the level of the curved side.
+    // The level of a cylinder is the level of its curved side, which does not depend on z.
     let square = match kind {
         CYLINDER => middle.truncate().length_squared(),
         _ => middle.length_squared(),

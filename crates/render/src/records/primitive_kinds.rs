@@ -33,7 +33,7 @@ macro_rules! primitive_kinds {
             pub const SOLID_KINDS: u32 = solid_bits(PRIMITIVE_KINDS);
         }
 
-        /// All kinds, by number.
+        /// All kinds, in the order of their numbers.
         pub const PRIMITIVE_KINDS: &[PrimitiveKind] = &[
             $(PrimitiveKind { name: stringify!($name), form: PrimitiveForm::$form }),*
         ];

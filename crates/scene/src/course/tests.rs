@@ -360,7 +360,7 @@ fn meshes_must_be_in_the_parent_folder_or_the_asset_root() {
 
 /// Valid fragment, invalid replacement, and the message from the line number on.
 const INVALID: &[(&str, &str, &str)] = &[
-    // Invalid JSON.
+    // The replacement is not valid JSON.
     ("\"spp\": 256,", "\"spp\": 256", "3:3: expected \",\" or \"}\""),
     ("\"spp\": 256,", "\"spp\": NaN,", "2:10: spp: expected value"),
     (
@@ -379,7 +379,7 @@ const INVALID: &[(&str, &str, &str)] = &[
         "\"has_bvh\": true\n    }\n  ]\n} {",
         "33:3: trailing characters",
     ),
-    // Keys and types.
+    // Unknown and missing keys, and values of the wrong type.
     (
         "\"spp\": 256,",
         "\"spp\": 256, \"SPP\": 16,",

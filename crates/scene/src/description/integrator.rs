@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::Pattern;
-use crate::limits::DEEPEST;
+use crate::limits::MAX_DEPTH;
 
 /// A light transport algorithm. In a file, the names are in snake case: `"path"`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Deserialize, Serialize, JsonSchema)]
@@ -48,7 +48,7 @@ impl Integrator {
             // More pilot samples, because a few samples may miss rare paths and underestimate the error.
             Integrator::Path => Row {
                 name: "path",
-                depths: (0, DEEPEST),
+                depths: (0, MAX_DEPTH),
                 pattern: Pattern::Sobol,
                 pilot_samples: 64,
                 follows_paths: true,

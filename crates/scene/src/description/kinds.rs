@@ -41,16 +41,16 @@ kinds! {
     Length, "a length in scene units", number(LENGTHS);
     Size, "two lengths in scene units", list(2, number(LENGTHS));
     Rgb, "linear red, green and blue", list(3, number(COLORS));
-    ShareRgb, "linear red, green and blue", list(3, number(SHARES));
-    Share, "", number(SHARES);
-    Degrees, "in degrees", number(TURNS);
-    Angles, "three angles in degrees", list(3, number(TURNS));
+    ShareRgb, "linear red, green and blue", list(3, number(FRACTIONS));
+    Share, "", number(FRACTIONS);
+    Degrees, "in degrees", number(ROTATIONS);
+    Angles, "three angles in degrees", list(3, number(ROTATIONS));
 
-    Pixels, "in pixels", integer(1, MOST);
-    Count, "a whole number", integer(1, MOST);
-    MaxSamples, "a whole number", integer(MIN_ADAPTIVE_SAMPLES, MOST);
+    Pixels, "in pixels", integer(1, MAX_COUNT);
+    Count, "a whole number", integer(1, MAX_COUNT);
+    MaxSamples, "a whole number", integer(MIN_ADAPTIVE_SAMPLES, MAX_COUNT);
     Stops, "in stops", number((-ViewSettings::MAX_STOPS, ViewSettings::MAX_STOPS));
-    Depth, "a whole number", integer(0, DEEPEST);
+    Depth, "a whole number", integer(0, MAX_DEPTH);
     Seed, "a whole number", integer(0, u32::MAX);
     Clamp, "", number(CLAMPS);
     ShadowEpsilon, "", number(SHADOW_EPSILONS);

@@ -12,7 +12,7 @@ use serde_json::json;
 
 use super::integrator::Integrator;
 use crate::description::kinds::{Clamp, Count, Depth, FilterRadius, MaxSamples, Rgb, Seed, ShadowEpsilon, Share};
-use crate::limits::MOST;
+use crate::limits::MAX_COUNT;
 
 /// Shadows of glass. In a file, the names are in snake case: `"opaque"`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
@@ -136,7 +136,7 @@ impl<'de> Deserialize<'de> for SamplesDescription {
             fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
                 write!(
                     f,
-                    "a whole number from 1 to {MOST}, or a table such as {{ pattern = \"grid\", count = 16 }}"
+                    "a whole number from 1 to {MAX_COUNT}, or a table such as {{ pattern = \"grid\", count = 16 }}"
                 )
             }
 

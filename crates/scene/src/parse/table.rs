@@ -7,7 +7,7 @@ use crate::Integrator;
 use crate::description::tables::{self, ReadError};
 use crate::description::tagged::Tagged;
 use crate::key_path::{KeyPath, Segment, cut, list, listed};
-use crate::limits::{BLADES, DEEPEST, MOST, UV_SETS};
+use crate::limits::{BLADES, MAX_COUNT, MAX_DEPTH, UV_SETS};
 use crate::problem::{At, Problem, Problems};
 use crate::suggest;
 
@@ -246,8 +246,8 @@ fn integer_rule(key: Option<&Segment>, integrator: Integrator) -> String {
         Some(Segment::Key(key)) if key == "seed" => (0, u32::MAX),
         Some(Segment::Key(key)) if key == "uv_set" => (0, UV_SETS - 1),
         Some(Segment::Key(key)) if key == "max_depth" => integrator.depths(),
-        Some(Segment::Key(key)) if key == "rr_depth" => (0, DEEPEST),
-        _ => (1, MOST),
+        Some(Segment::Key(key)) if key == "rr_depth" => (0, MAX_DEPTH),
+        _ => (1, MAX_COUNT),
     };
     format!("a whole number from {low} to {high}")
 }

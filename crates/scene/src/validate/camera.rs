@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use super::{Checked, MIN_SINE, between, check, length, number, point, show, unit};
 use crate::camera_path::CameraPath;
-use crate::limits::{APERTURES, BLADES, F_NUMBERS, FOVS, FRAMES, LENGTHS, TURNS};
+use crate::limits::{APERTURES, BLADES, F_NUMBERS, FOVS, FRAMES, LENGTHS, ROTATIONS};
 use crate::problem::{At, Collector, Problem, Problems, both};
 use crate::{Camera, CameraDescription, CameraKeyDescription, Lens, PerspectiveDescription, Projection};
 
@@ -100,7 +100,7 @@ fn lens_of(camera: &PerspectiveDescription) -> Result<Option<Lens>, Problems> {
         format!("{blades} must be 0 or a whole number from {} to {}", BLADES.0, BLADES.1)
     });
     problems.value(checked.at("blades"));
-    let rotation = problems.or_default(between(camera.blade_rotation, TURNS).at("blade_rotation"));
+    let rotation = problems.or_default(between(camera.blade_rotation, ROTATIONS).at("blade_rotation"));
     let diameter = aperture.or(f_number.map(|n| focal_length / n)).unwrap_or(0.0);
     problems.end((diameter > 0.0).then(|| Lens {
         radius: diameter / 2.0,

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::{DMat3, DVec3};
 
-use super::super::limits::{ELEVATIONS, ENVIRONMENT_SCALES, TURBIDITIES, TURNS};
+use super::super::limits::{ELEVATIONS, ENVIRONMENT_SCALES, ROTATIONS, TURBIDITIES};
 use super::super::sky::{Sky, sky};
 use super::super::studio::studio;
 use super::super::{EnvironmentDescription, EnvironmentImage, EnvironmentName, EnvironmentRotation, Image, Rotation};
@@ -107,7 +107,7 @@ fn sky_of(description: &EnvironmentDescription) -> Checked<Sky> {
     };
     Ok(Sky {
         elevation: value("sun_elevation", description.sun_elevation, ELEVATION, ELEVATIONS)?.to_radians(),
-        azimuth: value("sun_azimuth", description.sun_azimuth, 0.0, TURNS)?.to_radians(),
+        azimuth: value("sun_azimuth", description.sun_azimuth, 0.0, ROTATIONS)?.to_radians(),
         turbidity: value("turbidity", description.turbidity, TURBIDITY, TURBIDITIES)?,
     })
 }

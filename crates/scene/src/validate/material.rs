@@ -5,7 +5,7 @@ use glam::DVec3;
 use super::path::needs_path;
 use super::texture::Textures;
 use super::{At, Checked, Color, Problem, between, check, number};
-use crate::limits::{ABSORPTIONS, ETAS, IORS, KS, SHARES, SHININESS, TURNS};
+use crate::limits::{ABSORPTIONS, ETAS, FRACTIONS, IORS, KS, ROTATIONS, SHININESS};
 use crate::{
     ColorDescription, ConductorDescription, Facets, Material, MaterialDescription, MetalIndex, PhongDescription,
     Reflection, ValueDescription,
@@ -119,8 +119,8 @@ impl Textures<'_> {
     ) -> Checked<Facets> {
         Ok(Facets {
             roughness: self.value(roughness).at("roughness")?,
-            anisotropy: between(anisotropy, SHARES).at("anisotropy")?,
-            rotation: between(rotation, TURNS).at("anisotropy_rotation")?,
+            anisotropy: between(anisotropy, FRACTIONS).at("anisotropy")?,
+            rotation: between(rotation, ROTATIONS).at("anisotropy_rotation")?,
             compensated,
         })
     }

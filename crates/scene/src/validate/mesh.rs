@@ -9,7 +9,7 @@ use glam::{DAffine3, DMat3, DQuat, DVec3};
 
 use super::super::image_file::AssetKey;
 use super::super::key_path::cut;
-use super::super::limits::{FARTHEST, LENGTHS, SCALES, TURNS};
+use super::super::limits::{LENGTHS, MAX_COORDINATE, ROTATIONS, SCALES};
 use super::super::mesh_file;
 use super::super::suggest::Suggestions;
 use super::super::{
@@ -193,8 +193,8 @@ fn place_mesh(
     let low = corners.iter().copied().fold(DVec3::INFINITY, DVec3::min);
     let high = corners.iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max);
     let farthest = low.abs().max(high.abs()).max_element();
-    check(farthest <= FARTHEST, || {
-        let (farthest, limit) = (number(farthest), number(FARTHEST));
+    check(farthest <= MAX_COORDINATE, || {
+        let (farthest, limit) = (number(farthest), number(MAX_COORDINATE));
         format!("{file:?} reaches to {farthest} in world space; coordinates must be from -{limit} to {limit}")
     })
     .at("file")?;
@@ -359,7 +359,7 @@ fn factors(factors: DVec3) -> Checked<DVec3> {
 }
 
 pub(super) fn rotation_matrix(rotation: &Rotation) -> Checked<DMat3> {
-    let angle = |degrees: f64| between(degrees, TURNS);
+    let angle = |degrees: f64| between(degrees, ROTATIONS);
     Ok(match rotation {
         Rotation::Angles(angles) => {
             let [x, y, z] = [angle(angles.x)?, angle(angles.y)?, angle(angles.z)?];

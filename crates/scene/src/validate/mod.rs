@@ -31,7 +31,8 @@ use self::texture::Textures;
 use super::key_path::cut;
 use super::key_path::list;
 use super::limits::{
-    CLAMPS, COLORS, DEEPEST, FARTHEST, FILTER_RADII, LENGTHS, MIN_ADAPTIVE_SAMPLES, MOST, SHADOW_EPSILONS, SHARES,
+    CLAMPS, COLORS, FILTER_RADII, FRACTIONS, LENGTHS, MAX_COORDINATE, MAX_COUNT, MAX_DEPTH, MIN_ADAPTIVE_SAMPLES,
+    SHADOW_EPSILONS,
 };
 use super::problem::{At, Collector, Problem, Problems, both};
 use super::suggest::Suggestions;
@@ -239,8 +240,8 @@ pub(super) fn sample_count(pattern: Pattern, count: u32) -> Checked<u32> {
 }
 
 fn check_count(count: u32) -> Checked<u32> {
-    let is_valid = (1..=MOST).contains(&count);
-    check(is_valid, || format!("{count} must be from 1 to {MOST}"))?;
+    let is_valid = (1..=MAX_COUNT).contains(&count);
+    check(is_valid, || format!("{count} must be from 1 to {MAX_COUNT}"))?;
     Ok(count)
 }
 
@@ -301,7 +302,7 @@ fn filter(description: &PixelFilterDescription) -> Checked<PixelFilter> {
 }
 
 pub(super) fn adaptive_error(error: f64) -> Checked<f64> {
-    between(error, SHARES)
+    between(error, FRACTIONS)
 }
 
 pub(super) fn adaptive(
@@ -323,12 +324,12 @@ pub(super) fn adaptive(
         )
     })?;
     let error = adaptive_error(description.error).at("error")?;
-    let default = count.saturating_mul(16).min(MOST);
+    let default = count.saturating_mul(16).min(MAX_COUNT);
     let max_samples = description.max_samples.unwrap_or(default);
     let min = count.max(MIN_ADAPTIVE_SAMPLES); // one sample gives no error estimate
-    check((min..=MOST).contains(&max_samples), || {
+    check((min..=MAX_COUNT).contains(&max_samples), || {
         let reason = format!("the minimum is the greater of {MIN_ADAPTIVE_SAMPLES} and the count of pixel_samples");
-        format!("{max_samples} must be from {min} to {MOST}; {reason}")
+        format!("{max_samples} must be from {min} to {MAX_COUNT}; {reason}")
     })
     .at("max_samples")?;
     Ok(Adaptive { error, max_samples })
@@ -343,7 +344,7 @@ pub(super) fn max_depth(depth: u32, integrator: Integrator) -> Checked<u32> {
 }
 
 fn rr_depth(depth: u32) -> Checked<u32> {
-    check(depth <= DEEPEST, || format!("{depth} must be from 0 to {DEEPEST}"))?;
+    check(depth <= MAX_DEPTH, || format!("{depth} must be from 0 to {MAX_DEPTH}"))?;
     Ok(depth)
 }
 
@@ -360,8 +361,8 @@ fn check_path_key<T>(integrator: Integrator, value: Option<T>, check: fn(T) -> C
 
 pub(super) fn point(p: DVec3) -> Checked<DVec3> {
     for x in p.to_array() {
-        check(x.abs() <= FARTHEST, || {
-            let (x, limit) = (number(x), number(FARTHEST));
+        check(x.abs() <= MAX_COORDINATE, || {
+            let (x, limit) = (number(x), number(MAX_COORDINATE));
             format!("{x} must be from -{limit} to {limit}")
         })?;
     }

@@ -11,7 +11,7 @@ use glam::DVec3;
 
 use super::super::image_file::{AssetKey, Part};
 use super::super::key_path::{cut, cut_to};
-use super::super::limits::{BRIGHTEST, SHININESS};
+use super::super::limits::{MAX_COLOR, SHININESS};
 use super::super::{Color, ImageTextureDescription, Integrator, Material, Reflection, Texture};
 use super::default_material::default_materials;
 use super::images::Images;
@@ -181,9 +181,9 @@ impl<'a> SceneMaterials<'a> {
         let mut warnings = Warnings::default();
         let mut color = |name: &'static str, color: Option<[f64; 3]>, default: f64| {
             let color = color.map_or(DVec3::splat(default), DVec3::from);
-            let clamped = color.clamp(DVec3::ZERO, DVec3::splat(BRIGHTEST));
+            let clamped = color.clamp(DVec3::ZERO, DVec3::splat(MAX_COLOR));
             if clamped != color {
-                let (color, limit, clamped) = (show(color), number(BRIGHTEST), show(clamped));
+                let (color, limit, clamped) = (show(color), number(MAX_COLOR), show(clamped));
                 let rule = format!("each of {color} must be from 0 to {limit}; {clamped} is used instead");
                 warnings.add(name, rule);
             } else if name == "Kd" && color.max_element() > 1.0 {

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::super::limits::{ABSORPTIONS, ATTENUATION_DISTANCES, PRINCIPLED_IORS, SHARES, THICKNESSES, TURNS};
+use super::super::limits::{ABSORPTIONS, ATTENUATION_DISTANCES, FRACTIONS, PRINCIPLED_IORS, ROTATIONS, THICKNESSES};
 use super::super::{AlphaMode, Color, Principled, PrincipledDescription, Value, VertexColors};
 use super::texture::Textures;
 use super::{At, Checked, Problem, between, check};
@@ -21,7 +21,7 @@ impl Textures<'_> {
             metallic: self.value(&d.metallic).at("metallic")?,
             roughness: self.value(&d.roughness).at("roughness")?,
             anisotropy: self.value(&d.anisotropy).at("anisotropy")?,
-            anisotropy_rotation: between(d.anisotropy_rotation, TURNS)
+            anisotropy_rotation: between(d.anisotropy_rotation, ROTATIONS)
                 .at("anisotropy_rotation")?
                 .to_radians(),
             anisotropy_direction: self
@@ -41,7 +41,7 @@ impl Textures<'_> {
             sheen_roughness: self.value(&d.sheen_roughness).at("sheen_roughness")?,
             alpha: self.value(&d.alpha).at("alpha")?,
             alpha_mode: d.alpha_mode,
-            alpha_cutoff: between(d.alpha_cutoff, SHARES).at("alpha_cutoff")?,
+            alpha_cutoff: between(d.alpha_cutoff, FRACTIONS).at("alpha_cutoff")?,
             vertex_colors: d.vertex_colors,
             double_sided: d.double_sided,
         })
@@ -79,7 +79,7 @@ pub(super) fn dielectric(base_color: Color, roughness: f64) -> Principled {
 /// Returns the absorption coefficient per unit of length that gives the transmittance `color` over a distance.
 fn absorption(color: DVec3, distance: Option<f64>) -> Checked<DVec3> {
     for x in color.to_array() {
-        between(x, SHARES).at("attenuation_color")?;
+        between(x, FRACTIONS).at("attenuation_color")?;
     }
     let Some(distance) = distance else {
         return match color == DVec3::ONE {

@@ -173,7 +173,7 @@ fn frame(normal: DVec3, tangent: Option<DVec3>) -> Checked<(DVec3, DVec3)> {
     frame_of_unit(unit(normal).at("normal")?, normal, tangent, "the normal")
 }
 
-/// Returns [`frame`] for a unit normal `n`. Messages call the normal `name` and show `original`.
+/// Returns [`frame`] for a unit normal `n`. In messages, the normal is called `name` and has the value `original`.
 fn frame_of_unit(n: DVec3, original: DVec3, tangent: Option<DVec3>, name: &str) -> Checked<(DVec3, DVec3)> {
     let tangent = tangent.unwrap_or(if n.x.abs() < 0.9 { DVec3::X } else { DVec3::Y });
     let t = unit(tangent).at("tangent")?;

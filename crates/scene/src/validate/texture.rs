@@ -7,7 +7,7 @@ use super::{
     At, BTreeMap, BTreeSet, Checked, Collector, Color, Problem, Problems, between, check, color, number, show_pair,
 };
 use crate::image_file::Part;
-use crate::limits::{ANISOTROPIES, FACTORS, LINE_WIDTHS, OFFSETS, SCALES, SHARES, STRENGTHS, TURNS, UV_SETS};
+use crate::limits::{ANISOTROPIES, FACTORS, FRACTIONS, LINE_WIDTHS, OFFSETS, ROTATIONS, SCALES, STRENGTHS, UV_SETS};
 use crate::suggest::Suggestions;
 use crate::{
     Channel, ChannelReference, ColorDescription, Encoding, ImageTextureDescription, Integrator, MaterialDescription,
@@ -116,7 +116,7 @@ fn transform(scale: [f64; 2], rotate: f64, offset: [f64; 2]) -> Checked<[DVec3; 
         format!("{} must have magnitudes from {low} to {high}", show_pair(scale))
     })
     .at("scale")?;
-    let rotate = between(rotate, TURNS).at("rotate")?;
+    let rotate = between(rotate, ROTATIONS).at("rotate")?;
     let (low, high) = OFFSETS;
     check(offset.iter().all(|x| (low..=high).contains(x)), || {
         let (low, high) = (number(low), number(high));
@@ -195,7 +195,7 @@ impl Textures<'_> {
     pub(super) fn tint(&self, description: &ColorDescription) -> Checked<Color> {
         if let ColorDescription::Plain(tint) = description {
             for x in tint.to_array() {
-                between(x, SHARES)?;
+                between(x, FRACTIONS)?;
             }
         }
         let color = self.color(description)?;
@@ -263,7 +263,7 @@ impl Textures<'_> {
 
     pub(super) fn value(&self, description: &ValueDescription) -> Checked<Value> {
         Ok(match description {
-            ValueDescription::Plain(plain) => Value::Plain(between(*plain, SHARES)?),
+            ValueDescription::Plain(plain) => Value::Plain(between(*plain, FRACTIONS)?),
             ValueDescription::Texture(reference) => {
                 let colors = self.find(&reference.texture)?;
                 let texture = match (reference.channel, self.alphas.get(reference.texture.as_str())) {

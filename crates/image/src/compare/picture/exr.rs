@@ -136,7 +136,7 @@ fn empty(columns: u32, rows: u32, samples: SampleType) -> Result<Plane, Unreadab
     }
     let (width, height) = (u64::from(columns), u64::from(rows));
     Ok(match samples {
-        SampleType::U32 => Plane::Whole(zeros(width, height)?),
+        SampleType::U32 => Plane::Integers(zeros(width, height)?),
         SampleType::F16 => Plane::Halves(zeros(width, height)?),
         SampleType::F32 => Plane::Floats(zeros(width, height)?),
     })
@@ -153,7 +153,7 @@ fn store(plane: &mut Plane, start: usize, line: &[u8]) {
         }
     }
     match plane {
-        Plane::Whole(values) => copy(&mut values[start..], line, u32::from_ne_bytes),
+        Plane::Integers(values) => copy(&mut values[start..], line, u32::from_ne_bytes),
         Plane::Halves(values) => copy(&mut values[start..], line, u16::from_ne_bytes),
         Plane::Floats(values) => copy(&mut values[start..], line, f32::from_ne_bytes),
         Plane::Bytes(_) | Plane::Shorts(_) | Plane::One => {} // not in OpenEXR

@@ -54,7 +54,7 @@ pub enum Plane {
     /// 16-bit integers; 65,535 is 1.
     Shorts(Vec<u16>),
     /// 32-bit integers, unscaled.
-    Whole(Vec<u32>),
+    Integers(Vec<u32>),
     /// Bits of half-precision floats.
     Halves(Vec<u16>),
     /// Single-precision floats.
@@ -69,7 +69,7 @@ impl Plane {
         match self {
             Plane::Bytes(values) => copy(&values[pixels], to, |value| f64::from(value) / 255.0),
             Plane::Shorts(values) => copy(&values[pixels], to, |value| f64::from(value) / 65_535.0),
-            Plane::Whole(values) => copy(&values[pixels], to, f64::from),
+            Plane::Integers(values) => copy(&values[pixels], to, f64::from),
             Plane::Halves(values) => copy(&values[pixels], to, |value| f64::from(f16::from_bits(value).to_f32())),
             Plane::Floats(values) => copy(&values[pixels], to, f64::from),
             Plane::One => to.fill(1.0),

@@ -6,7 +6,7 @@ use std::path::Path;
 use glam::DVec3;
 
 use super::super::super::image_file::Part;
-use super::super::super::limits::BRIGHTEST;
+use super::super::super::limits::MAX_COLOR;
 use super::super::super::{
     AlphaMode, Channel, Color, Encoding, Material, NormalMap, Principled, Reflection, Texels, TextureKind, Value,
     VertexColors,
@@ -42,13 +42,13 @@ impl SceneMaterials<'_> {
             clamped
         };
         let diffuse = clamp_color(&mut warnings, "Kd", mtl.diffuse.unwrap_or([DIFFUSE; 3]), 1.0);
-        let emission = clamp_color(&mut warnings, "Ke", mtl.emission.unwrap_or_default(), BRIGHTEST);
+        let emission = clamp_color(&mut warnings, "Ke", mtl.emission.unwrap_or_default(), MAX_COLOR);
         let has_factors = mtl.metallic.is_some() || mtl.roughness.is_some();
         let has_maps = mtl.metallic_map.is_some() || mtl.roughness_map.is_some();
         let specular = match (mtl.illumination, mtl.specular) {
             (Some(0 | 1), _) => 0.0,
             (_, Some(color)) => {
-                let mean = clamp_color(&mut warnings, "Ks", color, BRIGHTEST).element_sum() / 3.0;
+                let mean = clamp_color(&mut warnings, "Ks", color, MAX_COLOR).element_sum() / 3.0;
                 (SPECULAR * mean).min(1.0)
             }
             (_, None) => f64::from(has_factors || has_maps),
