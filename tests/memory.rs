@@ -369,7 +369,10 @@ radius = 1
     let description = Description::parse(&text, "s.toml").unwrap();
     let mut assets = Assets::from_source(files_of(models().folder()));
     let error = description.validate_with(&assets).unwrap_err().to_string();
-    assert!(error.contains("cannot be read: there is no such file in memory"), "{error}");
+    assert!(
+        error.contains("cannot be read: there is no such file in memory"),
+        "{error}"
+    );
     assets
         .images
         .insert("a".to_owned(), Arc::new(Image::clone(&image_of(&scene))));

@@ -1,12 +1,15 @@
 //! Sessions: images, and packed scenes, have the bits of fresh ones after changes of camera and scene.
 
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 use proptest::prelude::*;
 use proptest::strategy::ValueTree as _;
 use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
-use wgray::scene::{Assets, Description};
-use wgray::{Aov, Camera, Context, Device, Options, Picture, Scene, Session};
+use wgray::scene::{Assets, Description, Image, LoadOptions, SceneFormat, Texels};
+use wgray::{
+    Aov, Camera, CancelToken, Context, Device, Error, Options, Picture, ProgressiveRender, Scene, Session, Status,
+};
 use wgray_render::pack::{self, PackedShading, pack, pack_with};
 
 use crate::adapter;
@@ -175,4 +178,193 @@ fn a_session_survives_invalid_options() {
         assert!(session.render(&invalid).is_err());
         assert_eq!(session.render(&options).expect("an image"), expected);
     }
+}
+
+fn devices() -> Vec<Device> {
+    let mut devices = vec![Device::Cpu];
+    devices.extend(adapter::device().map(|_| Device::Gpu));
+    devices
+}
+
+fn on(device: &Device) -> Options {
+    Options {
+        device: device.clone(),
+        ..Options::default()
+    }
+}
+
+/// Cancels after different times, and continues.
+#[test]
+fn steps_have_the_bits_of_a_render_in_spite_of_cancellations() {
+    for device in devices() {
+        let count = if device == Device::Cpu { 6 } else { 2 };
+        for description in random_descriptions(count) {
+            let scene = Arc::new(scene_of(&description));
+            let options = on(&device);
+            let expected = wgray::render(&scene, &options).expect("an image");
+            let mut session = Session::new(&Context::new(), Arc::clone(&scene));
+            let mut render = session.start(&options, &CancelToken::new()).expect("a start");
+            let black = render.snapshot();
+            assert!(bits(&black).iter().all(|bits| *bits == 0), "the first image is black");
+            assert_eq!((render.samples(), render.fraction()), (0, 0.0));
+            let (mut picture, mut former, mut pause) = (black, 0, 0);
+            loop {
+                let cancel = CancelToken::new();
+                let status = std::thread::scope(|threads| {
+                    threads.spawn(|| {
+                        std::thread::sleep(Duration::from_micros(pause * 500));
+                        cancel.cancel();
+                    });
+                    render.run(&cancel).expect("a step")
+                });
+                assert!(render.samples() >= former && (0.0..=1.0).contains(&render.fraction()));
+                former = render.samples();
+                render.snapshot_into(&mut picture);
+                assert_eq!(picture, render.snapshot());
+                if status == Status::Finished {
+                    break;
+                }
+                assert_eq!(status, Status::Cancelled);
+                pause += 1;
+            }
+            assert_eq!(render.fraction(), 1.0);
+            assert_eq!(render.finish(), expected);
+            // The session goes on.
+            assert_eq!(session.render(&options).expect("an image"), expected);
+        }
+    }
+}
+
+#[test]
+fn added_samples_do_not_depend_on_when_they_are_added() {
+    let text = "image = { width = 9, height = 7 }
+camera = { position = [0, -5, 2], look_at = [0, 0, 0.5], fov = 40 }
+render = { integrator = 'path', pixel_samples = 3 }
+environment = { name = 'studio' }
+materials.a = { type = 'diffuse', color = 0.5 }
+shapes = [{ type = 'sphere', material = 'a', center = [0, 0, 0], radius = 1 }]";
+    let scene = Arc::new(Scene::parse(text, "s.toml").expect("a scene"));
+    let never = CancelToken::new();
+    for device in devices() {
+        let options = on(&device);
+        let image = |additions: &[(bool, u32)]| {
+            let mut session = Session::new(&Context::new(), Arc::clone(&scene));
+            let mut render = session.start(&options, &never).expect("a start");
+            for (runs_first, count) in additions {
+                if *runs_first {
+                    assert_eq!(render.run(&never).expect("samples"), Status::Finished);
+                }
+                render.add_samples(*count).expect("an addition");
+            }
+            assert_eq!(render.run(&never).expect("samples"), Status::Finished);
+            assert_eq!(render.step(&never).expect("no samples"), Status::Finished);
+            (render.samples(), render.finish().pixels())
+        };
+        let expected = image(&[(false, 5)]);
+        assert_eq!(expected.0, 8);
+        assert!(image(&[(true, 5)]) == expected);
+        assert!(image(&[(true, 1), (false, 1), (true, 3)]) == expected);
+        assert!(image(&[(true, 4)]).1 != expected.1);
+        let mut session = Session::new(&Context::new(), Arc::clone(&scene));
+        let mut render = session.start(&options, &never).expect("a start");
+        let error = render.add_samples(65_534).unwrap_err().to_string();
+        assert_eq!(error, "samples: 65537 in total must be at most 65536");
+        assert!(render.add_samples(u32::MAX).is_err());
+    }
+    let adaptive = text.replace("pixel_samples = 3", "pixel_samples = 64, adaptive = { error = 0.01 }");
+    let scene = Scene::parse(&adaptive, "s.toml").expect("a scene");
+    let mut session = Session::new(&Context::new(), scene);
+    let mut render = session.start(&on(&Device::Cpu), &never).expect("a start");
+    assert!(render.add_samples(1).unwrap_err().to_string().contains("adaptive"));
+}
+
+/// The preparation of an environment map of 4096 x 2048 texels takes about a second.
+#[test]
+fn a_preparation_is_cancelled_at_once_and_used_later() {
+    let text = "image = { width = 8, height = 6 }
+camera = { position = [0, -5, 2], look_at = [0, 0, 0.5], fov = 40 }
+render = { integrator = 'path', pixel_samples = 1 }
+environment = { file = 'map' }";
+    let (width, height) = (4096, 2048);
+    let texels = (0..width * height).map(|i| [(i % 251) as f32, 1.0, (i / width) as f32]);
+    let image = Image {
+        width,
+        height,
+        texels: Texels::Floats(texels.collect()),
+    };
+    let load_options = LoadOptions::new().with_image("map", image);
+    let scene = Scene::from_slice(text.as_bytes(), SceneFormat::Toml, &load_options).expect("a scene");
+    let scene = Arc::new(scene);
+    let cancelled = |result: Result<ProgressiveRender, Error>| {
+        matches!(result, Err(Error::Render(wgray::error::RenderError::Cancelled)))
+    };
+    for device in devices() {
+        let options = on(&device);
+        let mut session = Session::new(&Context::new(), Arc::clone(&scene));
+        let cancel = CancelToken::new();
+        cancel.cancel();
+        assert!(cancelled(session.start(&options, &cancel)));
+        let cancel = CancelToken::new();
+        let (start, mut time_of_cancel) = (Instant::now(), Duration::ZERO);
+        std::thread::scope(|threads| {
+            threads.spawn(|| {
+                std::thread::sleep(Duration::from_millis(50));
+                time_of_cancel = start.elapsed();
+                cancel.cancel();
+            });
+            assert!(cancelled(session.start(&options, &cancel)));
+        });
+        let delay = start.elapsed() - time_of_cancel;
+        assert!(delay < Duration::from_millis(500), "cancelled after {delay:?}"); // usually 10 ms
+        // The preparation goes on, and is used, or dropped when the scene changes.
+        let never = CancelToken::new();
+        let expected = wgray::render(&scene, &options).expect("an image");
+        let mut render = session.start(&options, &never).expect("a start");
+        assert_eq!(render.run(&never).expect("samples"), Status::Finished);
+        assert_eq!(render.finish(), expected);
+        let cancel = CancelToken::new();
+        let mut other = Session::new(&Context::new(), Arc::clone(&scene));
+        std::thread::scope(|threads| {
+            threads.spawn(|| {
+                std::thread::sleep(Duration::from_millis(50));
+                cancel.cancel();
+            });
+            assert!(cancelled(other.start(&options, &cancel)));
+        });
+        let mut camera = scene.camera;
+        camera.position.x += 1.0;
+        other.set_camera(camera).expect("a camera");
+        let expected = wgray::render(&with_camera(&scene, camera), &options).expect("an image");
+        assert_eq!(other.render(&options).expect("an image"), expected);
+    }
+}
+
+#[test]
+fn renders_start_on_threads_of_a_pool() {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a pool");
+    let scene = Arc::new(scene_of(&random_descriptions(1)[0]));
+    let options = on(&Device::Cpu);
+    let expected = wgray::render(&scene, &options).expect("an image");
+    let image = pool.install(|| {
+        let mut session = Session::new(&Context::new(), Arc::clone(&scene));
+        let never = CancelToken::new();
+        let mut render = session.start(&options, &never).expect("a start");
+        render.run(&never).expect("samples");
+        render.finish().pixels()
+    });
+    assert!(image == expected.pixels());
+}
+
+#[test]
+fn types_are_send_and_sync() {
+    fn check<T: Send + Sync + 'static>() {}
+    check::<Context>();
+    check::<CancelToken>();
+    check::<Picture>();
+    check::<Scene>();
+    check::<LoadOptions>();
+    check::<Error>();
+    fn check_send<T: Send>() {}
+    check_send::<Session>();
+    check_send::<ProgressiveRender>();
 }
