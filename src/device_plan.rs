@@ -43,13 +43,13 @@ pub fn plan_device(scene: &Packed, device: &Device) -> Result<DevicePlan, Render
         }
         Device::Auto => {
             if let Some(why) = faster_on_cpu(&Context::new(), scene) {
-                return Ok(on_cpu(why));
+                return Ok(on_cpu(why.to_string()));
             }
         }
         _ => {}
     }
     match preferred(scene, device) {
-        Err(RenderError::NoDevice(why)) if *device == Device::Auto => Ok(on_cpu(why)),
+        Err(RenderError::NoDevice(why)) if *device == Device::Auto => Ok(on_cpu(why.to_string())),
         other => other,
     }
 }

@@ -2,7 +2,7 @@
 
 use thiserror::Error;
 
-pub use wgray_render::error::{RenderError, ShaderError, ShaderErrors};
+pub use wgray_render::error::{DeviceError, RenderError, ShaderError, ShaderErrors};
 use wgray_scene::{Problem, SceneError};
 
 /// An error of loading, rendering or saving a scene.

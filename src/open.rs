@@ -12,7 +12,7 @@ use wgray_scene::Problem;
 
 use crate::context::Context;
 use crate::device::{Device, DeviceInfo};
-use crate::error::{Error, RenderError};
+use crate::error::{DeviceError, Error, RenderError};
 
 /// Returns whether to use an adapter, given its name and whether it is software.
 pub(crate) type AcceptAdapter<'a> = &'a dyn Fn(&str, bool) -> bool;
@@ -116,7 +116,7 @@ pub(crate) fn adapter(
         None => {
             let wanted = |info: &gpu::GpuInfo| wanted.is_none_or(|wanted| wanted(&info.name, info.is_software()));
             let opened = gpu::choose_among(&choice_of(device), &wanted).map_err(|error| match device {
-                Device::Auto => RenderError::NoDevice(error.to_string()),
+                Device::Auto => RenderError::NoDevice(DeviceError::NotOpened(error.to_string())),
                 _ => error,
             })?;
             context.devices.add(device, &opened);
@@ -154,7 +154,5 @@ pub(crate) fn gpu_missing(device: &Device) -> RenderError {
         Device::Named(name) => format!("'{name}'"),
         _ => "a GPU".to_string(),
     };
-    RenderError::NoDevice(format!(
-        "{requested}: only the CPU is available, because the crate was built without the feature \"gpu\""
-    ))
+    RenderError::NoDevice(DeviceError::NotBuilt { requested })
 }

@@ -18,7 +18,7 @@ fn list(out: &mut impl Write) -> io::Result<()> {
     let chosen = adapters.first().map_or("cpu", |info| &info.name);
     writeln!(out, "auto selects: {chosen}")?;
     if adapters.is_empty() {
-        writeln!(out, "{}", gpu::HOW_TO_GET_VULKAN)?;
+        writeln!(out, "{}", wgray_render::error::HOW_TO_GET_VULKAN)?;
     }
     Ok(())
 }

@@ -32,12 +32,57 @@ impl fmt::Display for ShaderErrors {
     }
 }
 
+/// Advice for systems without an adapter.
+pub const HOW_TO_GET_VULKAN: &str =
+    "on Debian, 'apt-get install mesa-vulkan-drivers' installs software Vulkan (lavapipe)";
+
+/// The reason why no device matches a request.
+#[derive(Clone, Debug, Error, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum DeviceError {
+    /// The system has no adapter.
+    #[error("no Vulkan, Metal or DX12 adapter found; {HOW_TO_GET_VULKAN}")]
+    NoneFound,
+    /// No adapter has the requested name.
+    #[error(
+        "no adapter's name, driver or type contains '{requested}'; available: cpu, gpu, auto, {}",
+        available.join("; ")
+    )]
+    NoMatch {
+        /// The requested name.
+        requested: String,
+        /// The number, name and driver of each adapter.
+        available: Vec<String>,
+    },
+    /// Adapters with different names match the request.
+    #[error(
+        "'{requested}' matches several adapters; use a longer name, a driver or a number: {}",
+        matching.join("; ")
+    )]
+    Ambiguous {
+        /// The requested name.
+        requested: String,
+        /// The number, name and driver of each matching adapter.
+        matching: Vec<String>,
+    },
+    /// No adapter could be opened.
+    #[error("{0}")]
+    NotOpened(String),
+    /// The library was built without the feature `gpu`.
+    #[error("{requested}: only the CPU is available, because the crate was built without the feature \"gpu\"")]
+    NotBuilt {
+        /// The requested name in quotes, or `a GPU`.
+        requested: String,
+    },
+}
+
 /// An error that stops a render.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum RenderError {
     /// No device matches the request.
-    #[error("{0}")]
-    NoDevice(String),
+    #[error(transparent)]
+    NoDevice(#[from] DeviceError),
     /// A shader is invalid.
     #[error(transparent)]
     Shader(#[from] ShaderError),
@@ -120,7 +165,7 @@ pub enum RenderError {
     #[error("not enough memory: the image needs {} MiB; render a crop", .0 >> 20)]
     Memory(u64),
     /// A checkpoint or part cannot be read.
-    #[error("{0}")]
+    #[error(transparent)]
     Input(std::io::Error),
     /// The caller cancelled the render.
     #[error("cancelled")]

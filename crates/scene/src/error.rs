@@ -12,12 +12,12 @@ use crate::problem::{ErrorPlace, MAX_PROBLEMS, Problem, Problems};
 #[non_exhaustive]
 pub enum SceneError {
     /// The file cannot be read.
-    // Not named `source`, because error chains would print the text of `error` twice.
     #[error("{}: cannot be read: {error}", path.display())]
     Read {
         /// The file.
         path: PathBuf,
         /// The error of the operating system.
+        #[source]
         error: io::Error,
     },
     /// The file is not valid TOML or JSON, or not in the form of a scene.
@@ -51,10 +51,10 @@ pub enum SceneError {
         more: usize,
     },
     /// The glTF file could not be loaded as a scene.
-    #[error("{0}")]
+    #[error(transparent)]
     Gltf(GltfError),
     /// The mesh file could not be loaded as a scene.
-    #[error("{0}")]
+    #[error(transparent)]
     Mesh(MeshError),
     /// The file has a format that cannot be read.
     #[error("{}: {message}", path.display())]

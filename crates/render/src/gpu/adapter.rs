@@ -3,12 +3,8 @@
 use wgpu::{Backends, DeviceType};
 
 use super::float_controls::FloatControls;
-use crate::error::RenderError;
+use crate::error::{DeviceError, RenderError};
 use wgray_image::panic_guard::catch_panic;
-
-/// Advice for systems without an adapter.
-pub const HOW_TO_GET_VULKAN: &str =
-    "on Debian, 'apt-get install mesa-vulkan-drivers' installs software Vulkan (lavapipe)";
 
 /// A requested device.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -67,15 +63,13 @@ pub fn adapters() -> Vec<GpuInfo> {
 /// The errors of [`choose`](super::choose).
 pub fn preferred(choice: &AdapterChoice) -> Result<GpuInfo, RenderError> {
     let infos = adapters();
-    let matching = matching(&infos, choice).map_err(RenderError::NoDevice)?;
+    let matching = matching(&infos, choice)?;
     let first = matching.first().and_then(|i| infos.get(*i)).cloned();
-    first.ok_or_else(|| RenderError::NoDevice(NONE_FOUND.to_owned() + HOW_TO_GET_VULKAN))
+    first.ok_or(RenderError::NoDevice(DeviceError::NoneFound))
 }
 
-pub(super) const NONE_FOUND: &str = "no Vulkan, Metal or DX12 adapter found; ";
-
-/// Returns the matching adapters, best first. The error is a message for the user.
-pub(super) fn matching(infos: &[GpuInfo], choice: &AdapterChoice) -> Result<Vec<usize>, String> {
+/// Returns the matching adapters, best first.
+pub(super) fn matching(infos: &[GpuInfo], choice: &AdapterChoice) -> Result<Vec<usize>, DeviceError> {
     let AdapterChoice::Named(name) = choice else {
         return Ok((0..infos.len()).collect());
     };
@@ -94,25 +88,17 @@ pub(super) fn matching(infos: &[GpuInfo], choice: &AdapterChoice) -> Result<Vec<
         true => indices_where(&|info| matches(info, name)),
         false => same_name,
     };
-    let list = |indices: &[usize]| {
-        let lines = indices
-            .iter()
-            .map(|i| format!("{}: {}, {}", i + 1, infos[*i].name, infos[*i].driver));
-        lines.collect::<Vec<_>>().join("; ")
-    };
-    let all: Vec<usize> = (0..infos.len()).collect();
+    let line = |i: usize| format!("{}: {}, {}", i + 1, infos[i].name, infos[i].driver);
     match found.as_slice() {
-        [] => {
-            let available = list(&all);
-            Err(format!(
-                "no adapter's name, driver or type contains '{name}'; available: cpu, gpu, auto, {available}"
-            ))
-        }
+        [] => Err(DeviceError::NoMatch {
+            requested: name.clone(),
+            available: (0..infos.len()).map(line).collect(),
+        }),
         [first, rest @ ..] if rest.iter().any(|i| infos[*i].name != infos[*first].name) => {
-            let candidates = list(&found);
-            Err(format!(
-                "'{name}' matches several adapters; use a longer name, a driver or a number: {candidates}"
-            ))
+            Err(DeviceError::Ambiguous {
+                requested: name.clone(),
+                matching: found.into_iter().map(line).collect(),
+            })
         }
         _ => Ok(found),
     }
@@ -263,22 +249,23 @@ mod tests {
             assert_eq!(found(number), Ok(vec![i]));
         }
         for number in ["0", "6", "7", "23"] {
-            let message = found(number).unwrap_err();
+            let message = found(number).unwrap_err().to_string();
             assert!(message.contains(&format!("contains '{number}'")), "{message}");
         }
         assert_eq!(found("15"), Ok(vec![4]), "a whole word of a name did not match");
         assert!(
             found("7900")
                 .unwrap_err()
+                .to_string()
                 .starts_with("'7900' matches several adapters")
         );
-        let message = found("discrete").unwrap_err();
+        let message = found("discrete").unwrap_err().to_string();
         assert_eq!(
             message,
             "'discrete' matches several adapters; use a longer name, a driver or a number: 1: Radeon RX 7900, radv \
              Mesa 25; 2: Radeon RX 7900 XT, radv Mesa 25"
         );
-        let message = found("geforce").unwrap_err();
+        let message = found("geforce").unwrap_err().to_string();
         assert!(
             message.starts_with(
                 "no adapter's name, driver or type contains 'geforce'; available: cpu, gpu, auto, 1: Radeon"

@@ -5,10 +5,10 @@ use std::sync::mpsc;
 use bytemuck::{Pod, bytes_of, cast_slice};
 use wgpu::BufferUsages;
 
-use super::adapter::{AdapterChoice, GpuInfo, HOW_TO_GET_VULKAN, NONE_FOUND, enumerate, info, matching};
+use super::adapter::{AdapterChoice, GpuInfo, enumerate, info, matching};
 use super::failure::{Failure, error_of_opening};
 use super::pipeline_cache::PipelineCache;
-use crate::error::RenderError;
+use crate::error::{DeviceError, RenderError};
 use wgray_image::panic_guard::{CatchPanicOnDrop, catch_panic};
 
 /// An open device. Clones are handles to the same device.
@@ -42,14 +42,14 @@ pub fn choose_among(choice: &AdapterChoice, is_eligible: &dyn Fn(&GpuInfo) -> bo
     let adapters = enumerate();
     let infos: Vec<GpuInfo> = adapters.iter().map(info).collect();
     let mut failure = None;
-    let matching = matching(&infos, choice).map_err(RenderError::NoDevice)?;
+    let matching = matching(&infos, choice)?;
     for i in matching.into_iter().filter(|i| is_eligible(&infos[*i])) {
         match open(&adapters[i]) {
             Ok(device) => return Ok(device),
             Err(error) => failure = Some(error),
         }
     }
-    Err(failure.unwrap_or_else(|| RenderError::NoDevice(NONE_FOUND.to_owned() + HOW_TO_GET_VULKAN)))
+    Err(failure.unwrap_or_else(|| RenderError::NoDevice(DeviceError::NoneFound)))
 }
 
 fn open(adapter: &wgpu::Adapter) -> Result<Device, RenderError> {

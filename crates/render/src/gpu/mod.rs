@@ -28,7 +28,7 @@ mod texels;
 mod timer;
 mod validate;
 
-pub use adapter::{AdapterChoice, GpuInfo, HOW_TO_GET_VULKAN, adapters, preferred};
+pub use adapter::{AdapterChoice, GpuInfo, adapters, preferred};
 pub use bake::bake;
 pub use compile::{ValidKernel, check};
 pub use device::{Device, choose, choose_among};

@@ -128,14 +128,7 @@ const MIN_ROWS: [u32; 2] = [16, 64];
 
 impl<S: CheckpointStore> Bands<S> {
     /// Splits a region into bands. Pieces of the store, which must lie in the region, become bands.
-    pub fn new(
-        region: Region,
-        samples: u32,
-        split: &WorkSplit,
-        order: Order,
-        largest_film: u64,
-        store: S,
-    ) -> Bands<S> {
+    pub fn new(region: Region, samples: u32, split: &WorkSplit, order: Order, largest_film: u64, store: S) -> Bands<S> {
         let mut queue = VecDeque::new();
         let mut y = region.y0;
         let add_new = |queue: &mut VecDeque<Band>, y0: u32, y1: u32| {

@@ -11,12 +11,12 @@ use crate::ErrorPlace;
 #[non_exhaustive]
 pub enum GltfError {
     /// Unreadable file.
-    // Not named `source`: error chains would print its text twice.
     #[error("{}: cannot be read: {error}", path.display())]
     Read {
         /// The file.
         path: PathBuf,
         /// The I/O error.
+        #[source]
         error: io::Error,
     },
     /// Malformed JSON.
