@@ -8,7 +8,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// Rendering observes the token after each dispatch, and while the scene is packed and the device opened: within about
 /// 100 ms. A token stays cancelled.
 #[derive(Clone, Debug, Default)]
-pub struct CancelToken(Arc<AtomicBool>);
+pub struct CancelToken {
+    flag: Arc<AtomicBool>,
+    parent: Option<Arc<CancelToken>>,
+}
 
 impl CancelToken {
     /// Returns a token that is not cancelled.
@@ -16,13 +19,21 @@ impl CancelToken {
         CancelToken::default()
     }
 
-    /// Cancels all renders that have this token.
+    /// Returns a token that is also cancelled when this token is.
+    pub fn child(&self) -> CancelToken {
+        CancelToken {
+            flag: Arc::default(),
+            parent: Some(Arc::new(self.clone())),
+        }
+    }
+
+    /// Cancels all renders that have this token or one of its children.
     pub fn cancel(&self) {
-        self.0.store(true, Ordering::Relaxed);
+        self.flag.store(true, Ordering::Relaxed);
     }
 
     /// Returns true if the token is cancelled.
     pub fn is_cancelled(&self) -> bool {
-        self.0.load(Ordering::Relaxed)
+        self.flag.load(Ordering::Relaxed) || self.parent.as_ref().is_some_and(|parent| parent.is_cancelled())
     }
 }

@@ -43,7 +43,7 @@ pub fn plan_device(scene: &Packed, device: &Device) -> Result<DevicePlan, Render
         }
         Device::Auto => {
             if let Some(why) = faster_on_cpu(&Context::new(), scene) {
-                return Ok(on_cpu(why.to_string()));
+                return Ok(on_cpu(why));
             }
         }
         _ => {}

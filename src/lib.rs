@@ -79,6 +79,7 @@ mod progressive;
 mod render;
 mod renderer;
 mod session;
+mod task;
 
 pub use cancel::CancelToken;
 pub use context::Context;

@@ -14,9 +14,10 @@ use crate::context::Context;
 use crate::error::{Error, RenderError};
 use crate::options::Options;
 use crate::picture::Picture;
-use crate::progressive::ProgressiveRender;
+use crate::progressive::{ProgressiveRender, Status};
 use crate::render::{ImageSetup, Progressive, render_progressive_with, render_with};
 use crate::renderer::{FaultHandler, OpenScene, Renderer, warnings};
+use crate::task::Task;
 
 /// A scene to be rendered several times. The first render packs the scene (BVHs, textures, tables of the environment)
 /// and opens the device; later renders use them again. Every image has the bits that [`render`](crate::render()) gives.
@@ -120,6 +121,56 @@ impl Session {
         let setup = self.prepare(options, cancel)?;
         let open = self.state.open.as_mut().ok_or(RenderError::NoFilm)?; // not possible: `prepare` has opened it
         ProgressiveRender::new(open, setup)
+    }
+
+    /// Renders the scene on another thread, so that the future never blocks. wasm32 has no threads: there, this call
+    /// renders before it returns the future.
+    ///
+    /// Dropping the future cancels the render; the next render packs the scene again.
+    ///
+    /// ```
+    /// # async fn example() -> Result<(), wgray::Error> {
+    /// use wgray::{CancelToken, Context, Options, Scene, Session};
+    ///
+    /// let scene = Scene::load("scene.glb")?;
+    /// let mut session = Session::new(&Context::new(), scene);
+    /// let image = session.render_async(&Options::default(), &CancelToken::new()).await?;
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    ///
+    /// The errors of [`render`](crate::render()), and [`RenderError::Cancelled`].
+    pub fn render_async(
+        &mut self,
+        options: &Options,
+        cancel: &CancelToken,
+    ) -> impl Future<Output = Result<Picture, Error>> + Send {
+        let mut worker = Session {
+            context: self.context.clone(),
+            scene: Arc::clone(&self.scene),
+            state: std::mem::take(&mut self.state),
+            cancelled: self.cancelled.take(),
+        };
+        let (options, cancel) = (options.clone(), cancel.child());
+        let task = Task::spawn(&cancel.clone(), move || {
+            let result = worker.render_until_cancelled(&options, &cancel);
+            (worker, result)
+        });
+        async move {
+            let (worker, result) = task.await;
+            (self.state, self.cancelled) = (worker.state, worker.cancelled);
+            result
+        }
+    }
+
+    fn render_until_cancelled(&mut self, options: &Options, cancel: &CancelToken) -> Result<Picture, Error> {
+        let mut render = self.start(options, cancel)?;
+        match render.run(cancel)? {
+            Status::Cancelled => Err(RenderError::Cancelled.into()),
+            Status::Running | Status::Finished => Ok(render.finish()),
+        }
     }
 
     fn prepare(&mut self, options: &Options, cancel: &CancelToken) -> Result<ImageSetup, Error> {

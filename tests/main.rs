@@ -5,6 +5,7 @@ mod adapter;
 mod against_oracle;
 mod analytic;
 mod bounds;
+mod building;
 mod choices;
 mod cli;
 mod compare;

@@ -3,6 +3,7 @@
 //! Text is parsed into a [`Description`], field by field. [`Description::validate`] returns a [`Scene`] with resolved
 //! names and values in range, so that code that uses a scene need not validate it again.
 
+mod builder;
 mod camera_at;
 mod camera_path;
 mod course;
@@ -45,6 +46,7 @@ mod validate;
 mod visibility;
 mod write;
 
+pub use builder::{ImageId, MaterialId, MeshId, SceneBuilder, TextureId};
 pub use camera_path::CameraPath;
 pub use define::Define;
 pub use description::*;

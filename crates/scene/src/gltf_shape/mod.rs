@@ -267,7 +267,8 @@ impl ExpandedScene {
     }
 }
 
-fn rows(transform: &DAffine3) -> Vec<[f64; 4]> {
+/// Returns the rows of a transform's matrix, without the last row.
+pub fn rows(transform: &DAffine3) -> Vec<[f64; 4]> {
     let rows = transform.matrix3.transpose();
     let row = |i: usize| rows.col(i).extend(transform.translation[i]).to_array();
     vec![row(0), row(1), row(2)]

@@ -1,6 +1,7 @@
 //! Triangle meshes and their files. [`Mesh::load`] reads Wavefront OBJ, PLY and STL files.
 
 mod build;
+mod builder;
 mod cache;
 mod check;
 mod damage;
@@ -25,6 +26,7 @@ use glam::{DVec3, Vec2, Vec3, Vec4};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+pub use self::builder::MeshBuilder;
 use self::cache::Cache;
 pub use self::error::MeshError;
 use self::error::{Location, MeshFault};

@@ -1,0 +1,89 @@
+//! Work on another thread as a future.
+
+use std::future::Future;
+use std::pin::Pin;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::task::{Context, Poll, Waker};
+
+use crate::cancel::CancelToken;
+
+/// The result of work on another thread. Dropping the task cancels its token.
+pub(crate) struct Task<T> {
+    slot: Arc<Mutex<Slot<T>>>,
+    cancel: CancelToken,
+}
+
+enum Slot<T> {
+    Running(Option<Waker>),
+    Finished(T),
+    /// The work panicked, or the result was taken.
+    Empty,
+}
+
+/// Reports the end of the work, also if the work panics.
+struct Finish<T>(Arc<Mutex<Slot<T>>>);
+
+impl<T> Finish<T> {
+    fn set(&self, slot: Slot<T>) {
+        let previous = std::mem::replace(&mut *self.0.lock().unwrap_or_else(PoisonError::into_inner), slot);
+        if let Slot::Running(Some(waker)) = previous {
+            waker.wake();
+        }
+    }
+}
+
+impl<T> Drop for Finish<T> {
+    fn drop(&mut self) {
+        let is_running = matches!(*self.0.lock().unwrap_or_else(PoisonError::into_inner), Slot::Running(_));
+        if is_running {
+            self.set(Slot::Empty);
+        }
+    }
+}
+
+impl<T: Send + 'static> Task<T> {
+    /// Runs `work` on another thread; on wasm32, which has no threads, at once. `cancel` is the token of the work.
+    pub(crate) fn spawn(cancel: &CancelToken, work: impl FnOnce() -> T + Send + 'static) -> Task<T> {
+        let slot = Arc::new(Mutex::new(Slot::Running(None)));
+        let finish = Finish(Arc::clone(&slot));
+        let dispatch = tracing::dispatcher::get_default(Clone::clone);
+        let span = tracing::Span::current();
+        let run = move || {
+            let result = tracing::dispatcher::with_default(&dispatch, || span.in_scope(work));
+            finish.set(Slot::Finished(result));
+        };
+        match cfg!(target_family = "wasm") {
+            true => run(),
+            false => drop(std::thread::spawn(run)),
+        }
+        Task {
+            slot,
+            cancel: cancel.clone(),
+        }
+    }
+}
+
+impl<T> Future for Task<T> {
+    type Output = T;
+
+    /// # Panics
+    ///
+    /// If the work panicked.
+    fn poll(self: Pin<&mut Self>, context: &mut Context) -> Poll<T> {
+        let mut slot = self.slot.lock().unwrap_or_else(PoisonError::into_inner);
+        match std::mem::replace(&mut *slot, Slot::Empty) {
+            Slot::Running(_) => {
+                *slot = Slot::Running(Some(context.waker().clone()));
+                Poll::Pending
+            }
+            Slot::Finished(result) => Poll::Ready(result),
+            Slot::Empty => panic!("the thread of the render panicked"),
+        }
+    }
+}
+
+impl<T> Drop for Task<T> {
+    fn drop(&mut self) {
+        self.cancel.cancel();
+    }
+}
