@@ -1,7 +1,9 @@
 //! A ray tracer written as WGSL compute shaders on wgpu, with a CPU twin that computes the same bits.
 //!
-//! Scenes are read from files (`docs/scene-format.md` documents the format), and rendered on a GPU, on software Vulkan
-//! or on the CPU, whichever is available:
+//! Images are rendered on a GPU, on software Vulkan or on the CPU, whichever is available. `docs/scene-format.md` documents
+//! the scene format. The four uses of the library:
+//!
+//! # Render a file
 //!
 //! ```
 //! use wgray::{Error, Options, Scene};
@@ -17,35 +19,78 @@
 //! }
 //! ```
 //!
-//! - [`Options`] selects the device, a region of the image, and layers such as depth and normals. [`Overrides`] with
-//!   [`Scene::load_with`] replaces the size, number of samples or seed of the file.
-//! - [`render_progressive`] shows the image while it renders, and can be cancelled.
-//! - [`Picture`] provides the linear pixels and layers, and writes PNG, OpenEXR, JPEG and WebP files.
-//! - [`Session`] renders a scene several times, from other cameras for example, with one device and without packing the
-//!   scene again.
-//! - [`Description::new`] builds a scene in code, without a file:
+//! # Render from and to memory
 //!
 //! ```
-//! use wgray::scene::{PerspectiveDescription, PhongDescription, PointLightDescription, SphereDescription};
-//! use wgray::{Description, Device, Error, Options};
+//! use wgray::image::{Format, SaveOptions};
+//! use wgray::scene::{LoadOptions, MemoryFiles, SceneFormat};
+//! use wgray::{Error, Options, Scene};
+//!
+//! fn png(model: &[u8], texture: &[u8]) -> Result<Vec<u8>, Error> {
+//!     let files = MemoryFiles::new().with("wood.png", texture); // the files that the model refers to
+//!     let options = LoadOptions::new().with_source(files);
+//!     let scene = Scene::from_slice(model, SceneFormat::Gltf, &options)?;
+//!     let mut png = std::io::Cursor::new(Vec::new());
+//!     wgray::render(&scene, &Options::default())?.write_to(&mut png, Format::Png, &SaveOptions::default())?;
+//!     Ok(png.into_inner())
+//! }
+//! # assert!(png(b"{}", b"").is_err());
+//! ```
+//!
+//! # Build a scene in code
+//!
+//! ```
+//! use wgray::scene::{DiffuseDescription, EnvironmentDescription, PerspectiveDescription, SceneBuilder, SphereDescription};
+//! use wgray::{Error, Options};
 //!
 //! fn main() -> Result<(), Error> {
 //!     let camera = PerspectiveDescription::new([0.0, -5.0, 2.0], [0.0, 0.0, 0.5], 40.0);
-//!     let scene = Description::new(32, 24, camera)
-//!         .with_material("red", PhongDescription::new([0.8, 0.1, 0.1]))
-//!         .with_light(PointLightDescription::new([3.0, -4.0, 5.0], [1.0, 1.0, 1.0]))
-//!         .with_shape(SphereDescription::new("red", [0.0, 0.0, 0.5], 0.5))
-//!         .validate()?;
-//!     let options = Options { device: Device::Cpu, ..Options::default() };
-//!     let image = wgray::render(&scene, &options)?;
-//!     assert!(image.pixels().colors.iter().any(|[red, ..]| *red > 0.5));
+//!     let mut builder = SceneBuilder::new(32, 24, camera);
+//!     builder.environment(EnvironmentDescription::new([1.0, 1.0, 1.0]));
+//!     let red = builder.material(DiffuseDescription::new([0.8, 0.1, 0.1]));
+//!     builder.shape(SphereDescription::new(&red, [0.0, 0.0, 0.5], 0.5));
+//!     let image = wgray::render(&builder.build()?, &Options::default())?;
+//!     assert!(image.pixels().colors.iter().any(|[red, green, _]| red > green));
 //!     Ok(())
 //! }
 //! ```
 //!
+//! # Render a scene several times
+//!
+//! ```
+//! use wgray::{Context, Error, Options, Scene, Session};
+//!
+//! fn main() -> Result<(), Error> {
+//!     let scene = Scene::load("scenes/turntable.toml")?;
+//! #   let smaller = wgray::Overrides { size: Some((16, 16)), ..Default::default() };
+//! #   let scene = Scene::load_with("scenes/turntable.toml", &smaller)?;
+//!     let mut session = Session::new(&Context::new(), scene); // keeps the device and the packed scene
+//!     for frame in 1..=3 {
+//!         let camera = session.scene().camera_at(frame.into())?;
+//!         session.set_camera(camera)?;
+//!         let image = session.render(&Options::default())?;
+//! #       assert_eq!(image.width(), 16);
+//!     }
+//!     Ok(())
+//! }
+//! ```
+//!
+//! # More
+//!
+//! - [`Options`] selects the device, a region of the image, and layers such as depth and normals. [`Overrides`] replaces
+//!   the size, number of samples or seed of a scene.
+//! - [`Session::start`] renders step by step, with the image so far at any time; [`CancelToken`] cancels from another
+//!   thread. [`Session::render_async`] returns a future. [`render_progressive`] calls a function with the image so far.
+//! - [`Picture`] provides the linear pixels and layers, and writes PNG, OpenEXR, JPEG and WebP.
+//! - [`Description`] is a scene file as a value.
+//!
 //! # Features
 //!
-//! All are enabled by default; libraries may prefer `default-features = false`.
+//! All are enabled by default, so that `cargo install wgray` installs the program. Libraries usually need less:
+//!
+//! ```toml
+//! wgray = { version = "0.2", default-features = false, features = ["gpu"] }
+//! ```
 //!
 //! - `gpu`: rendering on GPUs and software Vulkan. Without it, [`Device::Auto`] is the CPU, and wgpu is not linked.
 //! - `cli`: the program `wgray`.
