@@ -97,25 +97,25 @@ pub(crate) fn choice_of(device: &Device) -> gpu::AdapterChoice {
     }
 }
 
-/// Puts a scene on the first matching adapter that `wanted` accepts. Without `wanted`, a device that the context has
-/// opened for the same request is used again.
+/// Opens the first adapter that matches `device` and that `accept` accepts, and creates an engine for the scene. Without
+/// `accept`, uses a device that the context has already opened for the same request.
 #[cfg(feature = "gpu")]
-pub(crate) fn adapter(
+pub(crate) fn open_adapter(
     context: &Context,
     scene: &Arc<Packed>,
     device: &Device,
     exact_rounding: bool,
-    wanted: Option<AcceptAdapter>,
+    accept: Option<AcceptAdapter>,
 ) -> Result<(Engine, DeviceInfo), Error> {
-    let opened = match wanted {
+    let opened = match accept {
         None => context.devices.get(device),
         Some(_) => None,
     };
     let opened = match opened {
         Some(opened) => opened,
         None => {
-            let wanted = |info: &gpu::GpuInfo| wanted.is_none_or(|wanted| wanted(&info.name, info.is_software()));
-            let opened = gpu::choose_among(&choice_of(device), &wanted).map_err(|error| match device {
+            let is_accepted = |info: &gpu::GpuInfo| accept.is_none_or(|accept| accept(&info.name, info.is_software()));
+            let opened = gpu::choose_among(&choice_of(device), &is_accepted).map_err(|error| match device {
                 Device::Auto => RenderError::NoDevice(DeviceError::NotOpened(error.to_string())),
                 _ => error,
             })?;
@@ -138,7 +138,7 @@ pub(crate) fn adapter(
 }
 
 #[cfg(not(feature = "gpu"))]
-pub(crate) fn adapter(
+pub(crate) fn open_adapter(
     _: &Context,
     _: &Arc<Packed>,
     device: &Device,

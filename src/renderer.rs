@@ -13,7 +13,7 @@ use wgray_render::records::Packed;
 use crate::context::Context;
 use crate::device::{Device, DeviceInfo};
 use crate::error::{Error, RenderError};
-use crate::open::{AcceptAdapter, Engine, adapter, faster_on_cpu};
+use crate::open::{AcceptAdapter, Engine, faster_on_cpu, open_adapter};
 use crate::options::Options;
 
 /// Prefix of messages that explain why the CPU is used.
@@ -165,7 +165,7 @@ impl OpenScene {
 
     fn adapter(&self, wanted: Option<AcceptAdapter>) -> Result<(Engine, DeviceInfo), Error> {
         let scene = self.engine.scene();
-        adapter(&self.context, scene, &self.device, self.exact_rounding, wanted)
+        open_adapter(&self.context, scene, &self.device, self.exact_rounding, wanted)
     }
 
     /// Recovers from an error so that the work can be repeated, or returns the error.

@@ -40,7 +40,7 @@ pub struct Session {
     context: Context,
     scene: Arc<Scene>,
     state: SceneState,
-    /// A preparation that was cancelled, and goes on.
+    /// A preparation that was cancelled, and continues in the background.
     cancelled: Option<Receiver<(SceneState, Result<ImageSetup, Error>)>>,
 }
 

@@ -261,8 +261,8 @@ impl AssetSource for DenyAll {
     }
 }
 
-/// Uses names of files that exist in the current folder: they must not be found, and errors must not tell them from
-/// files that do not exist.
+/// Uses names of files that exist in the current folder: they must not be found, and errors must be the same as
+/// for files that do not exist.
 #[test]
 fn no_file_is_read_and_no_error_reveals_which_files_exist() {
     assert!(Path::new("Cargo.toml").is_file() && Path::new("scenes/textures/grid.png").is_file());

@@ -234,7 +234,7 @@ fn steps_have_the_bits_of_a_render_in_spite_of_cancellations() {
             }
             assert_eq!(render.fraction(), 1.0);
             assert!(is_same(&render.finish(), &expected));
-            // The session goes on.
+            // The session can be used again.
             assert!(is_same(&session.render(&options).expect("an image"), &expected));
         }
     }
@@ -321,7 +321,7 @@ environment = { file = 'map' }";
         });
         let delay = start.elapsed() - time_of_cancel;
         assert!(delay < Duration::from_millis(500), "cancelled after {delay:?}"); // usually 10 ms
-        // The preparation goes on, and is used, or dropped when the scene changes.
+        // The preparation continues, and is used, or dropped when the scene changes.
         let never = CancelToken::new();
         let expected = wgray::render(&scene, &options).expect("an image");
         let mut render = session.start(&options, &never).expect("a start");

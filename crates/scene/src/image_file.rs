@@ -23,7 +23,7 @@ const MAX_FILE_BYTES: u64 = 512 << 20;
 /// Maximum component of a texel, equal to the maximum component of all colors.
 const MAX_TEXEL: f32 = 1e6;
 
-/// Locations of the images and meshes of a scene.
+/// The images and meshes of a scene: the folder or source of files, and those in memory.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Assets {
     /// Folder of the scene file; file names are relative to it.
@@ -399,8 +399,8 @@ impl Part {
 }
 
 impl File {
-    /// Returns true if the image contains this part of the file, in this encoding.
-    pub fn is(&self, part: Part) -> bool {
+    /// Returns true if the image is this part of its file, in the encoding that the part requests.
+    pub fn contains(&self, part: Part) -> bool {
         self.is_alpha == (part == Part::Alpha) && part.encoding().unwrap_or(self.default) == self.encoding
     }
 

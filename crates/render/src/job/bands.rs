@@ -19,7 +19,8 @@ use wgray_image::memory::fallible;
 pub enum Flow {
     /// Continue with the next dispatch.
     Continue,
-    /// Stop a render of all bands together as soon as every pixel has a sample; continue other renders.
+    /// The time limit has passed: joint rendering of all bands ends as soon as every pixel has a sample. Rendering band
+    /// by band continues.
     TimeIsUp,
     /// Cancel the render.
     Cancel,

@@ -193,7 +193,7 @@ impl Mesh {
     ///   each combination of the last `g` or `o` with `usemtl`. Files of `mtllib` are read if they are in the folder
     ///   of the mesh or below. Vertex colors are sRGB. Smoothing groups (`s`), fourth coordinates, lines and curves
     ///   are ignored.
-    /// - PLY files keep their vertices. Vertex colors are sRGB if they are integers, and linear if they are floats.
+    /// - The vertices of PLY files are not merged. Vertex colors are sRGB if they are integers, and linear if they are floats.
     /// - STL files have a vertex for each position, and a group for each `solid`. Facet normals are only used for
     ///   [`Normals::File`]; facets with different normals then have separate vertices.
     ///

@@ -107,7 +107,7 @@ impl<'a> Images<'a> {
         let cached = self
             .files
             .get_mut(&asset)
-            .and_then(|files| files.iter_mut().find(|(cached, _)| cached.is(part)));
+            .and_then(|files| files.iter_mut().find(|(cached, _)| cached.contains(part)));
         if let Some((cached, counted)) = cached {
             cached.check_name(file)?;
             let words = fits(Header::of(&cached.image), *counted)?;
