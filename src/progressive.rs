@@ -11,7 +11,7 @@ use wgray_scene::Problem;
 use crate::cancel::CancelToken;
 use crate::error::{Error, RenderError};
 use crate::picture::Picture;
-use crate::render::{ImageSetup, copy_band, empty};
+use crate::render::{ImageSetup, copy_band, empty, render_span};
 use crate::renderer::{FaultHandler, OpenScene, Renderer, warnings};
 use wgray_image::Region;
 
@@ -102,6 +102,7 @@ impl<'s> ProgressiveRender<'s> {
             ..warnings()
         };
         let mut renderer = Renderer::new(self.open, on_fault);
+        let _span = render_span(&renderer);
         let mut watch = |_: &mut dyn Backend, _: Region, _: f64| -> Result<Flow, RenderError> {
             Ok((!cancel.is_cancelled()).into())
         };

@@ -45,6 +45,7 @@ fn open(scene: &Scene, options: &Options) -> Result<OpenScene, Error> {
 }
 
 pub(crate) fn render_with(renderer: Renderer, scene: &Scene, options: &Options) -> Result<Picture, Error> {
+    let _span = render_span(&renderer);
     let packed = Arc::clone(renderer.scene());
     let mut prepared = RenderSetup::new(scene, renderer, options)?;
     let region = prepared.layout.region;
@@ -69,6 +70,10 @@ pub(crate) fn render_with(renderer: Renderer, scene: &Scene, options: &Options) 
         copy_band(&mut film, &band.film);
     }
     Ok(prepared.picture(film))
+}
+
+pub(crate) fn render_span(renderer: &Renderer) -> tracing::span::EnteredSpan {
+    tracing::debug_span!("render", device = renderer.info().name).entered()
 }
 
 /// Renders a scene progressively. `watch` is called at least about ten times per second with the current image, and
@@ -96,6 +101,7 @@ pub(crate) fn render_progressive_with(
 ) -> Result<Picture, Error> {
     let packed = Arc::clone(renderer.scene());
     let mut prepared = RenderSetup::new(scene, renderer, options)?;
+    let _span = render_span(&prepared.renderer);
     let RenderSetup { renderer, hits, layout } = &mut prepared;
     let (split, order) = (WorkSplit::of(packed.film_layout()), Order::Pixels);
     let largest_film = renderer.largest_film();

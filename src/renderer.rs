@@ -126,6 +126,13 @@ impl OpenScene {
             }
         }
         open.largest_film = open.engine.backend().largest_film();
+        let reason = match (&open.why, &options.device) {
+            (Some(why), _) => why.strip_prefix(ON_CPU).unwrap_or(why),
+            (None, Device::Auto) if open.info == DeviceInfo::cpu() => "no adapter can render the scene",
+            (None, Device::Auto) => "it is the best device",
+            (None, _) => "it was requested",
+        };
+        tracing::info!(device = open.info.name, reason, "device selected");
         Ok(open)
     }
 

@@ -14,6 +14,7 @@ use wgray_render::pack::{self, PackedShading, pack, pack_with};
 
 use crate::adapter;
 use crate::random_scenes::any_scene;
+use crate::test_folder::TestFolder;
 
 fn random_descriptions(count: usize) -> Vec<Description> {
     let mut runner = TestRunner::new_with_rng(Config::default(), TestRng::deterministic_rng(RngAlgorithm::ChaCha));
@@ -411,6 +412,70 @@ fn futures_have_the_same_image_and_can_be_cancelled_and_dropped() {
             block_on(session.render_async(&invalid, &CancelToken::new())),
             Err(Error::Option(_))
         ));
+    }
+}
+
+/// Collects the names of spans, and the reasons of events.
+#[derive(Clone, Default)]
+struct Recorder(Arc<std::sync::Mutex<Vec<String>>>);
+
+impl<S: tracing::Subscriber> tracing_subscriber::Layer<S> for Recorder {
+    fn on_new_span(
+        &self,
+        attributes: &tracing::span::Attributes,
+        _: &tracing::Id,
+        _: tracing_subscriber::layer::Context<S>,
+    ) {
+        self.0
+            .lock()
+            .expect("a list")
+            .push(attributes.metadata().name().to_owned());
+    }
+
+    fn on_event(&self, event: &tracing::Event, _: tracing_subscriber::layer::Context<S>) {
+        struct Reason(Option<String>);
+        impl tracing::field::Visit for Reason {
+            fn record_debug(&mut self, field: &tracing::field::Field, value: &dyn std::fmt::Debug) {
+                if field.name() == "reason" {
+                    self.0 = Some(format!("{value:?}"));
+                }
+            }
+        }
+        let mut reason = Reason(None);
+        event.record(&mut reason);
+        self.0.lock().expect("a list").extend(reason.0);
+    }
+}
+
+#[test]
+fn spans_cover_the_phases_and_the_device_has_a_reason() {
+    use tracing_subscriber::prelude::*;
+    for (device, reason) in devices().into_iter().zip(["requested", "requested"]) {
+        let recorder = Recorder::default();
+        let subscriber = tracing_subscriber::registry().with(recorder.clone());
+        tracing::subscriber::with_default(subscriber, || {
+            // A mesh that no other test has in use.
+            let folder = TestFolder::with_file("a.obj", "v 0 0 0\nv 1 0 0\nv 0 0 1\nf 1 2 3\n");
+            let overrides = wgray::Overrides {
+                size: Some((4, 3)),
+                pixel_samples: Some(1),
+                ..wgray::Overrides::default()
+            };
+            let scene = Scene::load_with(folder.path("a.obj"), &overrides).expect("a scene");
+            let mut session = Session::new(&Context::new(), scene);
+            // Spans of other threads belong to the same subscriber.
+            let mut render = session.start(&on(&device), &CancelToken::new()).expect("a start");
+            render.step(&CancelToken::new()).expect("a step");
+        });
+        let names = recorder.0.lock().expect("a list");
+        let mut expected = vec!["load", "mesh", "pack", "bvh", "render"];
+        if device != Device::Cpu {
+            expected.push("compile");
+        }
+        for name in expected {
+            assert!(names.iter().any(|found| found == name), "{name} is not in {names:?}");
+        }
+        assert!(names.iter().any(|found| found.contains(reason)), "{names:?}");
     }
 }
 

@@ -145,6 +145,7 @@ pub fn print_events() {
     use tracing_subscriber::prelude::*;
     let targets = Targets::new()
         .with_target("wgray", LevelFilter::DEBUG)
+        .with_target("wgray::renderer", LevelFilter::WARN) // the program itself reports the selected device
         .with_default(LevelFilter::WARN);
     let lines = (!is_json()).then(|| {
         tracing_subscriber::fmt::layer()

@@ -111,6 +111,7 @@ pub fn pipeline(
     if let Some(pipeline) = device.pipelines.get(key) {
         return Ok(pipeline);
     }
+    let _span = tracing::debug_span!("compile").entered();
     let checked = check(source)?;
     let exact = exact
         .map(|rounding| checked.exact_spirv(kernel, constants, rounding, device.info.float_controls))

@@ -31,6 +31,7 @@ impl PackedMesh {
         let corners = |triangle: &[u32; 3]| triangle.map(|vertex| mesh.positions[vertex as usize]);
         let boxes: Vec<Aabb> = mesh.triangles.par_iter().map(|t| Aabb::around(&corners(t))).collect();
         let bounds = boxes.iter().fold(Aabb::EMPTY, |bounds, b| bounds.with(b));
+        let _span = tracing::debug_span!("bvh", triangles = boxes.len()).entered();
         let tree = build(&boxes, MAX_LEAF_SIZE);
         let (triangles, copies, tangents) = match &tangents {
             Some(generated) => (

@@ -54,6 +54,7 @@ pub fn pack_with(scene: &Scene, shading: &PackedShading, texels: Vec<u32>) -> Pa
         appearances,
         environment_map,
     } = shading;
+    let _span = tracing::debug_span!("pack").entered();
     let origin = origin::origin(&scene.camera);
     let scene = &*origin::translated_to(scene, origin);
     let mut materials = appearances.materials.clone();

@@ -163,6 +163,7 @@ impl Scene {
             return Err(SceneError::Override(Problem::of("asset_root", rule)));
         }
         let path = path_of(&options.name, format);
+        let _span = tracing::debug_span!("load", path = %path.display()).entered();
         let read_error = |error| SceneError::Read {
             path: path.clone(),
             error,

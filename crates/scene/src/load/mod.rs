@@ -63,6 +63,7 @@ impl Scene {
         overrides: &Overrides,
         files: &mut BTreeSet<PathBuf>,
     ) -> Result<(Scene, Description), SceneError> {
+        let _span = tracing::debug_span!("load", path = %path.display()).entered();
         let assets = Assets::beside(folder_of(path));
         if is_gltf(path) {
             return load_gltf(path, &assets, overrides, files);
