@@ -389,6 +389,42 @@ fn image_of(scene: &Scene) -> Arc<Image> {
 }
 
 #[test]
+fn errors_of_files_have_a_kind_and_a_source() {
+    use std::error::Error as _;
+    use wgray::scene::SceneError;
+    let missing = |text: &str, overrides: Overrides| {
+        let options = LoadOptions::new().with_overrides(overrides).with_source(NoFiles);
+        Scene::from_slice(format!("{CAMERA}{text}").as_bytes(), SceneFormat::Toml, &options).unwrap_err()
+    };
+    let strict = Overrides {
+        strict: true,
+        ..Overrides::default()
+    };
+    let texture = "textures.a = { type = 'image', file = 'wood.png' }
+materials.a = { type = 'diffuse', color = { texture = 'a' } }
+shapes = [{ type = 'sphere', material = 'a', center = [0, 0, 0], radius = 1 }]";
+    for error in [
+        missing("shapes = [{ type = 'mesh', file = 'wood.png' }]", Overrides::default()),
+        missing(texture, strict),
+    ] {
+        let SceneError::Invalid { problem, .. } = &error else {
+            panic!("{error:?}");
+        };
+        let file = problem.file.as_ref().unwrap();
+        assert_eq!((file.name.as_str(), file.kind), ("wood.png", io::ErrorKind::NotFound));
+    }
+    let error = Scene::load("none.toml").unwrap_err();
+    let source = error.source().and_then(|source| source.downcast_ref::<io::Error>());
+    assert_eq!(source.map(io::Error::kind), Some(io::ErrorKind::NotFound));
+    let error = Scene::load("none.glb").unwrap_err();
+    assert!(error.source().is_some(), "{error:?}");
+    let error = Mesh::load(Path::new("none.obj"), None).unwrap_err();
+    assert!(error.source().is_some(), "{error:?}");
+    let error = wgray::Error::from(Scene::load("none.toml").unwrap_err());
+    assert!(error.source().is_some(), "{error:?}");
+}
+
+#[test]
 fn meshes_in_memory_equal_files() {
     let folder = models();
     for (name, format) in [

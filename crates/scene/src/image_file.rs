@@ -265,7 +265,7 @@ impl Assets {
                 .as_deref()
                 .map(|similar| similar.strip_prefix(&self.folder).unwrap_or(similar));
             let hint = similar.map_or_else(String::new, |name| format!("; did you mean {name:?}?"));
-            Problem::damage(unreadable(self.display_name(file), &error) + &hint)
+            Problem::damage(unreadable(self.display_name(file), &error) + &hint).with_file(file, error.kind())
         })?;
         let root = self.file_system.canonical_folder(&self.root).map_err(|error| {
             let root = self.root.display();
@@ -295,7 +295,7 @@ impl Assets {
             io::ErrorKind::FileTooLarge => {
                 Problem::new(format!("{file:?} must not be larger than {} MiB", MAX_FILE_BYTES >> 20))
             }
-            _ => Problem::damage(unreadable(file, &error)),
+            _ => Problem::damage(unreadable(file, &error)).with_file(file, error.kind()),
         })
     }
 }

@@ -66,7 +66,7 @@ pub use metals::MetalIndex;
 pub use note::Note;
 pub use parse::{Pieces, Places, is_json_scene};
 pub use presentation::{Presentation, UpAxis};
-pub use problem::{ErrorPlace, Problem};
+pub use problem::{ErrorPlace, Problem, UnreadableFile};
 pub use scene::*;
 pub use schema::fields::Kind as FieldKind;
 pub use schema::fields::{Field, Names, fields};

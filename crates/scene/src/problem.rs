@@ -1,6 +1,7 @@
 //! Violations of rules by values, each with the key path of the value.
 
 use std::fmt;
+use std::io;
 
 use crate::key_path::{KeyPath, Segment, cut_to};
 
@@ -33,8 +34,20 @@ pub struct Problem {
     pub(crate) is_damage: bool,
     /// True if the key is unknown.
     pub is_unknown_key: bool,
+    /// The file that cannot be read, if that is the problem.
+    pub file: Option<UnreadableFile>,
     /// True if the key is the subject of the message, as in `camera.fov is missing`.
     pub(super) is_predicate: bool,
+}
+
+/// A file of a scene that cannot be read.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct UnreadableFile {
+    /// The name in the scene.
+    pub name: String,
+    /// The kind of the I/O error.
+    pub kind: io::ErrorKind,
 }
 
 impl From<String> for Problem {
@@ -61,7 +74,17 @@ impl Problem {
             message: cut_to(MAX_MESSAGE_LEN, &message.into()).into_owned(),
             is_damage: false,
             is_unknown_key: false,
+            file: None,
             is_predicate: false,
+        }
+    }
+
+    /// Sets the file that cannot be read.
+    pub(crate) fn with_file(self, name: &str, kind: io::ErrorKind) -> Self {
+        let name = name.to_owned();
+        Self {
+            file: Some(UnreadableFile { name, kind }),
+            ..self
         }
     }
 

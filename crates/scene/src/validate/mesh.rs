@@ -18,7 +18,7 @@ use super::super::{
 };
 use super::mtl::SceneMaterials;
 use super::{At, Checked, Collector, MIN_SINE, Problem, between, check, list, number, point, show, unit};
-use crate::mesh::{Group, Mesh, Normals};
+use crate::mesh::{Group, Mesh, MeshError, Normals};
 
 /// Maximum number of groups of all shapes.
 const MAX_GROUPS: usize = 1 << 24;
@@ -159,7 +159,10 @@ fn load(file: &str, normals: Option<Normals>, lookup: &mut SceneLookup) -> Check
         return Ok(None);
     }
     let mesh = mesh_file::load(&lookup.assets.file_system, &path, normals)
-        .map_err(|error| Problem::new(error.to_string()))
+        .map_err(|error| match &error {
+            MeshError::Read { error: source, .. } => Problem::new(error.to_string()).with_file(file, source.kind()),
+            _ => Problem::new(error.to_string()),
+        })
         .at("file")?;
     if let (true, Some(damage)) = (lookup.assets.strict, mesh.damage.first()) {
         return Err(Problem::damage(damage.clone().of(Path::new(file)).to_string())).at("file");
