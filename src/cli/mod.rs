@@ -267,6 +267,17 @@ fn option_error(problem: &Problem) -> Usage {
     Usage(format!("--{name}{sub_key}: {}{hint}", problem.message))
 }
 
+/// Returns the messages of an error and its sources. A source whose text the previous message contains is omitted.
+fn chain_message(error: &anyhow::Error) -> String {
+    let mut message = error.to_string();
+    for source in error.chain().skip(1).map(ToString::to_string) {
+        if !message.ends_with(&source) {
+            message = format!("{message}: {source}");
+        }
+    }
+    message
+}
+
 /// Prints an error.
 fn report(error: &anyhow::Error, code: u8) {
     let code = Value::from(code);
@@ -295,7 +306,7 @@ fn report(error: &anyhow::Error, code: u8) {
             _ => "",
         };
         let facts = facts_of([("exit_code", code.clone())]);
-        log::print_with(Level::Error, &format!("{error:#}{hint}"), facts);
+        log::print_with(Level::Error, &(chain_message(error) + &hint), facts);
     }
     for error in shader {
         let mut facts = facts_of([("exit_code", code.clone())]);
