@@ -130,6 +130,7 @@ pub use cancel::CancelToken;
 pub use context::Context;
 pub use device::{Device, DeviceInfo};
 pub use error::Error;
+pub use glam;
 pub use glam::DVec3;
 pub use image::{Aov, AovSource, Pixels};
 pub use options::Options;

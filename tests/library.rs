@@ -284,6 +284,15 @@ fn a_progressive_image_equals_the_rendered_image_and_can_be_cancelled() {
 }
 
 #[test]
+fn layers_are_parsed_by_name() {
+    for aov in Aov::ALL {
+        assert_eq!(aov.to_string().parse(), Ok(aov));
+    }
+    let error = "dept".parse::<Aov>().unwrap_err();
+    assert!(error.starts_with("\"dept\" must be one of normal, "), "{error}");
+}
+
+#[test]
 fn an_image_in_memory_equals_a_file() {
     let folder = tempfile::tempdir().unwrap();
     let colors: Vec<[u8; 3]> = (0..12).map(|i| [i * 20, 255 - i * 9, 40]).collect();

@@ -1,6 +1,9 @@
 //! Arbitrary output variables (AOVs): first hits through pixel centers, adaptive sampling statistics, and means over
 //! samples.
 
+use std::fmt;
+use std::str::FromStr;
+
 use glam::Vec3;
 
 use super::{Band, Layout};
@@ -38,6 +41,26 @@ pub enum Aov {
     SampleCount,
     /// Variance estimated by [`Film::variance`](crate::film::Film::variance).
     Variance,
+}
+
+impl fmt::Display for Aov {
+    /// Writes the name.
+    fn fmt(&self, formatter: &mut fmt::Formatter) -> fmt::Result {
+        formatter.pad(self.name())
+    }
+}
+
+impl FromStr for Aov {
+    type Err = String;
+
+    /// Parses a name. The error lists the names.
+    fn from_str(name: &str) -> Result<Aov, String> {
+        let unknown = || {
+            let names = Aov::ALL.map(Aov::name).join(", ");
+            format!("{name:?} must be one of {names}")
+        };
+        Aov::ALL.into_iter().find(|aov| aov.name() == name).ok_or_else(unknown)
+    }
 }
 
 /// Source of an output variable.
