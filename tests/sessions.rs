@@ -450,6 +450,9 @@ impl<S: tracing::Subscriber> tracing_subscriber::Layer<S> for Recorder {
 #[test]
 fn spans_cover_the_phases_and_the_device_has_a_reason() {
     use tracing_subscriber::prelude::*;
+    // If there is only one subscriber, tracing asks the default one of the thread that first enters a span: in other
+    // tests, none.
+    let _second = tracing::Dispatch::new(tracing_subscriber::registry());
     for (device, reason) in devices().into_iter().zip(["requested", "requested"]) {
         let recorder = Recorder::default();
         let subscriber = tracing_subscriber::registry().with(recorder.clone());

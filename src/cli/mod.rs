@@ -380,8 +380,8 @@ fn exit_code(error: &anyhow::Error) -> u8 {
         7
     } else if error.is::<NoThreads>() {
         7
-    } else if error.is::<SceneError>() {
-        3
+    } else if let Some(error) = error.downcast_ref::<SceneError>() {
+        if error.is_out_of_memory() { 7 } else { 3 }
     } else {
         match error.downcast_ref::<RenderError>() {
             Some(RenderError::NoDevice(_)) => 4,

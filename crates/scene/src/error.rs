@@ -70,6 +70,19 @@ pub enum SceneError {
 }
 
 impl SceneError {
+    /// Returns true if memory was exhausted while a file was read.
+    pub fn is_out_of_memory(&self) -> bool {
+        let kind = match self {
+            SceneError::Read { error, .. }
+            | SceneError::Mesh(MeshError::Read { error, .. })
+            | SceneError::Gltf(GltfError::Read { error, .. }) => Some(error.kind()),
+            SceneError::Invalid { problem, .. } => problem.file.as_ref().map(|file| file.kind),
+            SceneError::Several { errors, .. } => return errors.iter().any(SceneError::is_out_of_memory),
+            _ => None,
+        };
+        kind == Some(io::ErrorKind::OutOfMemory)
+    }
+
     /// Returns the location of the error, or of the first error.
     pub fn place(&self) -> ErrorPlace {
         let in_file = |file: String| ErrorPlace {

@@ -295,6 +295,8 @@ impl Assets {
             io::ErrorKind::FileTooLarge => {
                 Problem::new(format!("{file:?} must not be larger than {} MiB", MAX_FILE_BYTES >> 20))
             }
+            // Not damage to the file, which a placeholder could replace.
+            io::ErrorKind::OutOfMemory => Problem::new(unreadable(file, &error)).with_file(file, error.kind()),
             _ => Problem::damage(unreadable(file, &error)).with_file(file, error.kind()),
         })
     }

@@ -49,7 +49,7 @@ pub fn choose_among(choice: &AdapterChoice, is_eligible: &dyn Fn(&GpuInfo) -> bo
             Err(error) => failure = Some(error),
         }
     }
-    Err(failure.unwrap_or_else(|| RenderError::NoDevice(DeviceError::NoneFound)))
+    Err(failure.unwrap_or(RenderError::NoDevice(DeviceError::NoneFound)))
 }
 
 fn open(adapter: &wgpu::Adapter) -> Result<Device, RenderError> {

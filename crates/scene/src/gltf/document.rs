@@ -214,7 +214,7 @@ impl Document {
                 self.folder.read(&path, MAX_IMAGE_BYTES).map_err(|error| {
                     let reason = format!("{} cannot be read: {error}", super::error::quoted(name));
                     match error.kind() {
-                        io::ErrorKind::FileTooLarge => ImageFault::Invalid(fault(reason)),
+                        io::ErrorKind::FileTooLarge | io::ErrorKind::OutOfMemory => ImageFault::Invalid(fault(reason)),
                         _ => ImageFault::Missing(reason),
                     }
                 })?
