@@ -56,3 +56,4 @@ mod test_folder;
 mod textures;
 mod twins;
 mod unchanged;
+mod wavefront;
