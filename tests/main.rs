@@ -58,3 +58,4 @@ mod test_folder;
 mod textures;
 mod twins;
 mod unchanged;
+mod wavefront;

@@ -47,8 +47,11 @@ const RUST_FILES_WITHOUT_SHADER: &[&str] = &[
     "renderer.rs",
     "integrators",
     "lobes.rs",
+    "rectangles.rs",
     "samples.rs",
+    "shadow_ray.rs",
     "traversal",
+    "wavefront",
 ];
 
 /// Functions and records that exist in only one language or differ: file, name, reason.
@@ -67,6 +70,36 @@ const ONE_SIDED: &[(&str, &str, &str)] = &[
         "linear_primitives.wgsl",
         "is_occluded_by_primitives",
         "reads the scene: in WGSL, it is in buffers.wgsl",
+    ),
+    (
+        "linear_primitives.wgsl",
+        "closest_of_kind",
+        "only in Rust, for the wavefront: the loop over the primitives of a kind",
+    ),
+    (
+        "linear_primitives.wgsl",
+        "is_occluded_by_kind",
+        "only in Rust, for the wavefront: the loop over the primitives of a kind",
+    ),
+    (
+        "integrators/path.wgsl",
+        "shade",
+        "only in Rust: the part of `advance` after the closest hit",
+    ),
+    (
+        "integrators/path.wgsl",
+        "is_shadow_ray_occluded",
+        "only in Rust: traces the shadow ray of `shade`",
+    ),
+    (
+        "integrators/path.wgsl",
+        "add_direct_light",
+        "in Rust, `sample_direct_light` returns the shadow ray, which is traced after `shade`",
+    ),
+    (
+        "integrators/path.wgsl",
+        "sample_direct_light",
+        "in WGSL, `add_direct_light` also traces the shadow ray",
     ),
     (
         "pixel.wgsl",

@@ -1,20 +1,20 @@
 //! Closest-hit and occlusion queries of the scene's BVHs: the results of `shaders/bvh.wgsl`, computed by [`traversal`].
 
 use bytemuck::cast_slice;
-use glam::{UVec2, Vec3, Vec4Swizzles as _};
+use glam::{UVec2, Vec2, Vec3, Vec4Swizzles as _};
 
 use super::geometry::triangle_casts;
 use super::light::{LightSegments, segments_to_light};
 use super::linear_primitives::is_occluded_by_primitive;
 use super::math::max;
-use super::mesh::{Crossing, mesh_pad, point_to_mesh, shear_of, triangle_crossing, vector_to_mesh};
+use super::mesh::{mesh_pad, point_to_mesh, shear_of, triangle_crossing, vector_to_mesh};
 use super::primitive::intersect;
 use super::ray::{Hit, Ray, nearer_hit, no_hit, standalone_prim};
 use super::samples::{LEVEL, Samples};
 use super::shadow::{SampleBlock, occlusion_mask};
 use super::slab::{Slabs, box_interval, interval_hits, slabs};
 use super::surface::{Surface, largest};
-use super::traversal::{self, Line, Nearest};
+use super::traversal::{self, Line, MeshRay, Nearest};
 use crate::bvh::{Aabb, Node};
 use crate::records::{
     BvhItem, CASTS_SHADOW, INFINITE_T, INSTANCE, Instance, Light, NO_INDEX, Packed, PackedMesh, SOME_SHADOWS,
@@ -22,9 +22,9 @@ use crate::records::{
 };
 
 /// Maximum number of items tested without the BVH: in a small BVH, rays hit most nodes.
-const FEW_ITEMS: usize = 4;
+pub const FEW_ITEMS: usize = 4;
 
-fn item_pad(scene: &Packed, origin: Vec3) -> f32 {
+pub fn item_pad(scene: &Packed, origin: Vec3) -> f32 {
     scene.counts.item_padding.x * (largest(origin) + scene.counts.item_padding.y)
 }
 
@@ -62,23 +62,37 @@ fn closest_of_item(
     if !interval_hits(interval, before.t) {
         return before;
     }
+    match item.kind & 0xff {
+        INSTANCE => closest_of_mesh(scene, before, item.index, ray, max(interval.x, 0.0), origin_prim),
+        _ => closest_of_primitive(scene, before, item, ray, interval.x, origin_prim, inside_prim),
+    }
+}
+
+/// Returns the closer one of `before` and the hit of a ray with an item that is a primitive. `near` is the distance to
+/// the item's box.
+pub fn closest_of_primitive(
+    scene: &Packed,
+    before: Hit,
+    item: &BvhItem,
+    ray: Ray,
+    near: f32,
+    origin_prim: UVec2,
+    inside_prim: UVec2,
+) -> Hit {
     let i = item.index;
     let is_inside = i == standalone_prim(inside_prim);
-    let t = match item.kind & 0xff {
-        INSTANCE => return closest_of_mesh(scene, before, i, ray, max(interval.x, 0.0), origin_prim),
-        kind => with_primitive_kind!(kind, |kind| intersect(
-            kind,
-            &scene.primitives[i as usize],
-            is_inside,
-            ray,
-            INFINITE_T
-        )),
-    };
+    let t = with_primitive_kind!(item.kind & 0xff, |kind| intersect(
+        kind,
+        &scene.primitives[i as usize],
+        is_inside,
+        ray,
+        INFINITE_T
+    ));
     let found = Hit {
         t: if i == standalone_prim(origin_prim) {
             INFINITE_T
         } else {
-            max(t, interval.x)
+            max(t, near)
         },
         primitive: i,
         ..no_hit()
@@ -87,11 +101,33 @@ fn closest_of_item(
 }
 
 fn closest_of_mesh(scene: &Packed, before: Hit, instance_index: u32, ray: Ray, start: f32, origin_prim: UVec2) -> Hit {
+    let MeshRay {
+        mesh,
+        line,
+        start,
+        skip,
+        best,
+    } = closest_mesh_ray(scene, before, instance_index, ray, start, origin_prim);
+    let found = traversal::closest(*LEVEL, &mesh, &line, start, skip, best);
+    if found.slot == NO_INDEX {
+        return before;
+    }
+    mesh_hit(&mesh, instance_index, &line, found)
+}
+
+/// Returns a ray in the object space of an instance, from `start` on, that searches for hits closer than `before`.
+#[inline(always)]
+pub fn closest_mesh_ray(
+    scene: &Packed,
+    before: Hit,
+    instance_index: u32,
+    ray: Ray,
+    start: f32,
+    origin_prim: UVec2,
+) -> MeshRay<'_> {
     let i = &scene.bvh.instances[instance_index as usize];
-    let packed = &*scene.bvh.meshes[i.mesh as usize];
     let direction = vector_to_mesh(i, ray.direction);
     let origin = point_to_mesh(i, ray.origin) + direction * start;
-    let pad = mesh_pad(i, origin);
     // At equal distance, the larger triangle index loses: this instance wins only over instances with larger indices.
     let best = Nearest {
         t: before.t,
@@ -102,25 +138,36 @@ fn closest_of_mesh(scene: &Packed, before: Hit, instance_index: u32, ray: Ray, s
         },
         slot: NO_INDEX,
     };
-    let skip = if origin_prim.x == instance_index + 1 {
-        origin_prim.y
-    } else {
-        NO_INDEX
-    };
-    let line = Line::new(origin, direction, pad);
-    let found = traversal::closest(*LEVEL, &traversal_mesh(packed), &line, start, skip, best);
-    if found.slot == NO_INDEX {
-        return before;
+    MeshRay {
+        mesh: traversal_mesh(&scene.bvh.meshes[i.mesh as usize]),
+        line: Line::new(origin, direction, mesh_pad(i, origin)),
+        start,
+        skip: excluded_triangle(origin_prim, instance_index),
+        best,
     }
-    let [v0, v1, v2] = corners(packed, found.slot as usize);
-    let s = slabs(origin, direction, pad);
-    let Crossing { barycentric, .. } = triangle_crossing(v0, v1, v2, origin, shear_of(direction), s);
+}
+
+/// Returns the hit of a ray of [`closest_mesh_ray`].
+#[inline(always)]
+pub fn mesh_hit(mesh: &traversal::Mesh, instance_index: u32, line: &Line, found: Nearest) -> Hit {
+    let [a, b, c, _] = mesh.triangles[found.slot as usize];
+    let vertices = [a, b, c].map(|vertex| &mesh.vertices[vertex as usize]);
     Hit {
         t: found.t,
         instance: instance_index + 1,
         primitive: found.triangle,
         slot: found.slot,
-        barycentric,
+        barycentric: Vec2::from_array(line.barycentric(vertices)),
+    }
+}
+
+/// Returns the index of the triangle that a ray or segment from `origin_prim` does not hit.
+#[inline(always)]
+fn excluded_triangle(origin_prim: UVec2, instance_index: u32) -> u32 {
+    if origin_prim.x == instance_index + 1 {
+        origin_prim.y
+    } else {
+        NO_INDEX
     }
 }
 
@@ -217,17 +264,12 @@ fn occluded_by_mesh(scene: &Packed, instance_index: u32, candidates: u32, rays: 
         u: vector_to_mesh(i, rays.light_segments.u),
         v: vector_to_mesh(i, rays.light_segments.v),
     };
-    let excluded = rays.surface.exclude_front;
     let segments = traversal::Segments {
         o: origin,
         pad: mesh_pad(i, origin),
         directions: &rays.samples.segments(*LEVEL, mesh_segments),
         t_max: rays.light.t_max,
-        skip: if excluded.x == instance_index + 1 {
-            excluded.y
-        } else {
-            NO_INDEX
-        },
+        skip: excluded_triangle(rays.surface.exclude_front, instance_index),
     };
     if i.shadows == SOME_SHADOWS {
         return occluded_by_groups(scene, i, mesh, &segments, candidates);
@@ -301,36 +343,55 @@ fn is_occluded_by_item(
 ) -> bool {
     let i = item.index;
     match item.kind & 0xff {
-        INSTANCE => is_occluded_by_mesh(scene, i, surface, to_light, t_max),
-        kind => with_primitive_kind!(kind, |kind| {
-            is_occluded_by_primitive(
-                kind,
-                &scene.primitives[i as usize],
-                i,
-                surface,
-                to_light,
-                t_max,
-                target_prim,
-            )
-        }),
+        INSTANCE => {
+            let MeshRay { mesh, line, skip, .. } = shadow_mesh_ray(scene, i, surface, to_light, t_max);
+            traversal::any(*LEVEL, &mesh, &line, skip, t_max)
+        }
+        _ => is_occluded_by_primitive_item(scene, item, surface, to_light, t_max, target_prim),
     }
 }
 
-fn is_occluded_by_mesh(scene: &Packed, instance_index: u32, surface: &Surface, to_light: Vec3, t_max: f32) -> bool {
+/// Returns true if an item that is a primitive occludes the segment.
+pub fn is_occluded_by_primitive_item(
+    scene: &Packed,
+    item: &BvhItem,
+    surface: &Surface,
+    to_light: Vec3,
+    t_max: f32,
+    target_prim: u32,
+) -> bool {
+    let i = item.index;
+    with_primitive_kind!(item.kind & 0xff, |kind| is_occluded_by_primitive(
+        kind,
+        &scene.primitives[i as usize],
+        i,
+        surface,
+        to_light,
+        t_max,
+        target_prim,
+    ))
+}
+
+/// Returns the segment in the object space of an instance, as a ray that searches for any hit.
+#[inline(always)]
+pub fn shadow_mesh_ray<'a>(
+    scene: &'a Packed,
+    instance_index: u32,
+    surface: &Surface,
+    to_light: Vec3,
+    t_max: f32,
+) -> MeshRay<'a> {
     let i = &scene.bvh.instances[instance_index as usize];
     let origin = point_to_mesh(i, surface.ray_origin);
-    let line = Line::new(origin, vector_to_mesh(i, to_light), mesh_pad(i, origin));
-    let excluded = surface.exclude_front;
-    let skip = if excluded.x == instance_index + 1 {
-        excluded.y
-    } else {
-        NO_INDEX
-    };
-    traversal::any(
-        *LEVEL,
-        &traversal_mesh(&scene.bvh.meshes[i.mesh as usize]),
-        &line,
-        skip,
-        t_max,
-    )
+    MeshRay {
+        mesh: traversal_mesh(&scene.bvh.meshes[i.mesh as usize]),
+        line: Line::new(origin, vector_to_mesh(i, to_light), mesh_pad(i, origin)),
+        start: 0.0,
+        skip: excluded_triangle(surface.exclude_front, instance_index),
+        best: Nearest {
+            t: t_max,
+            triangle: NO_INDEX,
+            slot: NO_INDEX,
+        },
+    }
 }

@@ -7,12 +7,15 @@ use rayon::prelude::*;
 
 use super::adaptive::{moments_with, pilot_add, pilot_finish, samples_wanted};
 use super::geometry::pixel_first_hit;
+use super::integrators::path::{path_layers, path_value};
 use super::pixel::{Layers, pixel_radiance};
+use super::wavefront::{MAX_PATHS, Wavefront};
 use crate::backend::{Backend, FilmState, Rules};
 use crate::error::RenderError;
 use crate::film::{Film, Layer};
 use crate::records::{FirstHit, Packed};
 use wgray_image::Region;
+use wgray_scene::Integrator;
 
 /// A scene's CPU backend. Dispatches run in [`Backend::poll`] or [`Backend::wait`], on the current rayon pool.
 pub struct Cpu<P> {
@@ -166,23 +169,56 @@ fn add_samples(scene: &Packed, film: &mut Film, tile: Region, samples: Range<u32
             part.layers[i] = layer;
         }
     }
-    parts.into_par_iter().for_each(|mut run| {
-        for x in 0..run.sums.len() {
-            let pixel = UVec2::new(run.first.x + x as u32, run.first.y);
-            if !scene.sampling.adaptive {
-                for sample in samples.clone() {
-                    let (value, layers) = pixel_radiance(scene, pixel, sample);
-                    run.sums[x] += value;
-                    run.add_layers(x, layers);
+    let statistics = match is_pilot {
+        _ if !scene.sampling.adaptive => Statistics::None,
+        true => Statistics::Pilot,
+        false => Statistics::Further,
+    };
+    parts
+        .into_par_iter()
+        .for_each_init(Wavefront::default, |wavefront, mut run| {
+            let (first, width) = (run.first, run.sums.len());
+            let pixel = |x: usize| UVec2::new(first.x + x as u32, first.y);
+            let samples_of = |x: usize| {
+                let end = match statistics {
+                    Statistics::None | Statistics::Pilot => samples.end,
+                    Statistics::Further => further_samples_end(scene, pilot_to_read, region, pixel(x), samples.end),
+                };
+                (samples.start..end).map(move |sample| (x, sample))
+            };
+            let camera_samples: Vec<(usize, u32)> = (0..width).flat_map(samples_of).collect();
+            for batch in camera_samples.chunks(MAX_PATHS) {
+                match scene.integrator {
+                    Integrator::Phong => {
+                        for &(x, sample) in batch {
+                            let (value, layers) = pixel_radiance(scene, pixel(x), sample);
+                            run.add(statistics, x, value, layers);
+                        }
+                    }
+                    Integrator::Path => {
+                        let samples = batch.iter().map(|&(x, sample)| (pixel(x), sample));
+                        let paths = wavefront.trace(scene, samples);
+                        for (&(x, _), path) in batch.iter().zip(paths) {
+                            run.add(statistics, x, path_value(path), path_layers(path));
+                        }
+                    }
                 }
-            } else if is_pilot {
-                add_pilot_samples(scene, pixel, samples.clone(), &mut run, x);
-            } else {
-                let pilot_sums = neighbor_pilot_sum(pilot_to_read, region, pixel);
-                add_further_samples(scene, pixel, samples.clone(), &mut run, x, pilot_sums);
             }
-        }
-    });
+            if statistics == Statistics::Pilot {
+                run.finish_pilot();
+            }
+        });
+}
+
+/// The statistics of samples that adaptive sampling needs. See `shaders/kernels/adaptive.wgsl`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Statistics {
+    /// None: sampling is not adaptive.
+    None,
+    /// Those of the pilot samples.
+    Pilot,
+    /// Those of the samples after the pilot samples.
+    Further,
 }
 
 /// A segment of a film row. Lists that are missing or read-only are empty.
@@ -195,6 +231,24 @@ struct Run<'a> {
 }
 
 impl Run<'_> {
+    /// Adds a sample to pixel `x`. Samples of a pixel are added in order.
+    fn add(&mut self, statistics: Statistics, x: usize, value: Vec4, layers: Layers) {
+        if statistics == Statistics::Pilot {
+            self.pilot_sums[x] = pilot_add(self.pilot_sums[x], self.sums[x], value);
+        }
+        if statistics != Statistics::None {
+            self.moments[x] = moments_with(self.moments[x], self.sums[x], value);
+        }
+        self.sums[x] += value;
+        self.add_layers(x, layers);
+    }
+
+    fn finish_pilot(&mut self) {
+        for ((pilot_sum, sum), moments) in self.pilot_sums.iter_mut().zip(&*self.sums).zip(&*self.moments) {
+            *pilot_sum = pilot_finish(*pilot_sum, *sum, *moments);
+        }
+    }
+
     fn add_layers(&mut self, x: usize, sample: Layers) {
         let Layers {
             emission,
@@ -225,33 +279,11 @@ fn runs(region: Region, records: &mut [Vec4], tile: Region) -> Vec<(UVec2, &mut 
     .collect()
 }
 
-/// See `shaders/kernels/adaptive.wgsl`.
-fn add_pilot_samples(scene: &Packed, pixel: UVec2, samples: Range<u32>, run: &mut Run, x: usize) {
-    for sample in samples {
-        let (value, layers) = pixel_radiance(scene, pixel, sample);
-        run.pilot_sums[x] = pilot_add(run.pilot_sums[x], run.sums[x], value);
-        run.moments[x] = moments_with(run.moments[x], run.sums[x], value);
-        run.sums[x] += value;
-        run.add_layers(x, layers);
-    }
-    run.pilot_sums[x] = pilot_finish(run.pilot_sums[x], run.sums[x], run.moments[x]);
-}
-
-/// Adds the samples after the pilot samples. The neighbors' pilot statistics determine the number of samples.
-fn add_further_samples(scene: &Packed, pixel: UVec2, samples: Range<u32>, run: &mut Run, x: usize, pilot_sums: Vec4) {
+/// Returns the end of a pixel's samples after the pilot samples. The neighbors' pilot statistics determine it.
+fn further_samples_end(scene: &Packed, pilot_sums: &[Vec4], region: Region, pixel: UVec2, end: u32) -> u32 {
     let s = &scene.specialization;
-    let end = samples_wanted(
-        pilot_sums,
-        s.pilot_samples,
-        f32::from_bits(s.squared_error),
-        samples.end,
-    );
-    for sample in samples.start..end {
-        let (value, layers) = pixel_radiance(scene, pixel, sample);
-        run.moments[x] = moments_with(run.moments[x], run.sums[x], value);
-        run.sums[x] += value;
-        run.add_layers(x, layers);
-    }
+    let pilot_sums = neighbor_pilot_sum(pilot_sums, region, pixel);
+    samples_wanted(pilot_sums, s.pilot_samples, f32::from_bits(s.squared_error), end)
 }
 
 fn neighbor_pilot_sum(pilot_sums: &[Vec4], region: Region, pixel: UVec2) -> Vec4 {

@@ -31,6 +31,7 @@ use crate::cpu::scattering::{
     shaded_normal,
 };
 use crate::cpu::sequence::sobol_bits;
+use crate::cpu::shadow_ray::ShadowRay;
 use crate::cpu::surface::{Surface, largest};
 use crate::cpu::texture::evaluate_material;
 use crate::cpu::thin::thin_reflectance;
@@ -58,7 +59,7 @@ pub struct PathState {
     pub skips: u32,
 }
 
-#[inline(always)]
+#[inline(never)] // compiled once, for `pixel_radiance` and the wavefront
 pub fn begin_path(scene: &Packed, pixel: UVec2, sample: u32) -> PathState {
     let start = camera_sample(scene, pixel, sample);
     let mut path = Path {
@@ -95,9 +96,20 @@ pub fn begin_path(scene: &Packed, pixel: UVec2, sample: u32) -> PathState {
 
 #[inline(always)]
 pub fn advance(scene: &Packed, state: &mut PathState, pixel: UVec2) {
+    let path = &state.path;
+    let hit = closest_hit(scene, path.ray, path.origin_prim, path.inside_prim);
+    if let Some(ray) = shade(scene, state, hit, pixel) {
+        let occluded = is_shadow_ray_occluded(scene, &ray, pixel, state.sample);
+        add_radiance(scene, state, ray.contribution, !occluded, ray.bounces);
+    }
+}
+
+/// The part of [`advance`] after the closest hit: ends the path or samples its next ray. Returns the shadow ray, which
+/// must be traced before the next hit is shaded.
+#[inline(never)] // compiled once, for `advance` and the wavefront
+pub fn shade(scene: &Packed, state: &mut PathState, hit: Hit, pixel: UVec2) -> Option<ShadowRay> {
     let s = &scene.specialization;
     let path = state.path;
-    let hit = closest_hit(scene, path.ray, path.origin_prim, path.inside_prim);
     if hit.primitive == NO_INDEX {
         state.ended = true;
         let is_environment_visible =
@@ -112,7 +124,8 @@ pub fn advance(scene: &Packed, state: &mut PathState, pixel: UVec2) {
             false => environment_light,
         };
         let contribution = path.throughput * environment_light;
-        return add_radiance(scene, state, contribution, is_environment_visible, path.depth);
+        add_radiance(scene, state, contribution, is_environment_visible, path.depth);
+        return None;
     }
     let prim = fetch_hit_primitive(scene, hit);
     let mut surface = surface_of(scene, &prim, hit, path.ray);
@@ -150,7 +163,8 @@ pub fn advance(scene: &Packed, state: &mut PathState, pixel: UVec2) {
             surface.side,
         )
     {
-        return continue_through(scene, state, surface, hit_diff, hit.t);
+        continue_through(scene, state, surface, hit_diff, hit.t);
+        return None;
     }
     if s.absorption != 0 {
         let inside = has_inside(material) & (surface.side < 0.0) & (material.alpha_mode == OPAQUE);
@@ -177,8 +191,9 @@ pub fn advance(scene: &Packed, state: &mut PathState, pixel: UVec2) {
     }
     if (path.depth >= s.bounces) | (material.kind == EMITTER) {
         state.ended = true;
-        return;
+        return None;
     }
+    let mut shadow_ray = None;
     let seed = scene.camera.seed;
     let key = hash4(UVec4::new(pixel.x, pixel.y, seed, 1 + 2 * path.depth));
     let decision_key = hash4(UVec4::new(pixel.x, pixel.y, seed, 2 + 2 * path.depth));
@@ -221,9 +236,7 @@ pub fn advance(scene: &Packed, state: &mut PathState, pixel: UVec2) {
                 );
             }
             let u = decision(scene, UVec2::new(key.x, key.y), state.sample);
-            add_direct_light(
-                scene, state, &prim, &surface, material, mixture, selection, u, true, pixel,
-            );
+            shadow_ray = sample_direct_light(scene, state, &prim, &surface, material, mixture, selection, u);
         }
         let u = decision(scene, UVec2::new(key.z, key.w), state.sample);
         sample_bsdf(
@@ -242,6 +255,26 @@ pub fn advance(scene: &Packed, state: &mut PathState, pixel: UVec2) {
     }
     let has_throughput = largest(state.path.throughput) > 0.0;
     state.ended |= !has_throughput;
+    shadow_ray
+}
+
+/// Returns true if the geometry occludes a shadow ray.
+pub fn is_shadow_ray_occluded(scene: &Packed, ray: &ShadowRay, pixel: UVec2, sample: u32) -> bool {
+    let surface = ray.surface();
+    if scene.specialization.alpha_surfaces == 0 {
+        return is_occluded(scene, false, &surface, ray.to_light, ray.t_max, ray.target_prim);
+    }
+    is_occluded_alpha(
+        scene,
+        false,
+        &surface,
+        ray.to_light,
+        ray.t_max,
+        ray.target_prim,
+        pixel,
+        sample,
+        ray.bounces,
+    )
 }
 
 #[inline(always)]
@@ -398,7 +431,7 @@ pub fn sample_delta_bsdf(
 
 #[expect(clippy::too_many_arguments, reason = "the twin of a WGSL function has its arguments")]
 #[inline(always)]
-pub fn add_direct_light(
+fn sample_direct_light(
     scene: &Packed,
     state: &mut PathState,
     prim: &HitPrimitive,
@@ -407,9 +440,7 @@ pub fn add_direct_light(
     mixture: &PrincipledLobes,
     selection: EmitterSelection,
     u: Vec2,
-    is_enabled: bool,
-    pixel: UVec2,
-) {
+) -> Option<ShadowRay> {
     let light = sample_emitter(scene, selection, surface.ray_origin, lit_normal(surface, material), u);
     let reflected = reflection(scene, prim, surface, material, mixture, normalize(light.to));
     let mut contribution = state.path.throughput * reflected.value * light.radiance * (1.0 / light.pdf);
@@ -437,25 +468,21 @@ pub fn add_direct_light(
         power_heuristic(light.pdf, reflected.pdf)
     };
     let max_component = largest(contribution);
-    let is_dark = !(is_enabled && max_component > 0.0 && max_component < INFINITE_T);
-    if scene.specialization.alpha_surfaces != 0 {
-        let bounce = state.path.depth + 1;
-        let (t_max, target_prim) = (light.t_max, light.primitive);
-        let occluded = is_occluded_alpha(
-            scene,
-            is_dark,
-            exit_surface,
-            to_light,
-            t_max,
-            target_prim,
-            pixel,
-            state.sample,
-            bounce,
-        );
-        return add_radiance(scene, state, contribution, !occluded, bounce);
+    let bounces = state.path.depth + 1;
+    if !(max_component > 0.0 && max_component < INFINITE_T) {
+        add_radiance(scene, state, contribution, false, bounces);
+        return None;
     }
-    let occluded = is_occluded(scene, is_dark, exit_surface, to_light, light.t_max, light.primitive);
-    add_radiance(scene, state, contribution, !occluded, state.path.depth + 1)
+    Some(ShadowRay {
+        origin: exit_surface.ray_origin,
+        to_light,
+        t_max: light.t_max,
+        exclude_front: exit_surface.exclude_front,
+        exclude_back: exit_surface.exclude_back,
+        target_prim: light.primitive,
+        contribution,
+        bounces,
+    })
 }
 
 #[expect(clippy::too_many_arguments, reason = "the twin of a WGSL function has its arguments")]

@@ -86,6 +86,17 @@ impl Line {
         [x - self.shear[0] * z, y - self.shear[1] * z, self.shear[2] * z]
     }
 
+    /// Returns the barycentric coordinates of the second and the third vertex where the ray hits the triangle.
+    #[inline(always)]
+    pub fn barycentric(&self, vertices: [&[f32; 4]; 3]) -> [f32; 2] {
+        let [a, b, c] = vertices.map(|vertex| self.sheared(in_order(vertex, self.axes)));
+        let u = c[0] * b[1] - c[1] * b[0];
+        let v = a[0] * c[1] - a[1] * c[0];
+        let w = b[0] * a[1] - b[1] * a[0];
+        let sum = u + v + w;
+        [v / sum, w / sum]
+    }
+
     /// Returns the distance of the hit with a triangle, if any: Woop, Benthin and Wald, "Watertight Ray/Triangle
     /// Intersection", JCGT 2(1), 2013. The ray must also hit the triangle's box.
     #[inline(always)]

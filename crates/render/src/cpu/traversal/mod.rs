@@ -13,8 +13,10 @@
 
 mod closest;
 mod four;
+mod interleaved;
 mod line;
 mod occluded;
+mod stack;
 
 use std::ops::Range;
 
@@ -22,7 +24,9 @@ pub use fearless_simd::Level;
 use fearless_simd::dispatch;
 use glam::Vec3;
 
+pub use self::interleaved::{MeshRay, RAYS, RaySource, trace};
 pub use self::line::Line;
+pub use self::stack::{BoxRay, Stack};
 use crate::bvh::{Aabb, Node};
 
 /// The triangles of a BVH.

@@ -1,0 +1,108 @@
+//! The wavefront: paths of the integrator `path` in batches, which pass through the stages closest hits, shading,
+//! occlusion and compaction bounce by bounce. Shading is that of [`advance`](super::integrators::path::advance), so each
+//! path has the bits of its scalar version. Tracing whole batches is faster.
+
+mod closest_hits;
+mod items;
+mod linear;
+mod occlusion;
+mod scratch;
+
+use glam::UVec2;
+
+use self::closest_hits::closest_hits;
+use self::occlusion::occluded_rays;
+use self::scratch::Scratch;
+use super::integrators::path::{PathState, add_radiance, begin_path, shade};
+use super::ray::Hit;
+use super::shadow_ray::ShadowRay;
+use crate::records::Packed;
+
+/// Maximum number of paths of a batch. Their states fit into a core's level-2 cache.
+pub const MAX_PATHS: usize = 1024;
+
+/// A batch of paths with the queues of its stages. The memory is reused from batch to batch.
+#[derive(Default)]
+pub struct Wavefront {
+    paths: Vec<PathState>,
+    pixels: Vec<UVec2>,
+    /// Indices of the paths that have not ended.
+    active: Vec<u32>,
+    /// Closest hits of the active paths.
+    hits: Vec<Hit>,
+    shadow_rays: Vec<QueuedShadowRay>,
+    occluded: Vec<bool>,
+    scratch: Scratch,
+}
+
+/// A shadow ray of a path.
+struct QueuedShadowRay {
+    path: u32,
+    ray: ShadowRay,
+}
+
+impl Wavefront {
+    /// Traces the paths of camera samples, each given by its pixel and number, and returns the paths in this order.
+    pub fn trace(&mut self, scene: &Packed, samples: impl Iterator<Item = (UVec2, u32)>) -> &[PathState] {
+        self.begin(scene, samples);
+        while !self.active.is_empty() {
+            self.find_closest_hits(scene);
+            self.shade(scene);
+            self.trace_shadow_rays(scene);
+            self.compact();
+        }
+        &self.paths
+    }
+
+    fn begin(&mut self, scene: &Packed, samples: impl Iterator<Item = (UVec2, u32)>) {
+        self.paths.clear();
+        self.pixels.clear();
+        for (pixel, sample) in samples {
+            self.paths.push(begin_path(scene, pixel, sample));
+            self.pixels.push(pixel);
+        }
+        self.active.clear();
+        self.active.extend(0..self.paths.len() as u32);
+    }
+
+    fn find_closest_hits(&mut self, scene: &Packed) {
+        closest_hits(scene, &self.paths, &self.active, &mut self.hits, &mut self.scratch);
+    }
+
+    /// Ends each active path or samples its next ray, and queues its shadow ray.
+    fn shade(&mut self, scene: &Packed) {
+        self.shadow_rays.clear();
+        for (&path, &hit) in self.active.iter().zip(&self.hits) {
+            let i = path as usize;
+            if let Some(ray) = shade(scene, &mut self.paths[i], hit, self.pixels[i]) {
+                self.shadow_rays.push(QueuedShadowRay { path, ray });
+            }
+        }
+    }
+
+    /// Adds the contribution of each shadow ray that is not occluded, before the path's next hit is shaded.
+    fn trace_shadow_rays(&mut self, scene: &Packed) {
+        occluded_rays(
+            scene,
+            &self.paths,
+            &self.pixels,
+            &self.shadow_rays,
+            &mut self.occluded,
+            &mut self.scratch,
+        );
+        for (QueuedShadowRay { path, ray }, occluded) in self.shadow_rays.iter().zip(&self.occluded) {
+            add_radiance(
+                scene,
+                &mut self.paths[*path as usize],
+                ray.contribution,
+                !occluded,
+                ray.bounces,
+            );
+        }
+    }
+
+    fn compact(&mut self) {
+        let paths = &self.paths;
+        self.active.retain(|path| !paths[*path as usize].ended);
+    }
+}

@@ -1,0 +1,187 @@
+//! The wavefront of the CPU path traces each path with the bits of the scalar integrator.
+
+use std::fmt::Write as _;
+
+use glam::{UVec2, Vec4};
+use proptest::strategy::{Strategy as _, ValueTree as _};
+use proptest::test_runner::TestRunner;
+use wgray::scene::Integrator;
+use wgray_render::cpu::integrators::path::{path_layers, path_value};
+use wgray_render::cpu::pixel::{Layers, pixel_radiance};
+use wgray_render::cpu::wavefront::Wavefront;
+use wgray_render::records::Packed;
+
+use crate::random_scenes::any_scene;
+use crate::scenes;
+
+/// Number of generated scenes, about half of which use the integrator `path`.
+const SCENES: usize = 600;
+
+type Path = ([u32; 4], [[u32; 4]; 5]);
+
+fn bits(value: Vec4, layers: Layers) -> Path {
+    let words = |v: Vec4| v.to_array().map(f32::to_bits);
+    let Layers {
+        emission,
+        direct,
+        indirect,
+        albedo,
+        normal,
+    } = layers;
+    (words(value), [emission, direct, indirect, albedo, normal].map(words))
+}
+
+/// Returns camera samples of pixels in rows with a step, several per pixel.
+fn samples(packed: &Packed, step: u32, count: u32) -> Vec<(UVec2, u32)> {
+    let (width, height) = (packed.camera.width, packed.camera.height);
+    let rows = (0..height).step_by(step as usize);
+    let pixels = rows.flat_map(|y| (0..width).step_by(step as usize).map(move |x| UVec2::new(x, y)));
+    pixels
+        .flat_map(|pixel| (0..count).map(move |sample| (pixel, sample)))
+        .collect()
+}
+
+fn wavefront(packed: &Packed, samples: &[(UVec2, u32)], batch: usize) -> Vec<Path> {
+    let mut wavefront = Wavefront::default();
+    let mut paths = Vec::new();
+    for samples in samples.chunks(batch) {
+        let traced = wavefront.trace(packed, samples.iter().copied());
+        paths.extend(traced.iter().map(|path| bits(path_value(path), path_layers(path))));
+    }
+    paths
+}
+
+fn scalar(packed: &Packed, samples: &[(UVec2, u32)]) -> Vec<Path> {
+    let path = |&(pixel, sample): &(UVec2, u32)| {
+        let (value, layers) = pixel_radiance(packed, pixel, sample);
+        bits(value, layers)
+    };
+    samples.iter().map(path).collect()
+}
+
+fn differing(a: &[Path], b: &[Path]) -> usize {
+    assert_eq!(a.len(), b.len());
+    a.iter().zip(b).filter(|(a, b)| a != b).count()
+}
+
+fn random_path_scenes() -> impl Iterator<Item = Packed> {
+    let mut runner = TestRunner::deterministic();
+    let scenes = (0..SCENES).map(move |_| {
+        let description = any_scene::description().new_tree(&mut runner).expect("a scene");
+        any_scene::packed(&description.current())
+    });
+    scenes.filter(|packed| packed.integrator == Integrator::Path)
+}
+
+/// Returns a scene with a BVH over eight instances of two meshes and many spheres, in a box.
+fn scene_with_many_items() -> Packed {
+    let mut text = String::from(
+        r#"
+        [image]
+        width = 48
+        height = 40
+        [camera]
+        position = [0, -6, 2]
+        look_at = [0, 0, 0.8]
+        fov = 40
+        [render]
+        integrator = "path"
+        max_depth = 6
+        pixel_samples = { count = 4 }
+        [environment]
+        color = [0.2, 0.3, 0.4]
+        [materials.grey]
+        type = "diffuse"
+        color = [0.6, 0.6, 0.6]
+        [materials.glass]
+        type = "dielectric"
+        ior = 1.5
+        [[lights]]
+        type = "rectangle"
+        center = [0, 0, 4]
+        size = [1, 1]
+        normal = [0, 0, -1]
+        tangent = [1, 0, 0]
+        color = [9, 9, 9]
+        [[shapes]]
+        type = "rectangle"
+        material = "grey"
+        center = [0, 0, 0]
+        size = [8, 8]
+        normal = [0, 0, 1]
+        tangent = [1, 0, 0]
+        [meshes.knot]
+        file = "meshes/knot.obj"
+        "#,
+    );
+    for i in 0..8 {
+        let (x, y, scale) = (f64::from(i % 4) - 1.5, f64::from(i / 4), 0.3 + 0.1 * f64::from(i));
+        let material = ["grey", "glass"][i as usize % 2];
+        write!(
+            text,
+            "[[instances]]\nmesh = \"knot\"\nmaterial = \"{material}\"\ntranslate = [{x}, {y}, 0.5]\n\
+             rotate = [{0}, 20, {0}]\nscale = {scale}\n",
+            40 * i
+        )
+        .expect("text");
+    }
+    for i in 0..80 {
+        let (x, y) = (0.4 * f64::from(i % 10) - 1.8, 0.5 * f64::from(i / 10) - 2.0);
+        write!(
+            text,
+            "[[shapes]]\ntype = \"sphere\"\nmaterial = \"grey\"\ncenter = [{x}, {y}, 0.15]\nradius = 0.15\n"
+        )
+        .expect("text");
+    }
+    scenes::parse(&text)
+}
+
+#[test]
+fn random_scenes_have_the_paths_of_the_scalar_integrator() {
+    let (mut scenes, mut meshes, mut alpha) = (0, 0, 0);
+    for (i, packed) in random_path_scenes().enumerate() {
+        let packed = if i % 2 == 0 { packed.with_layers() } else { packed };
+        let samples = samples(&packed, 2, 3);
+        let batch = [1, 7, 64, 1024][i % 4];
+        let differ = differing(&wavefront(&packed, &samples, batch), &scalar(&packed, &samples));
+        assert_eq!(differ, 0, "of {} paths of scene {i}", samples.len());
+        scenes += 1;
+        meshes += usize::from(!packed.bvh.meshes.is_empty());
+        alpha += usize::from(packed.specialization.alpha_surfaces != 0);
+    }
+    assert!(scenes > 100 && meshes > 20 && alpha > 5, "{scenes} {meshes} {alpha}");
+}
+
+#[test]
+fn scenes_have_the_paths_of_the_scalar_integrator() {
+    let mut scenes = scenes::all();
+    scenes.retain(|(_, packed)| packed.integrator == Integrator::Path);
+    assert!(scenes.len() >= 2);
+    scenes.push(("many items".into(), scene_with_many_items()));
+    for (name, packed) in scenes {
+        let samples = samples(&packed, packed.camera.width.div_ceil(48), 4);
+        let differ = differing(&wavefront(&packed, &samples, 1024), &scalar(&packed, &samples));
+        assert_eq!(differ, 0, "of {} paths, {name}", samples.len());
+    }
+}
+
+#[test]
+fn changed_scenes_are_found() {
+    let packed = scene_with_many_items();
+    assert!(packed.bvh.items.len() > 70 && packed.bvh.instances.len() == 8);
+    let samples = samples(&packed, 1, 2);
+    let expected = scalar(&packed, &samples);
+    assert_eq!(differing(&wavefront(&packed, &samples, 256), &expected), 0);
+    let changed = |change: fn(&mut Packed)| {
+        let mut packed = packed.clone();
+        change(&mut packed);
+        differing(&wavefront(&packed, &samples, 256), &expected)
+    };
+    let found = [
+        changed(|packed| packed.camera.seed += 1),
+        changed(|packed| packed.bvh.instances[3].anchor.x += 1e-4),
+        changed(|packed| packed.environment.shadow_epsilon *= 1.5),
+        changed(|packed| packed.primitives[0].anchor.z += 1e-5),
+    ];
+    assert!(found.iter().all(|differ| *differ > 0), "{found:?}");
+}
