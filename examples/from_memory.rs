@@ -37,8 +37,8 @@ fn main() -> Result<(), Box<dyn Error>> {
 
     // The bytes could also come from an archive, a database or the network.
     let files = MemoryFiles::new()
-        .with("knot.obj", *include_bytes!("../scenes/meshes/knot.obj"))
-        .with("grid.png", *include_bytes!("../scenes/textures/grid.png"));
+        .with("knot.obj", &include_bytes!("../scenes/meshes/knot.obj")[..])
+        .with("grid.png", &include_bytes!("../scenes/textures/grid.png")[..]);
     let options = LoadOptions::new().with_source(files);
     let scene = Scene::from_slice(SCENE.as_bytes(), SceneFormat::Toml, &options)?;
 

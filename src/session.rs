@@ -252,6 +252,7 @@ impl Session {
     }
 
     /// Returns the scene, packed for these options.
+    #[cfg(feature = "cli")]
     pub(crate) fn packed(&mut self, options: &Options) -> Arc<Packed> {
         self.state.packed(&self.scene, options)
     }
