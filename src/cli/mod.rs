@@ -306,7 +306,7 @@ fn report(error: &anyhow::Error, code: u8) {
             _ => "",
         };
         let facts = facts_of([("exit_code", code.clone())]);
-        log::print_with(Level::Error, &(chain_message(error) + &hint), facts);
+        log::print_with(Level::Error, &(chain_message(error) + hint), facts);
     }
     for error in shader {
         let mut facts = facts_of([("exit_code", code.clone())]);
