@@ -85,8 +85,8 @@ fn builds(criterion: &mut Criterion) {
 const SIDE: usize = 512;
 const PAD: f32 = 1e-6;
 
-/// A bumpy sphere on a floor, with a camera and a square area light: one camera ray per pixel, and 16 shadow rays from
-/// each hit to the light.
+/// Rays in a scene with a bumpy sphere on a floor, a camera and a square area light: one camera ray per pixel, and 16
+/// shadow rays from each hit to the light.
 struct View {
     surface: Surface,
     tree: Tree,

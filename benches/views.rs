@@ -1,4 +1,4 @@
-//! Time of a view beyond its tracing: 8 x 8 pixels of 1 sample, from cameras on a circle, by a session and by separate
+//! Overhead of a view: the time of 8 x 8 pixels with 1 sample, from cameras on a circle, in a session and in separate
 //! renders: `cargo bench --bench views [-- MODEL...]`. Models are files that `wgray render` accepts.
 
 use std::f64::consts::TAU;
@@ -57,11 +57,11 @@ fn compare(scene: &Scene, device: &Device) -> Result<(Duration, Duration), Error
         ..Options::default()
     };
     let cameras = cameras(scene);
-    let mut one = scene.clone();
+    let mut view_scene = scene.clone();
     let separate = median(cameras.iter().take(10).map(|camera| {
-        one.camera = *camera;
+        view_scene.camera = *camera;
         let start = Instant::now();
-        wgray::render(&one, &options)?;
+        wgray::render(&view_scene, &options)?;
         Ok(start.elapsed())
     }))?;
     let mut session = Session::new(&Context::new(), scene.clone());

@@ -5,7 +5,7 @@ struct LobeSample {
     wi: vec3f,             // z < 0: transmitted
     weight: vec3f,         // BSDF times cosine over pdf; 0 if the path ends
     pdf: f32,              // per solid angle
-    eta: f32,              // ratio of the indices before and behind the surface if transmitted, else 1
+    eta: f32,              // ratio of the indices in front of and behind the surface if transmitted, else 1
 }
 
 // Returns alpha along the two axes of the lobe: Burley, "Physically Based Shading at Disney", 2012, section 5.4, with
@@ -70,7 +70,7 @@ fn facet_eval(alpha: vec2f, wo: vec3f, wi: vec3f) -> f32 {
     return ggx_d(alpha, half_vector(wo, wi)) * masking;
 }
 
-// Returns the pdf of reflection by visible normals, per solid angle.
+// Returns the pdf, per solid angle, of directions reflected about sampled visible normals (VNDF).
 fn facet_pdf(alpha: vec2f, wo: vec3f, wi: vec3f) -> f32 {
     return ggx_d(alpha, half_vector(wo, wi)) * 0.5 / max(wo.z + ggx_length(alpha, wo), 1e-30);
 }

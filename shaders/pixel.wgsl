@@ -33,10 +33,10 @@ fn lens_point(pixel: vec2u, sample: u32) -> vec2f {
 
 // Further outputs of a pixel, as sums of weighted colors.
 struct Layers {
-    emission: vec4f,       // radiance without reflection; w: coverage of the pixel
-    direct: vec4f,         // radiance after one reflection
-    indirect: vec4f,       // radiance after more reflections
-    albedo: vec4f,         // albedo of the first surface that is not specular
+    emission: vec4f,       // emitted radiance; w: coverage of the pixel
+    direct: vec4f,         // radiance scattered once
+    indirect: vec4f,       // radiance scattered more than once
+    albedo: vec4f,         // albedo of the first surface that is neither mirror nor glass
     normal: vec4f,         // outward shading normal of the first hit
 }
 

@@ -16,7 +16,7 @@ struct PrincipledLobes {
     glass_f0: vec3f,       // reflectance of glass at normal incidence
     glass_f90: f32,        // reflectance of glass at grazing angles
     f0_ior: f32,           // reflectance by the index alone, at normal incidence
-    ratio: f32,            // ratio of the indices before and behind the surface, thin or not
+    ratio: f32,            // ratio of the indices in front of and behind the surface, thin or not
     eta: f32,              // ratio of the indices for refraction: 1 if thin
     thin: bool,            // transmission keeps the direction
     coat: f32,             // weight of the clearcoat lobe
@@ -27,8 +27,8 @@ struct PrincipledLobes {
     lobe_probs: vec4f,     // probabilities of diffuse, specular, glass and coat; sheen has the remaining probability
 }
 
-// Returns the lobes seen from wo. Lobes without a bit in `lobes` are omitted. `energy` holds tabulated albedos: x and y
-// as in `ggx_albedo` for anisotropic lobes, z for rough glass.
+// Returns the lobes for the outgoing direction wo. Lobes without a bit in `lobes` are omitted. `energy` contains
+// tabulated albedos: x and y as in `ggx_albedo` for anisotropic lobes, z for rough glass.
 fn principled_mixture(material: Material, wo: vec3f, outside: bool, coat_normal: vec3f, lobes: u32, energy: vec3f) -> PrincipledLobes {
     var m = PrincipledLobes();
     let rough = max(material.roughness * material.roughness, SMALLEST_ALPHA);

@@ -121,11 +121,11 @@ fn ewa_color(t: Texture, f: Footprint) -> vec3f {
     return color;
 }
 
-// Returns the mean of a level over the ellipse. The ellipse is resized so that the full filter has the same variance as
-// on the finest level, M + I, where a semi-axis r has the variance r^2 and I is the reconstruction filter. On a coarser
-// level, texels are means over a box and add the variance (1 - q) / 3, where q is the squared size of a finest texel,
-// and I becomes q I. Semi-axes stay above 1, so that every ellipse contains a texel. Differences from one texel are
-// averaged, so that constant colors stay exact.
+// Returns the mean of a level over the footprint ellipse, resized so that the filter has the same variance as on the
+// finest level: r^2 for a semi-axis r, plus q^2 for the reconstruction filter, where q is the side of a finest texel in
+// texels of this level. Texels of this level are box means of finest texels, which already adds (1 - q^2) / 3.
+// Semi-axes are at least 1, so that every ellipse contains a texel. Differences from one texel are averaged, so that
+// constant colors stay exact.
 fn ewa_level_color(t: Texture, level: Level, uv: vec2f, dx: vec2f, dy: vec2f) -> vec3f {
     let size = vec2f(f32(level.width), f32(level.height));
     let q = size / vec2f(f32(t.width), f32(t.height));

@@ -54,7 +54,7 @@ pub struct KnownDifference {
     pub check: &'static str,
     pub reason: &'static str,
     /// Maximum fraction of results that may differ.
-    pub share: f64,
+    pub max_fraction: f64,
 }
 
 pub const KNOWN_DIFFERENCES: &[KnownDifference] = &[
@@ -69,12 +69,12 @@ pub const KNOWN_DIFFERENCES: &[KnownDifference] = &[
 /// The driver rounds twice when it converts these integers to floats. Indices in scenes are below 2^31.
 pub const ROUNDED_TWICE: &str = "unsigned integers of 2^31 or more are rounded twice";
 
-const fn swiftshader(check: &'static str, reason: &'static str, share: f64) -> KnownDifference {
+const fn swiftshader(check: &'static str, reason: &'static str, max_fraction: f64) -> KnownDifference {
     KnownDifference {
         adapter: "SwiftShader",
         check,
         reason,
-        share,
+        max_fraction,
     }
 }
 
@@ -92,16 +92,16 @@ pub fn allowed<'a>(
 
 /// Checks the fraction of differing results against the table entry. Without an entry, no result may differ. An entry
 /// whose deviation no longer occurs is an error.
-pub fn judge(entry: Option<&KnownDifference>, check: &str, share: f64) -> Result<(), String> {
+pub fn judge(entry: Option<&KnownDifference>, check: &str, fraction: f64) -> Result<(), String> {
     match entry {
-        None if share == 0.0 => Ok(()),
-        None => Err(format!("{check}: {:.4} % of the results differ", share * 100.0)),
-        Some(entry) if share == 0.0 => Err(format!(
+        None if fraction == 0.0 => Ok(()),
+        None => Err(format!("{check}: {:.4} % of the results differ", fraction * 100.0)),
+        Some(entry) if fraction == 0.0 => Err(format!(
             "{check}: no result differs any more; remove the entry: {}",
             entry.reason
         )),
-        Some(entry) if share > entry.share => Err(format!(
-            "{check}: {share} of the results differ, more than this entry allows: {}",
+        Some(entry) if fraction > entry.max_fraction => Err(format!(
+            "{check}: {fraction} of the results differ, more than this entry allows: {}",
             entry.reason
         )),
         Some(_) => Ok(()),
@@ -114,7 +114,7 @@ fn outdated_or_exceeded_known_differences_fail() {
         adapter: "Some GPU",
         check: "dot",
         reason: "division by an approximation",
-        share: 0.1,
+        max_fraction: 0.1,
     }];
     let entry = allowed(&entries, "Some GPU 9000", "driver 1", "dot");
     assert!(entry.is_some());

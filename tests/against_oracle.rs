@@ -12,10 +12,10 @@ use crate::scenes;
 const TOLERANCE: f64 = 1e-5;
 
 /// Maximum fraction of differing pixels. At an edge, rounding can move a sample to the other side.
-const MAX_EDGE_SHARE: f64 = 0.0005;
+const MAX_EDGE_FRACTION: f64 = 0.0005;
 
 /// Scenes with more edges: name, maximum fraction of differing pixels, and reason.
-const EDGE_SHARES_BY_SCENE: &[(&str, f64, &str)] = &[
+const EDGE_FRACTIONS_BY_SCENE: &[(&str, f64, &str)] = &[
     (
         "balls-checker.toml",
         0.003,
@@ -28,11 +28,11 @@ const EDGE_SHARES_BY_SCENE: &[(&str, f64, &str)] = &[
     ),
 ];
 
-fn max_edge_share(scene: &str) -> f64 {
-    EDGE_SHARES_BY_SCENE
+fn max_edge_fraction(scene: &str) -> f64 {
+    EDGE_FRACTIONS_BY_SCENE
         .iter()
         .find(|(name, ..)| *name == scene)
-        .map_or(MAX_EDGE_SHARE, |(_, share, _)| *share)
+        .map_or(MAX_EDGE_FRACTION, |(_, fraction, _)| *fraction)
 }
 
 /// Scenes that the oracle does not support: name and unsupported features.
@@ -136,37 +136,37 @@ fn differing(a: &[[f64; 3]], b: &[[f64; 3]]) -> f64 {
 #[test]
 fn images_match_the_oracle() {
     for (name, description) in supported_scenes() {
-        let truth = Oracle::new(&description, Flaw::None).picture();
+        let expected = Oracle::new(&description, Flaw::None).picture();
         for mode in both() {
             let picture = means(&render(&scenes::packed(&description), mode));
-            let share = differing(&picture, &truth);
+            let fraction = differing(&picture, &expected);
             let errors = picture
                 .iter()
                 .flatten()
-                .zip(truth.iter().flatten())
+                .zip(expected.iter().flatten())
                 .map(|(a, b)| (a - b).abs());
             let mean = |p: &[[f64; 3]]| p.iter().flatten().sum::<f64>() / p.len() as f64;
             println!(
                 "{name} {mode:?}: {} of {} pixels differ by more than {TOLERANCE}, the largest error is {:.1e}, the mean differs by {:.1e}",
-                (share * truth.len() as f64).round(),
-                truth.len(),
+                (fraction * expected.len() as f64).round(),
+                expected.len(),
                 errors.fold(0.0, f64::max),
-                mean(&picture) / mean(&truth) - 1.0
+                mean(&picture) / mean(&expected) - 1.0
             );
             assert!(
-                share <= max_edge_share(&name),
-                "{name}, {mode:?}: {share} of the pixels differ"
+                fraction <= max_edge_fraction(&name),
+                "{name}, {mode:?}: {fraction} of the pixels differ"
             );
-            let drift = (mean(&picture) / mean(&truth) - 1.0).abs();
+            let mean_error = (mean(&picture) / mean(&expected) - 1.0).abs();
             assert!(
-                drift < 0.2 * max_edge_share(&name),
-                "{name}, {mode:?}: the mean differs by {drift}"
+                mean_error < 0.2 * max_edge_fraction(&name),
+                "{name}, {mode:?}: the mean differs by {mean_error}"
             );
         }
     }
 }
 
-/// Some scene detects each flaw. Every scene detects the flaws that affect all scenes.
+/// At least one scene detects each flaw; every scene detects the flaws that affect all scenes.
 #[test]
 fn a_flawed_oracle_is_found() {
     let mode = *both().last().expect("the CPU at least");
@@ -189,13 +189,13 @@ fn a_flawed_oracle_is_found() {
             if !affects_all_scenes && found.contains(&flaw) {
                 continue;
             }
-            let share = differing(&picture, &Oracle::new(&description, flaw).picture());
-            if share > 10.0 * MAX_EDGE_SHARE {
+            let fraction = differing(&picture, &Oracle::new(&description, flaw).picture());
+            if fraction > 10.0 * MAX_EDGE_FRACTION {
                 found.push(flaw);
             }
             assert!(
-                !affects_all_scenes || share > 10.0 * MAX_EDGE_SHARE,
-                "{name}: {flaw:?} changes only {share} of the pixels"
+                !affects_all_scenes || fraction > 10.0 * MAX_EDGE_FRACTION,
+                "{name}: {flaw:?} changes only {fraction} of the pixels"
             );
         }
     }
@@ -216,40 +216,40 @@ fn same_first_hit(hit: &FirstHit, intersection: &Option<Intersection>) -> bool {
     let Some(intersection) = intersection else {
         return hit.shape == NO_INDEX && hit.depth == 0.0;
     };
-    let close = |a: f64, b: f64| (a - b).abs() <= 2e-5 * (1.0 + b.abs());
+    let is_close = |a: f64, b: f64| (a - b).abs() <= 2e-5 * (1.0 + b.abs());
     let (normal, uv): (DVec3, DVec2) = (hit.normal.as_dvec3(), hit.uv.as_dvec2());
     // The angle u wraps around from 1 to 0, and is undefined at the poles.
-    let close_modulo_1 = |a: f64, b: f64| close(a, b) || close((a - b).abs(), 1.0);
+    let is_close_modulo_1 = |a: f64, b: f64| is_close(a, b) || is_close((a - b).abs(), 1.0);
     let is_pole = (intersection.uv.y - 0.5).abs() > 0.49;
     hit.shape as usize == intersection.object
-        && close(f64::from(hit.depth), intersection.t)
+        && is_close(f64::from(hit.depth), intersection.t)
         && (normal - intersection.normal).length() < 1e-4
         && (hit.shading_normal.as_dvec3() - intersection.shading_normal).length() < 1e-4
-        && (is_pole || close_modulo_1(uv.x, intersection.uv.x))
-        && close(uv.y, intersection.uv.y)
+        && (is_pole || is_close_modulo_1(uv.x, intersection.uv.x))
+        && is_close(uv.y, intersection.uv.y)
 }
 
 #[test]
 fn first_hits_match_the_oracle() {
     for (name, description) in supported_scenes() {
-        let truth = Oracle::new(&description, Flaw::None).intersections();
+        let expected = Oracle::new(&description, Flaw::None).intersections();
         let shifted = Oracle::new(&description, Flaw::ShiftedPixel).intersections();
         for mode in both() {
             let hits = first_hits(&scenes::packed(&description), mode);
-            let differing = |truth: &[Option<Intersection>]| {
-                assert_eq!(hits.len(), truth.len());
+            let differing = |expected: &[Option<Intersection>]| {
+                assert_eq!(hits.len(), expected.len());
                 let differ = hits
                     .iter()
-                    .zip(truth)
+                    .zip(expected)
                     .filter(|(hit, intersection)| !same_first_hit(hit, intersection))
                     .count();
                 differ as f64 / hits.len() as f64
             };
-            let share = differing(&truth);
-            println!("{name} {mode:?}: the first hits of {share} of the pixels differ");
+            let fraction = differing(&expected);
+            println!("{name} {mode:?}: the first hits of {fraction} of the pixels differ");
             assert!(
-                share <= MAX_EDGE_SHARE,
-                "{name}, {mode:?}: the first hits of {share} of the pixels differ"
+                fraction <= MAX_EDGE_FRACTION,
+                "{name}, {mode:?}: the first hits of {fraction} of the pixels differ"
             );
             assert!(differing(&shifted) > 0.1, "{name}: a shifted pixel is not found");
         }

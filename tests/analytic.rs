@@ -151,15 +151,15 @@ fn light_of_a_rectangle_on_a_plane() {
         let error = error_against(&|point| mean_cosine(size, h, point));
         println!("{mode:?}: light of a rectangle within {error:.1e}");
         assert!(error < 1e-4, "{mode:?}: {error}");
-        assert!(!(error_against(&|_| 1.0) < 1e-2), "a missing cosine passes");
+        assert!(!(error_against(&|_| 1.0) < 1e-2), "a missing cosine is accepted");
         assert!(
             !(error_against(&|point| mean_cosine(swapped, h, point)) < 1e-2),
-            "swapped axes pass"
+            "swapped axes are accepted"
         );
         let pixel = height / f64::from(SIDE);
         assert!(
             !(error_against(&|point| mean_cosine(size, h, point + DVec2::X * pixel)) < 1e-2),
-            "a shifted pixel passes"
+            "a shifted pixel is accepted"
         );
     }
 }
@@ -196,8 +196,8 @@ fn shadow_of_a_sphere() {
         };
         assert_eq!(wrong_pixels(DVec2::ZERO, 1e-5), 0, "{mode:?}");
         let pixel = height / f64::from(SIDE);
-        assert!(wrong_pixels(DVec2::X * pixel, 1e-5) > 20, "a shifted pixel passes");
-        assert!(wrong_pixels(DVec2::Y * pixel, 1e-5) > 20, "a shifted pixel passes");
+        assert!(wrong_pixels(DVec2::X * pixel, 1e-5) > 20, "a shifted pixel is accepted");
+        assert!(wrong_pixels(DVec2::Y * pixel, 1e-5) > 20, "a shifted pixel is accepted");
         // Semi-axes of the ellipse; `lean` is the angle between the cone's axis and the vertical.
         let lean = (axis.x / axis.z).abs().atan();
         let major_axis = light.z * ((lean + half_angle).tan() - (lean - half_angle).tan()) / 2.0;
@@ -213,7 +213,7 @@ fn shadow_of_a_sphere() {
         );
         assert!(
             !((shadow_area / (PI * major_axis * major_axis) - 1.0).abs() < 0.05),
-            "a circle passes"
+            "a circle is accepted"
         );
         // Outside the shadow, only the cosine remains, because a point light has no falloff.
         let errors = (0..SIDE * SIDE).filter(|pixel| lit(*pixel)).map(|pixel| {
@@ -290,7 +290,7 @@ fn outlines_of_ellipsoids() {
             );
             assert!(
                 !((centroid + DVec2::X - expected_center).length() < 0.1),
-                "a shifted pixel passes"
+                "a shifted pixel is accepted"
             );
             // Depth of the center minus the half-extent along the view direction.
             let half_extent = [a, b, c]
@@ -333,7 +333,7 @@ fn directional_light_on_a_plane() {
             assert!(error < 1e-6, "{mode:?}, shininess {exponent}: {error}");
             assert!(
                 !(max_error(&scene, mode, |_| expected(wrong_exponent)) < 1e-4),
-                "a wrong shininess passes"
+                "a wrong shininess is accepted"
             );
         }
         // Seen from below, the plane is black: the normal faces the viewer, so the light is behind the surface.

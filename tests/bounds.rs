@@ -20,9 +20,9 @@ const EPSILON: f64 = f32::EPSILON as f64;
 const CALLS: usize = 1 << 20;
 
 /// Returns the error in units in the last place (ulp) of the true value.
-fn ulps(result: f64, truth: f64) -> f64 {
-    let last_place = (truth as f32).abs().max(f32::MIN_POSITIVE);
-    (result - truth).abs() / f64::from(last_place.next_up() - last_place)
+fn ulps(result: f64, exact: f64) -> f64 {
+    let magnitude = (exact as f32).abs().max(f32::MIN_POSITIVE);
+    (result - exact).abs() / f64::from(magnitude.next_up() - magnitude)
 }
 
 const BOUNDS: &[Bound] = &[
@@ -60,8 +60,8 @@ const BOUNDS: &[Bound] = &[
         },
         error: |x, result| {
             let (x, y) = (f64::from(x[0]), f64::from(x[1]));
-            let truth = x.powf(y);
-            (result / truth - 1.0).abs() / (EPSILON * (1.0 + (y * x.log2()).abs()))
+            let exact = x.powf(y);
+            (result / exact - 1.0).abs() / (EPSILON * (1.0 + (y * x.log2()).abs()))
         },
     },
     Bound {
@@ -89,8 +89,8 @@ const BOUNDS: &[Bound] = &[
             vec![coordinate(), coordinate()]
         },
         error: |x, result| {
-            let truth = f64::from(x[0]).atan2(f64::from(x[1]));
-            (result - truth).abs() / (2.0 * EPSILON)
+            let exact = f64::from(x[0]).atan2(f64::from(x[1]));
+            (result - exact).abs() / (2.0 * EPSILON)
         },
     },
     Bound {

@@ -10,7 +10,7 @@ use wgray_render::records::{ENVIRONMENT, Packed, RANDOM, Sphere};
 use crate::random::Random;
 use crate::random_scenes::any_scene;
 
-fn some_scenes(count: usize) -> Vec<Packed> {
+fn generated_scenes(count: usize) -> Vec<Packed> {
     let mut runner = TestRunner::new_with_rng(Config::default(), TestRng::deterministic_rng(RngAlgorithm::ChaCha));
     let strategy = any_scene::without_trees();
     let scene = |_| any_scene::packed(&strategy.new_tree(&mut runner).expect("a scene").current());
@@ -61,7 +61,7 @@ fn count_culled(scenes: &[Packed], change_sphere: impl Fn(Sphere) -> Sphere) -> 
 
 #[test]
 fn culled_primitives_occlude_nothing() {
-    let scenes = some_scenes(400);
+    let scenes = generated_scenes(400);
     let (culled, wrong) = count_culled(&scenes, |sphere| sphere);
     println!("{culled} primitives were left out as occluders, {wrong} of them wrongly");
     assert!(culled > 10_000, "only {culled} primitives were culled");

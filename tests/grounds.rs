@@ -76,10 +76,10 @@ fn assert_equal_on_all_backends(d: &Description) {
 const TOLERANCE: f64 = 1e-3;
 
 fn count_wrong_pixels(d: &Description) -> usize {
-    let truth = Oracle::new(d, Flaw::None).picture();
+    let expected = Oracle::new(d, Flaw::None).picture();
     let cpu = reference(&packed(d));
     let close = |(a, b): (&f64, &f64)| (a - b).abs() <= TOLERANCE;
-    let pixels = means(&cpu).into_iter().zip(&truth);
+    let pixels = means(&cpu).into_iter().zip(&expected);
     pixels.filter(|(a, b)| !a.iter().zip(*b).all(close)).count()
 }
 

@@ -813,8 +813,8 @@ fn mixture(random: &Random) -> PrincipledLobes {
     let normal = random.pick(&[DVec3::Z, vector(random).normalize()]).as_vec3();
     let outside = random.once_in(2);
     // The albedo tables have values from 0 to 1.
-    let share = || random.pick(&[0.0, 1e-4, 0.3, 0.7, 1.0]) as f32;
-    let energy = Vec3::new(share(), share(), share());
+    let albedo = || random.pick(&[0.0, 1e-4, 0.3, 0.7, 1.0]) as f32;
+    let energy = Vec3::new(albedo(), albedo(), albedo());
     principled_mixture(
         &material,
         wo.with_z(wo.z.abs()),

@@ -333,7 +333,7 @@ tangent = [1, 0, 0]
 
 #[test]
 fn alpha_is_the_fraction_of_samples_that_hit() {
-    for (center, shares) in [
+    for (center, coverages) in [
         ([0.0, 0.0], [0.0, 1.0, 0.0]),
         ([0.5, 0.0], [0.0, 0.5, 0.5]),
         ([-0.75, 0.5], [0.375, 0.125, 0.0]),
@@ -346,10 +346,10 @@ fn alpha_is_the_fraction_of_samples_that_hit() {
         };
         assert_eq!(packed.film_layout(), layout, "alpha does not request layers");
         let film = render_all_modes(&packed);
-        for (i, share) in shares.into_iter().enumerate() {
-            assert_eq!(film.alpha(i), share, "{center:?}, pixel {i}");
+        for (i, coverage) in coverages.into_iter().enumerate() {
+            assert_eq!(film.alpha(i), coverage, "{center:?}, pixel {i}");
             // Colors are premultiplied; the environment is invisible.
-            let color = Vec3::new(0.5, 0.25, 4.0) * share;
+            let color = Vec3::new(0.5, 0.25, 4.0) * coverage;
             assert_eq!(
                 Vec3::from(wgray_render::film::mean(film.sums[i])),
                 color,

@@ -63,7 +63,7 @@ fn relative_errors(picture: &[[f64; 3]], radius: f64) -> (f64, f64) {
     let aperture_fraction = disk_radius * disk_radius / (circle_radius * circle_radius);
     let mut worst = 0.0_f64;
     let mut total = 0.0;
-    let rings = [0.0, 0.4, 0.7, 1.0].map(|share| share * (circle_radius - disk_radius - 1.0));
+    let rings = [0.0, 0.4, 0.7, 1.0].map(|fraction| fraction * (circle_radius - disk_radius - 1.0));
     let mut sums = [(0.0, 0.0); 3];
     for (i, mean) in picture.iter().enumerate() {
         let (x, y) = pixel_offset(i);
@@ -99,11 +99,11 @@ fn an_out_of_focus_disk_blurs_to_its_circle_of_confusion() {
             assert!(total_error < 0.02, "{mode:?} {distance}: {total_error}");
             assert!(
                 relative_errors(&picture, 1.1 * radius).0 > 0.1,
-                "a larger circle passes"
+                "a larger circle is accepted"
             );
             assert!(
                 relative_errors(&picture, 0.9 * radius).0 > 0.1,
-                "a smaller circle passes"
+                "a smaller circle is accepted"
             );
         }
     }

@@ -270,8 +270,8 @@ fn a_progressive_image_equals_the_rendered_image_and_can_be_cancelled() {
         assert!(result.unwrap() == rendered);
         assert!(images.len() > 1, "{}", images.len());
         assert!(images.is_sorted_by(|a, b| a.0 <= b.0));
-        let (share, last) = images.pop().unwrap();
-        assert!((share - 1.0).abs() < 1e-9 && last == rendered, "{share}");
+        let (fraction, last) = images.pop().unwrap();
+        assert!((fraction - 1.0).abs() < 1e-9 && last == rendered, "{fraction}");
         assert!(images[0].1 != rendered, "the first image equals the last");
 
         let cancelled = wgray::render_progressive(&scene, &options, &mut |_| Ok(ControlFlow::Break(())));

@@ -93,7 +93,7 @@ fn looping(rounds: u32) -> Shaders {
     edited_shaders(file, store, &looping)
 }
 
-/// Returns true if a film of one sample equals `plain` plus the iterations.
+/// Returns true if the red sums of `film` exceed those of `plain` by `rounds`: all rounds of the loop were executed.
 fn has_rounds(film: &Film, plain: &Film, rounds: u32) -> bool {
     let matches = |(a, b): (&glam::Vec4, &glam::Vec4)| a.x == b.x + rounds as f32 && a.y == b.y;
     film.sums.iter().zip(&plain.sums).all(matches)

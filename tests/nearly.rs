@@ -1,5 +1,5 @@
-//! Tolerances of images without guaranteed bits: relative error of pixels, fraction of outliers at edges, and error of
-//! the mean.
+//! Comparison of GPU and CPU films that need not be bit-identical, with tolerances for the relative error of pixels,
+//! the fraction of outliers at edges, and the error of the mean.
 
 use std::fmt;
 
@@ -9,8 +9,8 @@ use wgray_render::records::Packed;
 /// Maximum error of a pixel, relative to the largest channel of the pixel, because patterns subtract nearly equal
 /// integrals in dark channels.
 const RELATIVE: f64 = 1e-4;
-/// `RELATIVE` for scenes with textures on devices other than software Vulkan: a change of a coordinate by one ulp may
-/// span many texels.
+/// Replaces `RELATIVE` for scenes with textures on devices other than software Vulkan, where a texture coordinate that
+/// differs by one ulp may select another texel.
 const TEXTURED: f64 = 1e-3;
 /// Maximum fraction of outliers, which occur at edges where a comparison flips.
 pub const EDGES: f64 = 1e-3;
@@ -21,39 +21,40 @@ const SIDE: f64 = 400.0;
 /// outliers.
 const MEAN: f64 = 1e-5;
 
-/// Accumulated differences of GPU and CPU films.
+/// Difference of a GPU film from a CPU film, or the sum over several pairs of films.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Nearly {
+pub struct FilmDifference {
     /// Non-finite pixels; must be 0.
     non_finite: usize,
-    /// The number of outliers, and the limit.
+    /// Number of outliers.
     outliers: usize,
+    /// Tolerated number of outliers.
     max_outliers: f64,
     /// Sums of the compared pixels on the GPU and on the CPU.
     sums: [f64; 2],
 }
 
-impl Nearly {
-    /// Compares on software Vulkan, where plain WGSL differs only by fused and reordered operations.
-    pub fn by_plain_wgsl(gpu: &Film, cpu: &Film) -> Nearly {
-        Nearly::within(RELATIVE, 0.0, gpu, cpu)
+impl FilmDifference {
+    /// Uses the tolerances for plain WGSL on software Vulkan, which only fuses and reorders operations.
+    pub fn strict(gpu: &Film, cpu: &Film) -> FilmDifference {
+        FilmDifference::with_limits(RELATIVE, 0.0, gpu, cpu)
     }
 
-    /// Compares on other devices.
-    pub fn of(packed: &Packed, gpu: &Film, cpu: &Film) -> Nearly {
+    /// Uses the tolerances for devices other than software Vulkan, which are larger for textures and small images.
+    pub fn loose(packed: &Packed, gpu: &Film, cpu: &Film) -> FilmDifference {
         let relative = if packed.textures.records.is_empty() {
             RELATIVE
         } else {
             TEXTURED
         };
-        Nearly::within(relative, SIDE, gpu, cpu)
+        FilmDifference::with_limits(relative, SIDE, gpu, cpu)
     }
 
-    fn within(relative: f64, min_side: f64, gpu: &Film, cpu: &Film) -> Nearly {
+    fn with_limits(relative: f64, min_side: f64, gpu: &Film, cpu: &Film) -> FilmDifference {
         let side = (cpu.sums.len() as f64).sqrt();
-        let mut result = Nearly {
+        let mut result = FilmDifference {
             max_outliers: EDGES * side * side.max(min_side),
-            ..Nearly::default()
+            ..FilmDifference::default()
         };
         for (gpu, cpu) in gpu.sums.iter().zip(&cpu.sums) {
             let [a, b] = [gpu, cpu].map(|v| v.truncate().as_dvec3() / f64::from(v.w));
@@ -68,7 +69,7 @@ impl Nearly {
         result
     }
 
-    pub fn add(&mut self, other: Nearly) {
+    pub fn add(&mut self, other: FilmDifference) {
         self.non_finite += other.non_finite;
         self.outliers += other.outliers;
         self.max_outliers += other.max_outliers;
@@ -76,6 +77,7 @@ impl Nearly {
         self.sums[1] += other.sums[1];
     }
 
+    /// Returns an error if the difference exceeds a tolerance.
     pub fn judge(&self) -> Result<(), String> {
         if self.non_finite > 0 {
             return Err(format!("{} pixels are NaN or infinite", self.non_finite));
@@ -86,24 +88,25 @@ impl Nearly {
                 self.outliers, self.max_outliers
             ));
         }
-        if !(self.drift() <= MEAN) {
-            return Err(format!("the mean differs by {:.1e}", self.drift()));
+        if !(self.mean_error() <= MEAN) {
+            return Err(format!("the mean differs by {:.1e}", self.mean_error()));
         }
         Ok(())
     }
 
-    fn drift(&self) -> f64 {
+    /// Returns the relative error of the mean.
+    fn mean_error(&self) -> f64 {
         let [gpu, cpu] = self.sums;
         if gpu == cpu { 0.0 } else { (gpu - cpu).abs() / cpu }
     }
 }
 
-impl fmt::Display for Nearly {
+impl fmt::Display for FilmDifference {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (outliers, max_outliers, drift) = (self.outliers, self.max_outliers, self.drift());
+        let (outliers, max_outliers, mean_error) = (self.outliers, self.max_outliers, self.mean_error());
         write!(
             f,
-            "{outliers} pixels are outliers, the limit is {max_outliers:.0}; the mean differs by {drift:.1e}"
+            "number of outliers: {outliers} (limit {max_outliers:.0}); the mean differs by {mean_error:.1e}"
         )
     }
 }

@@ -102,6 +102,7 @@ pub struct Intersection {
     terminator_offsets: [DVec3; 2],
     /// The corners of the triangle on a mesh.
     corners: Option<[DVec3; 3]>,
+    /// Index of the surface in the oracle.
     surface: usize,
 }
 
@@ -289,8 +290,12 @@ impl<'a> Oracle<'a> {
             }
             MaterialDescription::Glass(glass) => {
                 assert!(glass.normal_map.is_none(), "the oracle does not support normal maps");
-                let outside_in = is_front != (self.flaw == Flaw::InvertedIndex);
-                let (n1, n2) = if outside_in { (1.0, glass.ior) } else { (glass.ior, 1.0) };
+                let is_entering = is_front != (self.flaw == Flaw::InvertedIndex);
+                let (n1, n2) = if is_entering {
+                    (1.0, glass.ior)
+                } else {
+                    (glass.ior, 1.0)
+                };
                 let reflected = follow(point + offset, direction.reflect(normal));
                 // Snell's law in sines, in the plane of incidence
                 let tangential = direction - normal * direction.dot(normal);
@@ -303,9 +308,9 @@ impl<'a> Oracle<'a> {
                 // Fresnel's equations with both indices: Hecht, "Optics", 4.6.2
                 let perpendicular = (n1 * cosine1 - n2 * cosine2) / (n1 * cosine1 + n2 * cosine2);
                 let parallel = (n2 * cosine1 - n1 * cosine2) / (n2 * cosine1 + n1 * cosine2);
-                let share = (perpendicular.powi(2) + parallel.powi(2)) / 2.0;
+                let reflectance = (perpendicular.powi(2) + parallel.powi(2)) / 2.0;
                 let transmitted = self.color(&glass.tint, intersection.uv) * follow(point - offset, refracted);
-                reflected * share + transmitted * (1.0 - share)
+                reflected * reflectance + transmitted * (1.0 - reflectance)
             }
             other => panic!("the oracle does not support the material {other:?}"),
         }

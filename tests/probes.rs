@@ -674,8 +674,8 @@ fn functions_give_the_same_bits_on_gpu_and_cpu() {
             &device.info.driver,
             DENORMALS,
         );
-        let share = skipped as f64 / (probed.len() * CALLS) as f64;
-        problems.extend(judge(known_difference, DENORMALS, share).err());
+        let fraction = skipped as f64 / (probed.len() * CALLS) as f64;
+        problems.extend(judge(known_difference, DENORMALS, fraction).err());
     }
     assert!(problems.is_empty(), "{}", problems.join("\n"));
     println!(
@@ -696,15 +696,15 @@ fn inputs_cover_both_outcomes_of_predicates() {
         };
         let words = inputs(&function, CALLS, 1);
         let results = probe.results(&words, kinds.len());
-        let share = |predicate: &dyn Fn(u32) -> bool| {
+        let fraction = |predicate: &dyn Fn(u32) -> bool| {
             results.iter().filter(|word| predicate(**word)).count() as f64 / results.len() as f64
         };
         if kinds[0] == ScalarKind::Bool {
-            let true_share =
+            let true_fraction =
                 results.iter().step_by(kinds.len()).filter(|word| **word != 0).count() as f64 / CALLS as f64;
             assert!(
-                (0.05..0.95).contains(&true_share),
-                "{file}: {name} is true for a fraction {true_share} of the inputs, which must be from 0.05 to 0.95: see tests/inputs.rs"
+                (0.05..0.95).contains(&true_fraction),
+                "{file}: {name} is true for a fraction {true_fraction} of the inputs, which must be from 0.05 to 0.95: see tests/inputs.rs"
             );
         }
         if name.starts_with("intersect_") {
@@ -721,7 +721,7 @@ fn inputs_cover_both_outcomes_of_predicates() {
                 "{file}: {name} hits for a fraction {hits} of the inputs, which must be from 0.1 to 0.9: see `local_point` in tests/inputs.rs"
             );
         }
-        let nan = share(&|word| f32::from_bits(word).is_nan());
+        let nan = fraction(&|word| f32::from_bits(word).is_nan());
         assert!(
             kinds[0] != ScalarKind::Float || nan < 0.5,
             "{file}: {name} is NaN for a fraction {nan} of the inputs"

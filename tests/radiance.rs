@@ -56,7 +56,8 @@ fn largest_error(film: &Film, expected: impl Fn(f64, f64) -> [f64; 3]) -> f64 {
     largest
 }
 
-/// Returns the reflected light of the point light. For a view along the normal, n.l = r.v = h / sqrt(h^2 + d^2).
+/// Returns the light that the plane reflects from the point light at the height h. For a view along the normal, the
+/// cosines of the diffuse and the specular term are equal: h / sqrt(h^2 + dx^2 + dy^2).
 fn point_light(x: f64, y: f64, power: i32) -> [f64; 3] {
     let (h, dx, dy) = (1.5, x - 0.4, y + 0.3);
     let cosine = h / (h * h + dx * dx + dy * dy).sqrt();
@@ -75,7 +76,7 @@ fn a_point_light_over_a_plane() {
         let error = largest_error(&film, |x, y| point_light(x, y, 6));
         assert!(error < 2e-6, "{error}");
         let wrong_power = largest_error(&film, |x, y| point_light(x, y, 5));
-        assert!(wrong_power > 0.01, "the wrong formula passes");
+        assert!(wrong_power > 0.01, "the wrong formula is accepted");
     }
 }
 
@@ -130,11 +131,11 @@ fn a_sphere_under_directional_light_casts_a_disk() {
     for film in films(&parse(&format!("{scene}{GROUND}{sphere}{light}"))) {
         let error = largest_error(&film, disk(0.5));
         assert!(error < 1e-6, "{error}");
-        assert!(largest_error(&film, disk(0.6)) > 0.5, "a larger disk passes");
+        assert!(largest_error(&film, disk(0.6)) > 0.5, "a larger disk is accepted");
     }
 }
 
-/// Returns a large shape of each kind, at these heights. `dark_or_lit` adds a small shape above them, because the
+/// Returns a large shape of each kind, at these heights. `all_dark_or_lit` adds a small shape above them, because the
 /// renderer culls shadow casters that have no other shape on one of their sides.
 fn covers(heights: [f64; 4]) -> [String; 4] {
     let [a, b, c, d] = heights;
@@ -148,7 +149,7 @@ fn covers(heights: [f64; 4]) -> [String; 4] {
 }
 
 /// Returns whether all pixels below the covers are dark, and whether all are lit.
-fn dark_or_lit(light: &str, covers: &str) -> (bool, bool) {
+fn all_dark_or_lit(light: &str, covers: &str) -> (bool, bool) {
     let scene = DOWN.replace("position = [0, 0, 5]", "position = [0, 0, 0.25]");
     let above = "[[shapes]]\ntype = 'sphere'\nmaterial = 'ground'\ncenter = [90, 90, 5]\nradius = 0.5\n";
     let films = films(&parse(&format!("{scene}{GROUND}{light}{above}{covers}")));
@@ -170,19 +171,23 @@ fn two_primitives_occlude() {
     let light = "[[lights]]\ntype = 'directional'\ndirection = [0, 0, -2]\ncolor = [1, 1, 1]\n";
     let kinds = covers([1.0, 1.5, 2.0, 3.0]);
     for (i, first) in kinds.iter().enumerate() {
-        assert_eq!(dark_or_lit(light, first), DARK, "{first}");
+        assert_eq!(all_dark_or_lit(light, first), DARK, "{first}");
         for second in &kinds[i + 1..] {
-            assert_eq!(dark_or_lit(light, &format!("{first}{second}")), DARK, "{first}{second}");
+            assert_eq!(
+                all_dark_or_lit(light, &format!("{first}{second}")),
+                DARK,
+                "{first}{second}"
+            );
         }
     }
-    assert_eq!(dark_or_lit(light, ""), LIT, "the light is occluded without covers");
+    assert_eq!(all_dark_or_lit(light, ""), LIT, "the light is occluded without covers");
 }
 
 /// A shape just in front of a light occludes the light; a shape behind the light does not.
 #[test]
 fn shapes_behind_a_light_do_not_occlude_it() {
     for (in_front, behind) in covers([1.45; 4]).iter().zip(&covers([1.55; 4])) {
-        assert_eq!(dark_or_lit(LIGHT, in_front), DARK, "{in_front}");
-        assert_eq!(dark_or_lit(LIGHT, behind), LIT, "{behind}");
+        assert_eq!(all_dark_or_lit(LIGHT, in_front), DARK, "{in_front}");
+        assert_eq!(all_dark_or_lit(LIGHT, behind), LIT, "{behind}");
     }
 }

@@ -13,7 +13,7 @@ use wgray_render::job::WorkSplit;
 use wgray_render::records::{FirstHit, Packed};
 
 use crate::adapter::{self, KNOWN_DIFFERENCES, allowed, bit_exact, judge};
-use crate::nearly::{EDGES, Nearly};
+use crate::nearly::{EDGES, FilmDifference};
 use crate::pictures::{
     RenderMode, backend, crop, differing, exact_modes, film, first_hits, reference, render, render_with, whole,
 };
@@ -24,10 +24,10 @@ pub fn compare(mode: RenderMode, packed: &Packed, gpu: &Film, cpu: &Film) -> Res
     assert_eq!((gpu.region, gpu.sums.len()), (cpu.region, cpu.sums.len()));
     let device = adapter::device().expect("the device that rendered the image");
     if !bit_exact(device) {
-        return Nearly::of(packed, gpu, cpu).judge();
+        return FilmDifference::loose(packed, gpu, cpu).judge();
     }
     if mode == RenderMode::Plain {
-        return Nearly::by_plain_wgsl(gpu, cpu).judge();
+        return FilmDifference::strict(gpu, cpu).judge();
     }
     let entry = allowed(KNOWN_DIFFERENCES, &device.info.name, &device.info.driver, "picture");
     judge(entry, "picture", differing(gpu, cpu) as f64 / cpu.sums.len() as f64)
@@ -43,13 +43,13 @@ pub fn compare_hits(gpu: &[FirstHit], cpu: &[FirstHit]) -> Result<(), String> {
     } else {
         |a, b| (a.shape, a.material) == (b.shape, b.material)
     };
-    let share = gpu.iter().zip(cpu).filter(|(a, b)| !same(a, b)).count() as f64 / gpu.len() as f64;
+    let fraction = gpu.iter().zip(cpu).filter(|(a, b)| !same(a, b)).count() as f64 / gpu.len() as f64;
     if bit_exact(device) {
         let entry = allowed(KNOWN_DIFFERENCES, &device.info.name, &device.info.driver, "first hits");
-        return judge(entry, "first hits", share);
+        return judge(entry, "first hits", fraction);
     }
-    if share > EDGES {
-        Err(format!("{share} of the first hits differ"))
+    if fraction > EDGES {
+        Err(format!("{fraction} of the first hits differ"))
     } else {
         Ok(())
     }
@@ -118,20 +118,20 @@ fn pictures_of_all_scenes_are_the_same() {
     let scenes: Vec<_> = small.chain(varied).collect();
     let compared = scenes.par_iter().map(|((name, packed), modes)| {
         let cpu = reference(packed);
-        let (mut pixels, mut images, mut plain) = (0, 0, Nearly::default());
+        let (mut pixels, mut images, mut plain) = (0, 0, FilmDifference::default());
         for &mode in *modes {
             let gpu = render(packed, mode);
             let problem = compare(mode, packed, &gpu, &cpu);
             assert!(problem.is_ok(), "{name}, {mode:?}: {}", problem.unwrap_err());
             if mode == RenderMode::Plain {
-                plain.add(Nearly::by_plain_wgsl(&gpu, &cpu));
+                plain.add(FilmDifference::strict(&gpu, &cpu));
             } else {
                 (pixels, images) = (pixels + cpu.sums.len(), images + 1);
             }
         }
         (pixels, images, plain)
     });
-    let (mut pixels, mut images, mut plain) = (0, 0, Nearly::default());
+    let (mut pixels, mut images, mut plain) = (0, 0, FilmDifference::default());
     for result in compared.collect::<Vec<_>>() {
         (pixels, images) = (pixels + result.0, images + result.1);
         plain.add(result.2);
@@ -162,7 +162,7 @@ fn a_different_image_is_found() {
         .find(|(name, _)| name == "cornell.toml")
         .expect("the scene");
     let cpu = reference(&packed);
-    let nearly = |film: &Film| Nearly::by_plain_wgsl(film, &cpu).judge();
+    let judge_film = |film: &Film| FilmDifference::strict(film, &cpu).judge();
     assert!(compare(RenderMode::Baked, &packed, &cpu, &cpu).is_ok());
     for (file, from, to) in [
         ("light.wgsl", "(2.0 * at.x - 1.0)", "(2.0000002 * at.x - 1.0)"),
@@ -182,30 +182,33 @@ fn a_different_image_is_found() {
             );
         }
         // The image is still within the tolerances.
-        assert!(nearly(&film).is_ok(), "'{to}' in place of '{from}'");
+        assert!(judge_film(&film).is_ok(), "'{to}' in place of '{from}'");
     }
     let mut changed = cpu.clone();
     changed.sums[77].y = f32::from_bits(changed.sums[77].y.to_bits() + 1);
     assert!(
         !bit_exact(device) || compare(RenderMode::Baked, &packed, &changed, &cpu).is_err(),
-        "one bit passes"
+        "a difference of one bit is accepted"
     );
     let mut changed = cpu.clone();
     changed.sums.rotate_right(1);
-    assert!(nearly(&changed).is_err(), "a shifted pixel passes");
+    assert!(judge_film(&changed).is_err(), "a shifted pixel is accepted");
     let mut changed = cpu.clone();
     changed
         .sums
         .iter_mut()
         .for_each(|sum| *sum *= Vec4::new(1.00002, 1.00002, 1.00002, 1.0));
-    assert!(nearly(&changed).is_err(), "a brighter image passes");
+    assert!(judge_film(&changed).is_err(), "a brighter image is accepted");
     let mut changed = cpu.clone();
     changed.sums[5].x = f32::NAN;
-    assert!(nearly(&changed).is_err(), "NaN passes");
+    assert!(judge_film(&changed).is_err(), "NaN is accepted");
     let hits = first_hits(&packed, RenderMode::Cpu);
     let mut changed = hits.clone();
     changed.iter_mut().take(20).for_each(|hit| hit.shape ^= 1);
-    assert!(compare_hits(&changed, &hits).is_err(), "a different shape index passes");
+    assert!(
+        compare_hits(&changed, &hits).is_err(),
+        "a different shape index is accepted"
+    );
 }
 
 #[test]
@@ -224,7 +227,7 @@ fn a_larger_image_agrees() {
             "cornell.toml, 401 x 397, {mode:?}: {} of {} pixels differ; {}",
             differing(&gpu, &cpu),
             cpu.sums.len(),
-            Nearly::by_plain_wgsl(&gpu, &cpu)
+            FilmDifference::strict(&gpu, &cpu)
         );
         let problem = compare(mode, &packed, &gpu, &cpu);
         assert!(problem.is_ok(), "{mode:?}: {}", problem.unwrap_err());
@@ -355,7 +358,7 @@ fn images_do_not_depend_on_the_number_of_threads() {
             "{threads} threads"
         );
     }
-    // Control: another seed.
+    // Negative control: another seed gives another image.
     let reseeded = reference(&scenes::packed(&configured(
         &description,
         (70, 31),

@@ -205,17 +205,17 @@ fn noisy(pattern: Pattern, seed: u32, counts: (u32, u32)) -> Packed {
 }
 
 /// Returns the deviation of each pixel from the reference, in standard errors over the seeds.
-fn deviations(pictures: &[Vec<[f64; 3]>], truth: &[[f64; 3]]) -> Vec<f64> {
+fn deviations(pictures: &[Vec<[f64; 3]>], expected_pixels: &[[f64; 3]]) -> Vec<f64> {
     let n = pictures.len() as f64;
     let pixel = |i: usize| {
         let values: Vec<f64> = pictures.iter().map(|p| p[i].iter().sum()).collect();
         let mean = values.iter().sum::<f64>() / n;
         let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0);
-        let expected: f64 = truth[i].iter().sum();
+        let expected: f64 = expected_pixels[i].iter().sum();
         // The reference, a fine grid, has its own error.
         (mean - expected) / ((variance / n).sqrt() + 1e-3 * expected)
     };
-    (0..truth.len()).map(pixel).collect()
+    (0..expected_pixels.len()).map(pixel).collect()
 }
 
 /// Checks that the mean and mean square of the deviations do not exceed the values of a standard normal distribution.
@@ -232,19 +232,19 @@ fn check_unbiased(deviations: &[f64]) -> Result<(), String> {
 
 #[test]
 fn images_of_random_patterns_have_the_mean_of_grids() {
-    let truth = means(&reference(&noisy(Pattern::Grid, 0, (256, 256))));
+    let expected_pixels = means(&reference(&noisy(Pattern::Grid, 0, (256, 256))));
     for (name, pattern) in patterns::all().into_iter().filter(|(_, pattern)| !is_fixed(*pattern)) {
         let picture = |seed| means(&reference(&noisy(pattern, seed, (4, 4))));
         let pictures: Vec<_> = (0..48).map(picture).collect();
-        let result = check_unbiased(&deviations(&pictures, &truth));
+        let result = check_unbiased(&deviations(&pictures, &expected_pixels));
         assert!(result.is_ok(), "{name}: {}", result.unwrap_err());
-        // Controls: a reference that is 2% too bright, and a shifted reference.
-        let brighter: Vec<[f64; 3]> = truth.iter().map(|pixel| pixel.map(|v| v * 1.02)).collect();
+        // Negative controls: a reference that is 2% too bright, and a shifted reference.
+        let brighter: Vec<[f64; 3]> = expected_pixels.iter().map(|pixel| pixel.map(|v| v * 1.02)).collect();
         assert!(
             check_unbiased(&deviations(&pictures, &brighter)).is_err(),
             "{name}: a bias is not found"
         );
-        let mut shifted = truth.clone();
+        let mut shifted = expected_pixels.clone();
         shifted.rotate_right(1);
         assert!(
             check_unbiased(&deviations(&pictures, &shifted)).is_err(),

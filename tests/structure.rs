@@ -286,7 +286,7 @@ fn cycles(imports: &BTreeMap<String, BTreeSet<String>>) -> Vec<Vec<String>> {
     };
     let reachable_modules: BTreeMap<&String, BTreeSet<String>> =
         imports.keys().map(|module| (module, reachable(module))).collect();
-    let in_one_cycle = |a: &String, b: &String| {
+    let is_same_cycle = |a: &String, b: &String| {
         reachable_modules[a].contains(b)
             && reachable_modules
                 .get(b)
@@ -296,7 +296,7 @@ fn cycles(imports: &BTreeMap<String, BTreeSet<String>>) -> Vec<Vec<String>> {
         .map(|module| {
             imports
                 .keys()
-                .filter(|other| in_one_cycle(module, other))
+                .filter(|other| is_same_cycle(module, other))
                 .cloned()
                 .collect()
         })

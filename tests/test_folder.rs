@@ -37,7 +37,7 @@ impl TestFolder {
     }
 
     /// Returns the sorted names of all files, hidden ones included, except those for which `is_ignored` returns true.
-    pub fn files_but(&self, is_ignored: impl Fn(&str) -> bool) -> Vec<String> {
+    pub fn files_except(&self, is_ignored: impl Fn(&str) -> bool) -> Vec<String> {
         let entries = fs::read_dir(self.folder()).expect("the folder");
         let names = entries.map(|entry| entry.expect("an entry").file_name().to_string_lossy().into_owned());
         let mut names: Vec<String> = names.filter(|name| !is_ignored(name)).collect();

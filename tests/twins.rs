@@ -137,7 +137,8 @@ fn twin_differences(source: &Source, file: &str, twin: &syn::File) -> Vec<String
         .filter(two_sided)
         .collect();
     let mut twins: Vec<_> = rust_functions(twin).into_iter().filter(two_sided).collect();
-    // Rust updates the argument `before` in place, as `state`.
+    // If a WGSL function takes `before` and returns the new value, its Rust twin may take `state: &mut T` instead. The
+    // argument is renamed for the comparison.
     let in_place = |wgsl: &Signature, twin: &Signature| {
         let has_result_type =
             |s: &Signature, name: &str| s.parts.iter().any(|(n, ty)| n == name && Some(ty) == s.result.as_ref());
@@ -329,7 +330,7 @@ fn violations(module: &[u32]) -> Vec<String> {
                 problems.push(format!("%{} (opcode {op}) may be contracted", words[2]));
             }
         } else if op == opcode::EXTENDED {
-            let is_integer_clamp = words[4] == opcode::FLOAT_CLAMP && only_made_integer(module, words[2]);
+            let is_integer_clamp = words[4] == opcode::FLOAT_CLAMP && is_only_converted_to_integer(module, words[2]);
             if !opcode::EXTENDED_ALLOWED.contains(&words[4]) && !is_integer_clamp {
                 problems.push(format!("extended instruction {}", words[4]));
             }
@@ -341,7 +342,7 @@ fn violations(module: &[u32]) -> Vec<String> {
 }
 
 /// Returns true if only conversions to integers use a result.
-fn only_made_integer(module: &[u32], result: u32) -> bool {
+fn is_only_converted_to_integer(module: &[u32], result: u32) -> bool {
     let defines = |op: u16, words: &[u32]| op == opcode::EXTENDED && words[2] == result;
     let functions = instructions(module).skip_while(|(op, _)| *op != opcode::FUNCTION);
     let mut users = functions.filter(|(op, words)| words[1..].contains(&result) && !defines(*op, words));

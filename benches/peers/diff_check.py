@@ -26,7 +26,7 @@ import numpy
 import OpenEXR
 from skimage.metrics import peak_signal_noise_ratio, structural_similarity
 
-# Maximum deviation of each metric, from rounding: FLIP is computed in f32 (also by NVIDIA), the others in f64.
+# Maximum deviation of each metric due to rounding: FLIP is computed in f32 (also by NVIDIA), the others in f64.
 BOUNDS = {"rmse": 1e-12, "rel_mse": 1e-12, "psnr": 1e-12, "ssim": 1e-11, "flip": 3e-5}
 
 

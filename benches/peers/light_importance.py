@@ -7,7 +7,7 @@ the walls of a room: the mean over the points, and the median in parentheses. Co
     target/peers/venv/bin/python benches/peers/light_importance.py
 
 The tree splits at the median of the longest side, unlike wgray's. The importance of a child is that of
-docs/path-tracing.md ("The tree over many lights"), compared with the earlier one. The variance is exact: it follows
+docs/path-tracing.md ("Light tree"), compared with the earlier one. The variance is exact: it follows
 from the contribution and the probability of each light, without sampling.
 """
 import argparse
@@ -92,12 +92,12 @@ def probabilities(positions, width, importance, points, normals, flat):
             low, high = positions[lights].min(0), positions[lights].max(0)
             radius = np.linalg.norm(high - low) / 2
             values.append(len(lights) * importance(points, normals, (low + high) / 2, radius, flat))
-        shares = np.stack(values, -1)
-        shares = np.where(shares > 0, np.maximum(shares, shares.sum(-1, keepdims=True) / 4096), 0)
-        total = shares.sum(-1, keepdims=True)
-        shares = np.where(total > 0, shares / np.where(total > 0, total, 1), 0)
+        weights = np.stack(values, -1)
+        weights = np.where(weights > 0, np.maximum(weights, weights.sum(-1, keepdims=True) / 4096), 0)
+        total = weights.sum(-1, keepdims=True)
+        weights = np.where(total > 0, weights / np.where(total > 0, total, 1), 0)
         for i, (_, child) in enumerate(node):
-            add_node(child, probability * shares[:, i])
+            add_node(child, probability * weights[:, i])
 
     add_node(tree(positions, np.arange(len(positions)), width), np.ones(len(points)))
     return out

@@ -97,7 +97,7 @@ def register():
             separable = self.distribution.smith_g1(si.wi, m) * self.distribution.smith_g1(wo, m)
             bend = (to_i + eta * to_o) ** 2
             mirrored = reflected * d * correlated_g2(self.distribution, si.wi, wo, m) / (4 * dr.abs(i))
-            # For radiance, which scales with the square of the relative index.
+            # In radiance transport, the factor eta^2 of the BTDF cancels against 1/eta^2, so neither appears.
             refracted = (1 - reflected) * d * separable * dr.abs(to_i * to_o / (i * bend))
             value = dr.select(mirrors, mi.Color3f(mirrored), self.color.eval(si, active) * refracted)
             visible = self.distribution.pdf(dr.mulsign(si.wi, i), m)

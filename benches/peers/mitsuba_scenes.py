@@ -72,7 +72,8 @@ def bsdf(material, traced, exact):
         elif any(material.alpha):
             plugin |= {"type": "roughconductor", "distribution": "ggx"} | microfacets(*material.alpha)
     elif material.kind == "principled":
-        # Only the metal (GGX with Schlick's formula) agrees, at roughnesses with little masking and multiple scattering.
+        # Only Mitsuba's metal (GGX with Schlick's formula) agrees with wgray's, at roughnesses with little masking and multiple
+        # scattering.
         # Disney's diffuse term, specular lobe, glass, clearcoat and sheen differ from glTF's; their cost is comparable.
         alpha_u, alpha_v = (float(alpha) for alpha in material.alpha)
         anisotropy = {"anisotropic": (1 - alpha_v / alpha_u) / 0.9} if alpha_u > alpha_v else {}

@@ -16,7 +16,7 @@ noise, and 1e-4 where an environment map is visible. Rough metal and glass are t
 fails
 
     if more than twice as many pixels are rejected at 1 % as expected by chance
-    if the whole image, multiplied by --control (1.02), would pass: the test is too insensitive; black images fail this
+    if the whole image would also pass when multiplied by --control (1.02): the test is too insensitive (black images)
     for the course scenes: if a block differs by more than 2 %, or the whole image by more than 0.5 %
 
 Exit status 1 if any scene fails. --save writes an image per scene: wgray's, Mitsuba's, and their difference, red where

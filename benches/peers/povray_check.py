@@ -135,7 +135,7 @@ class Numpy:
             n = np.where((which == i)[..., None], normal(p), n)
         n = np.where((dots(n, d) > 0)[..., None], -n, n)
         start = p + 1e-6 * n
-        seen = np.zeros(which.shape, int)
+        lit_counts = np.zeros(which.shape, int)
         for light in self.scene.lights:
             cells = 2 * (np.arange(n_grid) + .5) / n_grid - 1
             for i in cells:
@@ -148,13 +148,13 @@ class Numpy:
                     rv = np.maximum(dots(l - 2 * dots(n, l)[..., None] * n, d), 0)  # r.v = (2 (n.l) n - l).(-d)
                     value = kd * nl[..., None] + ks * (rv ** power)[..., None]
                     image += np.where(lit[..., None], value * np.array(light.color) / samples, 0)
-                    seen += lit
+                    lit_counts += lit
         image += pick("ambient") * np.array(self.scene.ambient)
         for light in self.scene.lights:
             front = self.quad(o, d, np.array(light.center), np.array(light.u), np.array(light.v))[0] < t
             image = np.where(front[..., None], light.color, image)
             which = np.where(front, LIGHT, which)
-        return image, which, seen
+        return image, which, lit_counts
 
 
 def white_specular(text):
@@ -237,19 +237,19 @@ def main():
         if done.returncode:
             sys.exit(f"POV-Ray failed:\n{done.stderr[-2000:]}")
         images[name] = read(f"{base}.exr")
-    reference, which, seen = Numpy(scene).render(width, height, args.light_samples)
-    classification = which, (seen > 0) & (seen < args.light_samples * len(scene.lights)), args.tolerance
+    reference, which, lit_counts = Numpy(scene).render(width, height, args.light_samples)
+    classification = which, (lit_counts > 0) & (lit_counts < args.light_samples * len(scene.lights)), args.tolerance
     ours, image = "numpy", reference
     if args.device != "none":
         subprocess.run([args.wgray, "render", variant, "--spp", "1", "--light-samples", str(args.light_samples), "--size",
                         f"{width}x{height}", "--device", args.device, "-q", "-o", out / "wgray.exr"], check=True)
         ours, image = "wgray", read(out / "wgray.exr")
         compare("wgray against numpy", image, reference, *classification)
-    shares = {name: compare(f"{ours} against POV-Ray, {name}", image, theirs, *classification,
+    fractions = {name: compare(f"{ours} against POV-Ray, {name}", image, theirs, *classification,
                             out / f"difference-{name.replace(' ', '-')}.png") for name, theirs in images.items()}
-    for name, share in shares.items():
-        if not 100 * share >= args.goal:
-            sys.exit(f"{name}: {100 * share:.3f} % of the pixels agree; the goal is {args.goal:g} %")
+    for name, fraction in fractions.items():
+        if not 100 * fraction >= args.goal:
+            sys.exit(f"{name}: {100 * fraction:.3f} % of the pixels agree; the goal is {args.goal:g} %")
 
 
 if __name__ == "__main__":

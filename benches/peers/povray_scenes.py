@@ -5,10 +5,9 @@ Shading is Phong without distance falloff; lights are invisible to the camera. P
 colour, so the image is that of a scene whose materials have a white `specular`; ambient and diffuse colours must be
 equal.
 
-An area light is converted in one of two ways. POV-Ray's `area_light` is the faster one and is used for timing. It
-multiplies the
-mean visibility by the mean shading, `mean(V) * mean(f)`, whereas wgray computes `mean(V * f)`: the images
-differ in penumbrae. A point light per sample gives wgray's formula.
+An area light is converted in one of two ways. POV-Ray's `area_light` is faster and is used for timing. POV-Ray then
+multiplies the mean visibility by the mean shading, `mean(V) * mean(f)`, whereas wgray computes `mean(V * f)`: the images
+differ in penumbrae. A point light for each light sample gives wgray's formula.
 """
 import math
 import struct

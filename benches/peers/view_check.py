@@ -78,8 +78,8 @@ def neutral(light):
     peak = light.max(1, keepdims=True)
     with np.errstate(divide="ignore", invalid="ignore"):
         shown = 1 - 0.24**2 / (peak + 0.24 - 0.76)
-        share = 1 / (0.15 * (peak - shown) + 1)
-        compressed = light * shown / peak * share + shown * (1 - share)
+        color_weight = 1 / (0.15 * (peak - shown) + 1)
+        compressed = light * shown / peak * color_weight + shown * (1 - color_weight)
     return np.where(peak < 0.76, light, compressed)
 
 

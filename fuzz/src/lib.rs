@@ -17,7 +17,7 @@ use wgray::{Device, Options, Overrides, Scene};
 pub use changed::changed;
 pub use everything::everything;
 
-/// The unused input bytes, from which decisions are derived. Decisions are 0 once all bytes are used.
+/// The unused input bytes, from which choices are derived. Once all bytes are used, every further byte is 0.
 pub struct Choices<'a>(pub &'a [u8]);
 
 impl Choices<'_> {

@@ -227,15 +227,15 @@ def main():
     unexplained = [m for m in survivors if m.key not in reasons]
     killed = {m.key for m in chosen} - {m.key for m in survivors}
     stale = [key for key in reasons if key in killed or key not in {m.key for m in mutations}]
-    share = 1 - len(survivors) / len(chosen)
-    print(f"\n{len(chosen) - len(survivors)} of {len(chosen)} detected ({share:.1%}). Mutations by detecting test:")
+    detected_fraction = 1 - len(survivors) / len(chosen)
+    print(f"\n{len(chosen) - len(survivors)} of {len(chosen)} detected ({detected_fraction:.1%}). Mutations by detecting test:")
     for test, number in sorted(detected_by.items(), key=lambda item: -item[1]):
         print(f"  {number:5} {test or 'no test'}")
     for m in unexplained:
         print(f"survives without an explanation: {m.name}\n    {m.key}")
     for key in stale:
         print(f"does not survive, but is listed in survivors.toml: {key}")
-    return 0 if share >= MIN_DETECTED and not unexplained and not stale else 1
+    return 0 if detected_fraction >= MIN_DETECTED and not unexplained and not stale else 1
 
 
 if __name__ == "__main__":

@@ -94,7 +94,7 @@ class Tests:
 
     def first_failing(self, stages, **environment):
         """Returns the name of the first failing test of the stages, or None. A stage that takes five times as long as
-        without a mutation counts as failed, by an infinite loop."""
+        without a mutation counts as failed, because the mutation has probably caused an infinite loop."""
         for stage in stages:
             binary, *filters = stage
             timeout = 5 * self.seconds[str(stage)] + 5 if str(stage) in self.seconds else None

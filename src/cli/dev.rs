@@ -282,7 +282,7 @@ impl Terminal {
             }
             Report::Finished { seconds } => self.line("", &format!("Finished after another {}", time(*seconds))),
             Report::Note(note) => self.line("", &format!("note: {note}")),
-            Report::Smaller([width, height], [shown_width, shown_height]) => self.line(
+            Report::ReducedImage([width, height], [shown_width, shown_height]) => self.line(
                 "",
                 &format!(
                     "{width} x {height} is too large to display; showing {shown_width} x {shown_height}. Use wgray render for the \

@@ -74,7 +74,8 @@ impl PictureOptions {
     pub fn warn(&self, saved: &SaveReport, log: &mut dyn FnMut(&str)) {
         for (name, count) in &saved.too_large {
             log(&format!(
-                "{name}: {count} values exceed 65504, the maximum of 16 bits, and were written as infinity; use --exr-type float"
+                "{name}: values beyond 65504, the maximum of 16 bits, were written as infinity (number of these values: \
+                 {count}); use --exr-type float"
             ));
         }
     }

@@ -113,7 +113,7 @@ fn identical_files_pass_and_a_single_differing_bit_fails() {
         5,
         "  largest    0.0392157 in G at (1, 1): 0.564706 instead of 0.603922\n",
     );
-    // (10 / 255)² / 24 values
+    // one of the 24 values differs by 10 / 255: sqrt((10 / 255)² / 24)
     assert_output(&result, 5, "  rmse       0.00800487\n");
     assert_eq!((result.stderr.as_str(), folder.files().len()), ("", 3));
 }
@@ -146,7 +146,7 @@ fn json_uses_the_names_of_the_text_output() {
         assert!(layer[metric].is_number(), "{metric}");
         assert!(text.contains(&format!("\n  {metric:<9}  ")), "{metric}");
     }
-    // infinity, which JSON cannot represent
+    // The PSNR of equal images is infinite, which JSON numbers cannot represent.
     let same = json(&folder.run(&["diff", "a.png", "a.png", "--json"]));
     assert_eq!(
         (&same["passes"], &same["layers"][0]["psnr"]),
@@ -188,7 +188,7 @@ fn limits_decide_the_exit_code() {
         };
         assert!(!passed && text.contains(&format!("fails: color: {metric} ")), "{text}");
         assert!(text.contains(&format!(" is {word} {limit}\n")), "{text}");
-        // one satisfied limit does not make up for a violated one
+        // A violated limit fails, even if another limit is satisfied.
         assert!(
             !passes(&[satisfied, violated]).0 && !passes(&[violated, satisfied]).0,
             "{violated}"
@@ -229,9 +229,12 @@ fn wrong_command_lines_exit_with_2() {
         ),
         (
             &["a.png", "b.png", "--out", "a.png"],
-            "--out: a.png: is the input a.png",
+            "--out: a.png: would overwrite the input a.png",
         ),
-        (&["a.png", "b.png", "--out", "./b.png"], "is the input b.png"),
+        (
+            &["a.png", "b.png", "--out", "./b.png"],
+            "would overwrite the input b.png",
+        ),
         (&["a.png", "b.png", "--out", "c.jpg"], "--out: c.jpg: must end in .png"),
         (&["a.png", "b.png", "--out", "-"], "standard output receives the report"),
         (
@@ -525,7 +528,7 @@ fn encodings_of_equal_values_are_equal() {
     exr(&folder, "id.exr", (2, 1), numbers(u32::MAX));
     exr(&folder, "next.exr", (2, 1), numbers(u32::MAX - 1));
     assert_output(&folder.run(&["diff", "id.exr", "id.exr"]), 0, "identical\n");
-    // equal if converted to f32
+    // The values are equal after conversion to f32.
     assert_output(
         &folder.run(&["diff", "id.exr", "next.exr"]),
         5,
@@ -698,7 +701,7 @@ fn an_unwritable_difference_image_exits_with_8() {
         assert_output(
             &folder.run(&["diff", "a.png", "b.png", "--out", "link.png"]),
             2,
-            "--out: link.png: is the input a.png",
+            "--out: link.png: would overwrite the input a.png",
         );
     }
     assert_eq!(

@@ -90,7 +90,7 @@ fn tasks_of_slurm_render_the_image() {
     assert_eq!((result.code, result.stderr.as_str()), (0, ""));
     assert!(folder.read("- {{}} .exr") == expected);
     assert!(!folder.path("my job/checkpoints/image-of-3").exists());
-    // Without a part, the merge fails and keeps the other files.
+    // If a part is missing, the merge fails and keeps the other files.
     fs::remove_file(parts.join("2.part")).expect("a part");
     fs::remove_file(folder.path("- {{}} .exr")).expect("the image");
     let result = task(&folder, "merge", "0", "0");
@@ -310,7 +310,7 @@ fn scripts_of_open_job_description_render_the_image() {
     let [render, merge] = scripts.as_slice() else {
         panic!("{scripts:?}")
     };
-    // Schedulers would expand the braces.
+    // Schedulers would expand double braces.
     assert!(!render.contains("{{") && !merge.contains("{{"));
     let [scene, output] = [SPECIAL_NAME, "- {{}} .exr"].map(|name| folder.path(name).display().to_string());
     let program = program().display().to_string();

@@ -160,7 +160,7 @@ fn ambiguous_frame_names_are_rejected() {
     assert_rejected(&folder, &stats, 2, &format!("--stats: s.json: {rule}"));
     let twice = ["moving.toml", "--frames", "1-2", "-o", "#.#.png"];
     assert_rejected(&folder, &twice, 2, "--output: #.#.png: must have a single group of #");
-    // Names that collide once the numbers are inserted.
+    // These names collide once the frame numbers are inserted.
     let colliding = ["moving.toml", "--frames", "1-12", "-o", "b#.png", "-o", "b1#.png"];
     assert_rejected(
         &folder,

@@ -203,7 +203,7 @@ fn a_second_writer_waits_and_resumes() {
     let result = wait_for_end(second);
     assert_eq!(result.code, 0, "{}", result.stderr);
     assert!(folder.read("second.exr") == expected);
-    // The file contains each finished piece once.
+    // The checkpoint is complete: a third render has nothing left to render.
     let third = start(
         &folder,
         &[&options[..], &["-o", "third.exr", "--stats", "stats.json"]].concat(),

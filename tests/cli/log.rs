@@ -236,7 +236,7 @@ fn a_signal_is_an_error_with_its_exit_code() {
     let mut stderr_lines = BufReader::new(child.stderr.take().expect("a pipe"))
         .lines()
         .map_while(Result::ok);
-    // The signal handlers are installed before this message.
+    // The signal handlers are installed before the message `ready`.
     assert!(stderr_lines.any(|line| line.contains("\"ready\"")));
     // SAFETY: the process is a child that has not been waited for, so that its id is still valid.
     unsafe { libc::kill(child.id() as i32, libc::SIGTERM) };

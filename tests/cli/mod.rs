@@ -126,7 +126,7 @@ impl TestFolder {
 
     /// Returns the names of all files, hidden ones included, except `small.toml`.
     fn files(&self) -> Vec<String> {
-        self.files_but(|name| name == "small.toml")
+        self.files_except(|name| name == "small.toml")
     }
 
     fn run(&self, arguments: &[&str]) -> RunResult {

@@ -324,8 +324,10 @@ mod unix {
                 &folder,
                 &format!("$0 render small.toml --device cpu -o q.png --stats {path} >> got"),
             );
-            let got = String::from_utf8(folder.read("got")).unwrap();
-            let stats = got.strip_prefix("first\n").unwrap_or_else(|| panic!("{path}: {got}"));
+            let output = String::from_utf8(folder.read("got")).unwrap();
+            let stats = output
+                .strip_prefix("first\n")
+                .unwrap_or_else(|| panic!("{path}: {output}"));
             serde_json::from_str::<serde_json::Value>(stats).unwrap();
         }
         assert_rejected(

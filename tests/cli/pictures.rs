@@ -306,7 +306,8 @@ fn half_float_overflows_are_counted() {
     // Values up to 65520, halfway to the next step, round to 65504.
     assert_eq!((infinite("R"), infinite("G")), (0, 0));
     let warning = format!(
-        "warning: h.exr: {infinite_blue} values exceed 65504, the maximum of 16 bits, and were written as infinity; use --exr-type float\n"
+        "warning: h.exr: values beyond 65504, the maximum of 16 bits, were written as infinity (number of these values: \
+         {infinite_blue}); use --exr-type float\n"
     );
     assert_eq!(result.stderr, warning);
     folder.run_quietly(&[
@@ -419,9 +420,9 @@ fn radiance_layers_use_the_view_of_the_image() {
         for (i, found) in shown.chunks(3).enumerate() {
             let color = ["R", "G", "B"].map(|part| f32::from_bits(numbers[&format!("{name}.{part}")][i]));
             let light = settings.rgb8(color);
-            let share = settings.display_share(color).map(to_8_bits);
-            differing += usize::from(light != share);
-            assert_eq!(found, if name == "albedo" { share } else { light }, "{name} {i}");
+            let reflectance = settings.display_reflectance(color).map(to_8_bits);
+            differing += usize::from(light != reflectance);
+            assert_eq!(found, if name == "albedo" { reflectance } else { light }, "{name} {i}");
         }
     }
     assert!(differing > 30, "{differing}");

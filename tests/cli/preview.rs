@@ -70,7 +70,7 @@ fn partial(path: &Path) -> Option<(u32, u32)> {
     Some((samples.parse().expect("a number"), requested.parse().expect("a number")))
 }
 
-fn take_files(folder: &TestFolder) -> Vec<(String, Vec<u8>)> {
+fn read_and_remove_files(folder: &TestFolder) -> Vec<(String, Vec<u8>)> {
     let files = folder.files().into_iter();
     let files: Vec<_> = files.map(|name| (name.clone(), folder.read(&name))).collect();
     for (name, _) in &files {
@@ -120,7 +120,7 @@ fn the_complete_files_are_the_same_with_and_without_previews() {
                 let result =
                     folder.run(&[&["render", "--device", device, "--quiet"], options, outputs, extra].concat());
                 assert_eq!((result.code, result.stderr.as_str()), (0, ""), "{options:?}");
-                take_files(&folder)
+                read_and_remove_files(&folder)
             };
             let (plain, previewed) = (render(&[]), render(&["--preview"]));
             assert!(plain.len() >= 2);
@@ -209,7 +209,7 @@ fn a_second_signal_ends_at_once() {
 }
 
 #[test]
-fn files_with_more_samples_stay() {
+fn files_with_more_samples_are_not_replaced() {
     let folder = TestFolder::new();
     let outputs = [
         "-o",

@@ -156,7 +156,7 @@ fn invalid_environment_options_are_rejected() {
             "must be a whole number from 1 to 100000",
         ),
     ] {
-        let before = folder.files_but(|_| false);
+        let before = folder.files_except(|_| false);
         let result = folder.run(&[&["render"], &arguments[..]].concat());
         assert_eq!(
             (result.code, result.stdout.as_str()),
@@ -169,7 +169,7 @@ fn invalid_environment_options_are_rejected() {
             "{arguments:?}: {}\n{message}",
             result.stderr
         );
-        assert_eq!(folder.files_but(|_| false), before, "{arguments:?}");
+        assert_eq!(folder.files_except(|_| false), before, "{arguments:?}");
     }
     let panorama = BALL.replace("fov = 40 }", "type = 'panorama' }");
     folder.write("panorama.toml", &panorama);
@@ -194,10 +194,10 @@ fn a_turntable_is_one_full_turn() {
         &["ball.toml", "--turntable", "4", "--frames", "3", "-o", "alone.exr"],
     );
     let names = ["t.01.exr", "t.02.exr", "t.03.exr", "t.04.exr"];
-    let found = folder.files_but(|name| !name.starts_with("t."));
+    let found = folder.files_except(|name| !name.starts_with("t."));
     assert_eq!(found, names);
-    // The first frame equals the still image. After a quarter turn the camera is at +x of the target, after a half turn
-    // at +y.
+    // The first frame equals the still image. As seen from the look-at point, the camera is towards +x after a quarter
+    // turn and towards +y after half a turn.
     assert_eq!(folder.read("t.01.exr"), folder.read("still.exr"));
     assert_eq!(folder.read("t.03.exr"), folder.read("alone.exr"));
     let max_difference = |position: &str, name: &str| {

@@ -59,7 +59,7 @@ fn saving_a_model_updates_the_image() {
     write(RED);
     let session = start(folder.path(), "box.glb");
     wait_for(&session, RED);
-    // Overwritten in place, as exporters do, then replaced by a rename.
+    // The file is overwritten in place, as exporters do, and then replaced by a rename.
     write(GREEN);
     wait_for(&session, GREEN);
     model(BLUE).write_glb(folder.path(), "new~");

@@ -125,7 +125,7 @@ fn invalid_messages_are_rejected_and_the_file_is_unchanged() {
     }
     assert!(failures.is_empty(), "{failures:#?}");
     assert_eq!(session.state().undo, None);
-    // Control: a valid message takes effect; none above did.
+    // Positive control: a valid message takes effect; none of the messages above did.
     let mut second_viewer = Viewer::new(address);
     second_viewer
         .send_text(set("shapes[0].radius", &json!(0.25)).as_bytes())

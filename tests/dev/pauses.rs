@@ -79,7 +79,7 @@ fn the_time_to_an_image_contains_the_time_to_compile() {
     drop(session);
     let mut images = 0;
     for report in reports {
-        assert!(!matches!(report, Report::Smaller(..)), "{report:?}");
+        assert!(!matches!(report, Report::ReducedImage(..)), "{report:?}");
         if let Report::Reloaded { seconds, compiled } = report {
             assert!(
                 compiled.is_none_or(|compiled| compiled <= seconds),

@@ -131,7 +131,7 @@ fn a_changed_comment_does_not_restart_the_render() {
     files.edit("scene.toml", "# a small scene", "# a very small scene");
     std::thread::sleep(IDLE_TIME);
     assert_eq!(session.revision(), revision);
-    files.edit("scene.toml", "fov = 40", "fov = 41"); // control: the file is being watched
+    files.edit("scene.toml", "fov = 40", "fov = 41"); // positive control: the file is being watched
     session.wait_for_rendered_image(&files);
 }
 

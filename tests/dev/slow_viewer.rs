@@ -95,7 +95,7 @@ fn a_slow_connection_does_not_delay_camera_moves() {
     loop {
         match viewer.receive().unwrap() {
             Received::Frame(header, size) => {
-                max_size = max_size.max(size); // frames are finer when the camera is at rest
+                max_size = max_size.max(size); // frames are finer, and thus larger, when the camera is at rest
                 viewer.acknowledge(&header);
             }
             Received::Text(message) if message["state"]["executed"].as_u64() >= Some(executed) => break,

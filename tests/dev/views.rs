@@ -31,7 +31,7 @@ fn the_camera_moves_and_is_saved_without_a_flicker() {
     session.wait("a finished image", finished);
     let state = session.state();
     assert!(state.camera_moved);
-    // The text of the moved camera gives the displayed image.
+    // A scene file with the text of the moved camera gives the displayed image.
     let from_text = {
         let (start, end) = (SCENE.find("[camera]").unwrap(), SCENE.find("[render]").unwrap());
         Files::new(&format!("{}{}\n{}", &SCENE[..start], state.camera, &SCENE[end..]))
@@ -56,7 +56,7 @@ fn the_camera_moves_and_is_saved_without_a_flicker() {
     assert!(!notice.bad && notice.text.contains("scene.toml"), "{}", notice.text);
     std::thread::sleep(IDLE_TIME);
     assert_eq!(session.revision(), revision, "the image was rendered again");
-    // Undoing restores the text, but not the view.
+    // Undoing restores the text of the file, but not the camera of the view.
     assert_eq!(session.state().undo.as_deref(), Some("camera"));
     session.inner.send(Command::UndoWrite);
     session.wait("the original file", |session| {

@@ -230,7 +230,7 @@ fn changes_of_another_program_are_not_undone() {
     set(&session, "camera.fov", json!(50), None);
     files.edit("scene.toml", "# a small scene", "# another scene");
     let edited = files.read("scene.toml");
-    session.inner.send(Command::UndoWrite); // whether or not the change was detected by then
+    session.inner.send(Command::UndoWrite); // the session may not have detected the change yet
     session.wait("nothing to undo", |session| {
         session.state().undo.is_none().then_some(())
     });

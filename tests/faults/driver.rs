@@ -165,7 +165,7 @@ impl TestFolder {
             .output()
             .expect("the program runs");
         let is_expected = |name: &str| ["scene.toml", "log", "out.exr"].contains(&name) || name.ends_with(".png");
-        let unexpected = self.files_but(is_expected);
+        let unexpected = self.files_except(is_expected);
         assert_eq!(unexpected, [""; 0], "temporary files are left");
         let stderr = without_summary(&String::from_utf8(output.stderr).expect("UTF-8"));
         assert!(

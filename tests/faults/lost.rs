@@ -175,7 +175,9 @@ fn repeated_losses_reach_a_limit() {
     let Some(driver) = driver() else { return };
     let folder = TestFolder::with_scene(SCENE);
     let expected = folder.render_expected(driver, &[]);
-    // After losses in the warm-up, the device never becomes ready; each loss in the samples is reported.
+    // `every:1` loses each device in its warm-up: no device becomes ready again after the first loss, and only that
+    // loss is reported. `every:2` loses each device while it renders samples: every loss is reported, the last as an
+    // error.
     let check_repeated_losses = |lose: &str, reopened: usize| {
         let folder = TestFolder::with_scene(SCENE);
         let result = folder.run_on(driver, &GPU, &[("FAULTS_LOSE", lose)]);

@@ -24,7 +24,7 @@ fn a_film_that_does_not_fit_is_reported_with_its_size() {
     let expected = folder.render_expected(driver, &large);
     let result = folder.run_on(driver, &[large, gpu].concat(), &[("FAULTS_LARGEST", "8388608")]);
     let parts = [
-        ": out of memory: the driver has no 16.0 MiB for a film of 1024 x 1024 pixels",
+        ": out of memory: the driver cannot allocate 16.0 MiB for a film of 1024 x 1024 pixels",
         ADVICE,
     ];
     assert_out_of_memory(&result, &parts);
@@ -92,7 +92,10 @@ fn a_scene_that_does_not_fit_is_reported_with_its_size() {
     let result = folder.run_on(driver, &["--device", "gpu"], &limit);
     assert_out_of_memory(
         &result,
-        &[": out of memory: the driver has no 5.3 MiB for the scene; ", ADVICE],
+        &[
+            ": out of memory: the driver cannot allocate 5.3 MiB for the scene; ",
+            ADVICE,
+        ],
     );
     let result = folder.run_on(driver, &["--device", "gpu"], &[]);
     assert_eq!((result.code, result.stderr.as_str()), (0, ""));
@@ -107,7 +110,7 @@ fn a_submit_without_memory_is_not_a_device_loss() {
     for submit in ["1", "2", "3", "4", "5"] {
         let faults = [("FAULTS_NO_MEMORY_IN", submit)];
         let result = folder.run_on(driver, &["--device", "gpu"], &faults);
-        assert_out_of_memory(&result, &[": out of memory: the driver has no "]);
+        assert_out_of_memory(&result, &[": out of memory: the driver "]);
         let result = folder.run_on(driver, &["--device", "auto"], &faults);
         assert_eq!(
             (result.code, result.lines().len()),

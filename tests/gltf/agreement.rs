@@ -72,7 +72,7 @@ fn a_file_has_the_same_bits_on_cpu_and_gpu() {
     for mode in exact_modes().into_iter().filter(|mode| *mode == RenderMode::Baked) {
         assert_eq!(differing(&render(&packed, mode), &expected), 0, "{mode:?}");
     }
-    // Control: another strength of the normal map.
+    // Negative control: another strength of the normal map changes the image.
     builder.get("materials")[material]["normalTexture"]["scale"] = json!(0.6);
     let mut control = load_scene(&builder.write(folder.path(), "other", Packing::Binary), "");
     (control.width, control.height) = (24, 24);

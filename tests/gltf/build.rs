@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::{Map, Value, json};
 
-/// Component types by their codes (glTF 2.0, 3.6.2.2).
+/// Component types with their codes (glTF 2.0, 3.6.2.2).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Component {
     I8 = 5120,
@@ -25,7 +25,7 @@ impl Component {
         }
     }
 
-    /// Returns the stored value of a normalized 1.
+    /// Returns the stored value that represents 1 in a normalized accessor.
     pub fn one(self) -> f64 {
         match self {
             Component::I8 => 127.0,
@@ -131,7 +131,7 @@ impl Builder {
         self.add("extensionsRequired", json!(extension));
     }
 
-    /// Appends bytes at a multiple of 4. Returns the buffer view.
+    /// Appends bytes at a multiple of 4. Returns the index of their buffer view.
     pub fn view(&mut self, bytes: &[u8]) -> usize {
         self.bytes.resize(self.bytes.len().next_multiple_of(4), 0);
         let view = json!({ "buffer": 0, "byteOffset": self.bytes.len(), "byteLength": bytes.len() });
@@ -158,7 +158,7 @@ impl Builder {
         bytes
     }
 
-    /// Adds stored values, tightly packed. Returns the accessor.
+    /// Adds an accessor of tightly packed values, given as they are stored. Returns the index of the accessor.
     pub fn accessor(&mut self, kind: &str, component: Component, values: &[f64]) -> usize {
         let (columns, rows) = shape(kind);
         let bytes = Builder::elements(kind, component, values, 1);
@@ -170,7 +170,7 @@ impl Builder {
         )
     }
 
-    /// Adds a vertex attribute with `min` and `max`, 4-byte aligned. Returns the accessor.
+    /// Adds a vertex attribute with `min` and `max`, 4-byte aligned. Returns the index of its accessor.
     pub fn attribute<const N: usize>(&mut self, component: Component, normalized: bool, values: &[[f64; N]]) -> usize {
         let kind = ["", "SCALAR", "VEC2", "VEC3", "VEC4"][N];
         let stored = |value: f64| match (component, normalized) {
@@ -216,7 +216,7 @@ impl Builder {
         self.attribute(Component::F32, false, values)
     }
 
-    /// Adds floats that are not a vertex attribute, such as animation keys. Returns the accessor.
+    /// Adds floats that are not a vertex attribute, such as animation keys. Returns the index of their accessor.
     pub fn samples<const N: usize>(&mut self, values: &[[f64; N]]) -> usize {
         let index = self.floats(values);
         let view = self.get("accessors")[index]["bufferView"].as_u64().expect("a view") as usize;
@@ -230,7 +230,7 @@ impl Builder {
         self.indices_of(Component::U32, values)
     }
 
-    /// Adds indices. Returns the accessor.
+    /// Adds indices. Returns the index of their accessor.
     pub fn indices_of(&mut self, component: Component, values: &[u32]) -> usize {
         let values: Vec<f64> = values.iter().map(|index| f64::from(*index)).collect();
         let index = self.accessor("SCALAR", component, &values);
@@ -304,7 +304,7 @@ impl Builder {
         )
     }
 
-    /// Returns the JSON; `uri` is the URI of the buffer.
+    /// Returns the JSON of the file; `uri` is the URI of the buffer.
     fn json(&self, uri: Option<String>) -> Vec<u8> {
         let mut root = self.root.clone();
         if !self.bytes.is_empty() {

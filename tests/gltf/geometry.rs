@@ -56,7 +56,7 @@ fn quantize(component: Component, value: f64) -> f64 {
 
 #[test]
 fn positions_may_have_any_integer_type() {
-    // Quantization tools scale the node in this way.
+    // Quantization tools compensate for the integer range by the scale of the node.
     for component in [Component::I8, Component::U8, Component::I16, Component::U16] {
         for normalized in [false, true] {
             let signed = matches!(component, Component::I8 | Component::I16);

@@ -114,12 +114,12 @@ fn light_intensities_in_lux_and_candela_give_the_closed_form_radiance() {
     let lights = json!([{ "type": "directional", "intensity": 5 }, { "type": "point", "intensity": 12 }]);
     builder.set("extensions", json!({ "KHR_lights_punctual": { "lights": lights } }));
     builder.root_node(json!({ "extensions": { "KHR_lights_punctual": { "light": 0 } } }));
-    // The irradiance is uniform to 1e-4.
+    // The point light is so far away that its irradiance is uniform to 1e-4.
     builder.root_node(json!({ "translation": [0, 0, 100], "extensions": { "KHR_lights_punctual": { "light": 1 } } }));
     builder.get("extensions")["KHR_lights_punctual"]["lights"][1]["intensity"] = json!(20_000);
     let folder = TestFolder::with_file("a", "");
     let file = builder.write(folder.folder(), "lux", Packing::Binary);
-    // The environment is black.
+    // Without the default environment, only the lights contribute.
     let mut scene = super::read::load_scene(&file, "");
     scene.environment = None;
     scene.render.background = DVec3::ZERO;
@@ -128,7 +128,7 @@ fn light_intensities_in_lux_and_candela_give_the_closed_form_radiance() {
     for pixel in pixels(&scene) {
         for (k, albedo) in [0.8, 0.4, 0.2].into_iter().enumerate() {
             let expected = albedo / std::f64::consts::PI * irradiance;
-            // Each sample selects one of two lights.
+            // The tolerance is large because each sample selects one of the two lights at random.
             assert!(
                 (f64::from(pixel[k]) / expected - 1.0).abs() < 0.15,
                 "{pixel:?}, not {expected}"

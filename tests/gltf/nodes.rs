@@ -81,7 +81,7 @@ fn meshes_flattened_along_their_normal_are_kept() {
         builder.root_node(json!({ "mesh": mesh, "translation": [0, 0, 2], "scale": scale }));
         scene(&builder, "flattened")
     };
-    // Flattened along the normal, or below the minimum scale of an instance.
+    // The quad is flattened along its normal, or its scale is below the minimum scale of an instance.
     for (scale, factor) in [([1.0, 1.0, 0.0], 1.0), ([1e-7; 3], 1e-7), ([-1e-7; 3], -1e-7)] {
         let scene = flattened(scale);
         assert_corners(&scene, &mapped_quad(|p| p * factor + 2.0 * DVec3::Z));
@@ -105,7 +105,7 @@ fn meshes_flattened_along_their_normal_are_kept() {
 }
 
 #[test]
-fn a_mesh_of_many_nodes_is_kept_once() {
+fn a_mesh_of_several_nodes_is_stored_once() {
     let mut builder = Builder::new();
     let mesh = builder.quad(None);
     for x in 0..5 {
@@ -207,7 +207,7 @@ fn cyclic_nodes_are_rejected() {
     builder.get("nodes")[1]["children"] = json!([0]);
     let message = rejection(&builder, "");
     assert!(message.contains("nodes"), "{message}");
-    // A node that is its own child.
+    // The node is its own child.
     let mut builder = two_scenes();
     builder.get("nodes")[0]["children"] = json!([0]);
     assert!(rejection(&builder, "").contains("nodes"));

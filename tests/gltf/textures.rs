@@ -313,7 +313,7 @@ fn rows() -> Vec<Row> {
         textured,
         plain,
     };
-    // The component that 128 encodes.
+    // The component of a normal that the byte 128 encodes.
     let half: f64 = 128.0 / 255.0 * 2.0 - 1.0;
     // The emissive rows are delta-specular, because NEE samples textured emission differently.
     vec![
@@ -499,7 +499,7 @@ fn constant_textures_equal_plain_values() {
             "{}: {textured:?} {plain:?}",
             row.name
         );
-        // Control: the images differ visibly.
+        // Negative control: with a white texel, the image differs visibly.
         assert!(
             max_difference(&white, &plain) > 0.1,
             "{}: {white:?} {plain:?}",

@@ -49,7 +49,7 @@ fn instances_are_in_proportion_to_the_file() {
 }
 
 #[test]
-fn meshes_that_share_all_they_have_are_few() {
+fn the_total_number_of_triangles_is_limited() {
     let count = 40_000;
     let corners = (0..3 * count).flat_map(|i| [i % 173, i * 7 % 131, i % 11]);
     let binary: Vec<u8> = corners.flat_map(|x| (x as f32).to_le_bytes()).collect();
@@ -71,7 +71,7 @@ fn meshes_that_share_all_they_have_are_few() {
 }
 
 #[test]
-fn accessors_are_not_read_for_ever() {
+fn repeated_reads_of_accessors_are_limited() {
     let (mut json, binary) = triangle();
     push(&mut json["accessors"], zeros(1 << 22, "VEC3"));
     push(&mut json["accessors"], zeros(1 << 20, "MAT4"));
@@ -157,7 +157,7 @@ fn sparse_files_are_refused_by_their_length() {
 }
 
 #[test]
-fn shapes_that_name_one_file_often_are_few() {
+fn shapes_that_repeat_a_file_are_limited() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     let (mut json, binary) = triangle();
@@ -198,7 +198,7 @@ fn blank(width: u32, height: u32, color: png::ColorType, depth: png::BitDepth) -
 }
 
 #[test]
-fn images_that_grow_a_thousandfold_are_told() {
+fn images_that_decode_to_a_thousand_times_their_size_are_rejected() {
     // A file of 65 KB with 67 million texels.
     let image = blank(8192, 8192, png::ColorType::Grayscale, png::BitDepth::Eight);
     let (mut json, mut binary) = triangle();
@@ -217,16 +217,16 @@ fn images_that_grow_a_thousandfold_are_told() {
     json["meshes"][0]["primitives"] = (0..50).map(primitive).collect();
     assert_rejected(&json, &binary, "texels in total; for files of ");
     // A file of 2 MB decodes to 2 GB. Large images of models are halved.
-    let deep = blank(16_384, 16_384, png::ColorType::Rgba, png::BitDepth::Sixteen);
+    let rgba16 = blank(16_384, 16_384, png::ColorType::Rgba, png::BitDepth::Sixteen);
     binary.truncate(start);
-    binary.extend(&deep);
+    binary.extend(&rgba16);
     json["buffers"][0]["byteLength"] = json!(binary.len());
-    json["bufferViews"][1]["byteLength"] = json!(deep.len());
+    json["bufferViews"][1]["byteLength"] = json!(rgba16.len());
     json["meshes"][0]["primitives"] = json!([primitive(0)]);
     json["materials"] = json!([slots(0)]);
     assert_rejected(&json, &binary, "; the limit for a file of ");
     let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("deep.png"), &deep).unwrap();
+    fs::write(folder.path().join("deep.png"), &rgba16).unwrap();
     let result = run(folder.path(), &["diff", "deep.png", "deep.png"]);
     assert!(
         result.code == 1 && result.output.contains("; the limit for a file of "),
@@ -391,7 +391,7 @@ fn shell(folder: &Path, script: &str) -> String {
 }
 
 #[test]
-fn texts_that_go_deep_or_on_for_ever_are_told() {
+fn deeply_nested_and_unterminated_values_are_rejected() {
     let folder = tempfile::tempdir().unwrap();
     let deep = 100_000;
     let dots = vec!["a"; deep].join(".");
@@ -428,7 +428,7 @@ fn texts_that_go_deep_or_on_for_ever_are_told() {
 }
 
 #[test]
-fn what_acts_on_a_terminal_is_shown() {
+fn control_characters_are_escaped_in_messages() {
     // `run` rejects control characters.
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();

@@ -92,7 +92,7 @@ fn mutate(format: &Format, random: &Random) -> Vec<u8> {
 }
 
 #[test]
-fn changed_files_are_read_or_told() {
+fn changed_files_are_read_or_rejected_with_a_message() {
     // The count is small by default; the seeds are fixed.
     let count: usize = std::env::var("WGRAY_TEST_HOSTILE").map_or(8, |count| count.parse().unwrap());
     let folder = tempfile::tempdir().unwrap();
@@ -147,7 +147,7 @@ fn changed_files_are_read_or_told() {
                 ReadCommand::Part => vec![run(folder, &["merge", &file, "-o", "out.exr", "-o", "out.png", "-q"])],
             }
         };
-        // Control: the original file is accepted.
+        // Positive control: the unmutated file is accepted.
         for result in run_commands(&format.bytes) {
             assert!(
                 [0, 1, 5].contains(&result.code)

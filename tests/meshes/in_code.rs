@@ -174,10 +174,10 @@ fn unusual_but_valid_meshes_are_rendered() {
         depth(&Arc::new(mesh))
     };
     let expected = depth(|_| {});
-    // Triangles of zero area, and duplicate triangles.
+    // Triangles of zero area and duplicate triangles do not change the depth.
     assert_eq!(depth(|m| m.triangles.extend([[0, 0, 0], [0, 1, 1]])), expected);
     assert_eq!(depth(|m| m.triangles = m.triangles.repeat(5000)), expected);
     assert_eq!(depth(|m| m.group_of = vec![0, 0]), expected);
-    // An unused vertex.
+    // An unused vertex does not change the depth.
     assert_eq!(depth(|m| m.positions.push(glam::Vec3::splat(-0.5))), expected);
 }

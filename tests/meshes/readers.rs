@@ -46,22 +46,22 @@ pub fn in_all_formats() -> Vec<(&'static str, Vec<u8>)> {
     for [x, y, z] in &positions {
         ascii_ply += &format!("{x} {y} {z}\n");
     }
-    let mut little = ply_header("binary_little_endian").into_bytes();
-    let mut big = ply_header("binary_big_endian").into_bytes();
+    let mut little_endian = ply_header("binary_little_endian").into_bytes();
+    let mut big_endian = ply_header("binary_big_endian").into_bytes();
     for x in positions.iter().flatten() {
-        little.extend(x.to_le_bytes());
-        big.extend(x.to_be_bytes());
+        little_endian.extend(x.to_le_bytes());
+        big_endian.extend(x.to_be_bytes());
     }
     for face in &faces {
         let numbers = |first: u32| face.iter().map(move |i| format!(" {}", i + first)).collect::<String>();
         obj += &format!("f{}\n", numbers(1));
         ascii_ply += &format!("{}{}\n", face.len(), numbers(0));
-        for bytes in [&mut little, &mut big] {
+        for bytes in [&mut little_endian, &mut big_endian] {
             bytes.push(face.len() as u8);
         }
         for i in face {
-            little.extend(i.to_le_bytes());
-            big.extend(i.to_be_bytes());
+            little_endian.extend(i.to_le_bytes());
+            big_endian.extend(i.to_be_bytes());
         }
     }
     let mut ascii_stl = String::from("solid crystal\n");
@@ -82,8 +82,8 @@ pub fn in_all_formats() -> Vec<(&'static str, Vec<u8>)> {
     vec![
         ("crystal.obj", obj.into_bytes()),
         ("ascii.ply", ascii_ply.into_bytes()),
-        ("little.PLY", little),
-        ("big.ply", big),
+        ("little.PLY", little_endian),
+        ("big.ply", big_endian),
         ("ascii.stl", ascii_stl.into_bytes()),
         ("binary.Stl", binary_stl),
     ]
@@ -224,7 +224,7 @@ fn duplicate_triangles_are_dropped_and_counted() {
         (mesh.positions.len(), &mesh.notes[..]),
         (4, &["1 of 3 triangles is a duplicate and was removed".into()][..])
     );
-    // Other groups and winding orders are kept.
+    // A duplicate in another group or with another winding order is kept.
     let mesh = load("a.obj", text.replace("f 2 3 5", "g b\nf 2 3 5"), None).unwrap();
     assert_eq!((mesh.triangles.len(), mesh.notes.len()), (3, 2), "{:?}", mesh.notes);
     let mesh = load("a.obj", text.replace("f 2 3 5", "f 3 2 5"), None).unwrap();
@@ -347,8 +347,8 @@ fn ply_may_have_all_types_in_any_order() {
 }
 
 /// Returns a binary PLY file with faces first, 64-bit floats and normals.
-fn faces_first(is_big: bool, normal: [f64; 3]) -> Vec<u8> {
-    let name = if is_big { "big" } else { "little" };
+fn faces_first(is_big_endian: bool, normal: [f64; 3]) -> Vec<u8> {
+    let name = if is_big_endian { "big" } else { "little" };
     let mut bytes = format!(
         "ply\nformat binary_{name}_endian 1.0\nelement face 1\nproperty list ushort short polygon\nproperty int flags\n\
          element vertex 3\nproperty double x\nproperty double y\nproperty double z\nproperty double nx\n\
@@ -357,7 +357,7 @@ fn faces_first(is_big: bool, normal: [f64; 3]) -> Vec<u8> {
     .into_bytes();
     let mut append = |little: &[u8]| {
         let mut value = little.to_vec();
-        if is_big {
+        if is_big_endian {
             value.reverse();
         }
         bytes.extend(value);
@@ -374,14 +374,14 @@ fn faces_first(is_big: bool, normal: [f64; 3]) -> Vec<u8> {
 
 #[test]
 fn binary_ply_has_normals_and_texture_coordinates() {
-    for is_big in [false, true] {
-        let mesh = load("a.ply", faces_first(is_big, [0.0, -3e200, 4e200]), None).unwrap();
+    for is_big_endian in [false, true] {
+        let mesh = load("a.ply", faces_first(is_big_endian, [0.0, -3e200, 4e200]), None).unwrap();
         assert_eq!(corners(&mesh), TWO_TRIANGLES[..1]);
         assert_eq!(mesh.normals[2].to_array(), [0.0, -0.6, 0.8]);
         assert_eq!(mesh.uvs[2].to_array(), [0.25, 0.75]);
         // Invalid normals are replaced.
         for invalid in [[0.0; 3], [f64::NAN, 0.0, 1.0], [f64::INFINITY, 0.0, 1.0]] {
-            let mesh = load("a.ply", faces_first(is_big, invalid), Some(Normals::File)).unwrap();
+            let mesh = load("a.ply", faces_first(is_big_endian, invalid), Some(Normals::File)).unwrap();
             assert_eq!(mesh.normals[2].to_array(), [0.0, 0.0, 1.0]);
             let rule = "have no valid normals; the triangle normals are used instead";
             assert_eq!(mesh.notes, [format!("3 vertices {rule}")]);

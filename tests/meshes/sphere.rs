@@ -133,19 +133,23 @@ fn a_fine_triangle_mesh_approximates_a_sphere() {
         (0, 0, 0),
         "{result:?}"
     );
-    // Control: a coarse flat-shaded mesh violates the bounds of the fine mesh. With vertex normals, the coarse mesh
-    // satisfies the bounds for its own inner radius.
+    // Negative control: a coarse flat-shaded mesh violates the bounds of the fine mesh. With vertex normals, the coarse
+    // mesh satisfies the bounds for its own inner radius.
     let coarse = Form::icosphere(2);
     let coarse_counts = classify(&coarse, fine_inner, "flat");
     assert!(
         coarse_counts.wrong_hits > 1000 && coarse_counts.wrong_shadows > 10 && coarse_counts.wrong_light > 10,
         "{coarse_counts:?}"
     );
-    let own_bounds = classify(&coarse, inner_radius(&coarse), "file");
+    let file_bounds_counts = classify(&coarse, inner_radius(&coarse), "file");
     assert_eq!(
-        (own_bounds.wrong_hits, own_bounds.wrong_shadows, own_bounds.wrong_light),
+        (
+            file_bounds_counts.wrong_hits,
+            file_bounds_counts.wrong_shadows,
+            file_bounds_counts.wrong_light
+        ),
         (0, 0, 0),
-        "{own_bounds:?}"
+        "{file_bounds_counts:?}"
     );
 }
 

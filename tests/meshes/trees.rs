@@ -81,8 +81,8 @@ fn brute_force_hit(scene: &Packed, ray: Ray, origin_prim: UVec2, inside_prim: UV
                 slot: slot as u32,
                 barycentric: crossing.barycentric,
             };
-            let is_own = origin_prim == UVec2::new(found.instance, found.primitive);
-            if crossing.is_hit && found.t > 0.0 && !is_own {
+            let is_origin = origin_prim == UVec2::new(found.instance, found.primitive);
+            if crossing.is_hit && found.t > 0.0 && !is_origin {
                 hit = nearer_hit(hit, found);
             }
         }
@@ -114,8 +114,8 @@ fn brute_force_occlusion(scene: &Packed, surface: &Surface, light: &Light, block
                     let casts = scene.bvh.group_words[(i.materials + group) as usize] & NO_SHADOW == 0;
                     let [v0, v1, v2] = corners(scene, i, slot);
                     let crossing = triangle_crossing(v0, v1, v2, mesh_origin, shear_of(direction), s);
-                    let is_own = surface.exclude_front == UVec2::new(item.index + 1, triangle.w);
-                    casts && !is_own && crossing.is_hit && crossing.t > 0.0 && crossing.t < light.t_max
+                    let is_origin = surface.exclude_front == UVec2::new(item.index + 1, triangle.w);
+                    casts && !is_origin && crossing.is_hit && crossing.t > 0.0 && crossing.t < light.t_max
                 })
             } else {
                 let (origin_prim, from_inside) = (

@@ -282,7 +282,7 @@ fn textures_use_their_set_of_coordinates() {
             // The control mesh has only this set. Roughness is omitted, because its texture coordinates would differ.
             let without_roughness =
                 |text: String| text.replace("roughness = { texture = 'first', channel = 'g' }\n", "");
-            let only_set = |mesh: &mut Mesh| {
+            let keep_one_uv_set = |mesh: &mut Mesh| {
                 set_uv_sets(mesh);
                 let sets = std::mem::take(&mut mesh.more_uvs);
                 if set > 0 {
@@ -293,7 +293,7 @@ fn textures_use_their_set_of_coordinates() {
                 folder.path(),
                 4,
                 &without_roughness(text(0, filter, keys)),
-                only_set,
+                keep_one_uv_set,
             ));
             let found = scene(
                 folder.path(),

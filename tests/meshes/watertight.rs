@@ -1,4 +1,4 @@
-//! Closed meshes are watertight: no ray at an edge or a vertex passes, at any position and scale.
+//! Closed meshes are watertight: no ray towards an edge or a vertex leaks through the mesh, at any position and scale.
 
 use glam::{DMat3, DVec3, UVec2, Vec3, Vec4Swizzles as _};
 use rayon::prelude::*;
@@ -87,21 +87,22 @@ impl Solid {
     }
 }
 
-/// Returns the number of rays that pass through a convex mesh. From outside, a ray towards the inscribed ball must hit
-/// the mesh before the point nearest to the center. From inside, a ray must hit the mesh at its target, up to the
-/// precision of slivers.
-fn count_passing(scene: &Packed, rays: u32, from_inside: bool) -> u32 {
+/// Returns the number of random rays that leak through a convex mesh. From outside, a ray towards the inscribed ball
+/// must hit the mesh before the point nearest to the center. From inside, a ray must hit the mesh at its target, up to
+/// the precision of slivers.
+fn count_leaks(scene: &Packed, rays: u32, from_inside: bool) -> u32 {
     let solid = Solid::new(scene);
     let chunks = (0..64u64).into_par_iter().map(|seed| {
         let random = Random::new(seed + if from_inside { 100 } else { 0 });
         (0..rays / 64)
-            .filter(|_| passes_convex(scene, &solid, from_inside, &random))
+            .filter(|_| leaks(scene, &solid, from_inside, &random))
             .count() as u32
     });
     chunks.sum()
 }
 
-fn passes_convex(scene: &Packed, solid: &Solid, from_inside: bool, random: &Random) -> bool {
+/// Traces a random ray and a shadow ray. Returns true if one of them leaks through the convex mesh.
+fn leaks(scene: &Packed, solid: &Solid, from_inside: bool, random: &Random) -> bool {
     let target = solid.target(random);
     let sideways = DVec3::from_array([(); 3].map(|()| random.between(-0.3, 0.3))) * solid.radius;
     let out = target - solid.center;
@@ -198,14 +199,14 @@ fn no_ray_passes_through_a_closed_mesh() {
                 let rays = 12_800;
                 total += rays;
                 assert_eq!(
-                    count_passing(&scene, rays, from_inside),
+                    count_leaks(&scene, rays, from_inside),
                     0,
                     "{name}, {transform:?}, from inside: {from_inside}"
                 );
             }
         }
     }
-    println!("{total} rays at edges and corners, and as many shadow rays: all hit");
+    println!("{total} rays towards edges and vertices, and as many shadow rays: all hit");
     assert!(total > 1_000_000);
 }
 
@@ -216,7 +217,7 @@ fn a_hole_in_a_mesh_is_found() {
         open.triangles.pop();
         for transform in TRANSFORMS {
             let scene = pack_mesh(&open.obj(None, None), transform);
-            let count = count_passing(&scene, 64_000, true);
+            let count = count_leaks(&scene, 64_000, true);
             assert!(count > 0, "{name}, {transform:?}");
         }
     }
@@ -235,11 +236,11 @@ fn standalone_triangles_are_not_watertight() {
     let mut separate = scene(&text, sources::path("scenes").as_path());
     // The mesh provides the targets of the rays.
     (separate.bvh.instances, separate.bvh.meshes) = (mesh.bvh.instances.clone(), mesh.bvh.meshes.clone());
-    let count = [false, true].map(|from_inside| count_passing(&separate, 64_000, from_inside));
+    let count = [false, true].map(|from_inside| count_leaks(&separate, 64_000, from_inside));
     println!("{count:?} of 64000 rays from outside and inside pass standalone triangles");
     assert!(count[0] + count[1] > 0, "{count:?}");
     assert_eq!(
-        [false, true].map(|from_inside| count_passing(&mesh, 64_000, from_inside)),
+        [false, true].map(|from_inside| count_leaks(&mesh, 64_000, from_inside)),
         [0, 0]
     );
 }
@@ -260,7 +261,7 @@ fn no_ray_passes_through_the_knot() {
         );
         assert_eq!((outside.1, inside.1), (0, 0), "{transform:?}");
     }
-    // Control: every 50th triangle is removed.
+    // Negative control: every 50th triangle is removed.
     let mut removed = 0;
     let remaining = knot.lines().filter(|line| {
         removed += u32::from(line.starts_with("f "));
@@ -272,7 +273,7 @@ fn no_ray_passes_through_the_knot() {
     assert!(outside.1 > 10 && inside.1 > 10, "{outside:?} {inside:?}");
 }
 
-/// Returns the number of rays, and of rays that pass through the knot: from outside, and from inside.
+/// Returns the number of rays and the number of those that leak through the knot: from outside, and from inside.
 fn knot_rays(scene: &Packed, solid: &Solid, rays: u32) -> [(u32, u32); 2] {
     let side = f64::from(scene.bvh.instances[0].side);
     let normal = |[a, b, c]: [DVec3; 3]| (b - a).cross(c - a).normalize() * side;

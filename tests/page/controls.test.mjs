@@ -95,7 +95,7 @@ test("a scene that cannot be edited disables saving, shows the reason, and offer
   const isMain = (id) => page.locator(id).evaluate((button) => button.classList.contains("main"));
   assert.deepEqual([await isMain("#copy"), await isMain("#save")], [true, false]);
   assert.ok(await page.locator("#copy").isEnabled());
-  // Control: a TOML scene can be saved.
+  // Positive control: a TOML scene can be saved.
   await studio.stop();
   await studio.start();
   const tomlPage = await open(browser, studio);

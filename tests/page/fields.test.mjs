@@ -333,7 +333,7 @@ test("the sample count of a grid steps from one square number to the next", asyn
   await page.keyboard.press("ArrowDown");
   await page.keyboard.press("ArrowDown");
   await waitForCount(4);
-  // A drag around one position does not alternate between two squares.
+  // A drag around one position does not alternate between two square numbers.
   const sent = await recordChanges(page);
   await page.locator("#pause").focus();
   await field.scrollIntoViewIfNeeded();
@@ -347,7 +347,7 @@ test("the sample count of a grid steps from one square number to the next", asyn
   assert.deepEqual((await sent()).map((text) => JSON.parse(text).set.value), [9]);
   await field.focus();
   await page.keyboard.press("PageUp");
-  await waitForCount(169); // ten squares up
+  await waitForCount(169); // ten square numbers higher
   // A typed count is sent unchanged; its error stays until a valid count is typed.
   const error = page.locator('[data-path="render.pixel_samples.count"] [role=alert]', { hasText: "square" });
   await field.fill("5");

@@ -38,7 +38,7 @@ test("the image equals the image of wgray render", async () => {
   await waitForRender(page, studio);
   assert.equal(await text(page, "#samples"), "4 of 4");
   assert.equal(await page.locator("#badge.live").count(), 1);
-  // Control: the comparison can fail.
+  // Negative control: the images of two scenes differ.
   const oldImage = await decode(page, studio.render());
   studio.edit("scene.toml", "fov = 40", "fov = 42");
   assert.notDeepEqual(await decode(page, studio.render()), oldImage);
@@ -321,7 +321,8 @@ test("pages of other origins are rejected", async () => {
   const page = await context.newPage();
   const response = await page.goto(`http://evil.example:${studio.port}/`);
   assert.equal(response.status(), 403);
-  // A WebSocket from a page of another origin is rejected. Control: a WebSocket from the program's page connects.
+  // A WebSocket from a page of another origin is rejected. Positive control: a WebSocket from the program's page
+  // connects.
   const connects = (url) =>
     new Promise((resolve) => {
       const socket = new WebSocket(url);

@@ -40,7 +40,7 @@ fn direction(cosine: f64, longitude: f64) -> Vec3 {
 }
 
 /// Returns outgoing directions from normal to grazing incidence, at several azimuths.
-fn viewers() -> Vec<Vec3> {
+fn view_directions() -> Vec<Vec3> {
     let mut all = vec![Vec3::Z];
     for cosine in [0.8, 0.4, 0.04] {
         for longitude in [0.0, 0.7, 1.3, TAU / 4.0] {
@@ -154,7 +154,7 @@ fn anisotropic_metal_conserves_energy() {
                 let keys = format!("{kind}, roughness = {roughness}, anisotropy = {anisotropy}");
                 let packed = scene_of(&keys);
                 let material = &packed.materials[0];
-                for wo in viewers() {
+                for wo in view_directions() {
                     for side in [1.0, -1.0].into_iter().take(1 + usize::from(has_inside)) {
                         let found = albedo(&packed, material, wo, side, true);
                         if !((found - 1.0).abs() < tolerance && found < 1.005) {
@@ -170,7 +170,8 @@ fn anisotropic_metal_conserves_energy() {
         "values outside the tolerance: {}: {deviations:#?}",
         deviations.len()
     );
-    // Control: no compensation, as an argument and in the file.
+    // Negative control: without compensation, energy is lost, and the argument and the key of the scene file have the
+    // same effect.
     let packed = scene_of("type = 'conductor', roughness = 0.6, anisotropy = 0.7");
     let loss = 1.0 - albedo(&packed, &packed.materials[0], direction(0.4, 0.7), 1.0, false);
     assert!(loss > 0.1, "{loss}");
@@ -197,7 +198,7 @@ fn textured_anisotropy_nearly_conserves_energy() {
                 if anisotropy_value != "0.45" {
                     material.anisotropy = anisotropy;
                 }
-                for wo in viewers() {
+                for wo in view_directions() {
                     let m = mixture(&packed, &material, wo, 1.0);
                     let found = furnace(m.alpha, None, false, wo, |wi| principled_eval(&m, wo, wi, ALL_LOBES).x);
                     assert!(
@@ -216,7 +217,7 @@ fn anisotropic_principled_metal_conserves_energy() {
         for anisotropy in [0.3, 0.7, 1.0] {
             let keys = format!("type = 'principled', roughness = {roughness}, anisotropy = {anisotropy}");
             let packed = scene_of(&keys);
-            for wo in viewers() {
+            for wo in view_directions() {
                 let m = mixture(&packed, &packed.materials[0], wo, 1.0);
                 let found = furnace(m.alpha, None, false, wo, |wi| principled_eval(&m, wo, wi, ALL_LOBES).x);
                 assert!((found - 1.0).abs() < 0.01 && found < 1.005, "{keys}, {wo}: {found}");
@@ -275,7 +276,7 @@ fn fully_transmissive_principled_equals_dielectric() {
             }
         }
     }
-    // Control: without the albedo table.
+    // Negative control: with albedos of 1 instead of the table, energy is lost.
     let keys = "type = 'principled', metallic = 0, transmission = 1, thickness = 1, roughness = 1";
     let material = scene_of(keys).materials[0];
     let wo = direction(0.3, 0.0);
@@ -295,7 +296,7 @@ fn mixed_principled_glass_conserves_energy() {
                  anisotropy = {anisotropy}"
             );
             let packed = scene_of(&keys);
-            for (wo, side) in viewers().into_iter().flat_map(|wo| [(wo, 1.0), (wo, -1.0)]) {
+            for (wo, side) in view_directions().into_iter().flat_map(|wo| [(wo, 1.0), (wo, -1.0)]) {
                 let m = mixture(&packed, &packed.materials[0], wo, side);
                 let specular = furnace(m.alpha, Some(f64::from(1.0 / m.eta)), false, wo, |wi| {
                     (principled_eval(&m, wo, wi, ALL_LOBES) - m.diffuse * (wi.z.max(0.0) / std::f32::consts::PI)).x
@@ -325,7 +326,7 @@ fn matched_indices_do_not_reflect() {
             };
             let matched = reflected(1.0);
             assert!(matched.abs() < 1e-3, "{}, {wo}: {matched}", keys(1.0));
-            // Control: the default index reflects.
+            // Negative control: the default index reflects light.
             assert!(reflected(1.5) > 0.03, "{wo}");
         }
     }
@@ -367,12 +368,12 @@ fn glass_around_the_camera_absorbs_over_the_full_path() {
         let packed = scene(&between);
         for mode in both() {
             let found = super::mean(&render(&packed, mode))[1];
-            // 1 of 25 paths is reflected.
+            // The tolerance covers the noise: 1 of 25 paths is reflected.
             assert!(
                 (found / expected - 1.0).abs() < 2e-3,
                 "{mode:?}, {between}: {found}, expected {expected}"
             );
-            // Control: only absorption behind the first surface.
+            // Negative control: absorption only behind the first surface gives another value.
             let partial = (1.0 - 0.04) * (-a * 0.7).exp() * 1.5 * 1.5;
             assert!(
                 (found / partial - 1.0).abs() > 0.1,

@@ -141,7 +141,7 @@ fn irradiance_matches_a_sum_over_all_directions() {
     for (image, points) in &images {
         for (rotation, normal) in [
             ("", DVec3::Z),
-            // The rotation of the map rotates the normal by the inverse.
+            // To rotate the map is to rotate the normal by the inverse rotation.
             ("\nrotate = { axis = [0, 1, 0], degrees = -50 }", tilted),
             ("\nrotate = [0, 90, 0]", DVec3::NEG_X),
         ] {
@@ -161,7 +161,7 @@ fn irradiance_matches_a_sum_over_all_directions() {
             }
         }
     }
-    // Control: the unrotated normal.
+    // Negative control: the unrotated normal gives another irradiance.
     let wrong = irradiance(&sunny(), 8, DVec3::Z) / irradiance(&sunny(), 8, tilted);
     assert!((wrong - DVec3::ONE).abs().min_element() > 0.05, "{wrong}");
 }
@@ -300,7 +300,10 @@ fn light_and_bsdf_sampling_of_the_map_agree() {
                 near(bsdf[i]),
                 "BSDF sampling alone differs: {bsdf:?}, expected {both:?}"
             );
-            assert!(!near(wrong[i]), "a wrong weight passes: {wrong:?}, expected {both:?}");
+            assert!(
+                !near(wrong[i]),
+                "a wrong weight is accepted: {wrong:?}, expected {both:?}"
+            );
         }
     }
 }
@@ -315,7 +318,7 @@ fn the_light_of_map_and_lights_adds_up() {
     let dark = EMITTERS.replace(", emission = [5, 3, 1]", "");
     for mode in both() {
         let sum = |packed: Packed| mean(&render(&packed, mode));
-        // The rectangle of the area light occludes in all three scenes.
+        // The rectangle of the area light occludes the other lights. It is black in the scene with the map alone.
         let rectangle = lights.split("[[lights]]").last().unwrap_or_default();
         let black_rectangle = format!(
             "[[lights]]{}",
@@ -502,10 +505,10 @@ fn sampled_directions_follow_their_pdf() {
                 let azimuth = PI - TAU * (f64::from(column) + 0.5) / f64::from(2 * fine);
                 let direction = DVec3::new(sine * azimuth.cos(), sine * azimuth.sin(), cosine).as_vec3();
                 let pdf = f64::from(environment_eval(&packed, direction, normal).pdf);
-                let share = pdf * sine * PI / f64::from(fine) * TAU / f64::from(2 * fine) * f64::from(COUNT);
+                let cell_count = pdf * sine * PI / f64::from(fine) * TAU / f64::from(2 * fine) * f64::from(COUNT);
                 let index = bin(direction);
-                expected[0][index] += share;
-                expected[1][index] += share * if direction.x > 0.0 { 1.08 } else { 0.92 };
+                expected[0][index] += cell_count;
+                expected[1][index] += cell_count * if direction.x > 0.0 { 1.08 } else { 0.92 };
             }
         }
         let size = (image.width, image.height, normal);
@@ -533,7 +536,7 @@ fn sampled_directions_follow_their_pdf() {
         let (wrong, _) = statistic(&expected[1]);
         assert!(
             wrong > max_sum,
-            "{size:?}: a wrong PDF passes: {wrong} of {degrees_of_freedom}"
+            "{size:?}: a wrong PDF is accepted: {wrong} of {degrees_of_freedom}"
         );
     }
 }
@@ -571,7 +574,7 @@ fn an_unoccluded_wall_has_little_noise() {
         let found = noise(normal, (64, "sobol"));
         assert!(found < 0.035, "{normal:?}: {found}");
     }
-    // Controls: unstratified samples, and few samples.
+    // Negative controls: unstratified samples, and few samples.
     assert!(noise([0.0, -1.0, 0.0], (64, "random")) > 0.035);
     assert!(noise([0.0, -1.0, 0.0], (4, "sobol")) > 0.035);
 }

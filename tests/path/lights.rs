@@ -36,12 +36,12 @@ fn selection_is_by_power_and_one_quarter_uniform() {
     let total = f64::from(16 * 17 / 2);
     let chi_square: f64 = (packed.lighting.lights.iter().zip(&counts))
         .map(|(light, count)| {
-            let share = 0.75 * f64::from(light.color.x) / total + 0.25 / 16.0;
+            let probability = 0.75 * f64::from(light.color.x) / total + 0.25 / 16.0;
             assert!(
-                (f64::from(light.density) - share).abs() < 1e-6,
-                "the PDF is not the documented share of the power"
+                (f64::from(light.density) - probability).abs() < 1e-6,
+                "the PDF is not the documented probability"
             );
-            let expected = share * f64::from(calls);
+            let expected = probability * f64::from(calls);
             (count - expected) * (count - expected) / expected
         })
         .sum();

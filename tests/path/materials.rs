@@ -187,7 +187,7 @@ fn direction(cosine: f64, longitude: f64) -> Vec3 {
 }
 
 /// Returns outgoing directions from normal to grazing incidence.
-fn viewers() -> Vec<Vec3> {
+fn view_directions() -> Vec<Vec3> {
     [1.0, 0.9, 0.5, 0.1, 0.01].map(|cosine| direction(cosine, 0.7)).to_vec()
 }
 
@@ -216,7 +216,7 @@ fn integral(wo: Vec3, mut f: impl FnMut(Vec3) -> f64) -> f64 {
 #[test]
 fn no_bsdf_gains_energy_in_a_white_furnace() {
     for lobes in all() {
-        for wo in viewers() {
+        for wo in view_directions() {
             let albedo = lobes.albedo(wo);
             let name = &lobes.name;
             if lobes.conserves_energy {
@@ -228,13 +228,13 @@ fn no_bsdf_gains_energy_in_a_white_furnace() {
             }
         }
     }
-    // Control: no compensation.
+    // Negative control: without compensation, energy is lost.
     let single_scattering = Material {
         diffuse: Vec3::splat(1e-3),
         roughness: 1.0,
         ..Material::zeroed()
     };
-    let wo = viewers()[1];
+    let wo = view_directions()[1];
     let loss = 1.0
         - integral(wo, |wi| {
             f64::from(rough_diffuse_eval(&single_scattering, angles_at(Vec3::Z, wo, wi)).x)
@@ -249,7 +249,7 @@ fn reflection_is_reciprocal() {
         .into_iter()
         .filter(|lobes| !(lobes.conserves_energy && lobes.has_facets()))
     {
-        for wo in viewers() {
+        for wo in view_directions() {
             for wi in [direction(0.8, 0.1), direction(0.3, 3.9), direction(0.02, 2.0)] {
                 let forward = lobes.eval(wo, wi) / wi.z;
                 let backward = lobes.eval(wi, wo) / wo.z;
@@ -276,7 +276,7 @@ fn refraction_is_reciprocal_up_to_the_squared_index() {
         };
         let flipped = |v: Vec3| Vec3::new(v.x, v.y, -v.z);
         let mut compared = 0;
-        for wo in viewers() {
+        for wo in view_directions() {
             for wi in [direction(0.9, 3.6), direction(0.5, 4.0), direction(0.3, 2.0)].map(flipped) {
                 let forward = rough_dielectric_eval(&lobes.material, wo, wi).x / -wi.z;
                 let backward = rough_dielectric_eval(&inverse, flipped(wi), flipped(wo)).x / wo.z;
@@ -296,7 +296,7 @@ fn refraction_is_reciprocal_up_to_the_squared_index() {
 #[test]
 fn pdfs_integrate_to_one() {
     for lobes in all() {
-        for wo in viewers() {
+        for wo in view_directions() {
             let total = integral(wo, |wi| f64::from(lobes.pdf(wo, wi)));
             // For microfacets, the PDF integrates to the fraction of valid samples.
             let count = 65_536;
@@ -388,7 +388,7 @@ fn sampled_directions_follow_their_pdf() {
             });
             assert!(
                 wrong > max_sum,
-                "{}: a wrong PDF passes: {wrong} of {degrees_of_freedom}",
+                "{}: a wrong PDF is accepted: {wrong} of {degrees_of_freedom}",
                 lobes.name
             );
         }
@@ -399,7 +399,7 @@ fn sampled_directions_follow_their_pdf() {
 fn mean_sample_weights_equal_the_albedo() {
     // The mean of eval / pdf equals the albedo by quadrature.
     for lobes in all() {
-        for wo in viewers() {
+        for wo in view_directions() {
             let expected = lobes.albedo(wo);
             let count = 65_536;
             let mut sum = 0.0;

@@ -35,7 +35,8 @@ fn direction(cosine: f64, longitude: f64) -> Vec3 {
     DVec3::new(sine * longitude.cos(), sine * longitude.sin(), cosine).as_vec3()
 }
 
-fn viewers() -> [Vec3; 5] {
+/// Returns outgoing directions from normal to grazing incidence.
+fn view_directions() -> [Vec3; 5] {
     [1.0, 0.9, 0.5, 0.15, 0.02].map(|cosine| direction(cosine, 0.7))
 }
 
@@ -128,7 +129,7 @@ fn integral(wo: Vec3, eta: f32, f: impl Fn(Vec3) -> f64) -> f64 {
 fn principled_lobes_gain_no_energy_in_a_white_furnace() {
     for (name, material) in grid() {
         // Transmitted radiance is not scaled by the squared index.
-        for wo in viewers() {
+        for wo in view_directions() {
             let m = mixture(&material, wo);
             let scale = |wi: Vec3| {
                 if wi.z < 0.0 {
@@ -147,7 +148,7 @@ fn principled_lobes_gain_no_energy_in_a_white_furnace() {
             }
         }
     }
-    // Control: no compensation.
+    // Negative control: without compensation, energy is lost.
     let metal = Material {
         metallic: 1.0,
         roughness: 1.0,
@@ -186,7 +187,7 @@ fn pdfs_integrate_to_the_fraction_of_valid_samples() {
 #[test]
 fn mean_sample_weights_equal_the_principled_albedo() {
     for (name, material) in grid() {
-        for wo in viewers() {
+        for wo in view_directions() {
             let m = mixture(&material, wo);
             let expected = integral(wo, m.eta, |wi| f64::from(principled_eval(&m, wo, wi, ALL_LOBES).y));
             let count = 65_536;
@@ -253,7 +254,7 @@ fn chi_square(m: &PrincipledLobes, wo: Vec3, pdf: impl Fn(Vec3) -> f64) -> (f64,
 
 #[test]
 fn sampled_directions_follow_their_pdf() {
-    // Only lobes that are wide compared with the cells.
+    // The test uses only lobes that are wide compared with the cells.
     for (name, material) in grid().into_iter().filter(|(_, material)| material.roughness >= 0.4) {
         for wo in [direction(0.9, 0.4), direction(0.4, 2.5)] {
             let m = mixture(&material, wo);
@@ -268,7 +269,7 @@ fn sampled_directions_follow_their_pdf() {
             });
             assert!(
                 wrong > max_sum,
-                "{name}: a wrong PDF passes: {wrong} of {degrees_of_freedom}"
+                "{name}: a wrong PDF is accepted: {wrong} of {degrees_of_freedom}"
             );
         }
     }
@@ -276,9 +277,9 @@ fn sampled_directions_follow_their_pdf() {
 
 #[test]
 fn each_layer_equals_its_standalone_bsdf() {
-    for wo in viewers() {
+    for wo in view_directions() {
         for wi in [direction(0.9, 1.0), direction(0.4, 3.0), direction(0.05, 5.0)] {
-            // Without metal and specular reflection: bit-identical to `diffuse`.
+            // Without metal and specular reflection, the material is bit-identical to `diffuse`.
             let color = Vec3::new(0.8, 0.4, 0.1);
             let matte = Material {
                 diffuse: color,
@@ -292,8 +293,8 @@ fn each_layer_equals_its_standalone_bsdf() {
             };
             let found = principled_eval(&mixture(&matte, wo), wo, wi, ALL_LOBES);
             assert_eq!(found, diffuse_eval(&diffuse, angles_at(Vec3::Z, wo, wi)));
-            // Metal: uncompensated GGX with Schlick's approximation, in f64 by other formulas (Walter et al. 2007, with
-            // tangents).
+            // Metal equals uncompensated GGX with Schlick's approximation, computed in f64 by other formulas (Walter et
+            // al. 2007, with tangents).
             for roughness in [0.3, 0.6, 1.0] {
                 let metal = Material {
                     metallic: 1.0,
@@ -436,7 +437,7 @@ fn values_come_from_the_channels_of_a_texture() {
     let expected = crate::pictures::reference(&plain);
     for kind in ["constant", "checker"] {
         let packed = picture_of(textured, texture(kind));
-        // One lookup for all four values; none if constant.
+        // Texture lookups: one for all four values of a texture, none for a constant.
         assert_eq!(packed.textures.lookups.len(), usize::from(kind == "checker"));
         for mode in crate::pictures::exact_modes() {
             assert_eq!(
@@ -446,7 +447,7 @@ fn values_come_from_the_channels_of_a_texture() {
             );
         }
     }
-    // Control: another channel.
+    // Negative control: another channel gives another image.
     let wrong_channel = picture_of(&textured.replace("'b'", "'g'"), texture("checker"));
     assert!(crate::pictures::differing(&crate::pictures::reference(&wrong_channel), &expected) > 20);
 }

@@ -68,7 +68,7 @@ fn a_spot_light_matches_the_documented_formula() {
             assert!(error < 4e-3, "{mode:?}, {integrator}, {cone}, {inner}: {error}");
             assert!(
                 wider_error > error,
-                "{mode:?}: a cone that is wider by 2 degrees passes: {wider_error}"
+                "{mode:?}: a cone that is wider by 2 degrees is accepted: {wider_error}"
             );
         }
     }

@@ -97,7 +97,7 @@ fn light_and_bsdf_sampling_agree() {
          [[lights]]\ntype = 'rectangle'\ncenter = [0, 0.2, 1.3]\nsize = [1, 0.5]\nnormal = [0, 0, -1]\ntangent = [1, 0, 0]\ncolor = [2, 3, 4]\n",
     ];
     let many = many_lights();
-    // The last shape and the many lights get all materials, each other shape one.
+    // The last shape and the many lights are tested with all materials, the other shapes with one material each.
     let (single_material_count, many_lights_index) = (shapes.len() - 1, shapes.len());
     let shapes = shapes.into_iter().chain([many.as_str()]);
     for (i, shape) in shapes.enumerate() {
@@ -143,7 +143,7 @@ fn light_and_bsdf_sampling_agree() {
                 );
                 assert!(
                     !near(wrong[i], 1e-2),
-                    "a wrong weight passes: {wrong:?}, expected {both:?}\n{shape}{material}"
+                    "a wrong weight is accepted: {wrong:?}, expected {both:?}\n{shape}{material}"
                 );
             }
         }

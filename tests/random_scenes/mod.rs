@@ -13,7 +13,7 @@ use wgray::scene::{Description, Scene};
 use wgray_render::gpu::compose::Shaders;
 
 use crate::adapter::{self, bit_exact};
-use crate::nearly::Nearly;
+use crate::nearly::FilmDifference;
 use crate::pictures::{RenderMode, differing, first_hits, reference, render_with};
 use crate::{patterns, rounding, sources};
 
@@ -124,7 +124,11 @@ fn random_scenes_are_within_tolerance_without_guaranteed_bits() {
     let Some(device) = adapter::device() else { return };
     let mut runner = TestRunner::new_with_rng(Config::default(), TestRng::deterministic_rng(RngAlgorithm::ChaCha));
     let strategy = any_scene::direct_light_description();
-    let (mut plain, mut imprecise, mut shifted) = (Nearly::default(), Nearly::default(), Nearly::default());
+    let (mut plain, mut imprecise, mut shifted) = (
+        FilmDifference::default(),
+        FilmDifference::default(),
+        FilmDifference::default(),
+    );
     // Three placements of each scene share its kernels.
     let placements = [
         (1.0, DVec3::ZERO),
@@ -144,12 +148,12 @@ fn random_scenes_are_within_tolerance_without_guaranteed_bits() {
         let cpu = reference(&packed);
         let with_plain_wgsl = render_with(&packed, RenderMode::Plain, sources::shaders());
         if bit_exact(device) {
-            plain.add(Nearly::by_plain_wgsl(&with_plain_wgsl, &cpu));
+            plain.add(FilmDifference::strict(&with_plain_wgsl, &cpu));
             let found = render_with(&packed, RenderMode::Rounded, rounding::imprecise_shaders());
-            imprecise.add(Nearly::of(&packed, &found, &cpu));
+            imprecise.add(FilmDifference::loose(&packed, &found, &cpu));
         } else {
-            plain.add(Nearly::of(&packed, &with_plain_wgsl, &cpu));
-            imprecise.add(Nearly::of(
+            plain.add(FilmDifference::loose(&packed, &with_plain_wgsl, &cpu));
+            imprecise.add(FilmDifference::loose(
                 &packed,
                 &render_with(&packed, RenderMode::Buffers, sources::shaders()),
                 &cpu,
@@ -157,7 +161,7 @@ fn random_scenes_are_within_tolerance_without_guaranteed_bits() {
         }
         let mut moved = cpu.clone();
         moved.sums.rotate_right(1);
-        shifted.add(Nearly::of(&packed, &moved, &cpu));
+        shifted.add(FilmDifference::loose(&packed, &moved, &cpu));
     }
     println!("random scenes: with plain WGSL {plain}; with imprecise quotients {imprecise}");
     assert!(plain.judge().is_ok(), "plain WGSL: {}", plain.judge().unwrap_err());

@@ -64,7 +64,7 @@ fn adaptive_images_do_not_depend_on_backend_or_work_split() {
             }
         }
     }
-    // Controls: another error, and another seed.
+    // Negative controls: another error, and another seed.
     let [a, b] = [0.02, 0.021].map(|error| reference(&adaptive(Pattern::Sobol, error, 90)));
     assert!(differing(&a, &b) > 0);
     let mut packed = adaptive(Pattern::Sobol, 0.02, 90);
@@ -310,12 +310,12 @@ fn weighted_moments_of_a_constant_are_zero() {
 fn the_estimate_is_an_upper_bound_on_average() {
     let packed = adaptive(Pattern::Sobol, 0.02, 1024);
     let film = reference(&packed);
-    let truth = reference(&cornell(Pattern::Sobol, 2048, |description| {
+    let converged = reference(&cornell(Pattern::Sobol, 2048, |description| {
         description.render.seed = 9
     }));
     let displayed = |v: f32| f64::from(v.clamp(0.0, 1.0)).powf(1.0 / 2.2);
     let mut squares = 0.0;
-    for (a, b) in film.means().zip(truth.means()) {
+    for (a, b) in film.means().zip(converged.means()) {
         squares += (0..3).map(|c| (displayed(a[c]) - displayed(b[c])).powi(2)).sum::<f64>();
     }
     let error = (squares / 3.0 / film.sums.len() as f64).sqrt();

@@ -100,7 +100,7 @@ fn tables_have_the_moments_of_their_filters() {
                     (found - expected).abs() < 3e-3 * radius.powi(power),
                     "{kind:?} of radius {radius}, moment {power}: {found}, expected {expected}"
                 );
-                // Control: another filter.
+                // Negative control: another filter has other moments.
                 for other in KINDS.into_iter().filter(|other| *other != kind) {
                     let expected = moment(other, power) / moment(other, 0) * radius.powi(power);
                     assert!(
@@ -182,7 +182,7 @@ fn images_of_every_filter_are_the_same_on_cpu_and_gpu() {
         }
         films.push(expected);
     }
-    // Control: other filters.
+    // Negative control: the filters give different images.
     for (i, film) in films.iter().enumerate() {
         assert!(films[..i].iter().all(|other| differing(film, other) > 100));
     }

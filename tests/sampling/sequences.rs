@@ -116,7 +116,7 @@ fn scrambled_sobol_points_are_nets() {
             }
         }
     }
-    // Controls: other patterns, an unaligned run, a moved point.
+    // Negative controls: other patterns, an unaligned run, a moved point.
     for key in keys(5) {
         for pattern in [RANDOM, HALTON] {
             let points: Vec<Vec2> = (0..64).map(|i| sample_square(pattern, 64, i, 0, key)).collect();
@@ -186,8 +186,8 @@ fn aligned_runs_of_halton_points_have_one_in_each_interval() {
     assert!(largest * 6.969_171_6e-8 < 1.0);
 }
 
-/// Returns the star discrepancy, max |fraction of points in [0, a) x [0, b) - a b|, over open and closed boxes that end
-/// at points.
+/// Returns the star discrepancy: the maximum of |fraction of points in the box - a b| over the boxes [0, a) x [0, b)
+/// and [0, a] x [0, b], where a and b are coordinates of points or 1.
 fn star_discrepancy(points: &[Vec2]) -> f64 {
     let n = points.len() as f64;
     let mut by_x: Vec<Vec2> = points.to_vec();
@@ -311,11 +311,11 @@ fn samples_of_pixels_and_lights_are_independent() {
             assert!(found < 6.0, "pattern {pattern}, pairs {pair}: {found}");
         }
     }
-    // Control: the same order with different scrambles.
-    let in_one_order = |purpose| {
+    // Negative control: two scrambles of the same sequence in the same order are dependent.
+    let same_order_points = |purpose| {
         let key = sample_key(UVec2::ZERO, 1, purpose);
         move |i: u32| i.reverse_bits().wrapping_add(key.x) as f32 / 4_294_967_296.0 * 0.999_999
     };
-    let (a, b) = (in_one_order(0), in_one_order(1));
+    let (a, b) = (same_order_points(0), same_order_points(1));
     assert!(dependence((0..4096).map(|i| (a(i), b(i)))) > 100.0);
 }

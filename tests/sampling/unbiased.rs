@@ -173,7 +173,7 @@ fn dots_and_lines_keep_their_brightness() {
         ),
         ("lines", brightness_of_lines, Box::new(lines)),
     ];
-    for (name, truth, make) in &cases {
+    for (name, expected, make) in &cases {
         for (round, error) in SETTINGS {
             let sampling = Sampling {
                 round,
@@ -182,12 +182,12 @@ fn dots_and_lines_keep_their_brightness() {
             let films: Vec<Film> = (0..24).map(|seed| seeded(make(sampling), seed)).collect();
             let (found, deviation) = estimate(&films.iter().map(brightness).collect::<Vec<_>>());
             assert!(
-                (found - truth).abs() < 0.003 * truth + 3.0 * deviation,
-                "{name}, {sampling:?}: {found} +- {deviation}, expected {truth}"
+                (found - expected).abs() < 0.003 * expected + 3.0 * deviation,
+                "{name}, {sampling:?}: {found} +- {deviation}, expected {expected}"
             );
         }
     }
-    // Control: a pixel stops after 16 black samples.
+    // Negative control: stopping at pixels whose first 16 samples are black darkens the image.
     let (few, many) = (dots(2, uniform(16)), dots(2, uniform(256)));
     let estimates = (0..24).map(|seed| {
         let (few, many) = (seeded(few.clone(), seed), seeded(many.clone(), seed));
@@ -199,8 +199,8 @@ fn dots_and_lines_keep_their_brightness() {
         kept_sums.map(|sum| f64::from(mean(*sum)[0])).sum::<f64>() / few.sums.len() as f64
     });
     let (found, deviation) = estimate(&estimates.collect::<Vec<_>>());
-    let truth = brightness_of_dots(2);
-    assert!(found + 3.0 * deviation < 0.8 * truth, "{found} +- {deviation}");
+    let expected = brightness_of_dots(2);
+    assert!(found + 3.0 * deviation < 0.8 * expected, "{found} +- {deviation}");
 }
 
 fn uniform(round: u32) -> Sampling {
@@ -208,11 +208,11 @@ fn uniform(round: u32) -> Sampling {
 }
 
 /// Returns the RMS error of uniform sampling, interpolated between powers of two with a power law.
-fn error_of_uniform(make: &dyn Fn(Sampling) -> Packed, truth: &[f64], seeds: u32, samples: f64) -> f64 {
+fn error_of_uniform(make: &dyn Fn(Sampling) -> Packed, converged: &[f64], seeds: u32, samples: f64) -> f64 {
     let lower = samples.log2().floor().min(8.0);
     let mean_square_error = |count: f64| {
         let packed = make(uniform(count.exp2() as u32));
-        let error_of_seed = |seed| mean_square(&displayed(&seeded(packed.clone(), seed)), truth);
+        let error_of_seed = |seed| mean_square(&displayed(&seeded(packed.clone(), seed)), converged);
         (0..seeds).map(error_of_seed).sum::<f64>() / f64::from(seeds)
     };
     let (a, b) = (mean_square_error(lower), mean_square_error(lower + 1.0));
@@ -231,18 +231,18 @@ fn adaptive_errors_do_not_exceed_errors_of_uniform_sampling() {
         ("shadow", Box::new(shadow)),
     ];
     for (name, make) in &cases {
-        let truth = displayed(&seeded(make(uniform(4096)), 99));
+        let converged = displayed(&seeded(make(uniform(4096)), 99));
         for (round, error) in SETTINGS {
             let sampling = Sampling {
                 round,
                 error: Some(error),
             };
             let films: Vec<Film> = (0..seeds).map(|seed| seeded(make(sampling), seed)).collect();
-            let square: f64 = films.iter().map(|film| mean_square(&displayed(film), &truth)).sum();
+            let square: f64 = films.iter().map(|film| mean_square(&displayed(film), &converged)).sum();
             let found = (square / f64::from(seeds)).sqrt();
             let counts: Vec<u32> = films.iter().flat_map(Film::sample_counts).collect();
             let samples = counts.iter().map(|n| f64::from(*n)).sum::<f64>() / counts.len() as f64;
-            let expected = error_of_uniform(make, &truth, seeds, samples);
+            let expected = error_of_uniform(make, &converged, seeds, samples);
             println!(
                 "{name}, {sampling:?}: {samples:.1} samples, {found:.4} against {expected:.4}: {:.2}",
                 found / expected

@@ -262,7 +262,7 @@ fn texture_differentials_on_an_ellipsoid_match_adjacent_rays() {
     assert!(compared > 500, "{compared}");
 }
 
-/// Control: without the derivative of the normal, the error is large.
+/// Negative control: without the derivative of the normal, the error is large.
 #[test]
 fn a_curved_mirror_needs_its_curvature() {
     let scene = ellipsoid_over_plane(PERSPECTIVE, &ellipsoid("mirror"));

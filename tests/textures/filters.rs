@@ -73,7 +73,7 @@ fn a_constant_image_is_constant_under_every_filter_and_footprint() {
                 for (uv, dx, dy) in footprints() {
                     let found = color(&scene, uv, dx, dy);
                     if file == "spot.png" {
-                        changed += u32::from(found != expected); // control: a single texel is visible
+                        changed += u32::from(found != expected); // negative control: a single texel is visible
                     } else {
                         assert_eq!(found, expected, "{keys}\n{uv} {dx} {dy}");
                     }
@@ -119,7 +119,7 @@ fn cached_weights_equal_the_reference_weights() {
         }
         different += u32::from((1..colors.len()).all(|i| colors[i] != colors[0]));
     }
-    assert!(different > 100, "{different}"); // control: the lookups differ
+    assert!(different > 100, "{different}"); // negative control: the lookups differ
 }
 
 #[test]
@@ -327,7 +327,7 @@ fn finest_ewa(texels: &[f64], p: DVec2, dx: DVec2, dy: DVec2) -> f64 {
     sum / total
 }
 
-/// The documented bound is 1.4 times the error of EWA over the finest level, at any aspect and angle. Control:
+/// The documented bound is 1.4 times the error of EWA over the finest level, at any aspect and angle. Negative control:
 /// trilinear filtering is nearly always worse.
 #[test]
 fn ewa_over_the_pyramid_nearly_equals_ewa_over_the_finest_level() {

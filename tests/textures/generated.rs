@@ -59,5 +59,5 @@ fn the_texture_files_match_the_generator() {
     found.sort();
     names.sort();
     assert_eq!(found, names);
-    assert_ne!(grid(0, 0), grid(8, 8)); // control: the generator is not constant
+    assert_ne!(grid(0, 0), grid(8, 8)); // negative control: the generator is not constant
 }

@@ -13,12 +13,12 @@ use super::filters::textured;
 use crate::random::Random;
 
 fn pattern_value(kind: u32, width: f64, u: f64, v: f64) -> f64 {
-    let share = if kind == CHECKER {
+    let is_odd_or_line = if kind == CHECKER {
         (u.floor() + v.floor()).rem_euclid(2.0) == 1.0
     } else {
         [u, v].iter().any(|x| (x - x.round()).abs() < width / 2.0)
     };
-    f64::from(u8::from(share))
+    f64::from(u8::from(is_odd_or_line))
 }
 
 /// Returns the mean over the parallelogram, at n x n points.
@@ -166,12 +166,12 @@ fn slanted_checkers_have_their_contrast() {
                 dx: edge(1.0),
                 dy: edge(3.0),
             };
-            let (share, expected) = (
+            let (mean, expected) = (
                 f64::from(procedural_share(CHECKER, 0.0, f)),
                 exact_mean(CHECKER, 0.0, f),
             );
             (low, high) = (expected.min(low), expected.max(high));
-            assert!((share - expected).abs() < 1e-5, "{size} {}: {share} {expected}", f.uv);
+            assert!((mean - expected).abs() < 1e-5, "{size} {}: {mean} {expected}", f.uv);
         }
         assert!(high - low > 0.1, "{size}: {low} to {high}");
     }
@@ -209,17 +209,17 @@ fn footprints_without_an_area_give_values_from_0_to_1() {
                     (edge * a, edge.perp() * b),
                     (edge * a, Vec2::new(b, a)),
                 ] {
-                    let share = procedural_share(kind, 0.2, Footprint { uv, dx, dy });
-                    assert!((0.0..=1.0).contains(&share), "{kind} {uv} {dx} {dy}: {share}");
+                    let mean = procedural_share(kind, 0.2, Footprint { uv, dx, dy });
+                    assert!((0.0..=1.0).contains(&mean), "{kind} {uv} {dx} {dy}: {mean}");
                 }
             }
         }
     }
     // Segments from 0.7 to 1.6, along an axis and the diagonal.
-    let share_along =
+    let segment_mean =
         |uv: Vec2, dx: Vec2| f64::from(procedural_share(CHECKER, 0.0, Footprint { uv, dx, dy: Vec2::ZERO }));
-    assert!((share_along(Vec2::new(1.15, 0.55), Vec2::new(0.9, 0.0)) - 0.6 / 0.9).abs() < 2e-3);
-    assert!((share_along(Vec2::new(1.15, 0.65), Vec2::splat(0.9)) - 0.5 / 0.9).abs() < 5e-3);
+    assert!((segment_mean(Vec2::new(1.15, 0.55), Vec2::new(0.9, 0.0)) - 0.6 / 0.9).abs() < 2e-3);
+    assert!((segment_mean(Vec2::new(1.15, 0.65), Vec2::splat(0.9)) - 0.5 / 0.9).abs() < 5e-3);
 }
 
 #[test]
@@ -252,7 +252,7 @@ fn without_a_footprint_the_pattern_is_point_sampled() {
     for i in 0..1000 {
         let kind = [CHECKER, LINES][i % 2];
         let uv = Vec2::new(numbers.between(-9.0, 9.0) as f32, numbers.between(-9.0, 9.0) as f32);
-        let share = procedural_share(
+        let mean = procedural_share(
             kind,
             0.25,
             Footprint {
@@ -262,7 +262,7 @@ fn without_a_footprint_the_pattern_is_point_sampled() {
             },
         );
         assert_eq!(
-            f64::from(share),
+            f64::from(mean),
             pattern_value(kind, 0.25, f64::from(uv.x), f64::from(uv.y)),
             "{uv}"
         );

@@ -280,7 +280,7 @@ fn branches_chosen_at_random_have_the_expected_mean() {
     let plate = (1.0 - r) / (1.0 + r); // after any number of internal reflections
     let found = f64::from(cpu_picture(&scene(&text(64), Path::new(".")))[0][0]);
     assert!((found - plate).abs() < 4e-3, "{found} {plate}");
-    // Control: 3 bounces are too few.
+    // Negative control: 3 bounces are too few.
     let truncated = f64::from(cpu_picture(&scene(&text(3), Path::new(".")))[0][0]);
     assert!(plate - truncated > 0.03, "{truncated}");
 }

@@ -26,7 +26,7 @@ pub struct Request {
     pub fallback: Option<Arc<Shaders>>,
     pub constants: Constants,
     /// The time when the change was noticed.
-    pub noticed: Instant,
+    pub noticed_at: Instant,
 }
 
 /// The renderer of a scene on a device, and the shaders that it uses.
@@ -35,7 +35,7 @@ pub type Ready = (Box<Gpu>, Arc<Shaders>);
 pub struct BuildResult {
     pub id: u64,
     pub constants: Constants,
-    pub noticed: Instant,
+    pub noticed_at: Instant,
     /// `None` if the shaders have errors and no fallback exists.
     pub result: Option<Result<Ready, RenderError>>,
     pub shader_errors: Option<ShaderErrors>,
@@ -100,7 +100,7 @@ fn build(choice: &AdapterChoice, times: &Times, request: Request) -> BuildResult
         shaders,
         fallback,
         constants,
-        noticed,
+        noticed_at,
     } = request;
     let start = Instant::now();
     // Checks the kernels of all views.
@@ -132,7 +132,7 @@ fn build(choice: &AdapterChoice, times: &Times, request: Request) -> BuildResult
     BuildResult {
         id,
         constants,
-        noticed,
+        noticed_at,
         result,
         shader_errors,
         duration: start.elapsed(),

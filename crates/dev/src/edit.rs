@@ -50,7 +50,7 @@ pub fn edited_in(pieces: &Pieces, path: &KeyPath, value: Option<&Value>) -> Resu
 pub struct Layout<'a>(Document<&'a str>);
 
 impl<'a> Layout<'a> {
-    /// Parses a text; returns `None` if the text is not TOML.
+    /// Parses a source; returns `None` if it is not TOML.
     pub fn of(text: &'a str) -> Option<Layout<'a>> {
         Document::parse(text).ok().map(Layout)
     }

@@ -72,7 +72,7 @@ impl FilmLayer {
     fn color_bytes(&self, value: [f32; 3], display: &DisplaySettings) -> [u8; 3] {
         match self.aov {
             Aov::Variance => display.error_color(standard_error(value)),
-            Aov::Albedo => display.view.display_share(value).map(to_8_bits),
+            Aov::Albedo => display.view.display_reflectance(value).map(to_8_bits),
             _ => display.color_bytes(value),
         }
     }

@@ -82,7 +82,7 @@ impl History {
         !(done.is_empty() && undone.is_empty())
     }
 
-    /// Returns the last change, or the last change that was undone.
+    /// Returns the step that an undo reverts, or, with `redo`, the step that a redo repeats.
     pub fn last(&self, redo: bool) -> Option<&Step> {
         if redo { self.undone.last() } else { self.done.last() }
     }

@@ -38,7 +38,7 @@ pub enum Report {
     /// A note about the scene.
     Note(String),
     /// The image is too large to display at full size: the full size, and the displayed size.
-    Smaller([u32; 2], [u32; 2]),
+    ReducedImage([u32; 2], [u32; 2]),
     /// The camera or a value was saved to the scene file, or could not be saved.
     Saved(String, Result<(), String>),
     /// A change of the scene file was undone or redone, or the undo or redo failed.

@@ -67,10 +67,10 @@ pub struct Group {
     pub fields: Vec<Field>,
 }
 
-/// The objects whose names contain a text.
+/// The objects whose names contain a query.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct ObjectList {
-    /// The text of the query.
+    /// The query.
     pub part: String,
     /// The name of each object, and its type, file or material.
     pub objects: Vec<(String, String)>,
@@ -257,7 +257,7 @@ impl SceneView {
         })
     }
 
-    /// Returns the objects whose names contain a text, in the order of the file's sections.
+    /// Returns the objects whose names contain a string, in the order of the file's sections.
     pub fn objects(&self, part: &str) -> ObjectList {
         let description = &self.loaded.description;
         let lowercase_part = part.to_lowercase();

@@ -64,7 +64,7 @@ impl Loaded {
 
     /// Returns the pieces of the text, which is scanned only once.
     pub(crate) fn pieces(&self) -> Pieces<'_> {
-        Pieces::known(&self.text, self.places.get_or_init(|| Places::of(&self.text)))
+        Pieces::with_places(&self.text, self.places.get_or_init(|| Places::of(&self.text)))
     }
 }
 

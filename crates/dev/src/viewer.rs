@@ -36,18 +36,18 @@ const PING_INTERVAL: Duration = Duration::from_secs(15);
 enum Request {
     /// Acknowledges this frame and all earlier frames; the server does not reply.
     Acknowledge(u64),
-    Question(Question),
+    Query(Query),
     Command(Command),
 }
 
 /// A query, which changes nothing.
 #[derive(Debug, PartialEq, Deserialize)]
 #[serde(rename_all = "snake_case")]
-enum Question {
+enum Query {
     Pixel([u32; 2]),
     Object([u32; 2]),
     Inspect(Inspect),
-    /// Requests the objects whose names contain a text.
+    /// Requests the objects whose names contain the string.
     Objects(String),
 }
 
@@ -56,7 +56,7 @@ struct Acknowledgement {
     shown: u64,
 }
 
-const QUESTIONS: [&str; 4] = ["pixel", "object", "inspect", "objects"];
+const QUERIES: [&str; 4] = ["pixel", "object", "inspect", "objects"];
 
 #[derive(Debug, PartialEq, Deserialize)]
 struct Inspect {
@@ -80,7 +80,7 @@ impl Request {
         // The text is parsed, because a JSON value hides duplicate keys.
         let parsed = match name.as_str() {
             "shown" => serde_json::from_str(message).map(|Acknowledgement { shown }| Request::Acknowledge(shown)),
-            name if QUESTIONS.contains(&name) => serde_json::from_str(message).map(Request::Question),
+            name if QUERIES.contains(&name) => serde_json::from_str(message).map(Request::Query),
             _ => serde_json::from_str(message).map(Request::Command),
         };
         parsed.map_err(|error| {
@@ -142,7 +142,7 @@ async fn receive(
                 acknowledged.send_replace(number);
                 continue;
             }
-            Ok(Request::Question(question)) => answer(question, shared).await,
+            Ok(Request::Query(query)) => answer(query, shared).await,
             Ok(Request::Command(command)) => {
                 let busy = || Reply::Refusal("busy: the command was dropped".to_string());
                 (shared.send_command)(command).map_or_else(busy, Reply::Accepted)
@@ -212,26 +212,26 @@ async fn send(
     }
 }
 
-async fn answer(question: Question, shared: &Shared) -> Reply<'static> {
-    match question {
-        Question::Pixel([x, y]) => {
+async fn answer(query: Query, shared: &Shared) -> Reply<'static> {
+    match query {
+        Query::Pixel([x, y]) => {
             let frame = shared.frames.borrow().clone();
             let values = frame.and_then(|frame| frame.pixel(x, y)).unwrap_or_default();
             Reply::Pixel { x, y, values }
         }
-        Question::Object(pixel) => {
+        Query::Object(pixel) => {
             let default = move || Object::without_scene("", Some(pixel));
             let object = query_scene(shared, default, move |view| view.at(pixel)).await;
             Reply::Object(Box::new(object))
         }
-        Question::Inspect(Inspect { name, material }) => {
+        Query::Inspect(Inspect { name, material }) => {
             let default = || Object::without_scene(&name, None);
             let object_name = name.clone();
             let query = move |view: &SceneView| view.object(&object_name, material.as_deref());
             let object = query_scene(shared, default, query).await;
             Reply::Object(Box::new(object))
         }
-        Question::Objects(part) => {
+        Query::Objects(part) => {
             Reply::Objects(query_scene(shared, ObjectList::default, move |view| view.objects(&part)).await)
         }
     }
@@ -271,7 +271,7 @@ mod tests {
     fn messages_are_parsed_and_errors_name_the_command() {
         assert_eq!(Request::parse("\"grab\""), Ok(Request::Command(Command::Grab)));
         assert_eq!(Request::parse("{\"shown\":7}"), Ok(Request::Acknowledge(7)));
-        let pixel = Request::Question(Question::Pixel([1, 2]));
+        let pixel = Request::Query(Query::Pixel([1, 2]));
         assert_eq!(Request::parse("{\"pixel\":[1,2]}"), Ok(pixel));
         for (message, error) in [
             ("{\"fly\":1}", "unknown command \"fly\""),

@@ -121,7 +121,7 @@ fn run(
     let mut deferred = None; // the event during a possibly incomplete save, and the time of the save's first change
     let mut has_errors = last.scene.is_err(); // whether the last scene that was read has errors, reported or not
     loop {
-        let Some((wake, noticed)) = deferred.take().or_else(|| Some((wakes.recv().ok()?, Instant::now()))) else {
+        let Some((wake, noticed_at)) = deferred.take().or_else(|| Some((wakes.recv().ok()?, Instant::now()))) else {
             return;
         };
         let woken = Instant::now();
@@ -168,19 +168,19 @@ fn run(
         };
         if let Some(new) = sources.reread(&last, &mut begin) {
             has_errors = new.scene.is_err();
-            let is_doubtful = new.scene.is_err() && new.scene.as_ref().err() != last.scene.as_ref().err();
-            if is_doubtful
-                && noticed.elapsed() < MAX_ERROR_DELAY
+            let is_new_error = new.scene.is_err() && new.scene.as_ref().err() != last.scene.as_ref().err();
+            if is_new_error
+                && noticed_at.elapsed() < MAX_ERROR_DELAY
                 && let Ok(wake) = wakes.recv_timeout(if is_growing { WRITE_SETTLE_TIME } else { ERROR_DELAY })
             {
-                deferred = Some((wake, noticed));
+                deferred = Some((wake, noticed_at));
                 continue;
             }
             // The scene may now use different files. Changes since the recorded states are noticed.
             folders.follow(sources, &new);
             last = new.clone();
             reading_reported = false;
-            if !report(Event::Files(Box::new(new), noticed, count)) {
+            if !report(Event::Files(Box::new(new), noticed_at, count)) {
                 return;
             }
         } else if std::mem::take(&mut reading_reported) && !report(Event::Reading(false)) {

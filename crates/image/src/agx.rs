@@ -61,13 +61,13 @@ fn matrix(rows: [[f64; 3]; 3]) -> DMat3 {
     DMat3::from_cols_array_2d(&rows).transpose()
 }
 
-/// Logarithmic position of a value in the dynamic range, 0 to 1.
+/// Returns the logarithmic position of a value in the dynamic range, 0 to 1.
 fn log_position(value: f64) -> f64 {
     let stops = (value / MIDDLE_GRAY).log2(); // -inf for 0
     ((stops + STOPS_BELOW) / (STOPS_BELOW + STOPS_ABOVE)).clamp(0.0, 1.0)
 }
 
-/// Sigmoid from (0, 0) to (1, 1), steepest at middle gray; middle gray is a fixed point.
+/// Returns the value of the sigmoid from (0, 0) to (1, 1) that is steepest at middle gray, which is a fixed point.
 fn curve(x: f64) -> f64 {
     let BranchScales { below, above } = &*BRANCH_SCALES;
     let (middle, gray) = pivot();
@@ -84,7 +84,7 @@ fn pivot() -> (f64, f64) {
 
 static GRAY: LazyLock<f64> = LazyLock::new(|| MIDDLE_GRAY.powf(1.0 / POWER));
 
-/// Scales of the two branches of the curve, below and above middle gray.
+/// Returns the scales of the two branches of the curve, below and above middle gray.
 struct BranchScales {
     below: f64,
     above: f64,
@@ -102,7 +102,7 @@ static BRANCH_SCALES: LazyLock<BranchScales> = LazyLock::new(|| {
     }
 });
 
-/// One branch of the sigmoid, relative to middle gray.
+/// Returns the value of one branch of the sigmoid, relative to middle gray.
 fn branch(x: f64, scale: f64) -> f64 {
     let x = SLOPE * x / scale;
     scale * x / (1.0 + x.powf(BEND)).powf(1.0 / BEND)

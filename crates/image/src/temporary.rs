@@ -10,13 +10,13 @@ type Name = std::path::PathBuf;
 
 static NAMES: Mutex<Vec<Name>> = Mutex::new(Vec::new());
 
-/// Number of names at which the names of deleted files are removed from the list.
-const PRUNE_FROM: usize = 64;
+/// From this number of names on, the names of deleted files are removed from the list.
+const MIN_PRUNED_NAMES: usize = 64;
 
 pub(super) fn register(path: &Path) {
     let Some(name) = name(path) else { return };
     let Ok(mut names) = NAMES.lock() else { return };
-    if names.len() >= PRUNE_FROM {
+    if names.len() >= MIN_PRUNED_NAMES {
         names.retain(exists);
     }
     // The allocation is marked `fallible`. Otherwise, its failure would end the program here, while this thread holds
@@ -82,7 +82,9 @@ mod tests {
     #[test]
     fn only_registered_files_are_removed() {
         let folder = tempfile::tempdir().unwrap();
-        let paths: Vec<_> = (0..PRUNE_FROM + 3).map(|i| folder.path().join(i.to_string())).collect();
+        let paths: Vec<_> = (0..MIN_PRUNED_NAMES + 3)
+            .map(|i| folder.path().join(i.to_string()))
+            .collect();
         for path in &paths {
             std::fs::write(path, "").unwrap();
             register(path);

@@ -82,8 +82,8 @@ impl ViewSettings {
         inverse(self.transform, display).map(|light| light / factor)
     }
 
-    /// Returns the display values of a reflectance such as an albedo: only the curve is applied.
-    pub fn display_share(&self, reflectance: [f32; 3]) -> [f64; 3] {
+    /// Returns the display values of a reflectance such as an albedo: only the curve of the transform is applied.
+    pub fn display_reflectance(&self, reflectance: [f32; 3]) -> [f64; 3] {
         match self.transform {
             ViewTransform::Gamma22 => reflectance.map(sanitized).map(gamma22),
             _ => reflectance.map(sanitized).map(srgb),
@@ -419,10 +419,10 @@ mod tests {
             };
             assert_eq!(brighter.display(light), view(transform).display(light.map(|x| 2.0 * x)));
             assert_ne!(brighter.display(light), view(transform).display(light));
-            let albedo = brighter.display_share(light);
+            let albedo = brighter.display_reflectance(light);
             assert_eq!(
                 albedo,
-                view(transform).display_share(light),
+                view(transform).display_reflectance(light),
                 "the exposure changes an albedo"
             );
         }

@@ -35,7 +35,7 @@ pub enum Layer {
     Direct,
     /// Radiance scattered more than once.
     Indirect,
-    /// Albedo of the surface.
+    /// Albedo of the first surface that is neither mirror nor glass, times the tints of the surfaces in front of it.
     Albedo,
     /// Outward shading normal.
     Normal,

@@ -64,7 +64,7 @@ impl CameraPath {
             CameraDescription::Perspective(c) => {
                 c.fov = interpolate(&self.extent).unwrap_or(c.fov);
                 if let Some(aperture) = interpolate(&self.aperture) {
-                    (c.aperture, c.f_number) = (Some(aperture), None); // either key sets the lens diameter
+                    (c.aperture, c.f_number) = (Some(aperture), None); // both keys set the lens diameter
                 }
                 c.focus_distance = interpolate(&self.focus_distance).or(c.focus_distance);
                 (&mut c.position, &mut c.look_at, &mut c.up)

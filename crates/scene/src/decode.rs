@@ -234,7 +234,7 @@ fn decode_ktx2(bytes: &[u8], fits: impl Fn(Header) -> Result<(), String>) -> Res
     file.decode().map_err(DecodeError::Damaged)
 }
 
-/// Uses the crate `png` directly, because it can skip color profiles and texts, whose decompressed size is unknown.
+/// Uses the crate `png` directly to skip color profiles and text chunks, whose decompressed size is unknown.
 fn decode_png(bytes: &[u8], fits: impl Fn(Header) -> Result<(), String>) -> Result<DynamicImage, DecodeError> {
     let mut options = png::DecodeOptions::default();
     options.set_ignore_text_chunk(true);

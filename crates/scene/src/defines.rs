@@ -206,9 +206,9 @@ fn kind_of(value: &Value) -> &'static str {
     match value {
         Value::Table(_) => "a table",
         Value::Array(_) => "a list",
-        Value::String(_) => "a text",
+        Value::String(_) => "a string",
         Value::Integer(_) | Value::Float(_) => "a number",
-        Value::Boolean(_) => "true or false",
-        Value::Datetime(_) => "a time",
+        Value::Boolean(_) => "a boolean",
+        Value::Datetime(_) => "a date or time",
     }
 }

@@ -159,10 +159,10 @@ impl Air {
     fn scattered_once(&self, row: &Row, direction: DVec3) -> DVec3 {
         let cosine = direction.dot(self.sun);
         let g = HAZE_FORWARD;
-        let by_molecules = 3.0 / (16.0 * PI) * (1.0 + cosine * cosine);
+        let molecule_phase = 3.0 / (16.0 * PI) * (1.0 + cosine * cosine);
         let spread = 1.0 + g * g - 2.0 * g * cosine;
-        let by_haze = (1.0 - g * g) / (4.0 * PI * spread * spread.sqrt());
-        let scattering = (self.molecules * by_molecules + self.haze * by_haze) / self.depth;
+        let haze_phase = (1.0 - g * g) / (4.0 * PI * spread * spread.sqrt());
+        let scattering = (self.molecules * molecule_phase + self.haze * haze_phase) / self.depth;
         let difference = row.mass - self.sun_mass;
         let path_integral = match difference.abs() > 1e-6 {
             true => (self.transmittance - row.transmittance) / difference,

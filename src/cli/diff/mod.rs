@@ -62,7 +62,7 @@ pub struct Args {
     #[arg(long, value_name = "LAYERS", value_delimiter = ',')]
     layers: Vec<String>,
 
-    /// Count a pixel in share only if one of its values differs by more than X
+    /// For the metric share, count only pixels with a value that differs by more than X
     #[arg(long, value_name = "X", default_value_t = 0.0, value_parser = threshold)]
     threshold: f64,
 
@@ -287,7 +287,10 @@ fn find_output<'a>(path: &'a Path, args: &Args) -> anyhow::Result<(Output, &'a P
     for input in [&args.a, &args.b] {
         if output.is_input(input) {
             let input = input.display();
-            return Err(Usage(format!("--out: {name}: is the input {input}; choose another name")).into());
+            return Err(Usage(format!(
+                "--out: {name}: would overwrite the input {input}; choose another name"
+            ))
+            .into());
         }
     }
     Ok((output, path))

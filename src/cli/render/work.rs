@@ -75,7 +75,7 @@ pub fn write(
         let count = totals.invalid_pixels;
         plan.log.log(
             Level::Warning,
-            &format!("{name}: {count} pixels are not finite (NaN or infinity)"),
+            &format!("{name}: number of pixels that are not finite (NaN or infinity): {count}"),
         );
     }
     Ok(totals)

@@ -1,4 +1,4 @@
-// Controls for the values of an object: number boxes, sliders, colours, vectors, choices, switches and texts. The
+// Controls for the values of an object: number boxes, sliders, colours, vectors, choices, switches and text fields. The
 // function of each kind returns {inputs, elements, update}. The control calls `change(value, i)` with the new value;
 // for a list, `i` is the index of the changed element.
 
@@ -11,8 +11,8 @@ const STEPS = 1000; // positions of a logarithmic slider
 export const valueOf = (field) => field.value ?? field.default;
 
 // Returns a control that matches the kind of the field.
-export function controlOf(field, change) {
-  const makers = { number: numberOf, whole: numberOf, color: colorsOf, vector: vectorOf, choice: choiceOf, switch: switchOf, text: textOf };
+export function makeControl(field, change) {
+  const makers = { number: numberControl, whole: numberControl, color: colorControl, vector: vectorControl, choice: choiceControl, switch: switchControl, text: textControl };
   return makers[field.kind](field, change);
 }
 
@@ -25,7 +25,7 @@ function numberBox(field, label) {
 }
 
 // Returns a number box and, if the field has a slider, a slider.
-function pairOf(field, label, slider, change) {
+function numberPair(field, label, slider, change) {
   const box = numberBox(field, label);
   let current;
   const range = slider ? make("input", { type: "range" }) : null;
@@ -75,13 +75,13 @@ function pairOf(field, label, slider, change) {
   return { inputs, element: make("div", { className: range ? "pair" : "single" }, ...inputs), update };
 }
 
-function numberOf(field, change) {
-  const pair = pairOf(field, field.name, field.slider, change);
+function numberControl(field, change) {
+  const pair = numberPair(field, field.name, field.slider, change);
   const update = (next) => pair.update(valueOf(next), next.slider);
   return { inputs: pair.inputs, elements: [pair.element], update };
 }
 
-function colorsOf(field, change) {
+function colorControl(field, change) {
   const picker = make("input", { type: "color", title: "Colour as displayed (sRGB)" });
   picker.setAttribute("aria-label", `${field.name}, as displayed (sRGB)`);
   let current = [0, 0, 0];
@@ -94,38 +94,38 @@ function colorsOf(field, change) {
   picker.addEventListener("input", () => {
     if (picker.value === hexOf(current)) return;
     setColor(colorOf(picker.value, current));
-    parts.show(current);
+    boxes.show(current);
     change(current);
   });
-  const parts = numbersOf(field, ["red", "green", "blue"].map((name) => `${field.name}, linear ${name}`), (list, i) => {
+  const boxes = numberBoxes(field, ["red", "green", "blue"].map((name) => `${field.name}, linear ${name}`), (list, i) => {
     setColor(list);
     picker.value = hexOf(current);
     change(current, i);
   });
   // Emission has no upper limit, so a single slider scales the colour and keeps its hue.
-  const strength = field.slider && pairOf({ ...field, kind: "number" }, `${field.name}, strength`, field.slider, (largest) => {
+  const strength = field.slider && numberPair({ ...field, kind: "number" }, `${field.name}, strength`, field.slider, (largest) => {
     current = tint.map((x) => digits(x * largest, 6));
     picker.value = hexOf(current);
-    parts.show(current);
+    boxes.show(current);
     change(current);
   });
   const legend = make("small", { className: "quiet" });
   const update = (next) => {
     setColor(valueOf(next) ?? [0, 0, 0]);
     picker.value = hexOf(current);
-    parts.update(next);
+    boxes.update(next);
     const largest = Math.max(...current);
     strength?.update(largest, next.slider);
     const scale = largest > 1 ? ` of the colour divided by ${digits(largest, 4)}` : "";
     legend.textContent = `Swatch: sRGB${scale}. R, G, B: linear`;
   };
-  const elements = [make("div", { className: "color" }, picker, ...parts.inputs), legend];
+  const elements = [make("div", { className: "color" }, picker, ...boxes.inputs), legend];
   if (strength) elements.push(make("small", { className: "strength", textContent: "Strength (largest channel)" }), strength.element);
-  return { inputs: [picker, ...parts.inputs, ...(strength?.inputs ?? [])], elements, update };
+  return { inputs: [picker, ...boxes.inputs, ...(strength?.inputs ?? [])], elements, update };
 }
 
 // Returns number boxes for a list.
-function numbersOf(field, labels, change) {
+function numberBoxes(field, labels, change) {
   let current = [];
   const boxes = labels.map((label) => numberBox(field, label));
   const showNumber = boxes.map((box, i) => {
@@ -143,14 +143,14 @@ function numbersOf(field, labels, change) {
   return { inputs: boxes, show, update: (next) => show(valueOf(next) ?? []) };
 }
 
-function vectorOf(field, change) {
+function vectorControl(field, change) {
   const names = field.length <= 4 ? ["x", "y", "z", "w"] : [];
   const labels = Array.from({ length: field.length }, (_, i) => `${field.name}, ${names[i] ?? i + 1}`);
-  const parts = numbersOf(field, labels, change);
-  return { inputs: parts.inputs, elements: [make("div", { className: "vector" }, ...parts.inputs)], update: parts.update };
+  const boxes = numberBoxes(field, labels, change);
+  return { inputs: boxes.inputs, elements: [make("div", { className: "vector" }, ...boxes.inputs)], update: boxes.update };
 }
 
-function choiceOf(field, change) {
+function choiceControl(field, change) {
   const box = make("select");
   box.setAttribute("aria-label", field.name);
   box.addEventListener("change", () => box.value && change(box.value));
@@ -164,14 +164,14 @@ function choiceOf(field, change) {
   return { inputs: [box], elements: [box], update };
 }
 
-function switchOf(field, change) {
+function switchControl(field, change) {
   const box = make("input", { type: "checkbox" });
   box.addEventListener("change", () => change(box.checked));
   const update = (next) => (box.checked = valueOf(next) ?? false);
   return { inputs: [box], elements: [make("label", { className: "check" }, box, field.name)], update };
 }
 
-function textOf(field) {
+function textControl(field) {
   const box = make("input", { type: "text", readOnly: true });
   box.setAttribute("aria-label", field.name);
   const update = (next) => (box.value = format(valueOf(next)));

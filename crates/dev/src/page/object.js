@@ -1,6 +1,6 @@
 // The selected object: its lines in the scene file, and controls that write its values to the file.
 
-import { controlOf, valueOf } from "/controls.js";
+import { makeControl, valueOf } from "/controls.js";
 import { element, lastState, onLink, onMessage, onState, sendCommand, sendQuery } from "/link.js";
 import { enable, make, reuse, setChildren } from "/parts.js";
 
@@ -150,7 +150,7 @@ function showObject(object) {
   shown = object;
   showNote();
   stale = held !== null; // while a control is held, no controls are added or removed
-  groups = reuse(groups, object.groups, ({ name }) => name, groupOf);
+  groups = reuse(groups, object.groups, ({ name }) => name, makeGroup);
   for (const group of object.groups) groups.get(group.name).show(group, object.file);
   if (!stale) setChildren([element("object-groups"), [...groups.values()].map(({ item }) => item)]);
 }
@@ -163,7 +163,7 @@ function showNote() {
 }
 
 // A table of the scene file: its source lines, the values in the file, and the values that the file leaves at defaults.
-function groupOf({ name }) {
+function makeGroup({ name }) {
   const pre = make("pre", { tabIndex: 0 });
   const kind = new Text();
   const [present, absent] = [make("div"), make("details", { className: "absent" })];
@@ -175,7 +175,7 @@ function groupOf({ name }) {
   const show = (group, file) => {
     kind.data = group.kind && group.kind !== name ? ` ${group.kind}` : "";
     showLines(pre, group, file);
-    rows = reuse(rows, group.fields, keyOf, fieldOf);
+    rows = reuse(rows, group.fields, keyOf, makeField);
     for (const field of group.fields) rows.get(keyOf(field)).show(field);
     if (held !== null) return;
     const itemsOf = (isAbsent) => group.fields.filter(({ value }) => (value === undefined) === isAbsent).map((field) => rows.get(keyOf(field)).item);
@@ -198,13 +198,13 @@ function showLines(pre, { line, text, more }, file) {
   const lines = text.split("\n");
   const width = String(line + lines.length).length;
   const numbered = lines.map((content, i) => `${String(line + i).padStart(width)}  ${content}`);
-  if (more) numbered.push(`${" ".repeat(width)}  … ${more} more lines`);
+  if (more) numbered.push(`${" ".repeat(width)}  … (lines omitted: ${more})`);
   pre.textContent = numbered.join("\n");
   pre.setAttribute("aria-label", `${file}, from line ${line}`);
 }
 
 // A value: its name, its controls, and the error of its last change.
-function fieldOf(field) {
+function makeField(field) {
   const error = make("p", { className: "bad", hidden: true });
   error.setAttribute("role", "alert");
   const title = make("span", { className: "name", textContent: field.name, title: field.about });
@@ -229,7 +229,7 @@ function fieldOf(field) {
       else accepted = value;
       note(text);
     });
-  const control = controlOf(field, change);
+  const control = makeControl(field, change);
   if (field.fixed) {
     head.append(make("small", { className: "fixed", textContent: field.fixed }));
     for (const input of control.inputs) input.disabled = true;

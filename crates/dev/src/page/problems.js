@@ -17,10 +17,10 @@ export function showProblems({ problems, editor, reading }, hasImage) {
   shown = content;
   const dock = element("problems");
   dock.hidden = !problems.length;
-  element("problem-list").replaceChildren(...problems.map((problem) => articleOf(problem, editor, hasImage)));
+  element("problem-list").replaceChildren(...problems.map((problem) => makeArticle(problem, editor, hasImage)));
 }
 
-function articleOf(problem, editor, hasImage) {
+function makeArticle(problem, editor, hasImage) {
   const { kind, place, message, excerpt } = problem;
   const title = make("h2", { textContent: place ?? kind });
   const link = editorLink(editor, problem);

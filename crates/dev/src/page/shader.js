@@ -17,7 +17,7 @@ export function setUpShader(showNotice) {
   element("copy-sliders").addEventListener("click", () => copy(showNotice));
   element("reset-sliders").addEventListener("click", () => sendCommand("reset_sliders"));
   onState((state, isCurrent) => {
-    rows = reuse(rows, state.sliders, rowKey, rowOf);
+    rows = reuse(rows, state.sliders, rowKey, makeRow);
     for (const slider of state.sliders) rows.get(rowKey(slider)).show(slider, state, isCurrent && !isSending);
     setChildren([element("sliders"), [...rows.values()].map(({ item }) => item)]);
     const moved = state.sliders.some(isMoved);
@@ -57,14 +57,14 @@ async function sendWaiting() {
 }
 
 // Returns a slider's row and the function that updates it.
-function rowOf(slider) {
+function makeRow(slider) {
   const id = `slider-${rowCount++}`;
   const name = make("label", { textContent: slider.name, htmlFor: id });
   const link = make("a");
   const reset = make("button", { type: "button", textContent: "Reset" });
   reset.setAttribute("aria-label", `Reset ${slider.name}`);
   const head = make("span", { className: "head" }, name, link, reset);
-  const { inputs, update } = (slider.kind === "bool" ? switchOf : numberOf)(slider);
+  const { inputs, update } = (slider.kind === "bool" ? switchControl : numberControl)(slider);
   inputs[0].id = id;
   reset.addEventListener("click", () => {
     if (reset.matches(":focus-visible")) inputs[0].focus(); // the button disappears
@@ -84,13 +84,13 @@ function rowOf(slider) {
   return { item, show };
 }
 
-function switchOf(slider) {
+function switchControl(slider) {
   const box = make("input", { type: "checkbox" });
   box.addEventListener("change", () => slide(slider, box.checked));
   return { inputs: [box], update: ({ value }) => (box.checked = value) };
 }
 
-function numberOf(slider) {
+function numberControl(slider) {
   const field = { kind: slider.kind === "f32" ? "number" : "whole" }; // `update` sets the range
   let last = slider.value;
   const range = make("input", { type: "range" });

@@ -30,7 +30,7 @@ impl Painter {
             Some(Ok((gpu, shaders))) => {
                 self.state.compile_seconds = Some(built.duration.as_secs_f64());
                 self.compiled = self.state.compile_seconds;
-                self.run(*gpu, shaders, pending.constants, built.noticed);
+                self.run(*gpu, shaders, pending.constants, built.noticed_at);
             }
             None => {
                 self.change = None;
@@ -69,7 +69,7 @@ impl Painter {
             Some(Ok((gpu, shaders))) if is_useful && built.shader_errors.is_none() => {
                 self.state.compile_seconds = Some(built.duration.as_secs_f64());
                 self.compiled = self.state.compile_seconds;
-                self.run(*gpu, shaders, built.constants, built.noticed);
+                self.run(*gpu, shaders, built.constants, built.noticed_at);
             }
             result => {
                 let _ = guarded(|| {
@@ -81,7 +81,7 @@ impl Painter {
     }
 
     /// Starts to render with a new kernel.
-    fn run(&mut self, mut gpu: Gpu, shaders: Arc<Shaders>, constants: Constants, noticed: Instant) {
+    fn run(&mut self, mut gpu: Gpu, shaders: Arc<Shaders>, constants: Constants, noticed_at: Instant) {
         let Some(loaded) = self.loaded.clone() else { return };
         let info = &gpu.device().info;
         self.state.device = format!("{}, {}", info.name, info.driver);
@@ -107,7 +107,7 @@ impl Painter {
                     slider_values,
                 });
                 self.problems.device = None;
-                self.record_start((noticed, true));
+                self.record_start((noticed_at, true));
             }
             Err(error) => self.fail(&error),
         }

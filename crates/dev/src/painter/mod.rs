@@ -231,7 +231,7 @@ impl Painter {
 
     pub fn handle(&mut self, event: Event) {
         match event {
-            Event::Files(snapshot, noticed, writes) => self.handle_files(*snapshot, noticed, writes),
+            Event::Files(snapshot, noticed_at, writes) => self.handle_files(*snapshot, noticed_at, writes),
             Event::BuildResult(built) => self.handle_build(*built),
             Event::Command(command) => {
                 self.execute(command);
@@ -255,7 +255,7 @@ impl Painter {
         self.publish();
     }
 
-    fn handle_files(&mut self, snapshot: Snapshot, noticed: Instant, writes: u64) {
+    fn handle_files(&mut self, snapshot: Snapshot, noticed_at: Instant, writes: u64) {
         self.state.reading = false;
         for (stage, duration) in ["read files", "pack"].into_iter().zip(snapshot.durations) {
             if !duration.is_zero() {
@@ -282,7 +282,7 @@ impl Painter {
             }
             Err(problem) => self.problems.files = Some(*problem),
         }
-        self.show_files(noticed, display_changed);
+        self.show_files(noticed_at, display_changed);
     }
 
     /// Sets the scene or its errors. Returns true if the display settings changed.
@@ -314,16 +314,16 @@ impl Painter {
         display_changed
     }
 
-    fn show_files(&mut self, noticed: Instant, display_changed: bool) {
+    fn show_files(&mut self, noticed_at: Instant, display_changed: bool) {
         self.failures = 0;
         self.replace_unavailable_view();
-        self.synchronize((noticed, true));
-        self.upload_sliders((noticed, true));
+        self.synchronize((noticed_at, true));
+        self.upload_sliders((noticed_at, true));
         // If only the display settings changed, shows the current image again. The first image of a new rendering is
         // shown later.
         let has_image = self.running.as_ref().is_some_and(|running| !running.canvas.is_new());
         if display_changed && self.pending.is_none() && has_image {
-            self.record_change((noticed, true));
+            self.record_change((noticed_at, true));
             self.show();
         }
     }
@@ -362,7 +362,7 @@ impl Painter {
         }
     }
 
-    fn request(&mut self, loaded: &Loaded, shaders: Arc<Shaders>, noticed: Instant) {
+    fn request(&mut self, loaded: &Loaded, shaders: Arc<Shaders>, noticed_at: Instant) {
         let constants = self.constants(loaded);
         let running = self.running.as_ref();
         let can_show_scene = running.is_some_and(|running| running.constants == constants);
@@ -378,7 +378,7 @@ impl Painter {
             shaders: shaders.clone(),
             fallback,
             constants,
-            noticed,
+            noticed_at,
         });
         self.pending = Some(Pending {
             id: self.requests,

@@ -65,11 +65,11 @@ impl Painter {
     /// Switches to the parked kernel if it has these shaders and constants. Returns whether the kernel was switched.
     pub(super) fn unpark(&mut self, shaders: &Arc<Shaders>, constants: &Constants) -> bool {
         let matches = |parked: &Running| parked.shaders == *shaders && parked.constants == *constants;
-        let is_match = self.parked.as_ref().is_some_and(matches);
-        if is_match {
+        let is_parked = self.parked.as_ref().is_some_and(matches);
+        if is_parked {
             std::mem::swap(&mut self.running, &mut self.parked);
         }
-        is_match
+        is_parked
     }
 
     /// Shows the current image of a kernel that was parked.

@@ -64,7 +64,7 @@ impl Painter {
         let (content, sides) = self.with_counterpart(content, finest);
         let change = self.change.take();
         self.latency = change
-            .map(|(noticed, _)| noticed.elapsed().as_secs_f64())
+            .map(|(noticed_at, _)| noticed_at.elapsed().as_secs_f64())
             .or(self.latency);
         self.frames += 1;
         let header = Header {
@@ -110,12 +110,12 @@ impl Painter {
         if let Some(running) = self.running.as_ref().filter(|_| done || is_complete) {
             self.last_good = Some(running.shaders.clone());
         }
-        if let Some((noticed, saved)) = change {
+        if let Some((noticed_at, saved)) = change {
             self.first_frame = saved.then_some(self.last_frame);
             if saved {
                 let compiled = self.compiled.take();
                 (self.report)(Report::Reloaded {
-                    seconds: noticed.elapsed().as_secs_f64(),
+                    seconds: noticed_at.elapsed().as_secs_f64(),
                     compiled,
                 });
             }
@@ -151,7 +151,7 @@ impl Painter {
         if self.reported_sizes != reduced {
             self.reported_sizes = reduced;
             if let Some((full, displayed)) = reduced {
-                (self.report)(Report::Smaller(full, displayed));
+                (self.report)(Report::ReducedImage(full, displayed));
             }
         }
     }

@@ -12,12 +12,14 @@ use wgray_render::cpu::Cpu;
 use wgray_render::records::NO_INDEX;
 use wgray_scene::{Bounds, CameraDescription, Geometry, Light, Scene};
 
-/// Maximum number of viewpoints that are kept.
+/// Maximum number of steps in the history.
 const MAX_STEPS: usize = 256;
 
 #[derive(Default)]
 pub struct CameraHistory {
+    /// Cameras before each step, oldest first.
     back: Vec<CameraDescription>,
+    /// Cameras that a step forward restores, the next one last.
     forward: Vec<CameraDescription>,
     /// True if the next move belongs to the current step.
     in_step: bool,

@@ -395,7 +395,7 @@ fn hunt_lab(color: [f64; 3]) -> [f64; 3] {
     ]
 }
 
-/// HyAB distance of two colors, raised to `QC`.
+/// Returns the HyAB distance of two colors, raised to the power `QC`.
 fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
     ((a[0] - b[0]).abs() + (a[1] - b[1]).hypot(a[2] - b[2])).powf(QC)
 }
@@ -505,8 +505,8 @@ fn add(to: &mut [f32], from: &[f32], weight: f32) {
     }
 }
 
-/// Converts a display value to a linear value. The 256 values of an 8-bit image use the table. They are recognized
-/// although `value` has been rounded to `f32`.
+/// Converts a display value to a linear value. The 256 values of an 8-bit image, also if rounded to `f32`, are looked
+/// up in the table.
 fn screen_to_linear(curve: &[f64; 256], value: f64) -> f64 {
     let step = (value * 255.0 + 0.5) as u8;
     if value as f32 == (f64::from(step) / 255.0) as f32 {

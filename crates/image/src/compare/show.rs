@@ -27,7 +27,7 @@ const BACKGROUND: [u8; 3] = [40, 40, 40];
 const TEXT_COLOR: [u8; 3] = [230, 230, 230];
 const OUTLINE_COLOR: [u8; 3] = [0, 220, 220];
 
-/// A visualization that is computed row by row.
+/// Three panels: images A and B, and their error map. Rows are computed on demand.
 pub struct ErrorImage<'a> {
     /// Width in pixels.
     pub width: usize,
@@ -239,16 +239,16 @@ const GLYPHS: [(char, [u8; 7]); 11] = [
     ('1', [0x04, 0x0c, 0x04, 0x04, 0x04, 0x04, 0x0e]),
 ];
 
-/// Draws row `y` of a text into a row of pixels.
-fn draw_text(to: &mut [[u8; 3]], text: &str, y: usize) {
+/// Draws row `y` of a label into a row of pixels.
+fn draw_text(pixels: &mut [[u8; 3]], text: &str, y: usize) {
     for (i, letter) in text.chars().enumerate() {
         let glyph = GLYPHS.iter().find(|(name, _)| *name == letter);
         let Some(dots) = glyph.and_then(|(_, rows)| rows.get(y / DOT)) else {
             continue;
         };
         for x in 0..5 * DOT {
-            if let (true, Some(to)) = (dots >> (4 - x / DOT) & 1 == 1, to.get_mut(i * 6 * DOT + x)) {
-                *to = TEXT_COLOR;
+            if let (true, Some(pixel)) = (dots >> (4 - x / DOT) & 1 == 1, pixels.get_mut(i * 6 * DOT + x)) {
+                *pixel = TEXT_COLOR;
             }
         }
     }

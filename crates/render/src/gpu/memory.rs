@@ -31,7 +31,7 @@ impl MemoryUse {
 
     fn message(&self, failed: Option<&FailedAllocation>) -> String {
         let cause = match failed {
-            Some((name, bytes)) => format!("the driver has no {} MiB for {name}", mebibytes(*bytes)),
+            Some((name, bytes)) => format!("the driver cannot allocate {} MiB for {name}", mebibytes(*bytes)),
             None => "the driver has no more memory".to_owned(),
         };
         let used = [
@@ -42,7 +42,7 @@ impl MemoryUse {
         let used: Vec<String> = used
             .iter()
             .filter(|(bytes, _)| *bytes > 0)
-            .map(|(bytes, purpose)| format!("{} {purpose}", mebibytes(*bytes)))
+            .map(|(bytes, purpose)| format!("{} MiB {purpose}", mebibytes(*bytes)))
             .collect();
         let in_use = match used.is_empty() {
             true => String::new(),
@@ -79,8 +79,8 @@ mod tests {
         let error_with_use = memory.explain(error(), Some(&failed));
         let advice = "render a crop or a smaller image, or use the CPU";
         let line = format!(
-            "gpu: out of memory: the driver has no 64.0 MiB for a copy of it in addition to 1.5 for the scene, 64.0 for the \
-             film; {advice}"
+            "gpu: out of memory: the driver cannot allocate 64.0 MiB for a copy of it in addition to 1.5 MiB for the \
+             scene, 64.0 MiB for the film; {advice}"
         );
         assert_eq!(error_with_use.to_string(), line);
         assert_eq!(memory.explain(error_with_use, None).to_string(), line);

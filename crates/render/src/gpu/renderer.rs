@@ -105,7 +105,7 @@ struct Kernels {
     sliders: Vec<Slider>,
 }
 
-/// A record per pixel of a region, and the bind group of the kernel that writes it.
+/// A buffer with a record for each pixel of a region, and the bind group of the kernel that writes the buffer.
 struct Target {
     region: Region,
     buffer: wgpu::Buffer,
@@ -404,7 +404,7 @@ impl Gpu {
             None => {
                 let usage = BufferUsages::COPY_SRC | BufferUsages::COPY_DST;
                 let buffer = self.device.checked(|| self.device.buffer(rows.bytes(), usage));
-                let name = format!("a copy of {} rows of the film", tile.height());
+                let name = "a copy of the film rows of a tile".to_owned();
                 self.explain(buffer, Some((name, rows.bytes())))?
             }
         };

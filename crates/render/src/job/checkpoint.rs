@@ -282,7 +282,8 @@ impl<'a> Checkpoint<'a> {
         let needed: u64 = lengths.sum();
         let limit = (2 * needed + MAX_REPLACED_BYTES).max(self.retry_length);
         if self.end > limit && self.rewrite(|temporary, path| temporary.persist(path)).is_err() {
-            // The disk may be full, or the file cannot be replaced. Nothing is lost; a later call tries again.
+            // The disk may be full, or the file cannot be replaced. The old file stays in use; the next attempt is made
+            // when it has doubled in length.
             self.retry_length = 2 * self.end;
         }
     }
@@ -362,7 +363,7 @@ impl CheckpointStore for Checkpoint<'_> {
             StoredPiece {
                 number: *i,
                 region: entry.region,
-                film: entry.film,
+                film: entry.film_region,
                 reached: entry.reached.clone(),
             }
         };

@@ -132,7 +132,7 @@ impl Identity {
             )
         } else if self.exact_rounding != other.exact_rounding {
             let text = either(other.exact_rounding, "with", "without");
-            format!("it was rendered {text} --exact-rounding")
+            format!("it was rendered {text}, --exact-rounding")
         } else if self.shaders != other.shaders {
             format!(
                 "its shaders differ: their hash is {}, not {}",

@@ -60,10 +60,13 @@ impl PartHeader {
     fn check(&self, identity: &Identity, entries: &[Entry]) -> Result<(), String> {
         let samples = identity.pixel_samples;
         for Entry {
-            region, film, reached, ..
+            region,
+            film_region,
+            reached,
+            ..
         } in entries
         {
-            if film != region || reached.pass != (samples..samples) {
+            if film_region != region || reached.pass != (samples..samples) {
                 return Err(format!("its piece of the pixels {region} is not finished"));
             }
         }

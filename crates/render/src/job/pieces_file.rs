@@ -44,8 +44,10 @@ pub struct Header {
 /// Location and contents of a piece.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Entry {
+    /// Rows of the piece.
     pub region: Region,
-    pub film: Region,
+    /// Region of the piece's film.
+    pub film_region: Region,
     /// Samples that the film's pixels have so far.
     pub reached: SampleProgress,
     /// True if first hits follow the film.
@@ -59,7 +61,7 @@ impl Entry {
     pub fn of(piece: &FilmPiece, start: u64, bytes: u64) -> Entry {
         Entry {
             region: piece.region,
-            film: piece.film.region,
+            film_region: piece.film.region,
             reached: piece.reached.clone(),
             has_hits: false,
             start,
@@ -219,7 +221,7 @@ pub fn read_header(input: &mut impl Read) -> io::Result<(Header, Key, u64)> {
 
 struct Head {
     region: Region,
-    film: Region,
+    film_region: Region,
     reached: SampleProgress,
     film_layout: FilmLayout,
     has_hits: bool,
@@ -228,7 +230,7 @@ struct Head {
 impl Head {
     fn words(&self) -> [u32; WORDS] {
         let Region { x0, y0, x1, y1 } = self.region;
-        let film = self.film;
+        let film = self.film_region;
         let SampleProgress { pass, next } = &self.reached;
         let flags = [self.film_layout.adaptive, self.film_layout.layers, self.has_hits];
         let flags = (0..).zip(flags).map(|(i, flag)| u32::from(flag) << i).sum();
@@ -249,7 +251,7 @@ impl Head {
         let region = |x0, y0, x1, y1| Region { x0, y0, x1, y1 };
         let head = Head {
             region: region(x0, y0, x1, y1),
-            film: region(fx0, fy0, fx1, fy1),
+            film_region: region(fx0, fy0, fx1, fy1),
             reached: SampleProgress {
                 pass: start..end,
                 next: [x, y],
@@ -266,13 +268,13 @@ impl Head {
         let lies_in = |inner: Region, outer: Region| !inner.is_empty() && inner.within(outer) == inner;
         let is_valid = lies_in(rows, job_region)
             && (rows.x0, rows.x1) == (job_region.x0, job_region.x1)
-            && lies_in(rows, head.film)
-            && lies_in(head.film, rows.with_neighbors())
-            && lies_in(head.film, picture)
+            && lies_in(rows, head.film_region)
+            && lies_in(head.film_region, rows.with_neighbors())
+            && lies_in(head.film_region, picture)
             && start <= end
             && end <= identity.pixel_samples
-            && (head.film.x0..head.film.x1).contains(&x)
-            && (head.film.y0..=head.film.y1).contains(&y)
+            && (head.film_region.x0..head.film_region.x1).contains(&x)
+            && (head.film_region.y0..=head.film_region.y1).contains(&y)
             && head.film_layout
                 == FilmLayout {
                     adaptive: identity.adaptive,
@@ -283,7 +285,7 @@ impl Head {
 
     fn data_bytes(&self) -> u64 {
         let hits = if self.has_hits { self.region.pixels() } else { 0 };
-        self.film.pixels() * self.film_layout.bytes() as u64 + hits * size_of::<FirstHit>() as u64
+        self.film_region.pixels() * self.film_layout.bytes() as u64 + hits * size_of::<FirstHit>() as u64
     }
 }
 
@@ -292,7 +294,7 @@ pub fn write_piece(out: &mut impl Write, key: &Key, piece: &FilmPiece, hits: &[F
     let lists: Vec<_> = piece.film.lists().collect();
     let head = Head {
         region: piece.region,
-        film: piece.film.region,
+        film_region: piece.film.region,
         reached: piece.reached.clone(),
         film_layout: piece.film.film_layout(),
         has_hits: !hits.is_empty(),
@@ -362,7 +364,7 @@ fn next_entry(
     }
     Ok(input.hash_matches()?.then_some(Entry {
         region: head.region,
-        film: head.film,
+        film_region: head.film_region,
         reached: head.reached,
         has_hits: head.has_hits,
         start,
@@ -382,7 +384,7 @@ pub fn read_piece(
     let mut input = HashingStream::keyed(input, key);
     let mut head = [0; HEAD as usize];
     input.read_and_hash(&mut head)?;
-    let mut film = Film::of(entry.film, film_layout);
+    let mut film = Film::of(entry.film_region, film_layout);
     for list in film.lists_mut() {
         input.read_words(cast_slice_mut::<Vec4, u32>(list))?;
     }

@@ -93,7 +93,7 @@ impl Steps {
         self.begin_pass(0);
     }
 
-    /// Continues a film of a region, possibly on another backend.
+    /// Continues a film from earlier progress, possibly on another backend.
     pub fn resume(&mut self, backend: &dyn Backend, region: Region, samples: u32, reached: &SampleProgress) {
         self.start(backend, region, samples);
         self.reached = reached.clone();

@@ -29,7 +29,8 @@ pub enum Aov {
     Instance,
     /// Barycentric coordinates of a mesh triangle's second and third vertex.
     Barycentric,
-    /// Albedo, also behind mirrors and glass.
+    /// Albedo of the first surface on the path that is neither mirror nor glass, times the tints of the mirrors and
+    /// glass surfaces in front of it.
     Albedo,
     /// Radiance scattered once.
     Direct,

@@ -111,7 +111,7 @@ fn encode(band: Band, content: Option<Aov>, layout: &Layout, depth: BitDepth) ->
         (Some(aov), _) => quantize(band, depth, |i| {
             let color = aov.color(band, i, layout).to_array();
             match (aov, aov.light()) {
-                (Aov::Albedo, _) => layout.view.display_share(color),
+                (Aov::Albedo, _) => layout.view.display_reflectance(color),
                 (_, Some(_)) => layout.view.display(color),
                 (_, None) => color.map(f64::from),
             }

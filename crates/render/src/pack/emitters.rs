@@ -60,7 +60,7 @@ pub fn emitters(
         .collect();
     let mut packed = PackedEmitters::default();
     let mut powers = Vec::new();
-    // Group of each emitter for `defend`: the material index, or a unique number for a light without a material.
+    // Group of each emitter for `mix_in_uniform`: the material index, or a unique number if a light has no material.
     let mut groups = Vec::new();
     for (i, (primitive, _)) in (0..).zip(primitives) {
         let material = &materials[primitive.material as usize];
@@ -108,7 +108,7 @@ pub fn emitters(
             }
         }
     }
-    balance(&mut powers, &references, &packed.lighting.lights);
+    scale_far_powers(&mut powers, &references, &packed.lighting.lights);
     let is_far = |reference: &(u32, u32)| is_far(&packed.lighting.lights, reference);
     let near_count = references.iter().filter(|reference| !is_far(reference)).count();
     if (MAX_LISTED_EMITTERS + 1..=MAX_TREE_EMITTERS).contains(&near_count) {
@@ -120,7 +120,7 @@ pub fn emitters(
         };
         return with_tree(packed, materials, primitives, bvh, &list);
     }
-    for (group, factor) in defend(&mut powers, &groups, |i| is_far(&references[i])) {
+    for (group, factor) in mix_in_uniform(&mut powers, &groups, |i| is_far(&references[i])) {
         if let Some(strength) = strengths.get_mut(group) {
             *strength *= factor;
         }
@@ -155,7 +155,7 @@ pub fn emitters(
 /// Defensive sampling of near emitters: scales the power of each group so that a quarter of the samples are uniform
 /// over all emitters. Otherwise, an occluded strong emitter would take the samples of the others. Returns the factors
 /// of the groups; no factors for a single group.
-fn defend(powers: &mut [f64], groups: &[usize], is_far: impl Fn(usize) -> bool) -> Vec<(usize, f64)> {
+fn mix_in_uniform(powers: &mut [f64], groups: &[usize], is_far: impl Fn(usize) -> bool) -> Vec<(usize, f64)> {
     let mut near: BTreeMap<usize, (f64, f64)> = BTreeMap::new();
     for (i, (power, group)) in powers.iter().zip(groups).enumerate() {
         if !is_far(i) {
@@ -187,7 +187,7 @@ fn defend(powers: &mut [f64], groups: &[usize], is_far: impl Fn(usize) -> bool) 
 
 /// Scales the power of distant emitters so that their fraction s of the power becomes 0.5 s + 0.25: in a wide
 /// landscape, a near emitter has a tiny fraction of the power, but dominates the light in its neighborhood.
-fn balance(powers: &mut [f64], references: &[(u32, u32)], lights: &[Light]) {
+fn scale_far_powers(powers: &mut [f64], references: &[(u32, u32)], lights: &[Light]) {
     let far: Vec<bool> = references.iter().map(|reference| is_far(lights, reference)).collect();
     let sum = |is_far: bool| -> f64 {
         let selected = powers.iter().zip(&far).filter(|(_, far)| **far == is_far);

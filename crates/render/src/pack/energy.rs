@@ -96,7 +96,7 @@ pub enum TableLobes {
     Mirror,
     /// Rough glass from outside, then from inside, with the bits of the index of refraction.
     Glass(u32),
-    /// The F0 and F90 parts of reflection, and rough glass with an index.
+    /// The F0 and F90 parts of reflection; also rough glass, if there is an index of refraction (as bits).
     PrincipledLobes(Option<u32>),
 }
 

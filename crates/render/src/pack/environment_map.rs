@@ -530,14 +530,17 @@ mod tests {
             let stride = (grid.rows() + 1) * 33;
             let up = normal_bin(Vec3::new(0.01, 0.01, 1.0)) as usize;
             let distribution = |bin: usize| widths(&words[grid.rows() * 32 + bin * stride..][..33]);
-            let lower_share: f64 = distribution(up)[grid.rows().div_ceil(2) + 2..].iter().sum();
-            let lower_share_of_all: f64 = distribution((NORMAL_BINS * NORMAL_BINS) as usize)
+            let lower_probability: f64 = distribution(up)[grid.rows().div_ceil(2) + 2..].iter().sum();
+            let lower_probability_for_all: f64 = distribution((NORMAL_BINS * NORMAL_BINS) as usize)
                 [grid.rows().div_ceil(2) + 2..]
                 .iter()
                 .sum();
             if height >= 32 {
-                assert_eq!(lower_share, 0.0, "{width} x {height}: light from behind");
-                assert!(lower_share_of_all > 0.2, "for all directions: {lower_share_of_all}");
+                assert_eq!(lower_probability, 0.0, "{width} x {height}: light from behind");
+                assert!(
+                    lower_probability_for_all > 0.2,
+                    "for all directions: {lower_probability_for_all}"
+                );
             }
         }
     }

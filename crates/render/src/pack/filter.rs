@@ -33,12 +33,12 @@ pub fn height(filter: PixelFilter, distance: f64) -> f64 {
 }
 
 fn mitchell(x: f64) -> f64 {
-    let six_times = if x < 1.0 {
+    let value_times_6 = if x < 1.0 {
         7.0 * x.powi(3) - 12.0 * x.powi(2) + 16.0 / 3.0
     } else {
         -7.0 / 3.0 * x.powi(3) + 12.0 * x.powi(2) - 20.0 * x + 32.0 / 3.0
     };
-    six_times / 6.0
+    value_times_6 / 6.0
 }
 
 /// Returns the [`FILTER_BINS_MAX`] equally likely bins of a filter: inner edge, outer edge, weight, 0. The bins of a

@@ -1,5 +1,5 @@
-//! Origin of the packed coordinates, near the camera's target. Otherwise, a scene at a distance of a thousand times its
-//! size from the origin would lose ten of the 24 bits of f32.
+//! Origin of the packed coordinates, near the camera's look-at point. Relative to the file's origin, a scene at a
+//! distance of a thousand times its size would lose ten of the 24 bits of f32.
 
 use std::borrow::Cow;
 
@@ -7,8 +7,9 @@ use glam::DVec3;
 
 use wgray_scene::{Camera, Light, Scene};
 
-/// Returns a point near the camera's target, on a grid whose spacing is a power of 2 not below the distance to the
-/// target. Scenes near the file's origin keep their coordinates, and no coordinate gains digits.
+/// Returns a point near the camera's look-at point, on a grid whose spacing is a power of 2, at least the distance from
+/// the camera to the look-at point. Scenes near the file's origin keep their coordinates, and no coordinate gains
+/// digits.
 pub fn origin(camera: &Camera) -> DVec3 {
     let cell = camera.position.distance(camera.look_at).log2().ceil().exp2();
     (camera.look_at / cell).round() * cell
@@ -53,7 +54,7 @@ mod tests {
     }
 
     #[test]
-    fn the_origin_is_no_farther_from_the_target_than_the_camera() {
+    fn the_origin_is_no_farther_from_the_look_at_point_than_the_camera() {
         for (position, look_at) in [
             ([2000.0, 1997.0, 2001.3], [2000.0, 2000.0, 2001.0]),
             ([-1e9, 1e9, 0.0], [-1e9 + 1e-3, 1e9, 1e-3]),

@@ -147,7 +147,7 @@ fn approximately_packed(color: DVec3) -> Option<u32> {
         return None;
     }
     let mantissas = steps.map(|x| x * units(exponent));
-    // Faster than `round`, and equal where rounding is certain.
+    // Faster than `round`, and equal to it if `is_certain`.
     let rounded = mantissas.map(|x| (x + 0.5) as u32);
     let is_certain = (mantissas.iter().zip(rounded)).all(|(x, rounded)| (x - f64::from(rounded)).abs() < MAX_DISTANCE);
     is_certain.then(|| join_bits(rounded, exponent))
@@ -205,7 +205,7 @@ mod tests {
                 assert_eq!(bytes.packed(color), exact, "{encoding:?} {color:?}");
             }
         }
-        let mut certain = 0;
+        let mut approximate_count = 0;
         let colors = additive(0.1).zip(additive(0.5)).zip(additive(0.9)).take(200_000);
         for (i, ((r, g), b)) in colors.enumerate() {
             // From dark to bright, with black in some components.
@@ -214,9 +214,9 @@ mod tests {
             let exact = packed(color.to_array().map(|x| steps(x, Encoding::Srgb)));
             let approximate = approximately_packed(color);
             assert_eq!(approximate.unwrap_or(exact), exact, "{color}");
-            certain += usize::from(approximate.is_some());
+            approximate_count += usize::from(approximate.is_some());
         }
-        assert!(certain > 150_000, "{certain} of 200000");
+        assert!(approximate_count > 150_000, "{approximate_count} of 200000");
         assert_eq!(approximately_packed(DVec3::ZERO), Some(packed([0.0; 3])));
         assert_eq!(approximately_packed(DVec3::ONE), Some(packed([255.0; 3])));
     }

@@ -53,24 +53,24 @@ fn has_both_sides(scene: &Scene, primitive: &Primitive) -> bool {
         below && above
     };
     let mut add_point = |p: DVec3| add_height((p - center).dot(normal), p.abs().max(center.abs()).max_element());
-    let both_by_lights = scene.lights.iter().any(|light| match light {
+    let found_by_lights = scene.lights.iter().any(|light| match light {
         Light::Rectangle { rectangle, .. } => rectangle.corners().into_iter().any(&mut add_point),
         Light::Point { position, .. } | Light::Spot { position, .. } => add_point(*position),
         Light::Directional { .. } => false,
     });
-    let both_by_shapes = both_by_lights
+    let found_by_shapes = found_by_lights
         || scene.shapes.iter().any(|shape| {
             let mut found = false;
             shape.geometry.each_extreme(normal, |p| found |= add_point(p));
             found
         });
     // Directional lights and planes are infinite, so the direction decides.
-    let both_by_directions = both_by_shapes
+    let found_by_directions = found_by_shapes
         || scene.lights.iter().any(|light| match light {
             Light::Directional { direction, .. } => add_height(-direction.dot(normal), 1.0),
             _ => false,
         });
-    both_by_directions
+    found_by_directions
         || scene.shapes.iter().any(|shape| match shape.geometry {
             Geometry::Plane { tangent, bitangent, .. } => [tangent, bitangent, -tangent, -bitangent]
                 .into_iter()

@@ -94,7 +94,7 @@ impl CameraKeyDescription {
         }
     }
 
-    /// Creates a key with position and target point.
+    /// Creates a key with a position and a look-at point.
     pub fn looking(frame: f64, position: impl Into<DVec3>, look_at: impl Into<DVec3>) -> Self {
         Self {
             position: Some(position.into()),

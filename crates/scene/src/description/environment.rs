@@ -116,7 +116,7 @@ impl EnvironmentName {
     }
 }
 
-/// A rotation of the environment, counter-clockwise as seen against the axis.
+/// A rotation of the environment, counter-clockwise when the axis points towards the viewer (right-hand rule).
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(
     untagged,

@@ -41,8 +41,8 @@ kinds! {
     Length, "a length in scene units", number(LENGTHS);
     Size, "two lengths in scene units", list(2, number(LENGTHS));
     Rgb, "linear red, green and blue", list(3, number(COLORS));
-    ShareRgb, "linear red, green and blue", list(3, number(FRACTIONS));
-    Share, "", number(FRACTIONS);
+    FractionRgb, "linear red, green and blue", list(3, number(FRACTIONS));
+    Fraction, "", number(FRACTIONS);
     Degrees, "in degrees", number(ROTATIONS);
     Angles, "three angles in degrees", list(3, number(ROTATIONS));
 
@@ -94,24 +94,24 @@ kinds! {
 }
 
 /// A plain color with components from 0 to 1, or a texture.
-pub(crate) struct ShareColor;
+pub(crate) struct FractionColor;
 
-impl JsonSchema for ShareColor {
+impl JsonSchema for FractionColor {
     fn inline_schema() -> bool {
         true
     }
 
     fn schema_name() -> Cow<'static, str> {
-        "ShareColor".into()
+        "FractionColor".into()
     }
 
     fn json_schema(generator: &mut SchemaGenerator) -> Schema {
         let mut schema = generator.subschema_for::<crate::ColorDescription>();
-        let share = generator.subschema_for::<ShareRgb>().to_value();
+        let rgb = generator.subschema_for::<FractionRgb>().to_value();
         if let Some(Value::Array(alternatives)) = schema.get_mut("anyOf")
             && let Some(plain) = alternatives.first_mut()
         {
-            *plain = share;
+            *plain = rgb;
         }
         copy_plain_title(&mut schema);
         schema

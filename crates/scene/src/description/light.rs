@@ -23,7 +23,7 @@ tagged! {
     }
 }
 
-/// A rectangular area light that emits from both sides.
+/// A rectangular area light. With `integrator = "path"`, only the side of its normal emits light; otherwise both sides.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RectangleLightDescription {
@@ -72,7 +72,7 @@ impl RectangleLightDescription {
     }
 }
 
-/// A point light without distance falloff.
+/// A point light. With `integrator = "path"`, light falls off with the square of the distance.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PointLightDescription {
@@ -116,7 +116,8 @@ impl DirectionalLightDescription {
     }
 }
 
-/// A spot light without distance falloff, with either `direction` or `look_at`.
+/// A spot light, with either `direction` or `look_at`. With `integrator = "path"`, light falls off with the square of
+/// the distance.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SpotLightDescription {

@@ -8,7 +8,7 @@ use toml::Table;
 use super::tables::ReadError;
 use super::tagged::{Tagged, tagged};
 use super::{ColorDescription, NormalMapDescription, PrincipledDescription, ValueDescription};
-use crate::description::kinds::{Absorption, Degrees, Etas, Ior, Ks, Metal, Share, ShareColor, Shininess};
+use crate::description::kinds::{Absorption, Degrees, Etas, Fraction, FractionColor, Ior, Ks, Metal, Shininess};
 
 tagged! {
     /// A material, by `type`.
@@ -99,7 +99,7 @@ impl PhongDescription {
 pub struct MirrorDescription {
     /// Factor of the reflected light.
     #[serde(default)]
-    #[schemars(with = "ShareColor")]
+    #[schemars(with = "FractionColor")]
     pub tint: ColorDescription,
     /// Normal map.
     pub normal_map: Option<NormalMapDescription>,
@@ -118,7 +118,7 @@ pub struct GlassDescription {
     pub ior: f64,
     /// Factor of the transmitted light.
     #[serde(default)]
-    #[schemars(with = "ShareColor")]
+    #[schemars(with = "FractionColor")]
     pub tint: ColorDescription,
     /// Normal map.
     pub normal_map: Option<NormalMapDescription>,
@@ -146,7 +146,7 @@ impl GlassDescription {
 #[serde(deny_unknown_fields)]
 pub struct DiffuseDescription {
     /// Albedo.
-    #[schemars(with = "ShareColor")]
+    #[schemars(with = "FractionColor")]
     pub color: ColorDescription,
     /// Roughness, 0 to 1.
     #[serde(default)]
@@ -185,7 +185,7 @@ macro_rules! microfacet_material {
             pub roughness: ValueDescription,
             /// Increase of the roughness along the first axis, 0 to 1.
             #[serde(default)]
-            #[schemars(with = "Share")]
+            #[schemars(with = "Fraction")]
             pub anisotropy: f64,
             /// Rotation of the first axis from the direction of u towards the direction of v, in degrees.
             #[serde(default)]
@@ -208,7 +208,7 @@ microfacet_material! {
     /// Smooth or rough metal, whose reflectance is given by `color`, by `metal`, or by `eta` and `k`.
     ConductorDescription {
         /// Reflectance; 1 if no key sets it.
-        #[schemars(with = "Option<ShareColor>")]
+        #[schemars(with = "Option<FractionColor>")]
         color: Option<ColorDescription>,
         /// A metal's name.
         #[schemars(with = "Option<Metal>")]
@@ -259,7 +259,7 @@ microfacet_material! {
         ior: f64,
         /// Factor of the transmitted light.
         #[serde(default)]
-        #[schemars(with = "ShareColor")]
+        #[schemars(with = "FractionColor")]
         color: ColorDescription,
         /// Absorption coefficient.
         #[serde(default)]

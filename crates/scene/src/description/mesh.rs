@@ -151,7 +151,7 @@ pub enum Up {
     Z,
 }
 
-/// A rotation, counter-clockwise as seen against its axis, in degrees.
+/// A rotation in degrees, counter-clockwise when the axis points towards the viewer (right-hand rule).
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(
     untagged,

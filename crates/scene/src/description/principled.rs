@@ -5,14 +5,16 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{ColorDescription, NormalMapDescription, TextureReference, ValueDescription};
-use crate::description::kinds::{AttenuationDistance, Degrees, PrincipledIor, Share, ShareColor, ShareRgb, Thickness};
+use crate::description::kinds::{
+    AttenuationDistance, Degrees, Fraction, FractionColor, FractionRgb, PrincipledIor, Thickness,
+};
 
 /// glTF's metallic-roughness material with extensions and glTF's defaults, for `integrator = "path"`.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct PrincipledDescription {
     /// Albedo of the dielectric's diffuse base, or reflectance of the metal at normal incidence.
-    #[schemars(with = "ShareColor")]
+    #[schemars(with = "FractionColor")]
     pub base_color: ColorDescription,
     /// Metallic weight, 0 to 1.
     pub metallic: ValueDescription,
@@ -38,7 +40,7 @@ pub struct PrincipledDescription {
     #[schemars(with = "Thickness")]
     pub thickness: f64,
     /// Transmittance of the volume over `attenuation_distance`.
-    #[schemars(with = "ShareRgb")]
+    #[schemars(with = "FractionRgb")]
     pub attenuation_color: DVec3,
     /// Distance over which the transmittance is `attenuation_color`; infinite if absent.
     #[schemars(with = "Option<AttenuationDistance>")]
@@ -50,7 +52,7 @@ pub struct PrincipledDescription {
     /// Normal map of the clear coat.
     pub clearcoat_normal_map: Option<NormalMapDescription>,
     /// Color of the sheen.
-    #[schemars(with = "ShareColor")]
+    #[schemars(with = "FractionColor")]
     pub sheen_color: ColorDescription,
     /// Roughness of the sheen, 0 to 1.
     pub sheen_roughness: ValueDescription,
@@ -59,7 +61,7 @@ pub struct PrincipledDescription {
     /// Effect of `alpha`.
     pub alpha_mode: AlphaMode,
     /// Minimum alpha of opaque points, with `alpha_mode = "mask"`.
-    #[schemars(with = "Share")]
+    #[schemars(with = "Fraction")]
     pub alpha_cutoff: f64,
     /// Use of a mesh's vertex colors.
     pub vertex_colors: VertexColors,

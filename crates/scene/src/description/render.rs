@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 
 use super::integrator::Integrator;
-use crate::description::kinds::{Clamp, Count, Depth, FilterRadius, MaxSamples, Rgb, Seed, ShadowEpsilon, Share};
+use crate::description::kinds::{Clamp, Count, Depth, FilterRadius, Fraction, MaxSamples, Rgb, Seed, ShadowEpsilon};
 use crate::limits::MAX_COUNT;
 
 /// Shadows of glass. In a file, the names are in snake case: `"opaque"`.
@@ -239,7 +239,7 @@ impl Pattern {
 #[serde(deny_unknown_fields, expecting = "a table, such as { error = 0.01 }")]
 pub struct AdaptiveDescription {
     /// Target standard error of a pixel's displayed value.
-    #[schemars(with = "Share")]
+    #[schemars(with = "Fraction")]
     pub error: f64,
     /// Maximum number of samples per pixel. If absent, 16 times the count of `pixel_samples`.
     #[serde(default, skip_serializing_if = "Option::is_none")]

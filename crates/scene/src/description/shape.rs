@@ -199,7 +199,7 @@ pub struct CylinderDescription {
 }
 
 impl CylinderDescription {
-    /// Creates a cylinder between the centers of its caps.
+    /// Creates a cylinder from the centers of its caps.
     pub fn new(material: impl Into<String>, start: impl Into<DVec3>, end: impl Into<DVec3>, radius: f64) -> Self {
         Self {
             material: material.into(),

@@ -12,7 +12,7 @@ use toml::Table;
 use super::tables::ReadError;
 use super::tagged::{Tagged, tagged};
 use crate::description::kinds::{
-    Anisotropy, Degrees, Factors, LineWidth, Rgb, Share, Strength, UvOffset, UvScale, UvSet, copy_plain_title,
+    Anisotropy, Degrees, Factors, Fraction, LineWidth, Rgb, Strength, UvOffset, UvScale, UvSet, copy_plain_title,
 };
 use crate::{Channel, Encoding, TextureFilter, Wrap};
 
@@ -77,7 +77,7 @@ impl<'de> Deserialize<'de> for ColorDescription {
 #[serde(untagged)]
 pub enum ValueDescription {
     /// A constant.
-    Plain(#[schemars(with = "Share")] f64),
+    Plain(#[schemars(with = "Fraction")] f64),
     /// One channel of a texture.
     Texture(ChannelReference),
 }

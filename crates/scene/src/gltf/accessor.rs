@@ -210,7 +210,7 @@ impl Document {
         let layout = Layout::of(&key, accessor)?;
         if layout.component_count() != N {
             let rule = format!(
-                "the elements have {} components; expected {N}",
+                "number of components of the elements: {}; expected {N}",
                 layout.component_count()
             );
             return Err(GltfFault::key(format!("{key}.type"), rule));
@@ -260,7 +260,7 @@ impl Document {
         match indices.iter().position(|index| *index == restart) {
             None => Ok(indices),
             Some(i) => {
-                let rule = "the primitive restart value; an index must be less";
+                let rule = "the primitive restart value; an index must be less than this value";
                 Err(GltfFault::key(key, format!("element {i} is {restart}, {rule}")))
             }
         }

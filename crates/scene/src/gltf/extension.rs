@@ -76,7 +76,9 @@ pub(super) fn check(root: &Root, notes: &mut Vec<String>) -> Result<(), GltfFaul
     }
     if ignored.len() > MAX_NOTES {
         let remaining = ignored.len() - MAX_NOTES;
-        notes.push(format!("{remaining} more extensions are not supported and are ignored"));
+        notes.push(format!(
+            "further extensions are not supported and are ignored (number of these: {remaining})"
+        ));
     }
     Ok(())
 }

@@ -49,7 +49,7 @@ pub(super) fn chunks(bytes: &[u8]) -> Result<Chunks, GltfFault> {
         let start = offset + CHUNK_HEADER;
         if size > length - start {
             let rule = format!(
-                "the chunk size {size} must be at most {}, the remaining bytes",
+                "the chunk size {size} must be at most {}, the number of remaining bytes",
                 length - start
             );
             return Err(GltfFault::new(Location::Byte(offset as u64), rule));
@@ -137,13 +137,16 @@ mod tests {
         );
         assert_eq!(
             error_of(&glb(23, &[(JSON, b"{}  ")])),
-            byte(12, "the chunk size 4 must be at most 3, the remaining bytes")
+            byte(12, "the chunk size 4 must be at most 3, the number of remaining bytes")
         );
         let mut bytes = glb(24, &[(JSON, b"{}  ")]);
         bytes[12..16].fill(0xff);
         assert_eq!(
             error_of(&bytes),
-            byte(12, "the chunk size 4294967295 must be at most 4, the remaining bytes")
+            byte(
+                12,
+                "the chunk size 4294967295 must be at most 4, the number of remaining bytes"
+            )
         );
         assert_eq!(
             error_of(&glb(24, &[(BIN, b"{}  ")])),

@@ -15,7 +15,7 @@ const MAX_OBJECTS: usize = 2 << 20;
 const MAX_VALUES: usize = 32 << 20;
 
 /// Keys of indices and OpenGL codes. The crate `gltf-json` truncates 64-bit values of these keys to 32 bits.
-const INDICES: &[&str] = &[
+const INDEX_KEYS: &[&str] = &[
     "attributes",
     "buffer",
     "bufferView",
@@ -176,7 +176,7 @@ fn normalize(value: &mut Value, index: Option<&str>) -> Result<(), (String, Stri
             map.remove("extras");
             for (key, value) in map {
                 // The elements of `attributes` and `targets` are indices as well.
-                let is_index = INDICES.contains(&key.as_str());
+                let is_index = INDEX_KEYS.contains(&key.as_str());
                 let inherited = index.filter(|outer| ["attributes", "targets"].contains(outer));
                 let index = if is_index { Some(key.as_str()) } else { inherited };
                 normalize(value, index).map_err(|(path, rule)| (format!(".{key}{path}"), rule))?;

@@ -171,8 +171,7 @@ impl<'a> Meshes<'a> {
             let message = format!("{location} has no TEXCOORD_{set}, which its material needs; (0, 0) is used");
             match self.without_uvs_count {
                 1 => message,
-                2 => format!("{message} (and 1 more primitive)"),
-                count => format!("{message} (and {} more primitives)", count - 1),
+                count => format!("{message} (number of such primitives: {count})"),
             }
         });
         [
@@ -191,8 +190,7 @@ impl<'a> Meshes<'a> {
             Damage {
                 what: match count {
                     1 => message,
-                    2 => format!("{message} (and 1 more primitive)"),
-                    count => format!("{message} (and {} more primitives)", count - 1),
+                    count => format!("{message} (number of such primitives: {count})"),
                 },
                 stand_in: "these numbers are ignored",
             }
@@ -259,7 +257,7 @@ impl<'a> Meshes<'a> {
         let mut material_indices = Vec::new();
         for part in parts {
             let material_use = materials.get(part.material);
-            let first_vertex = builder.vertices(self, part, material_use, key, skin.as_ref())?;
+            let first_vertex = builder.add_vertices(self, part, material_use, key, skin.as_ref())?;
             let count = builder.counts[&first_vertex];
             let mut triangles = self.triangles(part, count)?;
             if !builder.invalid_vertices.is_empty() {
@@ -362,7 +360,7 @@ struct MeshBuilder {
 
 impl MeshBuilder {
     /// Adds the vertices of a primitive, unless they were already added. Returns the index of the first vertex.
-    fn vertices(
+    fn add_vertices(
         &mut self,
         meshes: &Meshes,
         part: &Part,

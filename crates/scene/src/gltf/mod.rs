@@ -357,7 +357,7 @@ fn import(
             *mesh_index = Some(imported.meshes.len());
             let mut mesh = built.mesh;
             for note in mesh.notes.drain(..) {
-                tracing::debug!(mesh = key.mesh, "{note}"); // debug: open meshes are common
+                tracing::debug!(mesh = key.mesh, "{note}"); // debug level: exported meshes often have degenerate triangles
             }
             imported.meshes.push(Arc::new(mesh));
             mesh_materials.push(built.materials);

@@ -53,7 +53,7 @@ fn files_decode_to_the_images_of_the_reference_transcoder() {
     for name in &names {
         let image = decoded(&file(name)).unwrap();
         assert_eq!(image.color().has_alpha(), has_alpha(&file(name)).unwrap(), "{name}");
-        // The file uastc-1x1 has alpha too.
+        // The file uastc-1x1 also has alpha.
         let has_alpha = name.contains("alpha") || name == "uastc-1x1";
         assert_eq!(image.color().has_alpha(), has_alpha, "{name}");
         assert!(image.into_rgba8() == reference(name), "{name}");

@@ -173,7 +173,7 @@ fn push_copy<T: Copy>(list: &mut Vec<T>, vertex: usize) {
 }
 
 /// Returns the center, rounded to a grid whose cell size is the extent, rounded up to a power of 2. Meshes around the
-/// origin thus keep their coordinates, and no coordinate needs more bits than before.
+/// origin thus keep their coordinates, and subtracting the center adds no significant bits to a coordinate.
 fn center(positions: impl Iterator<Item = DVec3>) -> DVec3 {
     let (low, high) = positions.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| {
         (low.min(p), high.max(p))

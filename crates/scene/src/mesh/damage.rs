@@ -55,7 +55,7 @@ impl Damage {
         };
         let more = match self.count {
             1 => String::new(),
-            count => format!(" ({} similar)", count - 1),
+            count => format!(" (similar problems: {})", count - 1),
         };
         Note {
             line,

@@ -258,7 +258,7 @@ mod tests {
     }
 
     #[test]
-    fn files_of_lines_alone_take_little() {
+    fn the_numbers_of_problems_and_materials_are_limited() {
         let invalid = format!("newmtl a\n{}", "Kd x\n".repeat(100_000));
         let Mtl {
             problems,

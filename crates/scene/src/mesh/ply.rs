@@ -64,14 +64,14 @@ fn body(header: &Header, mut values: impl Values, with_normals: bool, damages: D
     raw.groups.push(Group::default());
     raw.begin_group(0);
     // Further elements with the same name are skipped.
-    let (mut seen_vertices, mut seen_faces) = (false, false);
+    let (mut has_vertices, mut has_faces) = (false, false);
     for element in &header.elements {
         check_size(element, &values)?;
         match element.name.as_str() {
-            "vertex" if !std::mem::replace(&mut seen_vertices, true) => {
+            "vertex" if !std::mem::replace(&mut has_vertices, true) => {
                 read_vertices(element, &mut values, with_normals, &mut raw)?
             }
-            "face" if !std::mem::replace(&mut seen_faces, true) => {
+            "face" if !std::mem::replace(&mut has_faces, true) => {
                 read_faces(element, &mut values, vertices.count, &mut raw)?
             }
             _ => {
@@ -102,15 +102,15 @@ fn check_size(element: &Element, values: &impl Values) -> Result<(), MeshFault> 
     match total <= values.bytes_left() as u128 {
         true => Ok(()),
         false => Err(element.location.fault(format!(
-            "the file is truncated: {} elements {:?} take {total} bytes or more; remaining bytes: {}",
-            element.count,
+            "the file is truncated: element {:?} with the count {} takes {total} bytes or more; remaining bytes: {}",
             element.name,
+            element.count,
             values.bytes_left()
         ))),
     }
 }
 
-/// Ends a row; extra values on its line are damage.
+/// Ends a row. Extra values on the line count as damage.
 #[inline]
 fn end_row(values: &mut impl Values, raw: &mut RawMesh) {
     if let Some(location) = values.end_row() {

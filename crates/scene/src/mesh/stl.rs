@@ -1,8 +1,8 @@
 //! STL files (3D Systems, "StereoLithography Interface Specification", 1989), with merged vertices.
 //!
 //! wgray has its own reader because the crate `stl_io` 0.11 reads only one solid of a text file, reports no line
-//! numbers, and treats every file that begins with `solid` as text. For a million triangles, the crate takes 0.3 s;
-//! loading with this reader takes 0.4 s.
+//! numbers, and treats every file that begins with `solid` as text. It is not much faster: for a million triangles, the
+//! crate takes 0.3 s without merging, and loading with this reader takes 0.4 s.
 
 use std::hash::BuildHasher;
 
@@ -55,7 +55,7 @@ pub(super) fn read(bytes: &[u8], with_normals: bool) -> Result<RawMesh, MeshFaul
         }
         None => {
             return Err(Location::File.fault(format!(
-                "the file must begin with \"solid\" or a header of {HEADER} bytes; it has {} bytes",
+                "the file must begin with \"solid\" or a header of {HEADER} bytes; number of bytes of the file: {}",
                 bytes.len()
             )));
         }

@@ -161,13 +161,13 @@ impl Piece<'_> {
 pub struct Pieces<'a>(Parts<'a>);
 
 impl<'a> Pieces<'a> {
-    /// Finds the pieces of a text.
+    /// Locates the parts of a scene file's text.
     pub fn of(text: &'a str) -> Pieces<'a> {
         Pieces(Parts::of(text))
     }
 
-    /// Returns the pieces of a text whose parts have already been located.
-    pub fn known(text: &'a str, places: &'a Places) -> Pieces<'a> {
+    /// Uses the part locations of an earlier parse of the text.
+    pub fn with_places(text: &'a str, places: &'a Places) -> Pieces<'a> {
         let parts = places.0.as_slice().into();
         Pieces(Parts { text, parts })
     }

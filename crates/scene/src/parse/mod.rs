@@ -271,7 +271,8 @@ fn read_parts(parts: &Parts, defines: &mut Defines) -> Result<Option<Result<Desc
     if defines.unapplied().is_some() {
         return Ok(None); // an override of an entire list, or of a name or index that does not exist
     }
-    let read = both(problems.end(()), read_file(rest)).map(|((), mut description)| {
+    let part_problems = problems.end(());
+    let read = both(part_problems, read_file(rest)).map(|((), mut description)| {
         // The elements of a section are either all in the parts or all in the rest.
         if has(Kind::Textures) {
             description.textures = textures;

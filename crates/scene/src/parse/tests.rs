@@ -426,7 +426,7 @@ fn the_page_has_every_pattern() {
 
 #[test]
 #[should_panic(expected = "under ## `[image]`")]
-fn a_key_that_is_missing_in_the_page_is_noticed() {
+fn a_key_that_is_missing_in_the_page_is_found() {
     check_keys(&format!("{START}[render]"), "## `[image]`");
 }
 

@@ -116,7 +116,7 @@ impl<'a> SceneMaterials<'a> {
         for library in &mesh.libraries {
             let maps = library.materials.iter().flat_map(MtlMaterial::maps);
             let maps: BTreeSet<&String> = maps.collect();
-            let maps = maps.into_iter().map(|map| self.beside(&library.file, map));
+            let maps = maps.into_iter().map(|map| self.referenced_path(&library.file, map));
             let paths = maps.chain([library.file.clone()]);
             let paths: Vec<PathBuf> = paths
                 .map(|path| self.images.assets.folder.join(self.display_path(&path)))
@@ -223,7 +223,7 @@ impl<'a> SceneMaterials<'a> {
         warnings.ignored(mtl);
         let map = mtl.diffuse_map.as_ref();
         let texture = map.and_then(|map| {
-            let found = self.map_texture(&self.beside(file, map), Part::Colors(None), has_uvs);
+            let found = self.map_texture(&self.referenced_path(file, map), Part::Colors(None), has_uvs);
             warnings.texture_or_warning("map_Kd", found, "Kd is used instead")
         });
         let diffuse = texture.map_or(Color::Plain(diffuse), Color::Texture);
@@ -295,7 +295,7 @@ impl<'a> SceneMaterials<'a> {
     }
 
     /// Returns the path of a file that an MTL file refers to.
-    fn beside(&self, library: &Path, name: &str) -> PathBuf {
+    fn referenced_path(&self, library: &Path, name: &str) -> PathBuf {
         let folder = library.parent().unwrap_or(Path::new(""));
         self.images.assets.file_system.resolve(folder, name)
     }
@@ -316,7 +316,7 @@ impl<'a> SceneMaterials<'a> {
 struct Warning {
     keyword: String,
     message: String,
-    /// The stand-in for a map that cannot be used.
+    /// The replacement of the map, if the warning is about a map that cannot be used.
     stand_in: Option<&'static str>,
     /// True for a damaged or missing file, which is an error in strict mode.
     is_damage: bool,

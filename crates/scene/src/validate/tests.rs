@@ -405,7 +405,7 @@ fn values_at_the_limits_are_valid() {
 }
 
 #[test]
-fn a_factor_without_color_is_missing() {
+fn a_material_needs_a_factor_or_a_color() {
     let message = parse(&with_line("diffuse = [0.4, 0, 0]", "")).unwrap_err().to_string();
     let line = VALID
         .lines()

@@ -134,7 +134,7 @@ fn transform(scale: [f64; 2], rotate: f64, offset: [f64; 2]) -> Checked<[DVec3; 
 pub(super) struct Textures<'a> {
     pub(super) names: Vec<&'a str>,
     pub(super) textures: &'a [Texture],
-    /// By name, the index of the alpha texture, or an error. Alpha textures follow the other textures.
+    /// For each name, the index of the alpha texture, or an error. Alpha textures follow the other textures.
     pub(super) alphas: BTreeMap<&'a str, Result<usize, String>>,
     pub(super) replaced: BTreeSet<usize>,
     /// The integrator, which determines the valid materials.

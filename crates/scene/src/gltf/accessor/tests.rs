@@ -118,7 +118,7 @@ fn every_type_is_read() {
     }
     assert_eq!(
         error_of(accessor(&bytes, description("VEC4")).vectors::<3>(0)),
-        "accessors[0].type: the elements have 4 components; expected 3"
+        "accessors[0].type: number of components of the elements: 4; expected 3"
     );
     assert_eq!(
         error_of(accessor(&bytes, description("VEC4")).vectors::<3>(1)),

@@ -198,7 +198,7 @@ fn buffers_may_be_data_uris() {
 }
 
 #[test]
-fn what_is_no_gltf_is_told() {
+fn files_that_are_not_gltf_are_rejected() {
     let outcome = |text: &str| match read(text.as_bytes().to_vec()) {
         Ok(_) => "fine".to_owned(),
         Err(fault) => fault.of(Path::new("a")).to_string(),
@@ -387,7 +387,7 @@ fn common_exporter_errors_are_repaired() {
 }
 
 #[test]
-fn extensions_are_refused_or_told_by_their_names() {
+fn unsupported_extensions_are_rejected_or_reported_by_name() {
     let read_with = |required: &[&str], used: &[&str]| {
         let json = json!({ "asset": { "version": "2.0" }, "extensionsRequired": required, "extensionsUsed": used });
         read(json.to_string().into_bytes())

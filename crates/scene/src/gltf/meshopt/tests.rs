@@ -55,7 +55,7 @@ fn hash(bytes: &[u8]) -> String {
 }
 
 #[test]
-fn streams_decode_to_what_the_reference_makes_of_them() {
+fn streams_decode_to_the_results_of_the_reference_decoder() {
     let all = streams();
     assert!(all.len() > 50, "{}", all.len());
     for Stream {

@@ -66,7 +66,7 @@ impl SceneMaterials<'_> {
         }
         warnings.ignored(mtl);
         let mut map = |name: &'static str, map: &Option<String>, part: Part| {
-            let found = self.map_texture(&self.beside(file, map.as_ref()?), part, traits.has_uvs);
+            let found = self.map_texture(&self.referenced_path(file, map.as_ref()?), part, traits.has_uvs);
             warnings.texture_or_warning(name, found, "it is ignored")
         };
         let colors = Part::Colors(None);
@@ -108,7 +108,7 @@ impl SceneMaterials<'_> {
 
     /// Returns the opacity of `map_d`: the alpha channel of the image, or the red channel if there is no alpha channel.
     fn opacity(&mut self, mtl: &MtlMaterial, file: &Path, traits: Traits, warnings: &mut Warnings) -> Option<Value> {
-        let path = self.beside(file, mtl.opacity_map.as_ref()?);
+        let path = self.referenced_path(file, mtl.opacity_map.as_ref()?);
         if let Ok(texture) = self.map_texture(&path, Part::Alpha, traits.has_uvs) {
             return Some(Value::Texture(texture, Channel::A));
         }
