@@ -1,6 +1,7 @@
 //! The wavefront of the CPU path traces each path with the bits of the scalar integrator.
 
 use std::fmt::Write as _;
+use std::sync::Arc;
 
 use glam::{UVec2, Vec4};
 use proptest::strategy::{Strategy as _, ValueTree as _};
@@ -8,7 +9,7 @@ use proptest::test_runner::TestRunner;
 use wgray::scene::Integrator;
 use wgray_render::cpu::integrators::path::{path_layers, path_value};
 use wgray_render::cpu::pixel::{Layers, pixel_radiance};
-use wgray_render::cpu::wavefront::Wavefront;
+use wgray_render::cpu::wavefront::{BatchMeshes, Wavefront};
 use wgray_render::records::Packed;
 
 use crate::random_scenes::any_scene;
@@ -42,7 +43,11 @@ fn samples(packed: &Packed, step: u32, count: u32) -> Vec<(UVec2, u32)> {
 }
 
 fn wavefront(packed: &Packed, samples: &[(UVec2, u32)], batch: usize) -> Vec<Path> {
-    let mut wavefront = Wavefront::default();
+    wavefront_with(BatchMeshes::new(packed), packed, samples, batch)
+}
+
+fn wavefront_with(meshes: BatchMeshes, packed: &Packed, samples: &[(UVec2, u32)], batch: usize) -> Vec<Path> {
+    let mut wavefront = Wavefront::new(Arc::new(meshes));
     let mut paths = Vec::new();
     for samples in samples.chunks(batch) {
         let traced = wavefront.trace(packed, samples.iter().copied());
@@ -162,6 +167,19 @@ fn scenes_have_the_paths_of_the_scalar_integrator() {
         let samples = samples(&packed, packed.camera.width.div_ceil(48), 4);
         let differ = differing(&wavefront(&packed, &samples, 1024), &scalar(&packed, &samples));
         assert_eq!(differ, 0, "of {} paths, {name}", samples.len());
+    }
+}
+
+#[test]
+fn meshes_that_are_too_large_are_traced_one_by_one() {
+    let packed = scene_with_many_items();
+    let triangles = packed.bvh.meshes.iter().map(|mesh| mesh.triangles.len()).sum::<usize>();
+    let samples = samples(&packed, 2, 2);
+    let expected = scalar(&packed, &samples);
+    for (limit, is_missing) in [(triangles, false), (triangles - 1, true)] {
+        let meshes = BatchMeshes::with_limit(&packed, limit);
+        assert_eq!(meshes.are_missing(&packed), is_missing);
+        assert_eq!(differing(&wavefront_with(meshes, &packed, &samples, 256), &expected), 0);
     }
 }
 

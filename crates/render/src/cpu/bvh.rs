@@ -102,17 +102,16 @@ pub fn closest_of_primitive(
 
 fn closest_of_mesh(scene: &Packed, before: Hit, instance_index: u32, ray: Ray, start: f32, origin_prim: UVec2) -> Hit {
     let MeshRay {
-        mesh,
         line,
         start,
         skip,
         best,
     } = closest_mesh_ray(scene, before, instance_index, ray, start, origin_prim);
-    let found = traversal::closest(*LEVEL, &mesh, &line, start, skip, best);
+    let found = traversal::closest(*LEVEL, &instance_mesh(scene, instance_index), &line, start, skip, best);
     if found.slot == NO_INDEX {
         return before;
     }
-    mesh_hit(&mesh, instance_index, &line, found)
+    mesh_hit(scene, instance_index, &line, found)
 }
 
 /// Returns a ray in the object space of an instance, from `start` on, that searches for hits closer than `before`.
@@ -124,7 +123,7 @@ pub fn closest_mesh_ray(
     ray: Ray,
     start: f32,
     origin_prim: UVec2,
-) -> MeshRay<'_> {
+) -> MeshRay {
     let i = &scene.bvh.instances[instance_index as usize];
     let direction = vector_to_mesh(i, ray.direction);
     let origin = point_to_mesh(i, ray.origin) + direction * start;
@@ -139,7 +138,6 @@ pub fn closest_mesh_ray(
         slot: NO_INDEX,
     };
     MeshRay {
-        mesh: traversal_mesh(&scene.bvh.meshes[i.mesh as usize]),
         line: Line::new(origin, direction, mesh_pad(i, origin)),
         start,
         skip: excluded_triangle(origin_prim, instance_index),
@@ -147,11 +145,20 @@ pub fn closest_mesh_ray(
     }
 }
 
+fn instance_mesh(scene: &Packed, instance_index: u32) -> traversal::Mesh<'_> {
+    traversal_mesh(&scene.bvh.meshes[scene.bvh.instances[instance_index as usize].mesh as usize])
+}
+
 /// Returns the hit of a ray of [`closest_mesh_ray`].
 #[inline(always)]
-pub fn mesh_hit(mesh: &traversal::Mesh, instance_index: u32, line: &Line, found: Nearest) -> Hit {
+pub fn mesh_hit(scene: &Packed, instance_index: u32, line: &Line, found: Nearest) -> Hit {
+    let mesh = instance_mesh(scene, instance_index);
     let [a, b, c, _] = mesh.triangles[found.slot as usize];
-    let vertices = [a, b, c].map(|vertex| &mesh.vertices[vertex as usize]);
+    let vertices = [
+        &mesh.vertices[a as usize],
+        &mesh.vertices[b as usize],
+        &mesh.vertices[c as usize],
+    ];
     Hit {
         t: found.t,
         instance: instance_index + 1,
@@ -171,7 +178,7 @@ fn excluded_triangle(origin_prim: UVec2, instance_index: u32) -> u32 {
     }
 }
 
-fn traversal_mesh(mesh: &PackedMesh) -> traversal::Mesh<'_> {
+pub fn traversal_mesh(mesh: &PackedMesh) -> traversal::Mesh<'_> {
     traversal::Mesh {
         nodes: cast_slice(&mesh.nodes),
         vertices: cast_slice(&mesh.vertices),
@@ -344,8 +351,8 @@ fn is_occluded_by_item(
     let i = item.index;
     match item.kind & 0xff {
         INSTANCE => {
-            let MeshRay { mesh, line, skip, .. } = shadow_mesh_ray(scene, i, surface, to_light, t_max);
-            traversal::any(*LEVEL, &mesh, &line, skip, t_max)
+            let MeshRay { line, skip, .. } = shadow_mesh_ray(scene, i, surface, to_light, t_max);
+            traversal::any(*LEVEL, &instance_mesh(scene, i), &line, skip, t_max)
         }
         _ => is_occluded_by_primitive_item(scene, item, surface, to_light, t_max, target_prim),
     }
@@ -374,17 +381,10 @@ pub fn is_occluded_by_primitive_item(
 
 /// Returns the segment in the object space of an instance, as a ray that searches for any hit.
 #[inline(always)]
-pub fn shadow_mesh_ray<'a>(
-    scene: &'a Packed,
-    instance_index: u32,
-    surface: &Surface,
-    to_light: Vec3,
-    t_max: f32,
-) -> MeshRay<'a> {
+pub fn shadow_mesh_ray(scene: &Packed, instance_index: u32, surface: &Surface, to_light: Vec3, t_max: f32) -> MeshRay {
     let i = &scene.bvh.instances[instance_index as usize];
     let origin = point_to_mesh(i, surface.ray_origin);
     MeshRay {
-        mesh: traversal_mesh(&scene.bvh.meshes[i.mesh as usize]),
         line: Line::new(origin, vector_to_mesh(i, to_light), mesh_pad(i, origin)),
         start: 0.0,
         skip: excluded_triangle(surface.exclude_front, instance_index),

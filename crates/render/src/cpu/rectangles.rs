@@ -43,10 +43,11 @@ impl<S: Simd> Rectangles<S> {
         let Rectangles { anchor, x, y, z } = *self;
         let from_ray = [anchor[0] - o[0], anchor[1] - o[1], anchor[2] - o[2]];
         let t = dot(z, from_ray) / dot_with(z, d);
-        let p = [0, 1, 2].map(
-            #[inline(always)]
-            |k| t * d[k] + o[k] - anchor[k],
-        );
+        let p = [
+            t * d[0] + o[0] - anchor[0],
+            t * d[1] + o[1] - anchor[1],
+            t * d[2] + o[2] - anchor[2],
+        ];
         let one = f32x8::splat(simd, 1.0);
         let inside = dot(x, p).abs().simd_le(one) & dot(y, p).abs().simd_le(one);
         let hits = inside & t.simd_gt(f32x8::splat(simd, 0.0)) & t.simd_lt(f32x8::splat(simd, limit));
@@ -59,10 +60,11 @@ impl<S: Simd> Rectangles<S> {
     pub fn occlude(&self, simd: S, p: Vec3, to_light: Vec3, t_max: f32) -> u32 {
         let (p, to_light) = (p.to_array(), to_light.to_array());
         let Rectangles { anchor, x, y, z } = *self;
-        let from_anchor = [0, 1, 2].map(
-            #[inline(always)]
-            |k| f32x8::splat(simd, p[k]) - anchor[k],
-        );
+        let from_anchor = [
+            f32x8::splat(simd, p[0]) - anchor[0],
+            f32x8::splat(simd, p[1]) - anchor[1],
+            f32x8::splat(simd, p[2]) - anchor[2],
+        ];
         let o = [dot(x, from_anchor), dot(y, from_anchor), dot(z, from_anchor)];
         let d = [dot_with(x, to_light), dot_with(y, to_light), dot_with(z, to_light)];
         let (depth, height) = (d[2].abs(), o[2].abs());

@@ -1,6 +1,7 @@
 //! CPU backend: evaluates the kernels' twins on a thread pool.
 
 use std::ops::{Deref, Range};
+use std::sync::{Arc, OnceLock};
 
 use glam::{UVec2, Vec4};
 use rayon::prelude::*;
@@ -9,7 +10,7 @@ use super::adaptive::{moments_with, pilot_add, pilot_finish, samples_wanted};
 use super::geometry::pixel_first_hit;
 use super::integrators::path::{path_layers, path_value};
 use super::pixel::{Layers, pixel_radiance};
-use super::wavefront::{MAX_PATHS, Wavefront};
+use super::wavefront::{BatchMeshes, MAX_PATHS, Wavefront};
 use crate::backend::{Backend, FilmState, Rules};
 use crate::error::RenderError;
 use crate::film::{Film, Layer};
@@ -23,6 +24,8 @@ pub struct Cpu<P> {
     rules: Rules,
     film: Option<(Film, FilmState)>,
     pending: Option<(Region, Range<u32>)>,
+    /// The meshes of the scene, from the first samples on.
+    meshes: OnceLock<Arc<BatchMeshes>>,
 }
 
 impl<P: Deref<Target = Packed>> Cpu<P> {
@@ -33,6 +36,7 @@ impl<P: Deref<Target = Packed>> Cpu<P> {
             scene,
             film: None,
             pending: None,
+            meshes: OnceLock::new(),
         }
     }
 
@@ -48,6 +52,7 @@ impl<P: Deref<Target = Packed>> Cpu<P> {
     pub fn edit_scene(&mut self, edit: impl FnOnce(&mut P)) {
         edit(&mut self.scene);
         (self.rules, self.film, self.pending) = (Rules::of(&self.scene), None, None);
+        self.meshes = OnceLock::new();
     }
 
     pub fn into_film(self) -> Option<Film> {
@@ -91,9 +96,14 @@ impl<P: Deref<Target = Packed>> Backend for Cpu<P> {
 
     fn poll(&mut self) -> Result<bool, RenderError> {
         if let (Some((tile, mut samples)), Some((film, _))) = (self.pending.take(), &mut self.film) {
+            let scene: &Packed = &self.scene;
+            let meshes = self.meshes.get_or_init(|| match scene.integrator {
+                Integrator::Phong => Arc::default(),
+                Integrator::Path => Arc::new(BatchMeshes::new(scene)),
+            });
             while !samples.is_empty() {
                 let end = self.rules.end_of_part(&samples);
-                add_samples(&self.scene, film, tile, samples.start..end);
+                add_samples(scene, meshes, film, tile, samples.start..end);
                 samples.start = end;
             }
         }
@@ -133,7 +143,7 @@ impl<P: Deref<Target = Packed>> Backend for Cpu<P> {
 }
 
 /// Adds samples to a tile: with adaptive sampling either pilot samples or later ones.
-fn add_samples(scene: &Packed, film: &mut Film, tile: Region, samples: Range<u32>) {
+fn add_samples(scene: &Packed, meshes: &Arc<BatchMeshes>, film: &mut Film, tile: Region, samples: Range<u32>) {
     let Film {
         region,
         sums,
@@ -174,9 +184,9 @@ fn add_samples(scene: &Packed, film: &mut Film, tile: Region, samples: Range<u32
         true => Statistics::Pilot,
         false => Statistics::Further,
     };
-    parts
-        .into_par_iter()
-        .for_each_init(Wavefront::default, |wavefront, mut run| {
+    parts.into_par_iter().for_each_init(
+        || Wavefront::new(Arc::clone(meshes)),
+        |wavefront, mut run| {
             let (first, width) = (run.first, run.sums.len());
             let pixel = |x: usize| UVec2::new(first.x + x as u32, first.y);
             let samples_of = |x: usize| {
@@ -207,7 +217,8 @@ fn add_samples(scene: &Packed, film: &mut Film, tile: Region, samples: Range<u32
             if statistics == Statistics::Pilot {
                 run.finish_pilot();
             }
-        });
+        },
+    );
 }
 
 /// The statistics of samples that adaptive sampling needs. See `shaders/kernels/adaptive.wgsl`.

@@ -38,44 +38,64 @@ impl<S: Simd> Four<S> {
         }
     }
 
-    /// Returns hits and distances, equal to [`Line::triangle`] of each triangle. Distances may be negative, down to
-    /// minus the padding of boxes.
+    /// See [`intersect`].
     #[inline(always)]
     pub fn intersect(&self, simd: S, line: &Line) -> (u32, f32x4<S>) {
-        let zero = f32x4::splat(simd, 0.0);
-        let mut sheared = [[zero; 3]; 3];
-        for (sheared, corner) in sheared.iter_mut().zip(&self.corners) {
-            let [x, y, z] = [
-                corner[line.axes[0]] - line.o[0],
-                corner[line.axes[1]] - line.o[1],
-                corner[line.axes[2]] - line.o[2],
-            ];
-            *sheared = [x - z * line.shear[0], y - z * line.shear[1], z];
-        }
-        let [a, b, c] = sheared;
-        let u = c[0] * b[1] - c[1] * b[0];
-        let v = a[0] * c[1] - a[1] * c[0];
-        let w = b[0] * a[1] - b[1] * a[0];
-        let inside = (u.simd_ge(zero) & v.simd_ge(zero) & w.simd_ge(zero))
-            | (u.simd_le(zero) & v.simd_le(zero) & w.simd_le(zero));
-        if inside.to_bitmask() as u32 & self.used == 0 {
-            return (0, zero);
-        }
-        let determinant = u + v + w;
-        let t = (u * (a[2] * line.shear[2]) + v * (b[2] * line.shear[2]) + w * (c[2] * line.shear[2])) / determinant;
-        let (mut near, mut far) = (f32x4::splat(simd, f32::NEG_INFINITY), f32x4::splat(simd, f32::INFINITY));
-        for k in 0..3 {
-            let axis = line.axes[k];
-            let [a, b, c] = [self.corners[0][axis], self.corners[1][axis], self.corners[2][axis]];
-            let first = (a.min(b).min(c) - line.o_low[k]) * line.inverse[k];
-            let second = (a.max(b).max(c) - line.o_high[k]) * line.inverse[k];
-            near = near.max(first.min(second));
-            far = far.min(first.max(second));
-        }
-        // This order of operands preserves NaN.
-        let t = near.simd_gt(t).select(near, t);
-        let t = far.simd_lt(t).select(far, t);
-        let hits = inside & determinant.simd_ne(zero) & near.simd_le(far) & far.simd_ge(zero);
-        (hits.to_bitmask() as u32 & self.used, t)
+        intersect(
+            simd,
+            line,
+            self.used,
+            #[inline(always)]
+            |corner, axis| self.corners[corner][axis],
+        )
     }
+}
+
+/// Returns hits and distances, equal to [`Line::triangle`] of each triangle. Distances may be negative, down to minus
+/// the padding of boxes. `coordinates` returns a coordinate of a corner of the triangles, `used` is the mask of the
+/// used lanes.
+#[inline(always)]
+pub fn intersect<S: Simd>(
+    simd: S,
+    line: &Line,
+    used: u32,
+    coordinates: impl Fn(usize, usize) -> f32x4<S>,
+) -> (u32, f32x4<S>) {
+    let zero = f32x4::splat(simd, 0.0);
+    let mut corners = [[zero; 3]; 3];
+    let mut sheared = [[zero; 3]; 3];
+    for (i, (corner, sheared)) in corners.iter_mut().zip(&mut sheared).enumerate() {
+        *corner = [
+            coordinates(i, line.axes[0]),
+            coordinates(i, line.axes[1]),
+            coordinates(i, line.axes[2]),
+        ];
+        let [x, y, z] = [corner[0] - line.o[0], corner[1] - line.o[1], corner[2] - line.o[2]];
+        *sheared = [x - z * line.shear[0], y - z * line.shear[1], z];
+    }
+    let [a, b, c] = sheared;
+    let u = c[0] * b[1] - c[1] * b[0];
+    let v = a[0] * c[1] - a[1] * c[0];
+    let w = b[0] * a[1] - b[1] * a[0];
+    let inside =
+        (u.simd_ge(zero) & v.simd_ge(zero) & w.simd_ge(zero)) | (u.simd_le(zero) & v.simd_le(zero) & w.simd_le(zero));
+    if inside.to_bitmask() as u32 & used == 0 {
+        return (0, zero);
+    }
+    let determinant = u + v + w;
+    let t = (u * (a[2] * line.shear[2]) + v * (b[2] * line.shear[2]) + w * (c[2] * line.shear[2])) / determinant;
+    let (mut near, mut far) = (f32x4::splat(simd, f32::NEG_INFINITY), f32x4::splat(simd, f32::INFINITY));
+    let [first_corner, second_corner, third_corner] = corners;
+    for k in 0..3 {
+        let (a, b, c) = (first_corner[k], second_corner[k], third_corner[k]);
+        let first = (a.min(b).min(c) - line.o_low[k]) * line.inverse[k];
+        let second = (a.max(b).max(c) - line.o_high[k]) * line.inverse[k];
+        near = near.max(first.min(second));
+        far = far.min(first.max(second));
+    }
+    // This order of operands preserves NaN.
+    let t = near.simd_gt(t).select(near, t);
+    let t = far.simd_lt(t).select(far, t);
+    let hits = inside & determinant.simd_ne(zero) & near.simd_le(far) & far.simd_ge(zero);
+    (hits.to_bitmask() as u32 & used, t)
 }

@@ -2,31 +2,26 @@
 
 use fearless_simd::prelude::*;
 
-use super::four::Four;
+use super::batch_mesh::{BatchMesh, LEAF};
 use super::line::maximum;
-use super::stack::{BoxRay, Entry, Stack};
-use super::{Line, Mesh, Nearest, remaining_t_max};
+use super::mesh_stack::MeshStack;
+use super::stack::BoxRay;
+use super::{Line, Nearest, remaining_t_max};
 
 /// Number of interleaved rays. With 4 or 16 the rays take longer.
 pub const RAYS: usize = 8;
 
 /// A ray in the object space of a mesh, with the arguments of [`closest`](super::closest).
 #[derive(Clone, Copy, Debug)]
-pub struct MeshRay<'a> {
-    pub mesh: Mesh<'a>,
+pub struct MeshRay {
     pub line: Line,
     pub start: f32,
     pub skip: u32,
     pub best: Nearest,
 }
 
-impl MeshRay<'_> {
-    const NONE: MeshRay<'static> = MeshRay {
-        mesh: Mesh {
-            nodes: &[],
-            vertices: &[],
-            triangles: &[],
-        },
+impl MeshRay {
+    const NONE: MeshRay = MeshRay {
         line: Line {
             axes: [0, 1, 2],
             o: [0.0; 3],
@@ -45,19 +40,26 @@ impl MeshRay<'_> {
     };
 }
 
+static NO_MESH: BatchMesh = BatchMesh {
+    nodes: Vec::new(),
+    leaves: Vec::new(),
+};
+
 /// The rays of a batch.
 pub trait RaySource<'a, S> {
     /// Takes a traced ray and its result, if any, and returns the next ray of the lane, if any.
-    fn next(&mut self, simd: S, lane: usize, traced: Option<(&MeshRay<'a>, Nearest)>) -> Option<MeshRay<'a>>;
+    fn next(&mut self, simd: S, lane: usize, traced: Option<(&Line, Nearest)>) -> Option<(&'a BatchMesh, MeshRay)>;
 }
 
 struct Lane<'a, 's> {
-    ray: MeshRay<'a>,
+    mesh: &'a BatchMesh,
+    ray: MeshRay,
     box_ray: BoxRay,
     best: Nearest,
     limit: f32,
-    next: Entry,
-    stack: &'s mut Stack,
+    /// The node or leaf to visit, as in [`BatchNode::children`](super::batch_mesh::BatchNode::children).
+    next: u32,
+    stack: &'s mut MeshStack,
     state: LaneState,
 }
 
@@ -70,37 +72,38 @@ enum LaneState {
 
 impl<'a> Lane<'a, '_> {
     #[inline(always)]
-    fn start(&mut self, ray: MeshRay<'a>) {
-        self.ray = ray;
+    fn start(&mut self, mesh: &'a BatchMesh, ray: MeshRay) {
+        self.mesh = mesh;
         self.box_ray = BoxRay::of(&ray.line);
         self.best = ray.best;
         self.limit = remaining_t_max(ray.start, ray.best.t);
-        self.next = Entry::ROOT;
+        self.ray = ray;
+        self.next = 0;
         self.state = LaneState::Tracing;
     }
 
     /// Visits a node or a leaf.
     #[inline(always)]
     fn step<S: Simd, const ANY: bool>(&mut self, simd: S) {
-        let Entry { first, count, .. } = self.next;
-        let MeshRay {
-            mesh,
-            line,
-            start,
-            skip,
-            ..
-        } = &self.ray;
-        if count == 0 {
-            let node = &mesh.nodes[first as usize];
-            self.stack.push_children(simd, node, &self.box_ray, self.limit);
+        if self.next & LEAF == 0 {
+            let node = &self.mesh.nodes[self.next as usize];
+            match ANY {
+                true => self
+                    .stack
+                    .push_children::<S, false>(simd, node, &self.box_ray, self.limit),
+                false => self
+                    .stack
+                    .push_children::<S, true>(simd, node, &self.box_ray, self.limit),
+            }
             return;
         }
-        let triangles = &mesh.triangles[first as usize..(first + count) as usize];
-        let (mut hits, t) = Four::new(simd, mesh, triangles).intersect(simd, line);
+        let MeshRay { line, start, skip, .. } = &self.ray;
+        let leaf = &self.mesh.leaves[(self.next & !LEAF) as usize];
+        let (mut hits, t) = leaf.intersect(simd, line);
         while hits != 0 {
             let i = hits.trailing_zeros() as usize;
             hits &= hits - 1;
-            let (t, triangle, slot) = (t[i], triangles[i][3], first + i as u32);
+            let (t, triangle, slot) = (t[i], leaf.triangles[i], leaf.first + i as u32);
             if ANY {
                 if t > 0.0 && t < self.best.t && triangle != *skip {
                     self.best = Nearest { t, triangle, slot };
@@ -119,16 +122,15 @@ impl<'a> Lane<'a, '_> {
 
     #[inline(always)]
     fn prefetch_next(&self) {
-        let Entry { first, count, .. } = self.next;
-        if count == 0 {
-            prefetch(self.ray.mesh.nodes, first as usize);
+        if self.next & LEAF == 0 {
+            prefetch(&self.mesh.nodes, self.next as usize);
         } else {
-            prefetch(self.ray.mesh.triangles, first as usize);
+            prefetch(&self.mesh.leaves, (self.next & !LEAF) as usize);
         }
     }
 }
 
-/// Starts to load an item and the bytes after it into the cache.
+/// Starts to load an item into the cache.
 #[inline(always)]
 fn prefetch<T>(items: &[T], index: usize) {
     #[cfg(target_arch = "x86_64")]
@@ -137,8 +139,9 @@ fn prefetch<T>(items: &[T], index: usize) {
         let address = items.as_ptr().wrapping_add(index).cast::<i8>();
         // SAFETY: a prefetch accepts any address, and changes no memory.
         unsafe {
-            _mm_prefetch::<_MM_HINT_T0>(address);
-            _mm_prefetch::<_MM_HINT_T0>(address.wrapping_add(64));
+            for offset in (0..size_of::<T>()).step_by(64) {
+                _mm_prefetch::<_MM_HINT_T0>(address.wrapping_add(offset));
+            }
         }
     }
     #[cfg(not(target_arch = "x86_64"))]
@@ -148,15 +151,16 @@ fn prefetch<T>(items: &[T], index: usize) {
 /// Traces the rays of a batch: like [`closest`](super::closest), or if `ANY` is true, up to any hit nearer than
 /// `best.t`, like [`any`](super::any). The stacks are empty, before and after.
 #[inline(always)]
-pub fn trace<'a, S: Simd, const ANY: bool>(simd: S, stacks: &mut [Stack; RAYS], rays: &mut impl RaySource<'a, S>) {
+pub fn trace<'a, S: Simd, const ANY: bool>(simd: S, stacks: &mut [MeshStack; RAYS], rays: &mut impl RaySource<'a, S>) {
     let mut lanes = stacks.each_mut().map(
         #[inline(always)]
         |stack| Lane {
+            mesh: &NO_MESH,
             ray: MeshRay::NONE,
             box_ray: BoxRay::of(&MeshRay::NONE.line),
             best: MeshRay::NONE.best,
             limit: 0.0,
-            next: Entry::ROOT,
+            next: 0,
             stack,
             state: LaneState::Waiting,
         },
@@ -174,12 +178,12 @@ pub fn trace<'a, S: Simd, const ANY: bool>(simd: S, stacks: &mut [Stack; RAYS], 
                         lane.prefetch_next();
                         continue;
                     }
-                    Some((&lane.ray, lane.best))
+                    Some((&lane.ray.line, lane.best))
                 }
             };
             match rays.next(simd, i, traced) {
-                Some(ray) => {
-                    lane.start(ray);
+                Some((mesh, ray)) => {
+                    lane.start(mesh, ray);
                     lane.prefetch_next();
                 }
                 None => {

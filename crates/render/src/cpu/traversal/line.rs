@@ -89,7 +89,11 @@ impl Line {
     /// Returns the barycentric coordinates of the second and the third vertex where the ray hits the triangle.
     #[inline(always)]
     pub fn barycentric(&self, vertices: [&[f32; 4]; 3]) -> [f32; 2] {
-        let [a, b, c] = vertices.map(|vertex| self.sheared(in_order(vertex, self.axes)));
+        let [a, b, c] = [
+            self.sheared(in_order(vertices[0], self.axes)),
+            self.sheared(in_order(vertices[1], self.axes)),
+            self.sheared(in_order(vertices[2], self.axes)),
+        ];
         let u = c[0] * b[1] - c[1] * b[0];
         let v = a[0] * c[1] - a[1] * c[0];
         let w = b[0] * a[1] - b[1] * a[0];

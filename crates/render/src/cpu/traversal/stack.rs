@@ -12,10 +12,10 @@ use crate::bvh::Node;
 #[derive(Clone, Copy, Debug)]
 pub struct BoxRay {
     /// Per axis: 1 for a negative direction.
-    is_negative: [usize; 3],
+    pub(super) is_negative: [usize; 3],
     /// Origins for tests of near and far sides.
-    origins: [[f32; 3]; 2],
-    inverse: [f32; 3],
+    pub(super) origins: [[f32; 3]; 2],
+    pub(super) inverse: [f32; 3],
 }
 
 impl BoxRay {
@@ -35,6 +35,13 @@ impl BoxRay {
             origins,
             inverse,
         }
+    }
+
+    /// Returns the octant of the direction: bit k is set if component k is negative.
+    #[inline(always)]
+    pub fn octant(&self) -> usize {
+        let [x, y, z] = self.is_negative;
+        x | y << 1 | z << 2
     }
 
     #[inline(always)]

@@ -4,7 +4,12 @@ use std::ops::Range;
 
 use glam::{DVec3, Vec3};
 
-use super::{Directions, Level, Line, Mesh, Nearest, Segments, closest, leaves, levels, occluded, occluded_items};
+use fearless_simd::dispatch;
+
+use super::{
+    BatchMesh, Directions, Level, Line, Mesh, MeshRay, MeshStack, Nearest, RAYS, RaySource, Segments, closest, leaves,
+    levels, occluded, occluded_items, trace,
+};
 use crate::bvh::{Aabb, Tree, build};
 
 const NONE: Nearest = Nearest {
@@ -430,6 +435,83 @@ fn leaves_are_visited_until_the_limit() {
             assert!(visits < 200, "{visits} visits");
         }
     }
+}
+
+/// A batch of rays and their results.
+struct Batch<'a> {
+    mesh: &'a BatchMesh,
+    rays: &'a [MeshRay],
+    next: usize,
+    /// Per lane the index of its ray.
+    traced: [usize; RAYS],
+    found: Vec<Option<Nearest>>,
+}
+
+impl<'a, S> RaySource<'a, S> for Batch<'a> {
+    fn next(&mut self, _: S, lane: usize, traced: Option<(&Line, Nearest)>) -> Option<(&'a BatchMesh, MeshRay)> {
+        if let Some((_, found)) = traced {
+            let previous = self.found[self.traced[lane]].replace(found);
+            assert_eq!(previous, None, "each ray is traced once");
+        }
+        let ray = *self.rays.get(self.next)?;
+        self.traced[lane] = self.next;
+        self.next += 1;
+        Some((self.mesh, ray))
+    }
+}
+
+#[test]
+fn batches_have_the_hits_of_brute_force() {
+    let random = &mut Random(10);
+    let mut stacks: [MeshStack; RAYS] = Default::default();
+    let (mut hits, mut misses) = (0, 0);
+    for (count, size) in [(1, 1.0), (9, 0.8), (300, 0.1), (2000, 0.05), (500, 0.5)] {
+        let scene = soup(random, count, size);
+        let mesh = BatchMesh::new(&scene.mesh());
+        for batch_size in [0, 1, 7, 8, 9, 100] {
+            let rays: Vec<MeshRay> = (0..batch_size)
+                .map(|i| {
+                    let axis = Vec3::AXES[random.below(3)];
+                    let direction = [random.vector(), random.vector(), axis, -axis][random.below(4)];
+                    MeshRay {
+                        line: Line::new(random.vector() * 1.5, direction, [0.0, 1e-6, 1e-3][i % 3]),
+                        start: 0.0,
+                        skip: [u32::MAX, random.below(count) as u32][i % 2],
+                        best: Nearest {
+                            t: [1e30, random.number().abs()][random.below(2)],
+                            ..NONE
+                        },
+                    }
+                })
+                .collect();
+            for level in levels() {
+                for any in [false, true] {
+                    let mut batch = Batch {
+                        mesh: &mesh,
+                        rays: &rays,
+                        next: 0,
+                        traced: [0; RAYS],
+                        found: vec![None; rays.len()],
+                    };
+                    dispatch!(level, simd => match any {
+                        true => trace::<_, true>(simd, &mut stacks, &mut batch),
+                        false => trace::<_, false>(simd, &mut stacks, &mut batch),
+                    });
+                    for (ray, found) in rays.iter().zip(batch.found) {
+                        let (expected, found) = (scene.closest(&ray.line, ray.skip, ray.best), found.unwrap());
+                        if any {
+                            assert_eq!(found == ray.best, expected == ray.best, "{level:?}");
+                        } else {
+                            assert_eq!(found, expected, "{level:?}");
+                        }
+                        hits += u32::from(expected != ray.best);
+                        misses += u32::from(expected == ray.best);
+                    }
+                }
+            }
+        }
+    }
+    assert!(hits > 500 && misses > 500, "{hits} {misses}");
 }
 
 /// Returns the distance and the smallest barycentric coordinate, in f64.

@@ -2,21 +2,38 @@
 
 use fearless_simd::{Simd, dispatch};
 
-use super::super::bvh::{closest_mesh_ray, closest_of_primitive, item_pad, mesh_hit};
+use super::super::bvh::{FEW_ITEMS, closest_mesh_ray, closest_of_primitive, item_pad, mesh_hit};
+use super::super::geometry::closest_hit;
 use super::super::integrators::path::PathState;
 use super::super::math::max;
 use super::super::path::Path;
-use super::super::ray::{Hit, standalone_prim};
+use super::super::ray::{Hit, nearer_hit, standalone_prim};
 use super::super::samples::LEVEL;
 use super::super::slab::{box_interval, interval_hits, slabs};
-use super::super::traversal::{MeshRay, Nearest, RAYS, RaySource, trace};
+use super::super::traversal::{BatchMesh, Line, MeshRay, Nearest, RAYS, RaySource, trace};
 use super::linear::LinearPrimitives;
-use super::scratch::{RayLane, Scratch};
+use super::meshes::BatchMeshes;
+use super::scratch::{QueuedRay, RayLane, Scratch};
 use crate::records::{INSTANCE, NO_INDEX, Packed};
 
 /// Finds the closest hits of the active paths, equal to `closest_hit`.
-pub fn closest_hits(scene: &Packed, paths: &[PathState], active: &[u32], hits: &mut Vec<Hit>, scratch: &mut Scratch) {
-    dispatch!(*LEVEL, simd => find(simd, scene, paths, active, hits, scratch))
+pub fn closest_hits(
+    scene: &Packed,
+    paths: &[PathState],
+    active: &[u32],
+    hits: &mut Vec<Hit>,
+    scratch: &mut Scratch,
+    meshes: &BatchMeshes,
+) {
+    if meshes.are_missing(scene) {
+        hits.clear();
+        hits.extend(active.iter().map(|i| {
+            let path = &paths[*i as usize].path;
+            closest_hit(scene, path.ray, path.origin_prim, path.inside_prim)
+        }));
+        return;
+    }
+    dispatch!(*LEVEL, simd => find(simd, scene, paths, active, hits, scratch, meshes))
 }
 
 #[inline(always)]
@@ -27,8 +44,10 @@ fn find<S: Simd>(
     active: &[u32],
     hits: &mut Vec<Hit>,
     scratch: &mut Scratch,
+    meshes: &BatchMeshes,
 ) {
     hits.clear();
+    scratch.clear();
     let has_bvh = scene.specialization.tlas_kinds != 0;
     let primitives = LinearPrimitives::new(simd, scene);
     for &i in active {
@@ -38,20 +57,48 @@ fn find<S: Simd>(
             inside_prim,
             ..
         } = &paths[i as usize].path;
-        let [origin_prim, inside_prim] = match has_bvh {
-            true => [standalone_prim(*origin_prim), standalone_prim(*inside_prim)],
-            false => [origin_prim.y, inside_prim.y],
-        };
-        hits.push(primitives.closest(simd, *ray, origin_prim, inside_prim));
+        if !has_bvh {
+            hits.push(primitives.closest(simd, *ray, origin_prim.y, inside_prim.y));
+            continue;
+        }
+        let (origin, inside) = (standalone_prim(*origin_prim), standalone_prim(*inside_prim));
+        let mut hit = primitives.closest(simd, *ray, origin, inside);
+        let position = hits.len() as u32;
+        if scene.bvh.items.len() > FEW_ITEMS {
+            scratch.queue.push(QueuedRay {
+                position,
+                instance: NO_INDEX,
+                near: 0.0,
+            });
+            hits.push(hit);
+            continue;
+        }
+        let slabs = slabs(ray.origin, ray.direction, item_pad(scene, ray.origin));
+        for item in &scene.bvh.items {
+            let interval = box_interval(item.low, item.high, slabs);
+            if !interval_hits(interval, hit.t) {
+                continue;
+            }
+            if item.kind & 0xff == INSTANCE {
+                scratch.queue.push(QueuedRay {
+                    position,
+                    instance: item.index,
+                    near: interval.x,
+                });
+            } else {
+                hit = closest_of_primitive(scene, hit, item, *ray, interval.x, *origin_prim, *inside_prim);
+            }
+        }
+        hits.push(hit);
     }
-    if has_bvh {
-        scratch.clear();
+    if !scratch.queue.is_empty() {
         let mut rays = Rays {
             scene,
+            meshes,
             paths,
             active,
             hits,
-            next: 0,
+            queue: scratch.queue.iter(),
             lanes: &mut scratch.lanes,
         };
         trace::<S, false>(simd, &mut scratch.stacks, &mut rays);
@@ -61,33 +108,30 @@ fn find<S: Simd>(
 /// The rays of the active paths, which traverse the BVH of the scene item by item.
 struct Rays<'a, 'h> {
     scene: &'a Packed,
+    meshes: &'a BatchMeshes,
     paths: &'a [PathState],
     active: &'a [u32],
     hits: &'h mut [Hit],
-    /// The next position in `active`.
-    next: usize,
+    queue: std::slice::Iter<'a, QueuedRay>,
     lanes: &'h mut [RayLane; RAYS],
 }
 
 impl<'a, S: Simd> RaySource<'a, S> for Rays<'a, '_> {
     #[inline(always)]
-    fn next(&mut self, simd: S, lane: usize, traced: Option<(&MeshRay<'a>, Nearest)>) -> Option<MeshRay<'a>> {
+    fn next(&mut self, simd: S, lane: usize, traced: Option<(&Line, Nearest)>) -> Option<(&'a BatchMesh, MeshRay)> {
         let scene = self.scene;
         let lane = &mut self.lanes[lane];
-        if let (Some((ray, found)), Some(position)) = (traced, lane.position)
+        if let Some((line, found)) = traced
             && found.slot != NO_INDEX
         {
-            self.hits[position] = mesh_hit(&ray.mesh, lane.instance, &ray.line, found);
+            // Another lane may have found a hit of the same ray.
+            let hit = &mut self.hits[lane.position];
+            *hit = nearer_hit(*hit, mesh_hit(scene, lane.instance, line, found));
         }
         loop {
-            if let Some(position) = lane.position {
-                let Path {
-                    ray,
-                    origin_prim,
-                    inside_prim,
-                    ..
-                } = &self.paths[self.active[position] as usize].path;
-                let hit = &mut self.hits[position];
+            if lane.in_bvh {
+                let path = &self.paths[self.active[lane.position] as usize].path;
+                let hit = &mut self.hits[lane.position];
                 while let Some(i) = lane.items.next(simd, scene, hit.t) {
                     let item = &scene.bvh.items[i];
                     let interval = box_interval(item.low, item.high, lane.slabs);
@@ -97,17 +141,25 @@ impl<'a, S: Simd> RaySource<'a, S> for Rays<'a, '_> {
                     if item.kind & 0xff == INSTANCE {
                         lane.instance = item.index;
                         let start = max(interval.x, 0.0);
-                        return Some(closest_mesh_ray(scene, *hit, item.index, *ray, start, *origin_prim));
+                        let ray = closest_mesh_ray(scene, *hit, item.index, path.ray, start, path.origin_prim);
+                        return Some((self.meshes.of_instance(scene, item.index), ray));
                     }
-                    *hit = closest_of_primitive(scene, *hit, item, *ray, interval.x, *origin_prim, *inside_prim);
+                    let (origin_prim, inside_prim) = (path.origin_prim, path.inside_prim);
+                    *hit = closest_of_primitive(scene, *hit, item, path.ray, interval.x, origin_prim, inside_prim);
                 }
             }
-            let position = self.next;
-            let ray = self.paths[*self.active.get(position)? as usize].path.ray;
-            self.next += 1;
-            lane.position = Some(position);
-            lane.slabs = slabs(ray.origin, ray.direction, item_pad(scene, ray.origin));
-            lane.items.start(scene, lane.slabs);
+            let queued = self.queue.next()?;
+            lane.position = queued.position as usize;
+            lane.instance = queued.instance;
+            lane.in_bvh = queued.instance == NO_INDEX;
+            let path = &self.paths[self.active[lane.position] as usize].path;
+            if !lane.in_bvh {
+                let (hit, start) = (self.hits[lane.position], max(queued.near, 0.0));
+                let ray = closest_mesh_ray(scene, hit, lane.instance, path.ray, start, path.origin_prim);
+                return Some((self.meshes.of_instance(scene, lane.instance), ray));
+            }
+            lane.slabs = slabs(path.ray.origin, path.ray.direction, item_pad(scene, path.ray.origin));
+            lane.items.start(lane.slabs);
         }
     }
 }

@@ -5,7 +5,6 @@ use std::ops::Range;
 use bytemuck::cast_slice;
 use fearless_simd::Simd;
 
-use super::super::bvh::FEW_ITEMS;
 use super::super::slab::Slabs;
 use super::super::traversal::{BoxRay, Stack};
 use crate::bvh::Node;
@@ -31,12 +30,8 @@ impl Default for Items {
 impl Items {
     /// Starts again with another ray.
     #[inline(always)]
-    pub fn start(&mut self, scene: &Packed, slabs: Slabs) {
+    pub fn start(&mut self, slabs: Slabs) {
         self.leaf = 0..0;
-        if scene.bvh.items.len() <= FEW_ITEMS {
-            self.leaf = 0..scene.bvh.items.len();
-            return;
-        }
         self.box_ray = BoxRay::new(
             slabs.low_origin.to_array(),
             slabs.high_origin.to_array(),

@@ -5,12 +5,16 @@
 mod closest_hits;
 mod items;
 mod linear;
+mod meshes;
 mod occlusion;
 mod scratch;
+
+use std::sync::Arc;
 
 use glam::UVec2;
 
 use self::closest_hits::closest_hits;
+pub use self::meshes::BatchMeshes;
 use self::occlusion::occluded_rays;
 use self::scratch::Scratch;
 use super::integrators::path::{PathState, add_radiance, begin_path, shade};
@@ -22,8 +26,8 @@ use crate::records::Packed;
 pub const MAX_PATHS: usize = 1024;
 
 /// A batch of paths with the queues of its stages. The memory is reused from batch to batch.
-#[derive(Default)]
 pub struct Wavefront {
+    meshes: Arc<BatchMeshes>,
     paths: Vec<PathState>,
     pixels: Vec<UVec2>,
     /// Indices of the paths that have not ended.
@@ -42,6 +46,20 @@ struct QueuedShadowRay {
 }
 
 impl Wavefront {
+    /// Creates an empty batch for a scene with these meshes.
+    pub fn new(meshes: Arc<BatchMeshes>) -> Wavefront {
+        Wavefront {
+            meshes,
+            paths: Vec::new(),
+            pixels: Vec::new(),
+            active: Vec::new(),
+            hits: Vec::new(),
+            shadow_rays: Vec::new(),
+            occluded: Vec::new(),
+            scratch: Scratch::default(),
+        }
+    }
+
     /// Traces the paths of camera samples, each given by its pixel and number, and returns the paths in this order.
     pub fn trace(&mut self, scene: &Packed, samples: impl Iterator<Item = (UVec2, u32)>) -> &[PathState] {
         self.begin(scene, samples);
@@ -66,7 +84,14 @@ impl Wavefront {
     }
 
     fn find_closest_hits(&mut self, scene: &Packed) {
-        closest_hits(scene, &self.paths, &self.active, &mut self.hits, &mut self.scratch);
+        closest_hits(
+            scene,
+            &self.paths,
+            &self.active,
+            &mut self.hits,
+            &mut self.scratch,
+            &self.meshes,
+        );
     }
 
     /// Ends each active path or samples its next ray, and queues its shadow ray.
@@ -89,6 +114,7 @@ impl Wavefront {
             &self.shadow_rays,
             &mut self.occluded,
             &mut self.scratch,
+            &self.meshes,
         );
         for (QueuedShadowRay { path, ray }, occluded) in self.shadow_rays.iter().zip(&self.occluded) {
             add_radiance(

@@ -3,20 +3,34 @@
 use glam::Vec3;
 
 use super::super::slab::{Slabs, slabs};
-use super::super::traversal::{RAYS, Stack};
+use super::super::traversal::{MeshStack, RAYS};
 use super::items::Items;
 
 /// Stacks of the interleaved rays.
 #[derive(Default)]
 pub struct Scratch {
-    pub stacks: [Stack; RAYS],
+    pub stacks: [MeshStack; RAYS],
     pub lanes: [RayLane; RAYS],
+    pub queue: Vec<QueuedRay>,
+}
+
+/// A ray to trace through a mesh or through the BVH of the scene.
+#[derive(Clone, Copy, Debug)]
+pub struct QueuedRay {
+    /// Position of the ray in its batch.
+    pub position: u32,
+    /// Index of the instance; [`NO_INDEX`](crate::records::NO_INDEX) for the BVH of the scene.
+    pub instance: u32,
+    /// Distance to the box of the instance.
+    pub near: f32,
 }
 
 /// A ray of a batch that traverses the scene's BVH.
 pub struct RayLane {
-    /// Position of the ray in its queue; `None` before the first ray.
-    pub position: Option<usize>,
+    /// Position of the ray in its batch.
+    pub position: usize,
+    /// True if the ray traverses the BVH of the scene, false if it traverses a single instance.
+    pub in_bvh: bool,
     pub slabs: Slabs,
     pub items: Items,
     /// Index of the instance whose mesh the ray traverses.
@@ -26,7 +40,8 @@ pub struct RayLane {
 impl Default for RayLane {
     fn default() -> RayLane {
         RayLane {
-            position: None,
+            position: 0,
+            in_bvh: false,
             slabs: slabs(Vec3::ZERO, Vec3::ONE, 0.0),
             items: Items::default(),
             instance: 0,
@@ -38,7 +53,8 @@ impl Scratch {
     /// Prepares for another batch.
     pub fn clear(&mut self) {
         for lane in &mut self.lanes {
-            lane.position = None;
+            lane.in_bvh = false;
         }
+        self.queue.clear();
     }
 }

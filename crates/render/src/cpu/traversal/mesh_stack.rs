@@ -1,0 +1,80 @@
+//! The stack of a ray of a batch: nodes and leaves of a mesh, approximately with the nearest on top.
+
+use fearless_simd::prelude::*;
+use fearless_simd::{f32x8, u8x32, u32x8};
+
+use super::batch_mesh::BatchNode;
+use super::closest::STACK;
+use super::stack::BoxRay;
+
+/// Nodes and leaves to visit, as values of [`BatchNode::children`]. Visiting a node removes an entry and adds up to 8,
+/// so that there are at most [`STACK`] entries. Eight are written at a time.
+#[derive(Clone, Debug)]
+pub struct MeshStack {
+    near: Box<[f32; STACK + 8]>,
+    children: Box<[u32; STACK + 8]>,
+    depth: usize,
+}
+
+impl Default for MeshStack {
+    fn default() -> MeshStack {
+        MeshStack {
+            near: Box::new([0.0; STACK + 8]),
+            children: Box::new([0; STACK + 8]),
+            depth: 0,
+        }
+    }
+}
+
+/// Per octant of a ray's direction the bytes that reverse the children from front to back: slot c is meant for octant
+/// c of the node.
+static BACK_TO_FRONT: [[u8; 32]; 8] = {
+    let mut table = [[0; 32]; 8];
+    let mut i = 0;
+    while i < 8 * 32 {
+        let (octant, lane, byte) = (i / 32, i / 4 % 8, i % 4);
+        table[octant][i % 32] = (4 * ((7 - lane) ^ octant) + byte) as u8;
+        i += 1;
+    }
+    table
+};
+
+impl MeshStack {
+    /// Removes entries up to one that is nearer than `limit`, and returns it.
+    #[inline(always)]
+    pub fn pop(&mut self, limit: f32) -> Option<u32> {
+        while self.depth > 0 {
+            self.depth -= 1;
+            if self.near[self.depth] <= limit {
+                return Some(self.children[self.depth]);
+            }
+        }
+        None
+    }
+
+    /// Adds the children of a node whose boxes the ray hits before `limit`, in front-to-back order if `SORTED`.
+    #[inline(always)]
+    pub fn push_children<S: Simd, const SORTED: bool>(&mut self, simd: S, node: &BatchNode, ray: &BoxRay, limit: f32) {
+        let mut near = f32x8::splat(simd, 0.0);
+        let mut far = f32x8::splat(simd, limit);
+        for k in 0..3 {
+            let negative = ray.is_negative[k];
+            let near_side = f32x8::simd_from(simd, node.planes[negative][k]);
+            let far_side = f32x8::simd_from(simd, node.planes[1 - negative][k]);
+            near = near.max((near_side - ray.origins[0][k]) * ray.inverse[k]);
+            far = far.min((far_side - ray.origins[1][k]) * ray.inverse[k]);
+        }
+        let mut children = u32x8::simd_from(simd, node.children);
+        if SORTED {
+            let order = u8x32::simd_from(simd, BACK_TO_FRONT[ray.octant()]);
+            near = near.swizzle_dyn(order);
+            far = far.swizzle_dyn(order);
+            children = children.swizzle_dyn(order);
+        }
+        let hits = near.simd_le(far);
+        let lanes = self.depth..self.depth + 8;
+        near.compress(hits).store_slice(&mut self.near[lanes.clone()]);
+        children.compress(hits).store_slice(&mut self.children[lanes]);
+        self.depth += (hits.to_bitmask() as u32).count_ones() as usize;
+    }
+}
