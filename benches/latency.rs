@@ -21,7 +21,7 @@ use wgray_scene::Overrides;
 const ROUNDS: usize = 7;
 /// Maximum time to wait for an image.
 const TIMEOUT: Duration = Duration::from_secs(120);
-/// The expression of `kernels/render.wgsl` that is multiplied by a factor.
+/// The expression of `kernels/render.wgsl` that a shader change multiplies by a new factor.
 const EXPRESSION: &str = "path_value(path)";
 
 /// Times from a change until the old image is discarded, until the first new image, and until each pixel has a sample.

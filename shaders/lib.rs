@@ -58,9 +58,9 @@ pub static SHARED: &[File] = files![
     "bvh_node.wgsl",
     "mesh.wgsl",
 ];
-/// Correctly rounded quotients and square roots. This file comes first, since naga requires a function before calls of
-/// it.
-pub static ROUNDING_FILE: &[File] = files!["rounding.wgsl"];
+/// Correctly rounded quotients and square roots. This file comes first, because naga requires that functions are
+/// defined before they are called.
+pub static ROUNDING_FILES: &[File] = files!["rounding.wgsl"];
 /// Buffers and scene traversal. Every kernel contains these files and [`SHARED`].
 pub static KERNEL: &[File] = files![
     "bindings.wgsl",
@@ -73,7 +73,7 @@ pub static KERNEL: &[File] = files![
     "texture.wgsl",
     "alpha.wgsl",
 ];
-/// The sampling of a pixel.
+/// Functions that sample a pixel.
 pub static SAMPLES: &[File] = files!["pixel.wgsl"];
 /// The integrator `phong`.
 pub static PHONG: &[File] = files!["integrators/whole.wgsl", "integrators/phong.wgsl"];
@@ -88,19 +88,19 @@ pub static PATH: &[File] = files![
 ];
 /// Loops that read the scene from buffers. Baked kernels have functions with constant records instead.
 pub static FROM_BUFFERS: &[File] = files!["buffers.wgsl"];
-/// Texels in a single buffer.
+/// Functions that read texels from a single buffer.
 pub static TEXELS: &[File] = files!["texels.wgsl"];
 /// The kernel that accumulates samples.
-pub static RENDER_FILE: &[File] = files!["film.wgsl", "kernels/render.wgsl"];
+pub static RENDER_FILES: &[File] = files!["film.wgsl", "kernels/render.wgsl"];
 /// The kernel that accumulates samples with adaptive sampling.
-pub static ADAPTIVE_FILE: &[File] = files!["film.wgsl", "kernels/adaptive.wgsl"];
+pub static ADAPTIVE_FILES: &[File] = files!["film.wgsl", "kernels/adaptive.wgsl"];
 /// The kernel that writes first hits.
-pub static FIRST_HITS_FILE: &[File] = files!["kernels/first_hits.wgsl"];
+pub static FIRST_HITS_FILES: &[File] = files!["kernels/first_hits.wgsl"];
 
-/// Returns every file, in the order of [`hash`].
+/// Returns every file once, in the order in which [`hash`] reads them.
 pub fn built_in() -> impl Iterator<Item = File> {
     let scene = [
-        ROUNDING_FILE,
+        ROUNDING_FILES,
         SHARED,
         KERNEL,
         SAMPLES,
@@ -109,7 +109,8 @@ pub fn built_in() -> impl Iterator<Item = File> {
         FROM_BUFFERS,
         TEXELS,
     ];
-    let kernels = [RENDER_FILE, &ADAPTIVE_FILE[1..], FIRST_HITS_FILE];
+    // `[1..]` omits film.wgsl, which `RENDER_FILES` contains too.
+    let kernels = [RENDER_FILES, &ADAPTIVE_FILES[1..], FIRST_HITS_FILES];
     scene.into_iter().chain(kernels).flatten().copied()
 }
 

@@ -50,13 +50,13 @@ impl std::fmt::Debug for OpenDevices {
 impl OpenDevices {
     pub(crate) fn get(&self, request: &Device) -> Option<gpu::Device> {
         let opened = self.opened.lock().unwrap_or_else(PoisonError::into_inner);
-        let found = opened.iter().find(|(known, _)| known == request);
+        let found = opened.iter().find(|(opened_request, _)| opened_request == request);
         found.map(|(_, device)| device.clone())
     }
 
     pub(crate) fn add(&self, request: &Device, device: &gpu::Device) {
         let mut opened = self.opened.lock().unwrap_or_else(PoisonError::into_inner);
-        opened.retain(|(known, _)| known != request);
+        opened.retain(|(opened_request, _)| opened_request != request);
         opened.push((request.clone(), device.clone()));
     }
 

@@ -85,7 +85,7 @@ impl Picture {
     /// Returns a channel by its OpenEXR name, if it exists: `R`, `G`, `B`, `A`, and the channels of requested layers,
     /// such as `depth.Z` or `normal.X`.
     pub fn channel(&self, name: &str) -> Option<Channel> {
-        if let Some(color) = ["R", "G", "B"].iter().position(|known| *known == name) {
+        if let Some(color) = ["R", "G", "B"].iter().position(|color_name| *color_name == name) {
             return Some(Channel::Floats(self.film.means().map(|mean| mean[color]).collect()));
         }
         if name == "A" {

@@ -31,8 +31,8 @@ const BOUNDS: &[Bound] = &[
         unit: "units in the last place, x a normal number",
         max_error: 4.5,
         arguments: |random| {
-            let (any, near_one) = (random.magnitude(-37.9, 38.5), random.between(0.9, 1.1));
-            vec![random.pick(&[any, near_one]) as f32]
+            let (any_magnitude, near_one) = (random.magnitude(-37.9, 38.5), random.between(0.9, 1.1));
+            vec![random.pick(&[any_magnitude, near_one]) as f32]
         },
         error: |x, result| ulps(result, f64::from(x[0]).log2()),
     },

@@ -42,7 +42,7 @@ fn square() -> Arc<Mesh> {
 }
 
 #[test]
-fn handles_give_the_scene_of_names() {
+fn handles_give_the_same_scene_as_names() {
     let mut builder = SceneBuilder::new(16, 12, camera());
     builder.render(settings());
     let map = builder.image(image());
@@ -131,8 +131,8 @@ fn invalid_scenes_are_errors() {
         edit(&mut builder);
         builder.build().expect_err("an error").to_string()
     };
-    let mut other = SceneBuilder::new(1, 1, camera());
-    let foreign = other.material(DiffuseDescription::new([0.5; 3]));
+    let mut other_builder = SceneBuilder::new(1, 1, camera());
+    let foreign = other_builder.material(DiffuseDescription::new([0.5; 3]));
     let message = error(&|builder| builder.shape(SphereDescription::new(&foreign, [0.0; 3], 1.0)));
     assert!(message.starts_with("shapes[0].material"), "{message}");
     let message = error(&|builder| {

@@ -19,20 +19,20 @@ const SAMPLES: u32 = 40;
 
 /// Returns a small scene with and without adaptive sampling, for direct lighting and for paths with layers.
 pub fn subjects() -> [Packed; 4] {
-    let mut plain = scenes::scene("cornell.toml");
-    (plain.image.width, plain.image.height) = SIZE;
-    plain.render.pixel_samples = patterns::samples(wgray::scene::Pattern::Sobol, SAMPLES);
-    plain.render.light_samples = patterns::samples(wgray::scene::Pattern::Sobol, 2);
-    let mut adaptive = plain.clone();
+    let mut base = scenes::scene("cornell.toml");
+    (base.image.width, base.image.height) = SIZE;
+    base.render.pixel_samples = patterns::samples(wgray::scene::Pattern::Sobol, SAMPLES);
+    base.render.light_samples = patterns::samples(wgray::scene::Pattern::Sobol, 2);
+    let mut adaptive = base.clone();
     adaptive.render.pixel_samples = patterns::samples(wgray::scene::Pattern::Sobol, 8);
     adaptive.render.adaptive = Some(AdaptiveDescription {
         error: 0.02,
         max_samples: Some(SAMPLES),
     });
-    let paths = [&plain, &adaptive].map(|scene| scenes::packed(&with_path_integrator(scene)).with_layers());
+    let paths = [&base, &adaptive].map(|scene| scenes::packed(&with_path_integrator(scene)).with_layers());
     let [layered, layered_adaptive] = paths;
     [
-        scenes::packed(&plain),
+        scenes::packed(&base),
         scenes::packed(&adaptive),
         layered,
         layered_adaptive,
@@ -127,14 +127,17 @@ const SENTENCES: &[Sentence] = &[
     }),
     ("layers do not change the other lists", |packed, make| {
         let film = complete_film(&mut *make());
-        let mut plain = packed.clone();
-        plain.specialization.layers = 0;
-        let plain_film = complete_film(&mut Cpu::new(&plain));
+        let mut without_layers = packed.clone();
+        without_layers.specialization.layers = 0;
+        let film_without_layers = complete_film(&mut Cpu::new(&without_layers));
         let same =
             |a: &[glam::Vec4], b: &[glam::Vec4]| bytemuck::cast_slice::<_, u32>(a) == bytemuck::cast_slice::<_, u32>(b);
-        check(same(&film.sums, &plain_film.sums), "the sums differ")?;
-        check(same(&film.moments, &plain_film.moments), "the moments differ")?;
-        check(same(&film.pilot_sums, &plain_film.pilot_sums), "the pilot sums differ")
+        check(same(&film.sums, &film_without_layers.sums), "the sums differ")?;
+        check(same(&film.moments, &film_without_layers.moments), "the moments differ")?;
+        check(
+            same(&film.pilot_sums, &film_without_layers.pilot_sums),
+            "the pilot sums differ",
+        )
     }),
     ("reading a film changes nothing", |_, make| {
         let mut b = make();
@@ -306,9 +309,9 @@ const SENTENCES: &[Sentence] = &[
             let pilot = b.samples_of_all();
             b.begin(full_region()).map_err(|e| e.to_string())?;
             b.render(region(0, 0, 20, 11), 0..pilot).map_err(|e| e.to_string())?;
-            let early = b.render(region(0, 0, 20, 1), pilot..pilot + 1);
+            let result = b.render(region(0, 0, 20, 1), pilot..pilot + 1);
             check(
-                matches!(early, Err(RenderError::PilotIncomplete { .. })),
+                matches!(result, Err(RenderError::PilotIncomplete { .. })),
                 "further samples are accepted before the pilot samples are complete",
             )?;
             b.render(region(0, 11, 20, 12), 0..pilot).map_err(|e| e.to_string())?;

@@ -1,5 +1,5 @@
-//! Scenes, meshes and images from memory, and images written to memory. Scenes equal those of files, and no file is
-//! read.
+//! Scenes, meshes and images read from memory, and images written to memory. Scenes from memory equal scenes from
+//! files, and are loaded without reading a file.
 
 use std::collections::BTreeMap;
 use std::io::{self, Cursor, Seek, SeekFrom, Write};
@@ -216,7 +216,7 @@ fn errors_have_file_line_and_rule() {
     assert_eq!(load("missing.toml"), format!("missing.toml:5: shapes[0].file: {rule}"));
     let rule = "\"folder.obj\" cannot be read: there is no such file in memory";
     assert_eq!(load("outside.toml"), format!("outside.toml:5: shapes[0].file: {rule}"));
-    // An override is named, with a name for a scene without one.
+    // An error of an override names the override, and a scene without a name has a default name.
     let overrides = Overrides {
         pixel_samples: Some(0),
         ..Overrides::default()
@@ -331,7 +331,7 @@ fn no_file_is_read_and_no_error_reveals_which_files_exist() {
     }
 }
 
-/// Images and meshes of the options, overrides, and files are used together.
+/// Images and meshes of the options, overrides, and files of a source apply to the same scene.
 #[test]
 fn assets_and_overrides_apply_together() {
     let text = format!(

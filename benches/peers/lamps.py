@@ -5,8 +5,8 @@ The columns are the time, the error, and the time to reach the error of one ligh
 
 Run it as `target/peers/venv/bin/python benches/peers/lamps.py --wgray target/release/wgray`.
 
-The error is that of `path_error.py`: the root of the mean over the pixels of the relative variance, from images with
-different seeds. The time is the shortest render time reported by `--stats`, without compilation. A light is a rectangle
+The error is that of `path_error.py`: the relative variance between images with different seeds, averaged over the pixels,
+and the root of this average. The time is the shortest render time reported by `--stats`, without compilation. A light is a rectangle
 that faces down, an emissive sphere or a point light. It is invisible to the camera, because the noise of a small
 visible light would dominate the error. A thousand lights are spread through the room, one per cell of a grid of 10 x 10
 x 10.

@@ -10,7 +10,7 @@ centres of the light's sample grid; Phong's formula is evaluated in numpy. The c
 sample per pixel:
 
     coverage   the pixels with a hit are the same, except at silhouettes
-    depth      the distance along the ray agrees to a relative 1e-4, except at silhouettes, where the second difference of
+    depth      the distance along the ray agrees to a relative error of 1e-4, except at silhouettes, where the second difference of
                the depth exceeds 1 % of the smallest depth
     image      the means agree to 1 %, and 97 % of the pixels to 0.02 in every channel, in linear values
 

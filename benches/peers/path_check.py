@@ -7,7 +7,7 @@
     ... path_check.py --wgray none                                      Mitsuba against itself, with different seeds
     ... path_check.py --wrong 1.02                                      wgray's images times 1.02: every scene must fail
 
-The scenes are those of path_scenes.py and scenes/cornell-path.toml. Both renderers render each BATCHES times with
+The scenes are those of path_scenes.py and scenes/cornell-path.toml. Both renderers render each scene BATCHES times with
 different seeds, to estimate mean and variance of every pixel. Welch's t-test compares the means at three levels:
 pixels, blocks of 8 x 8 pixels and the whole image, per channel. p-values are corrected for the number of tests of a
 level (Šidák), and the bound of 1 % for the number of levels and scenes, so that a correct renderer fails for one seed in
@@ -201,7 +201,7 @@ def main():
     all_scenes = {"cornell": install.ROOT / "scenes/cornell-path.toml"} | path_scenes.write(install.FOLDER / "path-scenes")
     names = list(all_scenes)
     if args.scenes:
-        names = [n for word in args.scenes.split(",") for n in (path_scenes.COURSE if word == "course" else [word])]
+        names = [n for word in args.scenes.split(",") for n in (path_scenes.COURSE_SCENES if word == "course" else [word])]
     for name in names:
         if name not in all_scenes:
             parser.error(f"--scenes: unknown {name!r}: one of course, {', '.join(all_scenes)}")

@@ -1,7 +1,7 @@
 """Prints the errors of the EXR images in a folder as JSON: `relative`, `absolute`; null for fewer than two images.
 
-`absolute` is the root of the mean over the pixels of the variance, `relative` that of the variance divided by the
-squared mean (plus 1e-4, for dark pixels); both are summed over the channels first. The images have the same expected
+`absolute` is computed from the variance of each pixel, `relative` from the variance divided by the squared mean (plus
+1e-4, for dark pixels): summed over the channels, averaged over the pixels, and then the root. The images have the same expected
 value and independent noise, so the variance of a pixel over the images is the mean squared error of one image. The
 absolute error is dominated by the pixels at the edges of visible lights, so the relative error is compared.
 """

@@ -3,9 +3,10 @@
 
     python path_scenes.py FOLDER
 
-TOML files of 96 x 96 pixels are written to FOLDER, the three JSON scenes of the course to FOLDER/configs, and the meshes
-of the JSON scenes to FOLDER/assets. The course's dragon and bunny are not redistributed: bumpy closed meshes of similar size and position
-replace them. `ray_differentials` is off, because Mitsuba does not filter its checkers.
+TOML files of 96 x 96 pixels are written to FOLDER, three JSON scenes to FOLDER/configs, and the meshes of the JSON
+scenes to FOLDER/assets. The JSON scenes have the format of a university course's renderer. The course's dragon and bunny
+are not redistributed: bumpy closed meshes of similar size and position replace them. `ray_differentials` is off, because
+Mitsuba does not filter its checkers.
 """
 import json
 import math
@@ -231,7 +232,8 @@ ASSETS = {
 }
 
 
-def course(depth, *objects):
+def course_scene(depth, *objects):
+    """Returns a JSON scene in the format of a university course's renderer: a box with objects."""
     walls = [("floor", "grey"), ("ceiling", "grey"), ("back", "grey"), ("left", "red"), ("right", "green")]
     return {
         "spp": 256, "max_depth": depth, "image_resolution": [600, 600],
@@ -244,10 +246,10 @@ def course(depth, *objects):
     }
 
 
-COURSE = {
-    "boxes": course(10, ("short", "grey", (0, 0, 0), 1), ("tall", "grey", (0, 0, 0), 1)),
-    "boxes-mirror": course(10, ("short", "grey", (-0.7, 0, 0.6), 1), ("tall", "mirror", (0.7, 0, -0.5), 1)),
-    "meshes": course(12, ("dragon", "grey", (0.3, 0.4, -0.2), 4), ("bunny", "grey", (-0.4, -0.1, 0.2), 4), ("short", "grey", (0, 0, 0), 1)),
+COURSE_SCENES = {
+    "boxes": course_scene(10, ("short", "grey", (0, 0, 0), 1), ("tall", "grey", (0, 0, 0), 1)),
+    "boxes-mirror": course_scene(10, ("short", "grey", (-0.7, 0, 0.6), 1), ("tall", "mirror", (0.7, 0, -0.5), 1)),
+    "meshes": course_scene(12, ("dragon", "grey", (0.3, 0.4, -0.2), 4), ("bunny", "grey", (-0.4, -0.1, 0.2), 4), ("short", "grey", (0, 0, 0), 1)),
 }
 
 
@@ -290,7 +292,7 @@ def write(folder):
     for name, text in SCENES.items():
         paths[name] = folder / f"{name}.toml"
         paths[name].write_text(text)
-    for name, scene in COURSE.items():
+    for name, scene in COURSE_SCENES.items():
         paths[name] = folder / "configs" / f"{name}.json"
         paths[name].write_text(json.dumps(scene, indent=2) + "\n")
     return paths

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Writes a wgray scene for POV-Ray 3.7 to standard output: povray_scenes.py SCENE.toml LIGHT_SAMPLES [SIZE]
+"""Converts a wgray scene to a scene of POV-Ray 3.7 on standard output: povray_scenes.py SCENE.toml LIGHT_SAMPLES [SIZE]
 
 Shading is Phong without distance falloff; lights are invisible to the camera. POV-Ray's Phong highlight has the light's
 colour, so the image is that of a scene whose materials have a white `specular`; ambient and diffuse colours must be

@@ -278,7 +278,7 @@ def without_specular(path, row, result):
 def load(path, integrator="phong"):
     traced = integrator == "path"
     if traced and str(path).endswith(".json"):
-        return course(path)
+        return read_course_scene(path)
     with open(path, "rb") as file:
         text = tomllib.load(file)
     camera, render = text["camera"], text.get("render", {})
@@ -363,8 +363,8 @@ def shape(path, row, material):
     raise ValueError(f"{path}: other renderers do not support shapes of type {kind!r}")
 
 
-def course(path):
-    """Reads a JSON scene. Its axes are not converted (y is up); the image is the same."""
+def read_course_scene(path):
+    """Reads a JSON scene in the format of a university course. Its axes are not converted (y is up); the image is the same."""
     with open(path, encoding="utf-8") as file:
         text = json.load(file)
     camera, light = text["cam_config"], text["light_config"]

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Compares wgray's view transforms with their specifications and with Blender's.
+"""Compares wgray's view transforms with their specifications and with Blender's view transforms.
 
     benches/peers/view_check.py [--wgray PROGRAM] [--count N] [--figure docs/output/views.png]
 
@@ -198,7 +198,7 @@ def hues(stops):
 
 
 def figure(args, path):
-    """Writes two scenes under each transform, side by side."""
+    """Writes an image of two scenes under each transform, side by side."""
     columns = []
     with tempfile.TemporaryDirectory() as folder:
         scene, out = os.path.join(folder, "hues.toml"), os.path.join(folder, "out.png")

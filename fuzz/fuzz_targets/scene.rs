@@ -36,8 +36,8 @@ fuzz_target!(|bytes: &[u8]| {
         return;
     };
     let written = description.to_toml().expect("a description converts to TOML");
-    let again = Description::parse(&written, "a.toml").expect("written TOML is valid");
-    assert_eq!(again.to_toml().ok(), Some(written));
+    let read_back = Description::parse(&written, "a.toml").expect("written TOML is valid");
+    assert_eq!(read_back.to_toml().ok(), Some(written));
     let _ = description.validate_with(&Assets::default());
     let overrides = Overrides {
         pixel_pattern: Some(wgray::scene::Pattern::Random),

@@ -32,8 +32,8 @@ fn begin_path(pixel: vec2u, sample: u32) -> PathState {
                      vec3f(0.0), vec3f(0.0), skipped_distance, 0u);
 }
 
-// Advances a path by one surface. Short code also runs for ended paths, and the results are discarded: software Vulkan
-// executes both sides of a branch, and each value that lives across the branch adds cost.
+// Traces a path to its next surface. Short code also runs for paths that have ended, and its results are discarded:
+// software Vulkan executes both sides of a branch, and each value that is live across the branch adds cost.
 fn advance(before: PathState, pixel: vec2u) -> PathState {
     var state = before;
     let path = before.path;

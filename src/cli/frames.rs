@@ -27,10 +27,10 @@ impl FromStr for Frames {
 
     fn from_str(text: &str) -> Result<Frames, String> {
         let mut frames = Vec::new();
-        let mut seen = BTreeSet::new();
+        let mut unique_frames = BTreeSet::new();
         for part in text.split(',') {
             for frame in range(part.trim())? {
-                if seen.insert(frame) {
+                if unique_frames.insert(frame) {
                     frames.push(frame);
                 }
                 if frames.len() > MAX_COUNT {

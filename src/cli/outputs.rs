@@ -168,7 +168,7 @@ impl Outputs {
 
     /// Rejects destinations that would replace an input or another output.
     pub fn check(&self, inputs: &[PathBuf], checkpoint: Option<&Path>) -> anyhow::Result<()> {
-        // Names of checkpoints in a folder are unique.
+        // wgray gives checkpoints in a folder unique names, so only a checkpoint file can replace another file.
         let checkpoint = checkpoint.filter(|path| !path.is_dir());
         let checkpoint = checkpoint.map(find_checkpoint).transpose()?;
         let checkpoint = checkpoint

@@ -110,12 +110,12 @@ impl Progress {
     fn print(&self, fraction: f64, remaining: Option<Duration>) {
         let seconds = self.start.elapsed().as_secs_f64();
         let width = if log::is_json() { 0 } else { 3 }; // aligns the lines
-        let left = remaining.map(|remaining| format!(", about {} left", format_duration(remaining)));
+        let remaining_text = remaining.map(|remaining| format!(", about {} left", format_duration(remaining)));
         let line = format!(
             "{}{:width$.0} % done after {seconds:.1} s{}",
             self.label,
             fraction * 100.0,
-            left.unwrap_or_default()
+            remaining_text.unwrap_or_default()
         );
         let mut facts = facts_of([
             ("fraction", fraction.into()),
@@ -201,7 +201,7 @@ mod tests {
     #[test]
     fn estimates_begin_when_they_are_meaningful() {
         let estimate = |seconds, first, fraction| {
-            remaining(Duration::from_secs(seconds), first, fraction).map(|left| left.as_secs_f64().round())
+            remaining(Duration::from_secs(seconds), first, fraction).map(|time| time.as_secs_f64().round())
         };
         assert_eq!(estimate(2, 0.0, 0.5), None);
         assert_eq!(estimate(5, 0.0, 0.005), None);

@@ -101,8 +101,8 @@ fn identical_files_pass_and_a_single_differing_bit_fails() {
     let folder = TestFolder::new();
     let (a, _) = write_two_pngs(&folder);
     png(&folder, "copy.png", (4, 2), &a);
-    for other in ["a.png", "copy.png"] {
-        let result = folder.run(&["diff", "a.png", other]);
+    for name in ["a.png", "copy.png"] {
+        let result = folder.run(&["diff", "a.png", name]);
         assert_output(&result, 0, "color R G B: identical\nidentical\n");
     }
     let result = folder.run(&["diff", "a.png", "b.png"]);
@@ -147,13 +147,13 @@ fn json_uses_the_names_of_the_text_output() {
         assert!(text.contains(&format!("\n  {metric:<9}  ")), "{metric}");
     }
     // The PSNR of equal images is infinite, which JSON numbers cannot represent.
-    let same = json(&folder.run(&["diff", "a.png", "a.png", "--json"]));
+    let report = json(&folder.run(&["diff", "a.png", "a.png", "--json"]));
     assert_eq!(
-        (&same["passes"], &same["layers"][0]["psnr"]),
+        (&report["passes"], &report["layers"][0]["psnr"]),
         (&true.into(), &"inf".into())
     );
     assert_eq!(
-        (&same["layers"][0]["flip"], &same["layers"][0]["ssim"]),
+        (&report["layers"][0]["flip"], &report["layers"][0]["ssim"]),
         (&0.0.into(), &1.0.into())
     );
 }
@@ -377,9 +377,13 @@ fn non_finite_values_are_counted_and_fail() {
     exr(&folder, "even.exr", (4, 1), red(&[0.5; 4]));
     let text = "color: 1 NaN and 2 infinite values in A, 1 and 2 in B, the first at (1, 0)";
     // identical files fail, too, regardless of the limits
-    let same = ["diff", "odd.exr", "odd.exr"];
-    assert_output(&folder.run(&same), 5, text);
-    assert_output(&folder.run(&[&same[..], &["--fail", "rmse=9"]].concat()), 5, text);
+    let diff_with_itself = ["diff", "odd.exr", "odd.exr"];
+    assert_output(&folder.run(&diff_with_itself), 5, text);
+    assert_output(
+        &folder.run(&[&diff_with_itself[..], &["--fail", "rmse=9"]].concat()),
+        5,
+        text,
+    );
     let result = folder.run(&["diff", "odd.exr", "even.exr", "--json", "--fail", "share=1"]);
     assert_eq!(result.code, 5);
     let layer = &json(&result)["layers"][0];

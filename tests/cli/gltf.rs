@@ -102,32 +102,35 @@ fn a_model_renders_without_a_scene() {
 #[test]
 fn options_select_parts_by_name_or_index() {
     let folder = folder_with_model(&with_cameras());
-    let plain = bits(&folder, &["box.glb"]);
-    let mut seen = vec![plain.clone()];
-    let assert_new_image = |options: &[&[&str]], seen: &mut Vec<Vec<u32>>| {
+    let default_image = bits(&folder, &["box.glb"]);
+    let mut images_so_far = vec![default_image.clone()];
+    let assert_new_image = |options: &[&[&str]], images_so_far: &mut Vec<Vec<u32>>| {
         let render = |options: &&[&str]| bits(&folder, &[&["box.glb"], *options].concat());
         let images: Vec<_> = options.iter().map(render).collect();
         assert!(
             images.iter().all(|bits| *bits == images[0]),
             "{options:?}: the images differ"
         );
-        assert!(!seen.contains(&images[0]), "{options:?}: the options have no effect");
-        seen.push(images[0].clone());
+        assert!(
+            !images_so_far.contains(&images[0]),
+            "{options:?}: the options have no effect"
+        );
+        images_so_far.push(images[0].clone());
     };
-    assert_new_image(&[&["--camera", "side camera"], &["--camera", "1"]], &mut seen);
-    assert_new_image(&[&["--view", "front"]], &mut seen);
-    assert_new_image(&[&["--view", "corner"]], &mut seen);
-    assert_new_image(&[&["--gltf-scene", "one"], &["--gltf-scene", "1"]], &mut seen);
+    assert_new_image(&[&["--camera", "side camera"], &["--camera", "1"]], &mut images_so_far);
+    assert_new_image(&[&["--view", "front"]], &mut images_so_far);
+    assert_new_image(&[&["--view", "corner"]], &mut images_so_far);
+    assert_new_image(&[&["--gltf-scene", "one"], &["--gltf-scene", "1"]], &mut images_so_far);
     assert_new_image(
         &[
             &["--time", "0.5"],
             &["--time", "0.5", "--animation", "rise"],
             &["--time", "0.5", "--animation", "0"],
         ],
-        &mut seen,
+        &mut images_so_far,
     );
-    assert_new_image(&[&["--variant", "golden"], &["--variant", "0"]], &mut seen);
-    assert_new_image(&[&["--environment", "sky"]], &mut seen);
+    assert_new_image(&[&["--variant", "golden"], &["--variant", "0"]], &mut images_so_far);
+    assert_new_image(&[&["--environment", "sky"]], &mut images_so_far);
     for options in [
         ["--camera", "front camera"],
         ["--camera", "0"],
@@ -136,7 +139,7 @@ fn options_select_parts_by_name_or_index() {
     ] {
         assert_eq!(
             bits(&folder, &[&["box.glb"], &options[..]].concat()),
-            plain,
+            default_image,
             "{options:?}"
         );
     }
@@ -310,7 +313,7 @@ fn a_converted_scene_has_the_same_bits() {
     fs::create_dir_all(folder.path("scenes/models")).unwrap();
     fs::copy(folder.path("box.glb"), folder.path("scenes/models/a box.glb")).unwrap();
     let model = "scenes/models/a box.glb";
-    let mut seen = Vec::new();
+    let mut earlier_images = Vec::new();
     for options in [
         &[][..],
         &["--camera", "1"],
@@ -343,8 +346,11 @@ fn a_converted_scene_has_the_same_bits() {
         let expected = bits(&folder, &[&[model], options].concat());
         folder.run_quietly(&["render", "scenes/box.toml", "-o", "bits.exr", "--device", "cpu"]);
         assert_eq!(pixels(&folder, "bits.exr"), expected, "{options:?}");
-        assert!(!seen.contains(&expected), "{options:?}: the comparison cannot fail");
-        seen.push(expected);
+        assert!(
+            !earlier_images.contains(&expected),
+            "{options:?}: the comparison cannot fail"
+        );
+        earlier_images.push(expected);
         let text = String::from_utf8(folder.read("scenes/box.toml")).unwrap();
         assert!(text.starts_with("# a box.glb, as a scene."), "{text}");
         assert!(text.contains("file = \"models/a box.glb\""), "{text}");
@@ -357,8 +363,8 @@ fn a_converted_scene_has_the_same_bits() {
 #[test]
 fn a_conversion_keeps_its_input_and_uses_relative_paths() {
     let folder = folder_with_model(&Model::default());
-    let same = ["convert", "small.toml", "-o", "./small.toml"];
-    assert_rejected(&folder, &same, 2, "is an input of the scene");
+    let onto_itself = ["convert", "small.toml", "-o", "./small.toml"];
+    assert_rejected(&folder, &onto_itself, 2, "is an input of the scene");
     assert_rejected(
         &folder,
         &["convert", "box.glb", "-o", "box.json"],
@@ -473,8 +479,8 @@ fn a_conversion_overwrites_a_file_only_with_force() {
     folder.run_quietly(&[&convert[..], &["--force"]].concat());
     assert!(folder.read("mine.toml").starts_with(b"# box.glb, as a scene. "));
     assert_rejected(&folder, &convert, 2, "already exists");
-    let same = ["convert", "mine.toml", "-o", "./mine.toml", "--force"];
-    assert_rejected(&folder, &same, 2, "is an input of the scene");
+    let onto_itself = ["convert", "mine.toml", "-o", "./mine.toml", "--force"];
+    assert_rejected(&folder, &onto_itself, 2, "is an input of the scene");
 }
 
 #[test]
@@ -516,7 +522,7 @@ fn a_turntable_frames_the_model() {
         "t#.png",
     ];
     folder.run_quietly(&[&turntable[..], &quick].concat());
-    let mut seen = Vec::new();
+    let mut earlier_frames = Vec::new();
     for frame in 1..=5 {
         let picture = image::open(folder.path(&format!("t{frame}.png"))).unwrap().into_rgba8();
         let is_at_edge = |x: u32, y: u32| x == 0 || y == 0 || x == 59 || y == 39;
@@ -530,7 +536,10 @@ fn a_turntable_frames_the_model() {
             "frame {frame} does not show the full model"
         );
         let bytes = picture.into_raw();
-        assert!(!seen.contains(&bytes), "frame {frame} equals an earlier frame");
-        seen.push(bytes);
+        assert!(
+            !earlier_frames.contains(&bytes),
+            "frame {frame} equals an earlier frame"
+        );
+        earlier_frames.push(bytes);
     }
 }

@@ -292,7 +292,11 @@ fn checkpoints_of_other_jobs_are_rejected() {
     }
     fs::remove_file(folder.path("c")).expect("a file");
     assert_eq!(run(&resume).code, 0, "a missing checkpoint is not created");
-    assert_eq!(folder.read("c"), checkpoint, "the same job gives another file");
+    assert_eq!(
+        folder.read("c"),
+        checkpoint,
+        "the checkpoint differs from that of the same job"
+    );
     for (name, rule) in [
         ("small.toml", ".toml files are scenes"),
         ("out.png", ".png files are images"),
@@ -342,7 +346,7 @@ fn a_folder_has_a_checkpoint_for_each_job() {
         all.map(|entry| entry.expect("a file").file_name().into_string().expect("UTF-8"))
             .collect::<BTreeSet<_>>()
     };
-    let mut seen = BTreeSet::new();
+    let mut known_files = BTreeSet::new();
     for extra in [
         &[][..],
         &["--seed", "7"],
@@ -354,10 +358,12 @@ fn a_folder_has_a_checkpoint_for_each_job() {
         let result = run(extra);
         assert_eq!(result.code, 0, "{extra:?}: {}", result.stderr);
         let current = files();
-        let new: Vec<_> = current.difference(&seen).cloned().collect();
-        let [new] = &new[..] else { panic!("{extra:?}: {new:?}") };
+        let new_files: Vec<_> = current.difference(&known_files).cloned().collect();
+        let [new_file] = &new_files[..] else {
+            panic!("{extra:?}: {new_files:?}")
+        };
         let result = run(extra);
-        let message = format!("error: --checkpoint: kept/{new}: already exists; pass --resume to continue it");
+        let message = format!("error: --checkpoint: kept/{new_file}: already exists; pass --resume to continue it");
         assert!(
             result.code == 2 && result.stderr.starts_with(&message),
             "{extra:?}: {}",
@@ -365,7 +371,7 @@ fn a_folder_has_a_checkpoint_for_each_job() {
         );
         assert_eq!(run(&[extra, &["--resume"]].concat()).code, 0);
         assert_eq!(files(), current, "{extra:?}");
-        seen = current;
+        known_files = current;
     }
     let result = run(&["--frames", "1-2"]);
     assert_eq!(result.code, 2, "{}", result.stderr);
@@ -761,7 +767,7 @@ fn a_time_limit_ends_with_a_complete_image() {
         );
     }
     // A limit that is not reached has no effect. A stopped render resumes and gives the same image.
-    let short = [
+    let arguments = [
         "render",
         "small.toml",
         "--size",
@@ -772,14 +778,14 @@ fn a_time_limit_ends_with_a_complete_image() {
         "--device",
         "cpu",
     ];
-    let short = |extra: &[&str]| folder.run(&[&short[..], extra].concat());
-    assert_eq!(short(&["-o", "whole.exr"]).code, 0);
-    let result = short(&["-o", "limited.exr", "--time-limit", "1h"]);
+    let render_with = |extra: &[&str]| folder.run(&[&arguments[..], extra].concat());
+    assert_eq!(render_with(&["-o", "whole.exr"]).code, 0);
+    let result = render_with(&["-o", "limited.exr", "--time-limit", "1h"]);
     assert_eq!((result.code, result.stderr.as_str()), (0, ""));
     assert_eq!(folder.run(&["diff", "limited.exr", "whole.exr"]).code, 0);
     let checkpoint = ["--checkpoint", "c", "--resume", "-o", "kept.exr"];
-    assert_eq!(short(&[&checkpoint[..], &["--time-limit", "0"]].concat()).code, 0);
+    assert_eq!(render_with(&[&checkpoint[..], &["--time-limit", "0"]].concat()).code, 0);
     assert!(folder.read("kept.exr") != folder.read("whole.exr"));
-    assert_eq!(short(&checkpoint).code, 0);
+    assert_eq!(render_with(&checkpoint).code, 0);
     assert!(folder.read("kept.exr") == folder.read("whole.exr"));
 }

@@ -89,10 +89,10 @@ fn a_render_logs_progress_and_statistics() {
 #[test]
 fn each_error_of_a_scene_is_a_message() {
     let folder = TestFolder::new();
-    let bad = SCENE
+    let invalid_scene = SCENE
         .replace("radius = 0.8", "radius = -1")
         .replace("fov = 40", "fov = 1000");
-    folder.write("bad.toml", &bad);
+    folder.write("bad.toml", &invalid_scene);
     let lights = "[[lights]]\ntype = \"point\"\n".repeat(30);
     folder.write("many.toml", &format!("{SCENE}{lights}"));
     for command in ["check", "render", "info"] {

@@ -280,7 +280,7 @@ fn an_image_outside_the_asset_root_is_reported_with_both_paths() {
     assert!(
         result
             .stderr
-            .contains("which lies outside of the asset root, sub; pass another --asset-root"),
+            .contains("which is outside the asset root sub; pass another --asset-root"),
         "{}",
         result.stderr
     );

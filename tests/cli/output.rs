@@ -236,7 +236,7 @@ fn path_layers_equal_the_layers_of_the_film() {
             let image = exr::prelude::read_first_flat_layer_from_file(folder.path("out.exr")).unwrap();
             let channels = &image.layer_data.channel_data.list;
             assert_eq!(channels.len(), if alpha { 20 } else { 19 });
-            let mut seen = Vec::new();
+            let mut earlier_channels = Vec::new();
             for channel in channels {
                 let exr::prelude::FlatSamples::F32(found) = &channel.sample_data else {
                     panic!("{}: no floats", channel.name);
@@ -258,10 +258,10 @@ fn path_layers_equal_the_layers_of_the_film() {
                     .collect();
                 assert_eq!(found.to_vec(), expected, "{name}, {device}");
                 assert!(
-                    !seen.contains(&expected),
+                    !earlier_channels.contains(&expected),
                     "{name} equals another channel, so the comparison cannot fail"
                 );
-                seen.push(expected);
+                earlier_channels.push(expected);
             }
         }
     }

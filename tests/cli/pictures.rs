@@ -475,9 +475,9 @@ fn images_have_metadata() {
     assert_eq!((png["shader_hash"].len(), png["scene_hash"].len()), (64, 64));
     folder.write("other.toml", &SCENE.replacen("0.8", "0.7", 1));
     folder.run_quietly(&["render", "other.toml", "--device", "cpu", "-o", "b.png", "--seed", "7"]);
-    let other = texts(&folder.path("b.png"));
-    assert_ne!(other["scene_hash"], png["scene_hash"]);
-    assert_eq!(other["shader_hash"], png["shader_hash"]);
+    let other_texts = texts(&folder.path("b.png"));
+    assert_ne!(other_texts["scene_hash"], png["scene_hash"]);
+    assert_eq!(other_texts["shader_hash"], png["shader_hash"]);
     let shown = |name: &str| {
         let data = exif::Reader::new()
             .read_from_container(&mut std::io::Cursor::new(folder.read(name)))
@@ -522,8 +522,8 @@ fn reproducible_images_do_not_depend_on_the_machine() {
             folder.run_quietly(&[&["render", "small.toml"], &outputs[..], option].concat());
             for name in NAMES {
                 let bytes = folder.read(name);
-                let mut earlier = files.iter().filter(|(other, _)| other == name);
-                let is_repeated = earlier.any(|(_, other)| *other == bytes);
+                let mut earlier = files.iter().filter(|(earlier_name, _)| earlier_name == name);
+                let is_repeated = earlier.any(|(_, earlier_bytes)| *earlier_bytes == bytes);
                 assert_eq!(is_repeated, reproducible && device == "gpu", "{name} {device}");
                 files.push((name.to_owned(), bytes));
             }

@@ -76,15 +76,15 @@ fn a_background_emits_no_light() {
     let (_, _, bytes) = read_png(&folder.path("a.png"));
     assert_eq!(bytes[..3], [255, 128, 0]);
     let pixels = |name: &str| image::open(folder.path(name)).unwrap().into_rgb32f();
-    let (plain, colored) = (pixels("plain.exr"), pixels("a.exr"));
+    let (default_image, colored) = (pixels("plain.exr"), pixels("a.exr"));
     let is_ball = |x: u32, y: u32| (4..6).contains(&x) && (3..5).contains(&y);
     let mut compared = 0;
-    for (x, y, pixel) in plain.enumerate_pixels().filter(|(x, y, _)| is_ball(*x, *y)) {
+    for (x, y, pixel) in default_image.enumerate_pixels().filter(|(x, y, _)| is_ball(*x, *y)) {
         assert_eq!(pixel, colored.get_pixel(x, y), "the background changes the ball");
         compared += 1;
     }
     assert_eq!(compared, 4);
-    assert_ne!(plain.get_pixel(0, 0), colored.get_pixel(0, 0));
+    assert_ne!(default_image.get_pixel(0, 0), colored.get_pixel(0, 0));
     folder.write("keyed.toml", &format!("{BALL}environment.background = [1, 0, 2]\n"));
     render_quietly(&folder, &["keyed.toml", "-o", "keyed.exr"]);
     render_quietly(&folder, &["ball.toml", "--background", "1,0,2", "-o", "option.exr"]);

@@ -1,4 +1,5 @@
-//! Film layers as views equal `wgray render --aov` with the same samples, and are rejected if the scene lacks them.
+//! The views of film layers show the same values as the layers of `wgray render --aov` with the same samples. A view is
+//! rejected if the scene does not have its layer.
 
 use std::sync::Arc;
 
@@ -56,14 +57,14 @@ fn layers_equal_the_layers_of_render_and_sum_to_the_image() {
         let (colors, color_compile_seconds) = (session.colors(), session.state().compile_seconds);
         let layered = files.packed().with_layers();
         let expected = |layer| files.render_values(&layered, &|film: &Film, i| film.layer(layer, i));
-        let mut seen = vec![colors.colors.clone()];
+        let mut earlier_layers = vec![colors.colors.clone()];
         let mut compiled = None;
         for (view, layer) in LAYERS {
             session.inner.send(Command::View(view));
             let (found, frame) = wait_layer(&session, view);
             assert_eq!(found.values.colors, expected(layer), "{view:?}");
             assert!(
-                !seen.contains(&found.values.colors),
+                !earlier_layers.contains(&found.values.colors),
                 "{view:?} equals another layer, so the comparison cannot fail"
             );
             assert!(found.values.colors.iter().any(|value| *value != [0.0; 3]), "{view:?}");
@@ -75,7 +76,7 @@ fn layers_equal_the_layers_of_render_and_sum_to_the_image() {
                 found.is_light(),
                 "{view:?}: layers of light, and no others, have a histogram"
             );
-            seen.push(found.values.colors);
+            earlier_layers.push(found.values.colors);
             // One kernel computes all layers.
             let compile_seconds = session.state().compile_seconds;
             assert_ne!(
@@ -89,7 +90,7 @@ fn layers_equal_the_layers_of_render_and_sum_to_the_image() {
             );
         }
         for (i, color) in colors.colors.iter().enumerate() {
-            let [direct, indirect, emission] = [2, 3, 4].map(|layer: usize| seen[layer][i]);
+            let [direct, indirect, emission] = [2, 3, 4].map(|layer: usize| earlier_layers[layer][i]);
             let sum = [0, 1, 2].map(|c| direct[c] + indirect[c] + emission[c]);
             assert!(is_close(*color, sum), "pixel {i}: {color:?} {sum:?}");
         }

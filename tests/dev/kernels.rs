@@ -9,7 +9,7 @@ const ADAPTIVE: &str = "shaders/kernels/adaptive.wgsl";
 
 fn problems(session: &TestSession) -> Vec<String> {
     let state = session.state();
-    let location = |place: &Option<String>| place.clone().unwrap_or_default();
+    let location = |location: &Option<String>| location.clone().unwrap_or_default();
     state
         .problems
         .iter()

@@ -197,7 +197,7 @@ impl TestSession {
         let settings = Settings {
             sources,
             device: AdapterChoice::Auto,
-            only_for_viewers: out.is_some(), // an output file must not wait for a viewer
+            only_for_viewers: out.is_some(), // must have no effect with an output file
             out,
             editor: None,
             report: Box::new(|_| ()),

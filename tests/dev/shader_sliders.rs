@@ -40,13 +40,13 @@ fn wait_for(session: &TestSession, expected: &Pixels) {
 /// Returns the image that `render` makes after edits of the kernel.
 fn render_with_edits(files: &Files, edits: &[(&str, &str)]) -> Pixels {
     let text = files.read(KERNEL);
-    let edited = Files::new(&files.read("scene.toml"));
-    let new = edits.iter().fold(text.clone(), |text, (old, new)| {
+    let edited_files = Files::new(&files.read("scene.toml"));
+    let edited_text = edits.iter().fold(text.clone(), |text, (old, new)| {
         assert!(text.contains(old), "{old}");
         text.replace(old, new)
     });
-    edited.write(KERNEL, &new);
-    edited.rendered_image()
+    edited_files.write(KERNEL, &edited_text);
+    edited_files.rendered_image()
 }
 
 #[test]

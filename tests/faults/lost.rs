@@ -158,8 +158,8 @@ fn a_permanently_lost_device_is_an_error_or_the_cpu_renders() {
     assert_eq!((result.code, result.stderr.as_str()), (0, ""));
     assert!(result.picture == Some(expected.clone()));
     // The program waits for a device that reopens late.
-    let late = [("FAULTS_LOSE", "2"), ("FAULTS_REFUSE", "2")];
-    let result = folder.run_on(driver, &GPU, &late);
+    let faults = [("FAULTS_LOSE", "2"), ("FAULTS_REFUSE", "2")];
+    let result = folder.run_on(driver, &GPU, &faults);
     assert_eq!(
         (result.code, result.count("device refused")),
         (0, 2),

@@ -107,11 +107,11 @@ fn ktx2_file(name: &str) -> Vec<u8> {
 }
 
 /// Returns an unlit quad with an image, for KTX2 through `KHR_texture_basisu`.
-fn with_image(bytes: &[u8], kind: &str, material_keys: &Value) -> Builder {
+fn with_image(bytes: &[u8], mime_type: &str, material_keys: &Value) -> Builder {
     let mut builder = Builder::new();
-    let image = builder.image(bytes, kind);
+    let image = builder.image(bytes, mime_type);
     let sampler = builder.add("samplers", json!({ "magFilter": 9728 }));
-    let texture = match kind {
+    let texture = match mime_type {
         "image/ktx2" => {
             builder.requires("KHR_texture_basisu");
             json!({ "sampler": sampler, "extensions": { "KHR_texture_basisu": { "source": image } } })

@@ -1,4 +1,4 @@
-//! Small files that once took minutes or gigabytes must give an error that names the limit, or an image.
+//! Small files that could take minutes or gigabytes must give an error that names the limit, or an image.
 
 use std::fs;
 use std::path::Path;

@@ -61,6 +61,7 @@ fn assert_rejected(result: &RunResult, name: &str) {
     );
     let rules = [
         "lies outside of",
+        "which is outside the asset root",
         "cannot be read",
         "must be a relative path",
         "it must be a relative path",

@@ -36,7 +36,7 @@ fn principled(material: &Material) -> &Principled {
 }
 
 #[test]
-fn values_have_their_usual_meaning() {
+fn values_are_converted_to_principled() {
     let (material, notes) = material("Kd 0.5 0.25 0.125\nKs 0.25\nPr 0.3\nPm 0.75\nKe 2 3 4\nd 0.5\n");
     assert_eq!(notes, Vec::<String>::new());
     let principled = principled(&material);

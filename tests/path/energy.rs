@@ -78,8 +78,8 @@ fn mixture(packed: &Packed, material: &Material, wo: Vec3, side: f32) -> Princip
 /// microfacet normals by the inverse CDF of their distribution (Walter et al. 2007, section 5.2). Transmitted radiance
 /// is not scaled by the squared index.
 fn furnace(alpha: Vec2, ior: Option<f64>, thin: bool, wo: Vec3, f: impl Fn(Vec3) -> f32) -> f64 {
-    // The integrand is periodic in the longitude, so few steps suffice.
-    let (steps, turns) = (360, 120);
+    // The integrand is periodic in the longitude, so few longitudes suffice.
+    let (steps, longitudes) = (360, 120);
     let a = alpha.as_dvec2();
     let o = wo.as_dvec3();
     let mut sum = 0.0;
@@ -88,8 +88,8 @@ fn furnace(alpha: Vec2, ior: Option<f64>, thin: bool, wo: Vec3, f: impl Fn(Vec3)
         let t = (f64::from(i) + 0.5) / f64::from(steps);
         let (u, du) = (1.0 - (1.0 - t) * (1.0 - t), 2.0 * (1.0 - t));
         let r = (u / (1.0 - u)).sqrt();
-        for j in 0..turns {
-            let longitude = TAU * (f64::from(j) + 0.5) / f64::from(turns);
+        for j in 0..longitudes {
+            let longitude = TAU * (f64::from(j) + 0.5) / f64::from(longitudes);
             let m = DVec3::new(-a.x * r * longitude.cos(), -a.y * r * longitude.sin(), 1.0).normalize();
             let c = o.dot(m);
             if c <= 0.0 {
@@ -119,7 +119,7 @@ fn furnace(alpha: Vec2, ior: Option<f64>, thin: bool, wo: Vec3, f: impl Fn(Vec3)
             }
         }
     }
-    sum / f64::from(steps * turns)
+    sum / f64::from(steps * longitudes)
 }
 
 /// Returns the total albedo: reflection and transmission.

@@ -318,19 +318,19 @@ fn pdfs_integrate_to_one() {
 /// Returns Pearson's chi-square of sampled directions and its degrees of freedom; small cells are merged.
 fn chi_square(lobes: &Lobes, wo: Vec3, pdf: impl Fn(Vec3) -> f64) -> (f64, f64) {
     const SAMPLES: u32 = 200_000;
-    const HEIGHTS: usize = 40;
-    const LONGITUDES: usize = 40;
+    const RINGS: usize = 40;
+    const SPOKES: usize = 40;
     // Cells are in the frame of the mirrored direction, around which lobes are narrow.
     let axis = Vec3::new(-wo.x, -wo.y, wo.z).as_dvec3().normalize();
     let u = axis.any_orthonormal_vector();
     let v = axis.cross(u);
     let cell = |d: DVec3| {
         let angle = d.dot(axis).clamp(-1.0, 1.0).acos();
-        let ring = ((angle / PI).sqrt() * HEIGHTS as f64) as usize;
+        let ring = ((angle / PI).sqrt() * RINGS as f64) as usize;
         let longitude = d.dot(v).atan2(d.dot(u)) / TAU + 0.5;
-        ring.min(HEIGHTS - 1) * LONGITUDES + ((longitude * LONGITUDES as f64) as usize).min(LONGITUDES - 1)
+        ring.min(RINGS - 1) * SPOKES + ((longitude * SPOKES as f64) as usize).min(SPOKES - 1)
     };
-    let mut counts = vec![0.0; HEIGHTS * LONGITUDES];
+    let mut counts = vec![0.0; RINGS * SPOKES];
     for i in 0..SAMPLES {
         // Independent samples, because low-discrepancy sequences are too even.
         let bits = wgray_render::cpu::rng::hash4(glam::UVec4::new(i, 7, 11, 13));
@@ -342,16 +342,16 @@ fn chi_square(lobes: &Lobes, wo: Vec3, pdf: impl Fn(Vec3) -> f64) -> (f64, f64) 
         assert!((wi.length() - 1.0).abs() < 1e-5, "{}: {wi}", lobes.name);
         counts[cell(wi)] += 1.0;
     }
-    let mut expected = vec![0.0; HEIGHTS * LONGITUDES];
+    let mut expected = vec![0.0; RINGS * SPOKES];
     let fine = 20;
-    for ring in 0..HEIGHTS * fine {
-        let edge = |i: usize| PI * (i as f64 / (HEIGHTS * fine) as f64).powi(2);
+    for ring in 0..RINGS * fine {
+        let edge = |i: usize| PI * (i as f64 / (RINGS * fine) as f64).powi(2);
         let (inner, outer) = (edge(ring), edge(ring + 1));
         let angle = (inner + outer) / 2.0;
-        for spoke in 0..LONGITUDES * fine {
-            let longitude = TAU * ((spoke as f64 + 0.5) / (LONGITUDES * fine) as f64 - 0.5);
+        for spoke in 0..SPOKES * fine {
+            let longitude = TAU * ((spoke as f64 + 0.5) / (SPOKES * fine) as f64 - 0.5);
             let d = axis * angle.cos() + (u * longitude.cos() + v * longitude.sin()) * angle.sin();
-            let area = (inner.cos() - outer.cos()) * TAU / (LONGITUDES * fine) as f64;
+            let area = (inner.cos() - outer.cos()) * TAU / (SPOKES * fine) as f64;
             expected[cell(d)] += pdf(d.as_vec3()) * area * f64::from(SAMPLES);
         }
     }

@@ -40,7 +40,8 @@ function png(width, height, rgba) {
 	return Buffer.concat([Buffer.from("\x89PNG\r\n\x1a\n", "latin1"), ...parts]);
 }
 
-// Returns smooth colors with some noise, which use all parts of the encodings; alpha increases to the right.
+// Returns an image of smooth colors with some noise, so that all parts of the encodings occur; alpha increases to the
+// right.
 function picture(width, height, hasAlpha) {
 	let state = 1;
 	const noise = () => ((state = (Math.imul(state, 1664525) + 1013904223) >>> 0) / 2 ** 32) * 40;

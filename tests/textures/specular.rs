@@ -18,7 +18,7 @@ fn reflectance(degrees: f64, ior: f64) -> f64 {
 fn reflectances_match_the_fresnel_equations() {
     assert!((reflectance(0.0, 1.5) - 0.04).abs() < 1e-6);
     assert!((reflectance(0.0, 1.0 / 1.5) - 0.04).abs() < 1e-6);
-    // Brewster's angle: only one polarization, half of the light, reflects ((n^2 - 1) / (n^2 + 1))^2.
+    // Brewster's angle: the reflectance is ((n^2 - 1) / (n^2 + 1))^2 for one polarization and 0 for the other.
     let brewster = 1.5f64.atan().to_degrees();
     assert!((reflectance(brewster, 1.5) - 0.5 * (1.25f64 / 3.25).powi(2)).abs() < 1e-6);
     // Total internal reflection.
@@ -191,7 +191,7 @@ fn a_truncated_path_returns_the_background() {
 
 #[test]
 fn glass_casts_a_shadow_unless_it_is_transparent() {
-    let floor = |shadows: &str, material: &str| {
+    let floor_radiance = |shadows: &str, material: &str| {
         let text = format!(
             "image = {{ width = 8, height = 8 }}
             camera = {{ position = [0, 0, 0.5], look_at = [0, 0, 0], up = [0, 1, 0], fov = 20 }}
@@ -232,9 +232,9 @@ fn glass_casts_a_shadow_unless_it_is_transparent() {
         cpu_picture(&scene(&text, Path::new(".")))[27][0]
     };
     let glass = "type = 'glass'\nior = 1.5";
-    assert_eq!(floor("opaque", glass), 0.0);
-    assert!(floor("transparent", glass) > 0.4);
-    assert_eq!(floor("transparent", "type = 'mirror'"), 0.0);
+    assert_eq!(floor_radiance("opaque", glass), 0.0);
+    assert!(floor_radiance("transparent", glass) > 0.4);
+    assert_eq!(floor_radiance("transparent", "type = 'mirror'"), 0.0);
 }
 
 /// After the last split, one branch is chosen at random. The mean equals the mean of a render that follows both

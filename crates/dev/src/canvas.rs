@@ -51,7 +51,7 @@ pub struct Canvas {
     /// The first hits of the rows rendered so far, top row first.
     hits: Vec<FirstHit>,
     /// True once the image has a result that can be shown.
-    shown: bool,
+    has_result: bool,
     limits: Limits,
 }
 
@@ -102,7 +102,7 @@ impl Canvas {
             coarser: None,
             cpu: Film::new(Region::whole(0, 0)),
             hits: Vec::new(),
-            shown: false,
+            has_result: false,
             limits,
         };
         canvas.restart(camera, view)?;
@@ -142,7 +142,7 @@ impl Canvas {
         self.compare = view.is_rendered_twice();
         self.coarser = None;
         self.hits.clear();
-        self.shown = false;
+        self.has_result = false;
         let largest_film = self.gpu.largest_film();
         self.final_scale = final_scale(camera.width, camera.height, largest_film, self.limits.scale);
         let scale = if self.hit_layer(view).is_some() {
@@ -158,7 +158,7 @@ impl Canvas {
         let is_empty = self.stage.scale == self.final_scale && self.steps.samples() == 0;
         let backends_change = self.compare != view.is_rendered_twice();
         // The film already contains this view.
-        self.shown = shows_film && self.stage.scale == self.final_scale && !is_empty;
+        self.has_result = shows_film && self.stage.scale == self.final_scale && !is_empty;
         if shows_film && (backends_change || is_empty) {
             self.restart(self.camera, view)
         } else if !shows_film && self.stage.scale > self.final_scale {
@@ -231,7 +231,7 @@ impl Canvas {
 
     /// Returns true until the image has a result that can be shown.
     pub fn is_new(&self) -> bool {
-        !self.shown
+        !self.has_result
     }
 
     pub fn is_done(&self, view: View) -> bool {
@@ -250,7 +250,7 @@ impl Canvas {
             Some(_) => self.step_hits(view)?,
             None => self.step_film()?,
         };
-        self.shown |= show;
+        self.has_result |= show;
         Ok(show)
     }
 

@@ -2,14 +2,14 @@
 
 use wgray_scene::KeyPath;
 
-/// Maximum number of steps.
+/// Maximum number of steps that can be undone.
 const MAX_STEPS: usize = 1000;
 
 #[derive(Debug)]
 pub struct Step {
     /// The changed key, for display.
     pub key: String,
-    /// The table that contains the change.
+    /// The table that contains the changed key.
     pub table: KeyPath,
     /// True if the camera was saved.
     pub is_camera: bool,

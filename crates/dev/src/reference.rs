@@ -190,11 +190,11 @@ mod tests {
     fn differences_between_images_are_measured() {
         let a = pixels(vec![[0.5; 3]; 64 * 64], 64);
         let b = pixels(vec![[0.75; 3]; 64 * 64], 64);
-        let same = ErrorMeasures::of(3, &a, &a);
-        assert_eq!((same.frame, same.rmse, same.flip), (3, Some(0.0), Some(0.0)));
-        let different = ErrorMeasures::of(4, &a, &b);
-        assert_eq!(different.rmse, Some(0.25));
-        assert!(different.flip.is_some_and(|flip| flip > 0.05), "{different:?}");
+        let zero = ErrorMeasures::of(3, &a, &a);
+        assert_eq!((zero.frame, zero.rmse, zero.flip), (3, Some(0.0), Some(0.0)));
+        let nonzero = ErrorMeasures::of(4, &a, &b);
+        assert_eq!(nonzero.rmse, Some(0.25));
+        assert!(nonzero.flip.is_some_and(|flip| flip > 0.05), "{nonzero:?}");
         let invalid = pixels(vec![[f32::NAN; 3]; 64 * 64], 64);
         assert_eq!(ErrorMeasures::of(5, &a, &invalid).rmse, None);
     }

@@ -193,16 +193,16 @@ mod tests {
         replace_unchanged(&file, b"theirs", b"ours").unwrap();
         assert_eq!(fs::read_to_string(&file).unwrap(), "ours");
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
-        // If the file keeps changing, the wait ends with an error.
         let set_age = |age: Duration| {
             let file = fs::File::options().write(true).open(&file).unwrap();
             file.set_modified(SystemTime::now() - age).unwrap();
         };
-        for (age, waits) in [(2 * MAX_SAVE_DURATION, false), (MAX_SAVE_DURATION / 4, true)] {
+        // A file that was modified recently is awaited; if it keeps changing, the wait ends with an error.
+        for (age, must_wait) in [(2 * MAX_SAVE_DURATION, false), (MAX_SAVE_DURATION / 4, true)] {
             set_age(age);
             let start = Instant::now();
             wait_settled(&file).unwrap();
-            assert_eq!(start.elapsed() > MAX_SAVE_DURATION / 2, waits, "{age:?}");
+            assert_eq!(start.elapsed() > MAX_SAVE_DURATION / 2, must_wait, "{age:?}");
         }
         set_age(Duration::ZERO);
         let is_done = AtomicBool::new(false);

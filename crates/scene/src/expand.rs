@@ -45,7 +45,7 @@ impl Description {
             None => self.validate_plain(settings, integrator, assets, files)?,
             Some(Err(problem)) => {
                 let validated = self.validate_plain(Err(problem.into()), integrator, assets, files);
-                validated.map_err(Problems::once_per_key)? // validation may find the problem of the file again
+                validated.map_err(Problems::once_per_key)? // validation may report this problem again
             }
             Some(Ok(expanded)) => {
                 // The files may have added lights.

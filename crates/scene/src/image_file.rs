@@ -278,7 +278,7 @@ impl Assets {
                     "{file:?} lies outside of the scene's folder, {root}; pass --asset-root with a folder that contains both"
                 ),
                 false => format!(
-                    "{file:?} is {}, which lies outside of the asset root, {root}; pass another --asset-root",
+                    "{file:?} resolves to {}, which is outside the asset root {root}; pass another --asset-root",
                     path.display()
                 ),
             }));

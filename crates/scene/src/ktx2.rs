@@ -48,6 +48,20 @@ pub(crate) struct Ktx2<'a> {
     decompressed_size: usize,
 }
 
+/// Returns the name of a channel of a color model.
+fn channel_name(model: u8, id: u8) -> String {
+    let name = match (model, id) {
+        (_, RGB) => "RGB",
+        (UASTC, UASTC_RGBA) => "RGBA",
+        (ETC1S, ETC1S_ALPHA) => "AAA",
+        (ETC1S, 3) | (UASTC, 4) => "RRR",
+        (ETC1S, 4) => "GGG",
+        (UASTC, 5) => "RRRG",
+        _ => return format!("channel id {id}"),
+    };
+    name.to_owned()
+}
+
 fn damaged(reason: impl std::fmt::Display) -> String {
     format!("is damaged or truncated: {reason}")
 }
@@ -119,7 +133,11 @@ impl<'a> Ktx2<'a> {
         let has_alpha = match (model, &channels[..]) {
             (_, [RGB]) => false,
             (ETC1S, [RGB, ETC1S_ALPHA]) | (UASTC, [UASTC_RGBA]) => true,
-            _ => return Err(format!("must have the channels RGB or RGBA; it has {channels:?}")),
+            _ => {
+                let names: Vec<String> = channels.iter().map(|id| channel_name(model, *id)).collect();
+                let names = names.join(", ");
+                return Err(format!("must have the channels RGB or RGBA; it has {names}"));
+            }
         };
         if !(1..=16).contains(&levels) {
             return Err(damaged(format!("it has {levels} levels")));

@@ -16,7 +16,7 @@ pub struct Material {
     pub emission: Color,
     /// Normal map.
     pub normal_map: Option<NormalMap>,
-    /// Visible to the camera. If false, only camera rays pass through.
+    /// True if the camera sees the surface. If false, camera rays pass through the surface, and other rays hit it.
     pub visible: bool,
 }
 

@@ -71,7 +71,7 @@ mod tests {
     #[test]
     fn similar_names_are_suggested_and_others_are_not() {
         let names = ["yellow", "red", "fov", "look_at"];
-        for (wrong, expected) in [
+        for (misspelled, expected) in [
             ("yellwo", Some("yellow")),
             ("Yellow", Some("yellow")),
             ("fovv", Some("fov")),
@@ -84,7 +84,7 @@ mod tests {
             ("x", None),
             ("", None),
         ] {
-            assert_eq!(closest(wrong, names), expected, "{wrong}");
+            assert_eq!(closest(misspelled, names), expected, "{misspelled}");
         }
         assert_eq!(closest(&"y".repeat(1000), names), None);
     }

@@ -162,7 +162,7 @@ function showNote() {
   if (element("object-note").textContent !== text) element("object-note").textContent = text;
 }
 
-// A table of the scene file: its source lines, the values in the file, and the values that the file leaves at defaults.
+// Makes the view of a table of the scene file: its source lines, the keys in the file, and the keys that the file omits.
 function makeGroup({ name }) {
   const pre = make("pre", { tabIndex: 0 });
   const kind = new Text();

@@ -156,8 +156,9 @@ impl Painter {
         Diagnostic::shader(error, shaders, self.sources.shaders.as_deref())
     }
 
-    /// Handles a render error. Opens a lost device again, up to a maximum number of attempts. If the driver truncates
-    /// the loops of the kernel, uses the last good shaders; halts if no good shaders exist.
+    /// Handles a render error. If the running shaders caused the error, the last shaders without errors are used again;
+    /// without such shaders, rendering halts. After other errors, a device is opened again, up to a maximum number of
+    /// attempts.
     pub(super) fn fail(&mut self, error: &RenderError) {
         if let (RenderError::LoopTruncated { .. } | RenderError::Shader(_), Some(running)) = (error, &mut self.running)
         {
@@ -181,7 +182,7 @@ impl Painter {
         self.device = None;
         self.pending = None;
         self.first_valid_request = self.requests + 1;
-        self.rejected.clear(); // another device may accept them
+        self.rejected.clear(); // another device may accept these shaders
         self.failures += 1;
         if let Some((loaded, shaders)) = self.target().filter(|_| self.failures <= MAX_ATTEMPTS) {
             self.request(&loaded, shaders, Instant::now());

@@ -120,7 +120,8 @@ pub struct Painter {
 
 struct Running {
     canvas: Canvas,
-    /// True if the driver truncates loops of the kernel; rendering halts until something changes.
+    /// True after the driver truncated loops of the kernel, or a shader failed to compile, without earlier shaders to
+    /// use instead. Rendering resumes when the scene, the view, the limits or a slider changes.
     halted: bool,
     shaders: Arc<Shaders>,
     constants: Constants,

@@ -342,7 +342,7 @@ fn opponents(padded: &PaddedTile, linear: impl Fn(f64) -> f64) -> PaddedTile {
     });
     let [r, g, b] = &padded.values;
     for ((r, g), b) in r.iter().zip(g).zip(b) {
-        let [x, y, z] = white_xyz([*r, *g, *b].map(|value| linear(f64::from(value))));
+        let [x, y, z] = xyz_relative_to_white([*r, *g, *b].map(|value| linear(f64::from(value))));
         let opponent = [116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z)];
         for (to, value) in values.iter_mut().zip(opponent) {
             to.push(value as f32);
@@ -355,20 +355,20 @@ fn opponents(padded: &PaddedTile, linear: impl Fn(f64) -> f64) -> PaddedTile {
 }
 
 /// Returns X, Y and Z of a linear color relative to white: IEC 61966-2-1, with the matrix of ꟻLIP.
-fn white_xyz([r, g, b]: [f64; 3]) -> [f64; 3] {
+fn xyz_relative_to_white([r, g, b]: [f64; 3]) -> [f64; 3] {
     let x = (10_135_552.0 * r + 8_788_810.0 * g + 4_435_075.0 * b) / 24_577_794.0;
     let y = (2_613_072.0 * r + 8_788_810.0 * g + 887_015.0 * b) / 12_288_897.0;
     let z = (1_425_312.0 * r + 8_788_810.0 * g + 70_074_185.0 * b) / 73_733_382.0;
-    [x * WHITE[0], y, z * WHITE[1]]
+    [x * INVERSE_WHITE[0], y, z * INVERSE_WHITE[1]]
 }
 
-/// 1 / X and 1 / Z of white.
-const WHITE: [f64; 2] = [1.052_156_925, 0.918_357_670];
+/// 1 / X and 1 / Z of white, whose Y is 1.
+const INVERSE_WHITE: [f64; 2] = [1.052_156_925, 0.918_357_670];
 
 /// Converts an opponent color to linear RGB, clamped to 0 ... 1.
 fn linear([y, cx, cz]: [f64; 3]) -> [f64; 3] {
     let y = (y + 16.0) / 116.0;
-    let (x, z) = ((y + cx / 500.0) / WHITE[0], (y - cz / 200.0) / WHITE[1]);
+    let (x, z) = ((y + cx / 500.0) / INVERSE_WHITE[0], (y - cz / 200.0) / INVERSE_WHITE[1]);
     let rows = [
         [3.241_003_275, -1.537_398_934, -0.498_615_861],
         [-0.969_224_334, 1.875_930_071, 0.041_554_224],
@@ -380,7 +380,7 @@ fn linear([y, cx, cz]: [f64; 3]) -> [f64; 3] {
 /// Returns L*, a* and b* of a linear color; a* and b* are scaled by L* (Hunt effect).
 fn hunt_lab(color: [f64; 3]) -> [f64; 3] {
     const DELTA: f64 = 6.0 / 29.0;
-    let [x, y, z] = white_xyz(color).map(|value| {
+    let [x, y, z] = xyz_relative_to_white(color).map(|value| {
         if value > DELTA * DELTA * DELTA {
             value.cbrt()
         } else {

@@ -87,11 +87,11 @@ mod tests {
         fn add_scaled(self, other: Complex, factor: f64) -> Complex {
             Complex(self.0 + factor * other.0, self.1 + factor * other.1)
         }
-        fn square(self) -> f64 {
+        fn norm_squared(self) -> f64 {
             self.0 * self.0 + self.1 * self.1
         }
         fn root(self) -> Complex {
-            let length = self.square().sqrt();
+            let length = self.norm_squared().sqrt();
             let re = ((length + self.0) / 2.0).sqrt();
             let im = ((length - self.0) / 2.0).max(0.0).sqrt();
             Complex(re, if self.1 < 0.0 { -im } else { im })
@@ -104,9 +104,9 @@ mod tests {
         // The index times the refracted cosine: sqrt(n^2 - sin^2).
         let nt = n2.add_scaled(Complex(1.0 - c * c, 0.0), -1.0).root();
         let s = Complex(c, 0.0);
-        let s_ratio = s.add_scaled(nt, -1.0).square() / s.add_scaled(nt, 1.0).square();
+        let s_ratio = s.add_scaled(nt, -1.0).norm_squared() / s.add_scaled(nt, 1.0).norm_squared();
         let p = n2.times(Complex(c, 0.0));
-        let p_ratio = p.add_scaled(nt, -1.0).square() / p.add_scaled(nt, 1.0).square();
+        let p_ratio = p.add_scaled(nt, -1.0).norm_squared() / p.add_scaled(nt, 1.0).norm_squared();
         (s_ratio + p_ratio) / 2.0
     }
 

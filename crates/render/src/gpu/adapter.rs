@@ -158,7 +158,7 @@ pub(super) fn info(adapter: &wgpu::Adapter) -> GpuInfo {
 /// Returns true for a whole word: `7900` in "Radeon RX 7900 XT", but not `15` in "llvmpipe (LLVM 15.0.6)".
 fn has_word(text: &str, word: &str) -> bool {
     let mut words = text.split(|c: char| !c.is_alphanumeric() && c != '.');
-    words.any(|other| other == word)
+    words.any(|candidate| candidate == word)
 }
 
 /// Returns true if an adapter's name, driver or type contains a name, ignoring case.

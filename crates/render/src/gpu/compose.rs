@@ -12,7 +12,7 @@ use crate::records::Specialization;
 use wgray_image::blocking_path;
 use wgray_scene::Integrator;
 use wgray_shaders::{
-    ADAPTIVE_FILE, FIRST_HITS_FILE, FROM_BUFFERS, KERNEL, PATH, PHONG, RENDER_FILE, ROUNDING_FILE, SAMPLES, TEXELS,
+    ADAPTIVE_FILES, FIRST_HITS_FILES, FROM_BUFFERS, KERNEL, PATH, PHONG, RENDER_FILES, ROUNDING_FILES, SAMPLES, TEXELS,
 };
 pub use wgray_shaders::{File, SHARED, built_in};
 
@@ -34,19 +34,19 @@ pub struct Kernel {
 /// Accumulates samples in the film.
 pub static RENDER: Kernel = Kernel {
     entry_point: "render",
-    files: &[KERNEL, SAMPLES, RENDER_FILE],
+    files: &[KERNEL, SAMPLES, RENDER_FILES],
     integrates: true,
 };
 /// Accumulates samples until each pixel has converged.
 pub static ADAPTIVE: Kernel = Kernel {
     entry_point: "adaptive",
-    files: &[KERNEL, SAMPLES, ADAPTIVE_FILE],
+    files: &[KERNEL, SAMPLES, ADAPTIVE_FILES],
     integrates: true,
 };
 /// Writes the first hits through pixel centers.
 pub static FIRST_HITS: Kernel = Kernel {
     entry_point: "first_hits",
-    files: &[KERNEL, FIRST_HITS_FILE],
+    files: &[KERNEL, FIRST_HITS_FILES],
     integrates: false,
 };
 /// All kernels.
@@ -149,7 +149,7 @@ impl Shaders {
         texels: Option<&str>,
     ) -> Source {
         let mut source = Source::default();
-        self.append(&mut source, ROUNDING_FILE);
+        self.append(&mut source, ROUNDING_FILES);
         source.extend(&self.shared());
         source.append(
             "crates/render/src/records/specialization.rs",

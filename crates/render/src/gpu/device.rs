@@ -27,8 +27,8 @@ pub struct Device {
 ///
 /// # Errors
 ///
-/// [`RenderError::NoDevice`] if no adapter matches, or adapters with different names match; otherwise the error of the
-/// last adapter that cannot be opened.
+/// [`RenderError::NoDevice`] if no adapter matches, or if the choice is ambiguous because adapters with different names
+/// match. If no matching adapter can be opened, the error of the last of them.
 pub fn choose(choice: &AdapterChoice) -> Result<Device, RenderError> {
     choose_among(choice, &|_| true)
 }

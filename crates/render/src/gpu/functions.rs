@@ -16,19 +16,19 @@ pub struct FunctionText<'a> {
 
 /// Returns the functions up to the first unmatched brace.
 pub fn functions(text: &str) -> Vec<FunctionText<'_>> {
-    let plain = without_comments(text);
+    let code = without_comments(text);
     let mut found = Vec::new();
     let mut offset = 0;
-    while let Some(start) = next_word(&plain, offset, "fn") {
+    while let Some(start) = next_word(&code, offset, "fn") {
         let name = text[start + 2..].trim_start();
         let name = &name[..name
             .find(|c: char| !c.is_alphanumeric() && c != '_')
             .unwrap_or(name.len())];
-        let Some(open) = plain[start..].find('{').map(|i| start + i) else {
+        let Some(open) = code[start..].find('{').map(|i| start + i) else {
             break;
         };
-        let Some(close) = closing(&plain, open) else { break };
-        let head = &plain[start..open];
+        let Some(close) = closing(&code, open) else { break };
+        let head = &code[start..open];
         let result = head.rfind("->").map_or("", |arrow| &text[start + arrow + 2..open]);
         // The attributes of a result precede the type.
         let result = result.rsplit(')').next().unwrap_or_default().trim();
@@ -45,9 +45,9 @@ pub fn functions(text: &str) -> Vec<FunctionText<'_>> {
 
 /// Blanks out comments; byte offsets do not change.
 pub fn without_comments(text: &str) -> String {
-    let mut plain = text.as_bytes().to_vec();
+    let mut code = text.as_bytes().to_vec();
     let mut i = 0;
-    while i < plain.len() {
+    while i < code.len() {
         let rest = &text.as_bytes()[i..];
         let length = if rest.starts_with(b"//") {
             rest.iter().position(|byte| *byte == b'\n').unwrap_or(rest.len())
@@ -58,14 +58,14 @@ pub fn without_comments(text: &str) -> String {
             i += 1;
             continue;
         };
-        for byte in &mut plain[i..i + length] {
+        for byte in &mut code[i..i + length] {
             if *byte != b'\n' {
                 *byte = b' ';
             }
         }
         i += length;
     }
-    String::from_utf8(plain).unwrap_or_default() // never invalid: only complete characters were replaced
+    String::from_utf8(code).unwrap_or_default() // never invalid: only complete characters were replaced
 }
 
 /// Returns true if only comments and white space differ.
@@ -106,7 +106,7 @@ mod tests {
     #[test]
     fn comments_are_not_code() {
         let text = "const a: f32 = 0.5; // slider 0..1\nfn f() -> f32 { return a; } // one\n";
-        for same in [
+        for edited in [
             text.to_owned(),
             format!("// a line\n\n{text}"),
             text.replace("one", "another"),
@@ -115,16 +115,16 @@ mod tests {
             text.replace("{ return", "{\n    return"),
             text.replace('\n', "\r\n"),
         ] {
-            assert!(is_same_code(text, &same), "{same}");
+            assert!(is_same_code(text, &edited), "{edited}");
         }
-        for other in [
+        for edited in [
             text.replace("0.5", "0.25"),
             text.replace("fn f", "// fn f"),
             text.replace("one", "one\u{2028}fn g() {}"),
             format!("/* /* */ // */ fn g() {{}}\n{text}"),
             text.replace("return a", "returna"),
         ] {
-            assert!(!is_same_code(text, &other), "{other}");
+            assert!(!is_same_code(text, &edited), "{edited}");
         }
     }
 

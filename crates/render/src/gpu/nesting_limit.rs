@@ -11,8 +11,8 @@ const ALTERNATIVES: usize = 400;
 
 /// Returns the location of code that is nested too deeply, and the violated rule.
 pub fn too_deep(text: &str) -> Option<(Range<usize>, String)> {
-    let plain = without_comments(text);
-    let bytes = plain.as_bytes();
+    let code = without_comments(text);
+    let bytes = code.as_bytes();
     let violation = |offset: usize, construct: &str, max: usize| {
         Some((
             offset..offset + 1,
@@ -42,7 +42,7 @@ pub fn too_deep(text: &str) -> Option<(Range<usize>, String)> {
                 if alternatives.len() > 1 {
                     alternatives.pop();
                 }
-                let rest = plain[offset + 1..].trim_start();
+                let rest = code[offset + 1..].trim_start();
                 let is_else_if = rest
                     .strip_prefix("else")
                     .is_some_and(|rest| rest.trim_start().starts_with("if"));

@@ -227,12 +227,15 @@ mod tests {
     #[test]
     fn misplaced_instructions_are_detected() {
         let module = module(FloatControls::ALL);
-        let mut wrong = module.clone();
+        let mut misplaced = module.clone();
         let capabilities = end_of(&module, |opcode| opcode == OP_CAPABILITY);
-        let first: Vec<u32> = wrong.drain(HEADER..HEADER + 2).collect();
+        let first: Vec<u32> = misplaced.drain(HEADER..HEADER + 2).collect();
         let position = capabilities + extension(FLOAT_CONTROLS).len() - 2;
-        wrong.splice(position..position, first);
-        assert_eq!(requested_controls(&wrong).2, requested_controls(&module).2);
-        assert!(!in_order(&wrong), "a capability after an extension was not detected");
+        misplaced.splice(position..position, first);
+        assert_eq!(requested_controls(&misplaced).2, requested_controls(&module).2);
+        assert!(
+            !in_order(&misplaced),
+            "a capability after an extension was not detected"
+        );
     }
 }

@@ -188,16 +188,16 @@ fn mix_in_uniform(powers: &mut [f64], groups: &[usize], is_far: impl Fn(usize) -
 /// Scales the power of distant emitters so that their fraction s of the power becomes 0.5 s + 0.25: in a wide
 /// landscape, a near emitter has a tiny fraction of the power, but dominates the light in its neighborhood.
 fn scale_far_powers(powers: &mut [f64], references: &[(u32, u32)], lights: &[Light]) {
-    let far: Vec<bool> = references.iter().map(|reference| is_far(lights, reference)).collect();
+    let far_flags: Vec<bool> = references.iter().map(|reference| is_far(lights, reference)).collect();
     let sum = |is_far: bool| -> f64 {
-        let selected = powers.iter().zip(&far).filter(|(_, far)| **far == is_far);
+        let selected = powers.iter().zip(&far_flags).filter(|(_, far)| **far == is_far);
         selected.map(|(power, _)| power).sum()
     };
     let (far_power, near_power) = (sum(true), sum(false));
     if far_power > 0.0 && near_power > 0.0 {
         let fraction = 0.5 * (far_power / (far_power + near_power)) + 0.25;
         let factor = near_power * fraction / (1.0 - fraction) / far_power;
-        for (power, _) in powers.iter_mut().zip(far).filter(|(_, far)| *far) {
+        for (power, _) in powers.iter_mut().zip(far_flags).filter(|(_, far)| *far) {
             *power *= factor;
         }
     }

@@ -13,7 +13,7 @@ use wgray_scene::{self as scene, EnvironmentImage, Scene};
 /// Minimum integral of a map over all directions. Darker maps count as black, because their PDFs would approach the
 /// subnormal numbers.
 const MIN_INTEGRAL: f64 = 1e-25;
-/// Minimum fraction of the power of a block with light samples. Darker blocks are reached only by BSDF samples.
+/// Blocks with less than this fraction of the map's power get no light samples; only BSDF samples reach them.
 const MIN_BLOCK_FRACTION: f64 = 1e-12;
 /// Parts per side of a block, each with its own mean direction.
 const PARTS: usize = 4;

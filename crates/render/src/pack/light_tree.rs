@@ -95,14 +95,14 @@ impl Cone {
     }
 }
 
-/// An emitter in the tree.
+/// An emitter in the light tree.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TreeEmitter {
     /// Lower corner of the box.
     pub low: DVec3,
     /// Upper corner of the box.
     pub high: DVec3,
-    /// Bounds of the emission.
+    /// Bounds of the directions of emission.
     pub cone: Cone,
     /// Maximum intensity.
     pub intensity: f64,

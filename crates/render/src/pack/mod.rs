@@ -173,8 +173,8 @@ fn environment(scene: &Scene, environment_map: &EnvironmentMap, probability: f64
     }
 }
 
-/// Counts the primitives of each kind outside of the BVH, and the rows of tables. `linear_primitives` must be
-/// sorted by kind, and shadow casters must come first.
+/// Counts the primitives of each kind outside of the BVH, and the rows of tables. `linear_primitives` must be sorted by
+/// kind; within a kind, shadow casters must come first.
 fn counts(
     linear_primitives: &[(Primitive, bool)],
     area_lights: usize,

@@ -41,7 +41,7 @@ records! {
     pub struct Environment {
         /// Ambient light.
         pub ambient: Vec3,
-        /// Offset of ray origins above a surface, relative to the largest coordinate.
+        /// Offset of ray origins above a surface, as a multiple of the largest absolute coordinate at the hit.
         pub shadow_epsilon: f32,
         /// Radiance of rays that leave the scene; with `path` only for camera rays, if [`BACKGROUND`] is set.
         pub background: Vec3,

@@ -31,7 +31,7 @@ specialization! {
     primitives = "PRIMITIVES",
     /// Bit i: primitives of kind i outside of the BVH can cast shadows.
     shadow_casters = "SHADOW_CASTERS",
-    /// Bit i: the scene's BVH has primitives of kind i; [`INSTANCE`](super::INSTANCE) for meshes.
+    /// Bit i: the scene's BVH contains primitives of kind i. Meshes have the kind [`INSTANCE`](super::INSTANCE).
     tlas_kinds = "TLAS_KINDS",
     /// Bit 0: area lights exist; bit 1: other lights exist; bit 2: spot lights exist.
     lights = "LIGHTS",

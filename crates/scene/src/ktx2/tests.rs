@@ -1,4 +1,5 @@
-//! Tests with files of a reference encoder, compared with the output of its transcoder, and with damaged files.
+//! Tests that files written by the Basis Universal encoder decode to the same texels as with its transcoder, and that
+//! damaged files are rejected or decoded without a panic.
 
 use std::fs;
 use std::path::PathBuf;
@@ -105,7 +106,7 @@ fn headers_are_checked() {
             "uastc-5x7-levels",
             52,
             60,
-            "must have the channels RGB or RGBA; it has [",
+            "must have the channels RGB or RGBA; it has RGB",
         ),
         ("uastc-5x7-levels", 52, u32::MAX, damaged),
         ("uastc-5x7-levels", INDEX + 4, u32::MAX, damaged),
@@ -130,13 +131,13 @@ fn headers_are_checked() {
             "{name} {offset} {value}: {error}"
         );
     }
-    // A file with separate channels for red and green.
+    // A file whose only channel is RRR.
     let mut bytes = file("etc1s-48x20");
     let descriptor = short(&bytes, 48).unwrap() as usize;
     bytes[descriptor + 31] = 3;
     assert_eq!(
         decoded(&bytes).unwrap_err(),
-        "must have the channels RGB or RGBA; it has [3]"
+        "must have the channels RGB or RGBA; it has RRR"
     );
 }
 

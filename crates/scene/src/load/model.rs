@@ -107,8 +107,8 @@ pub(super) fn describe(
         })?;
     let mesh = crate::mesh_file::load(&assets.file_system, &canonical, None)
         .map_err(|error| SceneError::Mesh(error.at(path)))?;
-    if let (true, Some(damage)) = (overrides.strict, mesh.damage.first()) {
-        return Err(SceneError::Mesh(damage.clone().of(path)));
+    if let (true, Some(defect)) = (overrides.strict, mesh.defects.first()) {
+        return Err(SceneError::Mesh(defect.clone().of(path)));
     }
     let presentation = &overrides.presentation;
     let mut shape = MeshDescription {

@@ -1,4 +1,4 @@
-//! Damage to mesh files that has a stand-in: the damage is reported, and the rest of the file is used.
+//! Defects of mesh files that do not prevent reading: each has a remedy, and a note reports both.
 
 use super::error::{Location, MeshFault};
 use crate::note::Note;
@@ -13,22 +13,22 @@ pub(super) const TRUNCATED: &str = "the facets before the end are used";
 pub(super) const EXTRA_VALUES: &str = "the extra values were ignored";
 
 #[derive(Default)]
-pub(super) struct Damages(Vec<Damage>);
+pub(super) struct Defects(Vec<Defect>);
 
-struct Damage {
-    stand_in: &'static str,
+struct Defect {
+    remedy: &'static str,
     first: MeshFault,
     count: usize,
 }
 
-impl Damages {
+impl Defects {
     /// Records a fault. `fault` is only called for the first fault of each kind.
     #[cold]
-    pub fn add(&mut self, stand_in: &'static str, fault: impl FnOnce() -> MeshFault) {
-        match self.0.iter_mut().find(|damage| damage.stand_in == stand_in) {
-            Some(damage) => damage.count += 1,
-            None => self.0.push(Damage {
-                stand_in,
+    pub fn add(&mut self, remedy: &'static str, fault: impl FnOnce() -> MeshFault) {
+        match self.0.iter_mut().find(|defect| defect.remedy == remedy) {
+            Some(defect) => defect.count += 1,
+            None => self.0.push(Defect {
+                remedy,
                 first: fault(),
                 count: 1,
             }),
@@ -37,16 +37,16 @@ impl Damages {
 
     /// Returns the first fault of each kind, and one note per kind that counts its faults.
     pub fn into_parts(self) -> (Vec<MeshFault>, Vec<Note>) {
-        let notes = self.0.iter().map(Damage::note).collect();
-        (self.0.into_iter().map(|damage| damage.first).collect(), notes)
+        let notes = self.0.iter().map(Defect::note).collect();
+        (self.0.into_iter().map(|defect| defect.first).collect(), notes)
     }
 
     pub fn first(&self) -> Option<&MeshFault> {
-        self.0.first().map(|damage| &damage.first)
+        self.0.first().map(|defect| &defect.first)
     }
 }
 
-impl Damage {
+impl Defect {
     fn note(&self) -> Note {
         let (line, location) = match self.first.location {
             Location::File => (None, String::new()),
@@ -59,7 +59,7 @@ impl Damage {
         };
         Note {
             line,
-            ..Note::from(format!("{location}{}; {}{more}", self.first.message, self.stand_in))
+            ..Note::from(format!("{location}{}; {}{more}", self.first.message, self.remedy))
         }
     }
 }

@@ -80,8 +80,8 @@ pub struct Mesh {
     pub libraries: Vec<Library>,
     /// Warnings, with the action taken: `1 of 12 triangles is a duplicate and was removed`.
     pub notes: Vec<Note>,
-    /// Damage, which is an error in strict mode.
-    pub(crate) damage: Vec<MeshFault>,
+    /// Defects, which are errors in strict mode.
+    pub(crate) defects: Vec<MeshFault>,
     /// Bounding box, BVH and other derived data.
     cache: Cache,
 }
@@ -242,8 +242,8 @@ impl Mesh {
         format: MeshFormat,
         normals: Option<Normals>,
     ) -> Result<Mesh, MeshError> {
-        let (mut mesh, libraries, damage) = read(bytes, format, normals).map_err(|fault| fault.of(path))?;
-        mesh.damage = damage;
+        let (mut mesh, libraries, defects) = read(bytes, format, normals).map_err(|fault| fault.of(path))?;
+        mesh.defects = defects;
         for names in libraries {
             mesh.load_libraries(file_system, path, &names);
         }
@@ -359,7 +359,7 @@ impl MeshFormat {
     }
 }
 
-/// Returns the mesh, the names of its MTL files and the damage.
+/// Returns the mesh, the names of its MTL files and the defects.
 fn read(
     bytes: &[u8],
     format: MeshFormat,
@@ -377,16 +377,16 @@ fn read(
         MeshFormat::Ply => (ply::read(bytes, uses_normals)?, Vec::new()),
         MeshFormat::Stl => (stl::read(bytes, normals == Some(Normals::File))?, Vec::new()),
     };
-    if let (true, Some(fault)) = (raw.triangles.is_empty(), raw.damages.first()) {
+    if let (true, Some(fault)) = (raw.triangles.is_empty(), raw.defects.first()) {
         return Err(fault.clone());
     }
-    let (damage, notes) = std::mem::take(&mut raw.damages).into_parts();
+    let (defects, notes) = std::mem::take(&mut raw.defects).into_parts();
     raw.notes.splice(0..0, notes);
-    let mesh = build::build_mesh(raw, normals).map_err(|fault| match damage.first() {
+    let mesh = build::build_mesh(raw, normals).map_err(|fault| match defects.first() {
         Some(first) if fault.is_empty => first.clone(),
         _ => fault,
     })?;
-    Ok((mesh, libraries, damage))
+    Ok((mesh, libraries, defects))
 }
 
 /// Reads an MTL file in the folder of the mesh.

@@ -69,7 +69,7 @@ impl Reader {
         match keyword {
             b"v" => {
                 let position = position(words).unwrap_or_else(|fault| {
-                    self.raw.damages.add(damage::VERTEX, || fault);
+                    self.raw.defects.add(damage::VERTEX, || fault);
                     DVec3::NAN
                 });
                 check_count(self.positions.len(), words)?;
@@ -79,7 +79,7 @@ impl Reader {
             }
             b"vt" => {
                 let uv = uv(words).unwrap_or_else(|fault| {
-                    self.raw.damages.add(damage::UV, || fault);
+                    self.raw.defects.add(damage::UV, || fault);
                     Vec2::ZERO
                 });
                 check_count(self.uvs.len(), words)?;
@@ -87,7 +87,7 @@ impl Reader {
             }
             b"vn" => {
                 let normal = vector(words).unwrap_or_else(|fault| {
-                    self.raw.damages.add(damage::NORMAL, || fault);
+                    self.raw.defects.add(damage::NORMAL, || fault);
                     DVec3::ZERO
                 });
                 check_count(self.normals.len(), words)?;
@@ -130,7 +130,7 @@ impl Reader {
             match self.corner(word, words.location()) {
                 Ok(corner) => self.corners.push(corner),
                 Err(message) => {
-                    self.raw.damages.add(damage::FACE, || words.fault(message));
+                    self.raw.defects.add(damage::FACE, || words.fault(message));
                     return Ok(());
                 }
             }
@@ -138,7 +138,7 @@ impl Reader {
         let count = self.corners.len();
         if count < 3 {
             let rule = || words.fault(format!("a face must have at least 3 corners, not {count}"));
-            self.raw.damages.add(damage::FACE, rule);
+            self.raw.defects.add(damage::FACE, rule);
             return Ok(());
         }
         let corners = std::mem::take(&mut self.corners);
@@ -171,7 +171,7 @@ impl Reader {
             true => color = Vec3::from(values.map(|x| srgb_to_linear(x.clamp(0.0, 1.0)) as f32)).extend(1.0),
             false => {
                 let rule = || words.fault("the color of the vertex must be three finite numbers");
-                self.raw.damages.add(damage::COLOR, rule);
+                self.raw.defects.add(damage::COLOR, rule);
             }
         }
         self.colors.resize(self.positions.len(), Vec4::ONE);
@@ -211,10 +211,10 @@ impl Reader {
             return Err(invalid_corner(word));
         }
         let position = index(position, self.positions.len(), "vertex")?;
-        let damages = &mut self.raw.damages;
-        let mut or_none = |found: Result<u32, String>, stand_in| {
+        let defects = &mut self.raw.defects;
+        let mut or_none = |found: Result<u32, String>, remedy| {
             found.unwrap_or_else(|message| {
-                damages.add(stand_in, || location.fault(message));
+                defects.add(remedy, || location.fault(message));
                 NONE
             })
         };

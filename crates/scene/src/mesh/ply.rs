@@ -10,7 +10,7 @@ use glam::{DVec3, Vec2, Vec4};
 
 use self::header::{Element, Format, Header, Property, Scalar, header};
 use self::values::{Ascii, Binary, Values};
-use super::damage::{self, Damages};
+use super::damage::{self, Defects};
 use super::error::{Location, MeshFault, format_number};
 use super::raw_mesh::{RawMesh, coordinate, texture_coordinate, unit};
 use super::tokens::Tokens;
@@ -19,13 +19,13 @@ use wgray_image::color::srgb_to_linear;
 
 pub(super) fn read(bytes: &[u8], with_normals: bool) -> Result<RawMesh, MeshFault> {
     let mut words = Tokens::new(bytes);
-    let mut damages = Damages::default();
-    let header = header(&mut words, &mut damages)?;
+    let mut defects = Defects::default();
+    let header = header(&mut words, &mut defects)?;
     match header.format {
         Format::Ascii => {
             // Each line is a row, as in other readers, unless there are fewer lines than rows.
             let row_per_line = words.lines_left() as u128 >= header.rows();
-            body(&header, Ascii { words, row_per_line }, with_normals, damages)
+            body(&header, Ascii { words, row_per_line }, with_normals, defects)
         }
         Format::Binary { is_big_endian } => {
             let offset = words.offset();
@@ -37,13 +37,13 @@ pub(super) fn read(bytes: &[u8], with_normals: bool) -> Result<RawMesh, MeshFaul
                     is_big_endian,
                 },
                 with_normals,
-                damages,
+                defects,
             )
         }
     }
 }
 
-fn body(header: &Header, mut values: impl Values, with_normals: bool, damages: Damages) -> Result<RawMesh, MeshFault> {
+fn body(header: &Header, mut values: impl Values, with_normals: bool, defects: Defects) -> Result<RawMesh, MeshFault> {
     let element = |name: &str| header.elements.iter().find(|element| element.name == name);
     let vertices =
         element("vertex").ok_or_else(|| Location::File.fault("the header must have an element \"vertex\""))?;
@@ -58,7 +58,7 @@ fn body(header: &Header, mut values: impl Values, with_normals: bool, damages: D
         return Err(vertices.location.fault(rule));
     }
     let mut raw = RawMesh {
-        damages,
+        defects,
         ..RawMesh::default()
     };
     raw.groups.push(Group::default());
@@ -115,7 +115,7 @@ fn check_size(element: &Element, values: &impl Values) -> Result<(), MeshFault> 
 fn end_row(values: &mut impl Values, raw: &mut RawMesh) {
     if let Some(location) = values.end_row() {
         let rule = "the line has more values than the header declares";
-        raw.damages.add(damage::EXTRA_VALUES, || location.fault(rule));
+        raw.defects.add(damage::EXTRA_VALUES, || location.fault(rule));
     }
 }
 
@@ -231,7 +231,7 @@ fn read_vertices(
         let position = |name: &'static str, x: f64| coordinate(x).map_err(|rule| (name, rule));
         let position = || Ok(DVec3::new(position("x", x)?, position("y", y)?, position("z", z)?));
         raw.positions.push(position().unwrap_or_else(|violation| {
-            raw.damages.add(damage::VERTEX, || fault(violation));
+            raw.defects.add(damage::VERTEX, || fault(violation));
             DVec3::NAN
         }));
         if has_normals {
@@ -241,7 +241,7 @@ fn read_vertices(
             let uv = |name: &'static str, x: f64| texture_coordinate(x).map_err(|rule| (name, rule));
             let uv = || Ok(Vec2::new(uv("u", u)?, uv("v", v)?));
             raw.uvs.push(uv().unwrap_or_else(|violation| {
-                raw.damages.add(damage::UV, || fault(violation));
+                raw.defects.add(damage::UV, || fault(violation));
                 Vec2::ZERO
             }));
         }
@@ -250,7 +250,7 @@ fn read_vertices(
             let mut color = Vec4::from_array(std::array::from_fn(value));
             if !color.is_finite() {
                 let rule = "the values must be finite as 32-bit floats".to_owned();
-                raw.damages.add(damage::COLOR, || fault(("color", rule)));
+                raw.defects.add(damage::COLOR, || fault(("color", rule)));
                 color = Vec4::ONE;
             }
             raw.colors.push(color);
@@ -309,10 +309,10 @@ fn read_faces(
                 let rule = || {
                     format!("face {i}: vertex {vertex} does not exist; number of vertices, counted from 0: {vertices}")
                 };
-                raw.damages.add(damage::FACE, || location.fault(rule()));
+                raw.defects.add(damage::FACE, || location.fault(rule()));
             } else if length < 3 {
                 let rule = || format!("face {i}: must have at least 3 vertices, not {length}");
-                raw.damages.add(damage::FACE, || location.fault(rule()));
+                raw.defects.add(damage::FACE, || location.fault(rule()));
             } else {
                 raw.face(&corners, location)?;
             }

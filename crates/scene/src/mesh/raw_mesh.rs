@@ -3,7 +3,7 @@
 use crate::note::Note;
 use glam::{DVec3, Vec2, Vec3, Vec4};
 
-use super::damage::Damages;
+use super::damage::Defects;
 use super::error::{Location, MeshFault, format_number};
 use super::polygon::Polygon;
 use super::{Group, MAX_COORDINATE, MAX_ELEMENTS, Mesh, build};
@@ -30,7 +30,7 @@ pub(crate) struct RawMesh {
     pub notes: Vec<Note>,
     /// The reason why the file has no triangles, if known.
     pub(super) no_triangles_reason: Option<&'static str>,
-    pub(super) damages: Damages,
+    pub(super) defects: Defects,
 }
 
 impl RawMesh {

@@ -110,7 +110,7 @@ fn solid(words: &mut Tokens, facets: &mut Facets) -> Result<(), MeshFault> {
             Some(word) => return Err(words.fault(format!("{} must be \"facet\" or \"endsolid\"", quoted(word)))),
             None => {
                 let rule = "the file ends inside a solid; \"endsolid\" is missing";
-                facets.raw.damages.add(damage::TRUNCATED, || words.fault(rule));
+                facets.raw.defects.add(damage::TRUNCATED, || words.fault(rule));
                 return Ok(());
             }
         }
@@ -159,7 +159,7 @@ impl Facets {
     fn position(&mut self, p: DVec3, fault: impl FnOnce(usize, String) -> MeshFault) -> DVec3 {
         for axis in 0..3 {
             if let Err(rule) = coordinate(p[axis]) {
-                self.raw.damages.add(damage::FACE, || fault(axis, rule));
+                self.raw.defects.add(damage::FACE, || fault(axis, rule));
                 return DVec3::NAN;
             }
         }

@@ -208,7 +208,7 @@ fn explain(error: ReadError, table: &Table, is_tagged: bool, integrator: Integra
                 "a list of 4 numbers"
             }
             "an array of length 4" => "a list of 4 points",
-            "fewer elements in array" => "a shorter list",
+            "fewer elements in array" => "a list with fewer elements",
             "a map" => "a table",
             table if table.starts_with("struct ") => "a table",
             "a sequence" => "a list of tables, each under its own [[header]]",

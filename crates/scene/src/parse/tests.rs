@@ -58,7 +58,11 @@ fn invalid_text_is_reported_with_its_line() {
             "camera.focal_length: \"a, expected b\" must be a number",
         ),
         ("up = [0, 1]", 1, "camera.up: [0, 1] must be a list of 3 numbers"),
-        ("up = [0, 0, 1, 0]", 1, "camera.up: [0, 0, 1, 0] must be a shorter list"),
+        (
+            "up = [0, 0, 1, 0]",
+            1,
+            "camera.up: [0, 0, 1, 0] must be a list with fewer elements",
+        ),
         ("up = [0, 0, true]", 1, "camera.up[2]: true must be a number"),
         ("up = { z = 1 }", 1, "camera.up: { z = 1 } must be a list of 3 numbers"),
         (

@@ -164,8 +164,8 @@ fn load(file: &str, normals: Option<Normals>, lookup: &mut SceneLookup) -> Check
             _ => Problem::new(error.to_string()),
         })
         .at("file")?;
-    if let (true, Some(damage)) = (lookup.assets.strict, mesh.damage.first()) {
-        return Err(Problem::damage(damage.clone().of(Path::new(file)).to_string())).at("file");
+    if let (true, Some(defect)) = (lookup.assets.strict, mesh.defects.first()) {
+        return Err(Problem::damage(defect.clone().of(Path::new(file)).to_string())).at("file");
     }
     lookup.scene_materials.register(&mesh);
     Ok(Some(mesh))

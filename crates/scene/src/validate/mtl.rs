@@ -38,7 +38,7 @@ pub(super) struct SceneMaterials<'a> {
     /// The folder to which paths in messages are relative, without symbolic links.
     folder: PathBuf,
     /// The materials of each mesh, by the address of the mesh.
-    meshes: HashMap<usize, GroupMaterials>,
+    group_materials: HashMap<usize, GroupMaterials>,
     integrator: Integrator,
     /// The indices of materials, by file, line and traits.
     indices: HashMap<(PathBuf, usize, Traits), usize>,
@@ -86,7 +86,7 @@ impl<'a> SceneMaterials<'a> {
             textures,
             files,
             images,
-            meshes: HashMap::new(),
+            group_materials: HashMap::new(),
             indices: HashMap::new(),
             maps: BTreeMap::new(),
             warnings: BTreeMap::new(),
@@ -109,10 +109,10 @@ impl<'a> SceneMaterials<'a> {
     /// Registers a mesh and the files that it refers to, whether or not these files are used.
     pub fn register(&mut self, mesh: &Arc<Mesh>) {
         let address = Arc::as_ptr(mesh).addr();
-        if self.meshes.contains_key(&address) {
+        if self.group_materials.contains_key(&address) {
             return;
         }
-        self.meshes.insert(address, GroupMaterials::of(mesh));
+        self.group_materials.insert(address, GroupMaterials::of(mesh));
         for library in &mesh.libraries {
             let maps = library.materials.iter().flat_map(MtlMaterial::maps);
             let maps: BTreeSet<&String> = maps.collect();
@@ -128,7 +128,7 @@ impl<'a> SceneMaterials<'a> {
     /// Returns the material that the mesh's file assigns to a group.
     pub fn group_material(&mut self, mesh: &Arc<Mesh>, group: usize) -> Option<usize> {
         let address = Arc::as_ptr(mesh).addr();
-        let group_materials = self.meshes.get(&address)?;
+        let group_materials = self.group_materials.get(&address)?;
         if let Some(material) = group_materials.materials[group] {
             return Some(material);
         }
@@ -153,7 +153,7 @@ impl<'a> SceneMaterials<'a> {
                 self.materials.len() - 1
             }
         };
-        if let Some(group_materials) = self.meshes.get_mut(&address) {
+        if let Some(group_materials) = self.group_materials.get_mut(&address) {
             group_materials.materials[group] = Some(material);
         }
         Some(material)

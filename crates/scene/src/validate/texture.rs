@@ -191,7 +191,7 @@ impl Textures<'_> {
         })
     }
 
-    /// Validates a color factor that must conserve energy.
+    /// Validates a color that is a factor of light: energy conservation limits its channels to 0 ... 1.
     pub(super) fn tint(&self, description: &ColorDescription) -> Checked<Color> {
         if let ColorDescription::Plain(tint) = description {
             for x in tint.to_array() {

@@ -1,6 +1,6 @@
 //! PLY headers: elements and property types.
 
-use super::super::damage::{self, Damages};
+use super::super::damage::{self, Defects};
 use super::super::error::{Location, MeshFault, quoted};
 use super::super::tokens::Tokens;
 
@@ -91,7 +91,7 @@ impl Header {
     }
 }
 
-pub(super) fn header(words: &mut Tokens, damages: &mut Damages) -> Result<Header, MeshFault> {
+pub(super) fn header(words: &mut Tokens, defects: &mut Defects) -> Result<Header, MeshFault> {
     if words.next_on_line() != Some(&b"ply"[..]) {
         return Err(words.fault("the file must begin with \"ply\""));
     }
@@ -146,7 +146,7 @@ pub(super) fn header(words: &mut Tokens, damages: &mut Damages) -> Result<Header
             Some(b"end_header") => break,
             Some(word) => {
                 let rule = "must be \"format\", \"comment\", \"obj_info\", \"element\", \"property\" or \"end_header\"";
-                damages.add(damage::LINE, || words.fault(format!("{} {rule}", quoted(word))));
+                defects.add(damage::LINE, || words.fault(format!("{} {rule}", quoted(word))));
             }
         }
     }

@@ -103,14 +103,14 @@ fn invalid_files_have_equal_errors_by_parts() {
 
 #[test]
 fn sizes_of_parts_and_whole_files_are_limited() {
-    let many = "[0, 0, 0],".repeat(MAX_PART_BYTES / 10 + 1);
+    let elements = "[0, 0, 0],".repeat(MAX_PART_BYTES / 10 + 1);
     let error_of = |text: &str| parse_by_parts(text).unwrap_err();
-    let long = format!("{START}{RED}[[shapes]]\nx = [{many}]\n");
+    let large_part = format!("{START}{RED}[[shapes]]\nx = [{elements}]\n");
     assert_eq!(
-        error_of(&long),
+        error_of(&large_part),
         "s:6:1: the table that starts here is larger than 4 MiB"
     );
-    let rest = format!("{START}x = [{many}]\n{SPHERE}");
+    let rest = format!("{START}x = [{elements}]\n{SPHERE}");
     assert!(error_of(&rest).starts_with("s:1:1: "));
     assert!(
         error_of(&rest)
