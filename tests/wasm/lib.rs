@@ -12,7 +12,10 @@ use wgray::{Device, Error, Options, Scene};
 fn pixels(scene: &str) -> Result<Vec<f32>, Error> {
     let files = MemoryFiles::new()
         .with("meshes/knot.obj", &include_bytes!("../../scenes/meshes/knot.obj")[..])
-        .with("textures/grid.png", &include_bytes!("../../scenes/textures/grid.png")[..]);
+        .with(
+            "textures/grid.png",
+            &include_bytes!("../../scenes/textures/grid.png")[..],
+        );
     let options = LoadOptions::new().with_source(files);
     let scene = Scene::from_slice(scene.as_bytes(), SceneFormat::Toml, &options)?;
     let options = Options {
