@@ -42,7 +42,8 @@ fn opacity_at(before: Material, prim: HitPrimitive, hit: Hit, uv: vec2f) -> f32 
     return select(opacity, 1.0, material.alpha_mode == OPAQUE);
 }
 
-// Variant of `is_occluded` with alpha. Returns true if the ray skips more than MAX_ALPHA_SKIPS surfaces.
+// Variant of `is_occluded` for scenes with alpha: skips surfaces that do not accept the shadow ray. Returns true if the
+// ray skips more than MAX_ALPHA_SKIPS surfaces.
 fn is_occluded_alpha(already_occluded: bool, surface: Surface, to_light: vec3f, t_max: f32, target_prim: u32, pixel: vec2u, sample: u32,
              bounce: u32) -> bool {
     if already_occluded {

@@ -290,7 +290,8 @@ fn is_occluded_by_item(item: BvhItem, surface: Surface, to_light: vec3f, t_max: 
     return occluded | is_occluded_by_primitive_item(item, surface, to_light, t_max, target_prim);
 }
 
-// Returns true if a mesh instance, except the surface's own triangle, occludes the segment.
+// Returns true if a triangle of the instance, except the surface's own triangle, occludes the segment from the surface
+// along `t_max * to_light`.
 fn is_occluded_by_mesh(instance_index: u32, surface: Surface, to_light: vec3f, t_max: f32) -> bool {
     let i = load_instance(instance_index);
     let origin = point_to_mesh(i, surface.ray_origin);

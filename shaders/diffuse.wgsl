@@ -1,10 +1,10 @@
 // The material `diffuse`: Lambertian, or energy-preserving Oren-Nayar (EON) if rough.
 
-// Cosines between normal, wi and wo.
+// Cosines of the angles between normal, wi and wo.
 struct Angles {
-    wi: f32,
-    wo: f32,
-    between: f32,          // between wi and wo
+    wi: f32,               // cosine between normal and wi
+    wo: f32,               // cosine between normal and wo
+    between: f32,          // cosine between wi and wo
 }
 
 fn angles_at(normal: vec3f, wo: vec3f, wi: vec3f) -> Angles {

@@ -50,7 +50,8 @@ fn single_scatter_albedo_aniso(material: Material, alpha: vec2f, wo: vec3f, part
 fn single_scatter_albedo_glass(material: Material, alpha: vec2f, wo: vec3f, side: f32) -> f32 {
     if ANISOTROPIC != 0u {
         if material.aniso_table != 0u {
-            // The last two parts hold the two sides of glass.
+            // The table of rough glass has two parts: outside and inside. That of a principled material has two parts
+            // for reflection before these.
             let part = select(2u, 0u, material.kind == ROUGH_GLASS) + select(1u, 0u, side > 0.0);
             return single_scatter_albedo_aniso(material, alpha, wo, part);
         }

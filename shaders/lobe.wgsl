@@ -41,8 +41,8 @@ fn lobe_frame(surface: Surface, rotation: f32) -> Tangents {
     return Tangents(u, cross(n, u));
 }
 
-// Returns the angle from u to v, in half turns, of a direction in red and green, where 0 to 1 encode -1 to 1
-// (KHR_materials_anisotropy); 0 for zero.
+// Decodes the direction in a texel's red and green channels, where 0 to 1 encode -1 to 1 (KHR_materials_anisotropy).
+// Returns its angle, measured from u towards v, in half turns; 0 for the zero vector.
 fn direction_turn(color: vec3f) -> f32 {
     return atan2(2.0 * color.y - 1.0, 2.0 * color.x - 1.0) * 0.31830988618379067;
 }

@@ -1,7 +1,8 @@
 // Sample patterns on the unit square.
 
 // Returns point `index` of the point set `group`. The sets of a pixel, or of a light, are numbered in order of use.
-// `side` is the side of a grid, else the size of a set. `key` differs by pixel, light and seed.
+// `side` is the number of cells along a side for grids, and the number of points in a set for other patterns. `key`
+// differs by pixel, light and seed.
 fn sample_square(pattern: u32, side: u32, index: u32, group: u32, key: vec2u) -> vec2f {
     if pattern == GRID {
         return grid_sample(side, index);

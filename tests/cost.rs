@@ -139,9 +139,9 @@ fn min_of_three(work: impl Fn() + Sync) -> f64 {
     thread.install(times)
 }
 
-/// Returns the ratio of the CPU times. Repeats the measurements while the ratio is above `limit`, because other
-/// processes may disturb a measurement.
-fn ratio_below(limit: f64, large: impl Fn() + Sync, small: impl Fn() + Sync) -> f64 {
+/// Returns the CPU time of `large` divided by that of `small`. Repeats the measurements while the quotient is not below
+/// `limit`, because other processes may disturb a measurement.
+fn cpu_time_ratio(limit: f64, large: impl Fn() + Sync, small: impl Fn() + Sync) -> f64 {
     const ROUNDS: usize = 8;
     let (mut large_time, mut small_time) = (f64::INFINITY, f64::INFINITY);
     for _ in 0..ROUNDS {
@@ -162,7 +162,7 @@ fn parsing_and_packing_take_linear_time() {
             packed(text);
         };
         // 8 times the input: n log n takes 10 times as long, n^2 64 times.
-        let ratio = ratio_below(24.0, || pack(&large), || pack(&small));
+        let ratio = cpu_time_ratio(24.0, || pack(&large), || pack(&small));
         println!("{name}: {ratio:.1}");
         assert!(ratio < 24.0, "{name}: 8 times the input takes {ratio} times as long");
     }
@@ -174,7 +174,7 @@ fn quadratic_work_is_found() {
         let pairs = (0..n).flat_map(|i| (0..n).map(move |j| i ^ j));
         assert!(std::hint::black_box(pairs.max()).is_some());
     };
-    let ratio = ratio_below(24.0, || square(8 * 400), || square(400));
+    let ratio = cpu_time_ratio(24.0, || square(8 * 400), || square(400));
     assert!(ratio > 24.0, "{ratio}");
 }
 
@@ -186,7 +186,7 @@ fn kernels_do_not_grow_with_materials_lights_and_textures() {
         }
         let [small, large] = [600, 6000].map(|n| packed(&scene(n, element)).expect("a scene"));
         let check = |packed: &Packed| check_kernels(packed, sources::shaders(), Forms::All).expect("valid kernels");
-        let ratio = ratio_below(3.0, || check(&large), || check(&small));
+        let ratio = cpu_time_ratio(3.0, || check(&large), || check(&small));
         println!("{name}: {ratio:.2}");
         assert!(ratio < 3.0, "{name}: {ratio}");
     }

@@ -164,7 +164,7 @@ fn the_inside_of_a_sphere_is_lit_from_inside_only() {
     }
 }
 
-/// Pixel centers and the light lie on lines of symmetry.
+/// Tests a square of two triangles, a box of rectangles on a floor, and a tetrahedron.
 #[test]
 fn adjacent_faces_do_not_shadow_each_other_at_shared_edges() {
     for setting in settings() {

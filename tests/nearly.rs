@@ -8,18 +8,18 @@ use wgray_render::records::Packed;
 
 /// Maximum error of a pixel, relative to the largest channel of the pixel, because patterns subtract nearly equal
 /// integrals in dark channels.
-const RELATIVE: f64 = 1e-4;
-/// Replaces `RELATIVE` for scenes with textures on devices other than software Vulkan, where a texture coordinate that
-/// differs by one ulp may select another texel.
-const TEXTURED: f64 = 1e-3;
+const MAX_PIXEL_ERROR: f64 = 1e-4;
+/// Replaces `MAX_PIXEL_ERROR` for scenes with textures on devices other than software Vulkan, where a texture
+/// coordinate that differs by one ulp may select another texel.
+const MAX_PIXEL_ERROR_TEXTURED: f64 = 1e-3;
 /// Maximum fraction of outliers, which occur at edges where a comparison flips.
-pub const EDGES: f64 = 1e-3;
-/// Image side in pixels below which `EDGES` is scaled up on devices other than software Vulkan, because the number of
-/// pixels on edges is proportional to the side.
-const SIDE: f64 = 400.0;
-/// Maximum relative error of the mean. On devices other than software Vulkan, the mean of images below `SIDE` ignores
-/// outliers.
-const MEAN: f64 = 1e-5;
+pub const MAX_OUTLIER_FRACTION: f64 = 1e-3;
+/// Image side in pixels below which `MAX_OUTLIER_FRACTION` is scaled up on devices other than software Vulkan,
+/// because the number of pixels on edges is proportional to the side.
+const MIN_SIDE: f64 = 400.0;
+/// Maximum relative error of the mean. On devices other than software Vulkan, the mean of images below `MIN_SIDE`
+/// ignores outliers.
+const MAX_MEAN_ERROR: f64 = 1e-5;
 
 /// Difference of a GPU film from a CPU film, or the sum over several pairs of films.
 #[derive(Clone, Copy, Debug, Default)]
@@ -37,23 +37,23 @@ pub struct FilmDifference {
 impl FilmDifference {
     /// Uses the tolerances for plain WGSL on software Vulkan, which only fuses and reorders operations.
     pub fn strict(gpu: &Film, cpu: &Film) -> FilmDifference {
-        FilmDifference::with_limits(RELATIVE, 0.0, gpu, cpu)
+        FilmDifference::with_limits(MAX_PIXEL_ERROR, 0.0, gpu, cpu)
     }
 
     /// Uses the tolerances for devices other than software Vulkan, which are larger for textures and small images.
     pub fn loose(packed: &Packed, gpu: &Film, cpu: &Film) -> FilmDifference {
         let relative = if packed.textures.records.is_empty() {
-            RELATIVE
+            MAX_PIXEL_ERROR
         } else {
-            TEXTURED
+            MAX_PIXEL_ERROR_TEXTURED
         };
-        FilmDifference::with_limits(relative, SIDE, gpu, cpu)
+        FilmDifference::with_limits(relative, MIN_SIDE, gpu, cpu)
     }
 
     fn with_limits(relative: f64, min_side: f64, gpu: &Film, cpu: &Film) -> FilmDifference {
         let side = (cpu.sums.len() as f64).sqrt();
         let mut result = FilmDifference {
-            max_outliers: EDGES * side * side.max(min_side),
+            max_outliers: MAX_OUTLIER_FRACTION * side * side.max(min_side),
             ..FilmDifference::default()
         };
         for (gpu, cpu) in gpu.sums.iter().zip(&cpu.sums) {
@@ -88,7 +88,7 @@ impl FilmDifference {
                 self.outliers, self.max_outliers
             ));
         }
-        if !(self.mean_error() <= MEAN) {
+        if !(self.mean_error() <= MAX_MEAN_ERROR) {
             return Err(format!("the mean differs by {:.1e}", self.mean_error()));
         }
         Ok(())

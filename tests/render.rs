@@ -13,7 +13,7 @@ use wgray_render::job::WorkSplit;
 use wgray_render::records::{FirstHit, Packed};
 
 use crate::adapter::{self, KNOWN_DIFFERENCES, allowed, bit_exact, judge};
-use crate::nearly::{EDGES, FilmDifference};
+use crate::nearly::{FilmDifference, MAX_OUTLIER_FRACTION};
 use crate::pictures::{
     RenderMode, backend, crop, differing, exact_modes, film, first_hits, reference, render, render_with, whole,
 };
@@ -48,7 +48,7 @@ pub fn compare_hits(gpu: &[FirstHit], cpu: &[FirstHit]) -> Result<(), String> {
         let entry = allowed(KNOWN_DIFFERENCES, &device.info.name, &device.info.driver, "first hits");
         return judge(entry, "first hits", fraction);
     }
-    if fraction > EDGES {
+    if fraction > MAX_OUTLIER_FRACTION {
         Err(format!("{fraction} of the first hits differ"))
     } else {
         Ok(())

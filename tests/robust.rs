@@ -131,7 +131,8 @@ fn scaling_changes_pixels_only_near_edges() {
     assert_eq!(near, 0, "some of the sampled pixels are near edges");
 }
 
-/// Offsets reach a million times the size of the scene: coordinates are relative to a point near the look-at point.
+/// Offsets are up to a million times the size of the scene. The image does not change, because packed coordinates are
+/// relative to a point near the look-at point.
 #[test]
 fn translation_does_not_change_the_image() {
     for offset in [100.0, -2000.0, 1e6] {

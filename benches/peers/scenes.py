@@ -217,7 +217,7 @@ def color(path, row, key, textures, default=None):
 def material(path, row, textures, traced):
     kind = {"mirror": "conductor", "glass": "dielectric"}.get(row["type"], row["type"])
     if kind != "phong" and not traced:
-        raise ValueError(f"{path}: material {row['type']!r}: other renderers support only phong without a path tracer")
+        raise ValueError(f"{path}: material {row['type']!r}: without a path tracer, other renderers support only phong")
     rough = kind in ("conductor", "dielectric", "principled")
     if "normal_map" in row or "metal" in row or isinstance(row.get("roughness"), dict):
         raise ValueError(f"{path}: other renderers support neither normal maps, roughness textures nor named metals")

@@ -60,7 +60,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     outputs.check(&files, None)?;
     outputs.check_size(layout.region)?;
     let open_outputs = outputs.open().map_err(RenderError::Output)?;
-    let stop = signal::stop().context("signal handler")?;
+    let stop = signal::install_handlers().context("signal handler")?;
     let Files::Pictures(targets) = open_outputs.files else {
         return Ok(ExitCode::SUCCESS); // unreachable: merge does not write parts
     };

@@ -9,7 +9,7 @@ use signal_hook::flag;
 
 #[derive(Clone, Debug, Default)]
 pub struct Stop {
-    /// The last signal, or 0.
+    /// The first signal, or 0 before a signal.
     signal: Arc<AtomicUsize>,
     /// True after the first signal.
     requested: Arc<AtomicBool>,
@@ -38,14 +38,14 @@ pub fn exit_code(signal: i32) -> u8 {
     128_u8.saturating_add(u8::try_from(signal).unwrap_or(0))
 }
 
-/// Records the first signal; a second signal ends the program immediately. Signals that are ignored when the program
-/// starts stay ignored, as `nohup` and background jobs require.
-pub fn stop() -> io::Result<Stop> {
-    stop_with(None)
+/// Installs handlers that record the first signal; a second signal ends the program immediately. Signals that are
+/// ignored when the program starts stay ignored, as `nohup` and background jobs require.
+pub fn install_handlers() -> io::Result<Stop> {
+    install_handlers_with(None)
 }
 
-/// Like [`stop`], with another exit code for SIGTERM.
-fn stop_with(sigterm_code: Option<u8>) -> io::Result<Stop> {
+/// Like [`install_handlers`], with another exit code for SIGTERM.
+fn install_handlers_with(sigterm_code: Option<u8>) -> io::Result<Stop> {
     let stop = Stop::default();
     for signal in [SIGINT, SIGTERM, HANG_UP] {
         if !is_ignored(signal) {
@@ -88,7 +88,7 @@ impl Signals {
     pub fn defer(&mut self) -> io::Result<&Stop> {
         let stop = match self.stop.take() {
             Some(stop) => stop,
-            None => stop_with(self.sigterm_code)?,
+            None => install_handlers_with(self.sigterm_code)?,
         };
         self.is_immediate.store(false, Ordering::Relaxed);
         Ok(self.stop.insert(stop))

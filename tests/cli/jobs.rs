@@ -761,7 +761,7 @@ fn a_time_limit_ends_with_a_complete_image() {
         assert!(
             result
                 .stderr
-                .contains("--time-limit: cannot stop early with --pixel-pattern"),
+                .contains("--time-limit: the first samples must cover the pixel, which those of --pixel-pattern"),
             "{}",
             result.stderr
         );

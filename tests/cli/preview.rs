@@ -370,11 +370,11 @@ fn previews_need_passes_and_a_file() {
         (&["--tile", "1/2", "-o", "x.part"][..], "cannot be used with '--tile"),
         (
             &["--pixel-pattern", "grid", "--spp", "4"],
-            "--preview: cannot stop early with --pixel-pattern grid; use sobol",
+            "--preview: the first samples must cover the pixel, which those of --pixel-pattern grid do not; use sobol",
         ),
         (
             &["--pixel-pattern", "jittered", "--spp", "4"],
-            "--preview: cannot stop early with --pixel-pattern jittered",
+            "--preview: the first samples must cover the pixel, which those of --pixel-pattern jittered",
         ),
         (
             &["-o", "-"],

@@ -275,7 +275,7 @@ impl Builder {
         node
     }
 
-    /// Adds an image in the buffer. Returns its index.
+    /// Adds an image whose bytes are in the buffer. Returns the index of the image.
     pub fn image(&mut self, bytes: &[u8], kind: &str) -> usize {
         let view = self.view(bytes);
         self.add("images", json!({ "bufferView": view, "mimeType": kind }))

@@ -313,8 +313,8 @@ fn rows() -> Vec<Row> {
         textured,
         plain,
     };
-    // The component of a normal that the byte 128 encodes.
-    let half: f64 = 128.0 / 255.0 * 2.0 - 1.0;
+    // The component of an anisotropy direction that the byte 128 encodes.
+    let near_zero: f64 = 128.0 / 255.0 * 2.0 - 1.0;
     // The emissive rows are delta-specular, because NEE samples textured emission differently.
     vec![
         row(
@@ -438,7 +438,7 @@ fn rows() -> Vec<Row> {
             ),
             glossy(
                 "KHR_materials_anisotropy",
-                json!({ "anisotropyStrength": 0.3, "anisotropyRotation": half.atan2(1.0) }),
+                json!({ "anisotropyStrength": 0.3, "anisotropyRotation": near_zero.atan2(1.0) }),
             ),
         ),
         row(
@@ -450,7 +450,7 @@ fn rows() -> Vec<Row> {
             ),
             glossy(
                 "KHR_materials_anisotropy",
-                json!({ "anisotropyStrength": 0.8, "anisotropyRotation": 0.25 + 1.0_f64.atan2(half) }),
+                json!({ "anisotropyStrength": 0.8, "anisotropyRotation": 0.25 + 1.0_f64.atan2(near_zero) }),
             ),
         ),
     ]

@@ -307,7 +307,7 @@ fn differing(scene: &Packed, rays: u32, seed: u64) -> [u32; 4] {
     [wrong_hits, wrong_shadows, hit_count, occluded_count]
 }
 
-/// Returns the nodes of a BVH over boxes, and the order of the boxes.
+/// A function that builds a BVH over boxes and returns its nodes and the order of the boxes.
 type Builder<'a> = &'a dyn Fn(&[Aabb]) -> (Vec<bvh::Node>, Vec<u32>);
 
 fn with_bvhs(scene: &Packed, build: Builder) -> Packed {

@@ -158,7 +158,7 @@ pub struct State {
     pub device: String,
     /// The selected view.
     pub view: View,
-    /// The gain of the difference in [`View::Compare`].
+    /// The factor by which [`View::Compare`] multiplies differences.
     pub gain: f32,
     /// True if invalid pixels are marked.
     pub marks: bool,
@@ -195,7 +195,7 @@ pub struct State {
     pub comparable: (bool, Option<String>),
     /// The reason if the selected comparison cannot be shown.
     pub no_comparison: Option<String>,
-    /// The error measures of a comparison.
+    /// The error measures of the two compared images; absent without a comparison.
     pub apart: Option<ErrorMeasures>,
     /// The current errors.
     pub problems: Vec<Diagnostic>,

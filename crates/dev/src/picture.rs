@@ -122,11 +122,11 @@ pub enum Content {
     Color(Pixels),
     /// [`View::Samples`]: the sample counts, and the final number of samples.
     Samples(Vec<u32>, u32),
-    /// The views of first hits.
+    /// A view of first hits: the layer, and the first hit of each pixel.
     Hits(Aov, Vec<FirstHit>),
     /// [`View::Compare`]: the image, and a second image of the same size.
     Compare(Pixels, Pixels),
-    /// The views of film layers.
+    /// A view of a film layer.
     Film(FilmLayer),
 }
 

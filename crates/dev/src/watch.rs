@@ -16,7 +16,7 @@ use super::source::{FileStamp, Loaded, Snapshot, Sources};
 
 /// Files are read after this time without a change, because saving in an editor causes several events.
 const SETTLE_TIME: Duration = Duration::from_millis(20);
-/// Files are read after this time at the latest.
+/// Maximum delay of reading while files keep changing.
 const MAX_SETTLE_TIME: Duration = Duration::from_millis(150);
 
 /// An error in the scene is reported after this time without a change, because the scene file may be incomplete.
@@ -27,7 +27,7 @@ const MAX_ERROR_DELAY: Duration = Duration::from_secs(1);
 /// Incomplete or large models, meshes and textures are read after this time without a change, because a program may
 /// still be writing the files.
 const WRITE_SETTLE_TIME: Duration = Duration::from_millis(300);
-/// Such files are read after this time at the latest.
+/// Maximum delay of reading such files while they keep changing.
 const MAX_WRITE_SETTLE_TIME: Duration = Duration::from_secs(10);
 /// Minimum total size in bytes at which models, meshes and textures count as large.
 const LARGE_BYTES: u64 = 1 << 20;

@@ -62,7 +62,7 @@ impl Drop for DepthGuard {
     }
 }
 
-/// A value of a library. Panics while the value is dropped are ignored.
+/// A wrapper of a library's value that ignores panics while the value is dropped.
 #[derive(Clone)]
 pub struct CatchPanicOnDrop<T>(ManuallyDrop<T>);
 

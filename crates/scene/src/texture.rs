@@ -189,7 +189,9 @@ pub fn words(width: u32, height: u32, levels: u32, is_float: bool) -> u64 {
 /// Returns the maximum size of an environment map in 32-bit words: three words per texel (including two additional
 /// rows), two words per cell between texels, and the tables of blocks.
 pub(crate) fn environment_words(width: u32, height: u32) -> u64 {
-    const BLOCKS: u64 = 32 * 32 + 290 * 33 * 33;
+    // For each of at most 32 x 32 blocks, the reciprocal of its power. For each bin of normals (17 x 17, and one for
+    // all normals), 33 cumulative distributions of 33 words.
+    const MAX_BLOCK_TABLE_WORDS: u64 = 32 * 32 + (17 * 17 + 1) * 33 * 33;
     let (width, height) = (u64::from(width), u64::from(height));
-    3 * width * (height + 2) + 2 * width * (height + 1) + BLOCKS
+    3 * width * (height + 2) + 2 * width * (height + 1) + MAX_BLOCK_TABLE_WORDS
 }

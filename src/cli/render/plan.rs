@@ -188,7 +188,7 @@ fn can_end_early(option: &str, scene: &Scene) -> Result<(), Usage> {
     match pattern.needs_square() {
         false => Ok(()),
         true => Err(Usage(format!(
-            "{option}: cannot stop early with --pixel-pattern {}; use sobol",
+            "{option}: the first samples must cover the pixel, which those of --pixel-pattern {} do not; use sobol",
             pattern.name()
         ))),
     }

@@ -24,7 +24,8 @@ use crate::film::{Film, FilmLayout};
 use crate::records::FirstHit;
 use wgray_image::Region;
 
-/// First bytes of the file, damaged by text conversions.
+/// First bytes of the file. As in PNG, a conversion of line ends or to 7 bits changes these bytes, so that the damaged
+/// file is recognized.
 pub const MAGIC: &[u8; 16] = b"\x89wgray pieces\r\n\x1a";
 
 pub const FORMAT: u32 = 2;
@@ -76,7 +77,7 @@ pub struct Contents {
     pub entries: Vec<Entry>,
     /// Offset after the last complete piece or the header.
     pub end: u64,
-    /// Damaged or incomplete bytes after `end`.
+    /// Number of damaged or incomplete bytes after `end`.
     pub damaged: u64,
 }
 
@@ -420,7 +421,7 @@ pub fn latest(entries: &[Entry]) -> Vec<usize> {
 
 /// Adds a piece to a map from first rows to piece numbers. Removes the pieces that share rows with the new piece.
 pub fn replace(rows: &mut std::collections::BTreeMap<u32, usize>, entries: &[Entry], number: usize, region: Region) {
-    // Pieces are disjoint: only the last piece that starts above can overlap.
+    // The pieces in the map are disjoint: of the pieces that start above the region, only the last can overlap it.
     let last_above = rows
         .range(..region.y0)
         .next_back()

@@ -41,7 +41,7 @@ fn camera_visibility(material: &scene::Material) -> u32 {
     }
 }
 
-/// Packs microfacets. `resolve` looks up a textured roughness.
+/// Returns a record with the fields of microfacets; the other fields are zero. `resolve` looks up a textured roughness.
 fn microfacet_record(
     facets: &Facets,
     resolve: &mut impl FnMut(&Color, u32, Option<(Channel, u32)>) -> Vec3,

@@ -448,7 +448,7 @@ records! {
         pub film_size: UVec2,
         /// Range of samples.
         pub samples: UVec2,
-        /// Loop that detects truncation (`shaders/completion.wgsl`).
+        /// Start and end of the loop that detects truncated loops (`shaders/completion.wgsl`).
         pub loop_probe: UVec2,
     }
 }

@@ -85,7 +85,8 @@ pub enum Selection {
 }
 
 impl Selection {
-    /// Returns the index of the first name that is selected. A name of digits takes precedence over an index.
+    /// Returns the index of the selected element in a list of names. A number selects the first element with
+    /// this number as its name, or, if none exists, the element at this index.
     pub(crate) fn among(&self, names: &[Option<&str>]) -> Option<usize> {
         let position = |selected: &str| names.iter().position(|name| *name == Some(selected));
         match self {

@@ -118,7 +118,7 @@ impl JsonSchema for FractionColor {
     }
 }
 
-/// Copies the title of the plain value to a key that also accepts a texture.
+/// Sets the title of a key that accepts a plain value or a texture to that of the plain value, with ", or a texture".
 pub(crate) fn copy_plain_title(schema: &mut Schema) {
     let plain = schema
         .get("anyOf")

@@ -327,9 +327,9 @@ fn check(root: &Root) -> Result<(), GltfFault> {
     }
 }
 
-/// Returns the fault of an index into a list of `count` entries. `entries` is their name, for example `accessors`.
-pub(super) fn out_of_range(key: impl Into<String>, index: usize, entries: &str, count: usize) -> GltfFault {
-    GltfFault::key(key, format!("{index} is out of range; number of {entries}: {count}"))
+/// Returns the error for an index beyond a list of `count` entries. `list_name` is for example `accessors`.
+pub(super) fn out_of_range(key: impl Into<String>, index: usize, list_name: &str, count: usize) -> GltfFault {
+    GltfFault::key(key, format!("{index} is out of range; number of {list_name}: {count}"))
 }
 
 /// Returns true for validation errors of the crate `gltf-json` that this importer tolerates.

@@ -19,7 +19,7 @@ impl Skin {
             let count = document.json.skins.len();
             return Err(document.fault(
                 "nodes",
-                format!("{skin_index} is out of range; number of skins: {count}"),
+                format!("the skin {skin_index} is out of range; number of skins: {count}"),
             ));
         };
         let location = |key: &str| format!("skins[{skin_index}].{key}");

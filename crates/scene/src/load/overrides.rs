@@ -178,7 +178,8 @@ impl Overrides {
         assets
     }
 
-    /// Applies the frame to a validated scene, or returns the errors of the validation.
+    /// Sets the camera of the frame in a validated scene, and adds a note if `light_samples` is ignored. Returns the
+    /// errors of a failed validation.
     pub(super) fn finish(
         &self,
         validated: Result<Scene, Problems>,

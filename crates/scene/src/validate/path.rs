@@ -86,7 +86,7 @@ fn alpha_note(names: &[String], materials: &[Material]) -> Option<String> {
     };
     let rule = "has no effect without alpha_mode = \"mask\" or \"blend\"";
     Some(format!(
-        "materials: alpha {rule}: {}",
+        "materials: alpha {rule}; affected: {}",
         matching_names(names, materials, is_unused)?
     ))
 }
@@ -97,7 +97,7 @@ fn cutoff_note(names: &[String], materials: &[Material]) -> Option<String> {
         |principled: &Principled| principled.alpha_mode != AlphaMode::Mask && principled.alpha_cutoff != default;
     let rule = "has no effect without alpha_mode = \"mask\"";
     Some(format!(
-        "materials: alpha_cutoff {rule}: {}",
+        "materials: alpha_cutoff {rule}; affected: {}",
         matching_names(names, materials, is_unused)?
     ))
 }

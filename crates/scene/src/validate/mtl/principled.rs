@@ -117,7 +117,8 @@ impl SceneMaterials<'_> {
         Some(Value::Texture(texture, Channel::R))
     }
 
-    /// Returns true if an image contains normals. Gray images contain heights, which are not supported.
+    /// Returns true if the texture of `map_Bump` is a normal map. A gray image is a height map, which is not supported:
+    /// adds a warning.
     fn has_directions(&self, texture: usize, warnings: &mut Warnings) -> bool {
         let has_colors = match &self.textures[texture].kind {
             TextureKind::Image { image, .. } => match &image.texels {

@@ -90,8 +90,8 @@ fn unused_alpha_causes_a_note() {
             &format!("[materials.leaf]\ntype = 'principled'\n{keys}\n[materials.clay]"),
         ))
     };
-    const ALPHA: &str = "materials: alpha has no effect without alpha_mode = \"mask\" or \"blend\": \"leaf\"";
-    const CUTOFF: &str = "materials: alpha_cutoff has no effect without alpha_mode = \"mask\": \"leaf\"";
+    const ALPHA: &str = "materials: alpha has no effect without alpha_mode = \"mask\" or \"blend\"; affected: \"leaf\"";
+    const CUTOFF: &str = "materials: alpha_cutoff has no effect without alpha_mode = \"mask\"; affected: \"leaf\"";
     for (keys, expected) in [
         ("alpha = 0.5", vec![ALPHA]),
         ("alpha = { texture = 'spots' }", vec![ALPHA]),
