@@ -119,6 +119,10 @@ impl Stack {
             let leaf = u32::from(node.leaves[slot as usize]);
             let lower_slots = u32::from(node.inner) & ((1 << slot) - 1);
             let is_inner = u32::from(node.inner) >> slot & 1 == 1;
+            // A large padding turns the inverted box of an empty slot into a box.
+            if !is_inner && leaf == 0 {
+                continue;
+            }
             let child = Entry {
                 near: near[slot as usize],
                 first: if is_inner {
