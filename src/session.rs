@@ -17,7 +17,7 @@ use crate::picture::Picture;
 use crate::progressive::{ProgressiveRender, Status};
 use crate::render::{ImageSetup, Progressive, render_progressive_with, render_with};
 use crate::renderer::{FaultHandler, OpenScene, Renderer, warnings};
-use crate::task::Task;
+use crate::task::{Task, spawn_thread};
 
 /// A scene to be rendered several times. The first render packs the scene (BVHs, textures, tables of the environment)
 /// and opens the device; later renders use them again. Every image has the bits that [`render`](crate::render()) gives.
@@ -197,14 +197,9 @@ impl Session {
             };
         }
         let (sender, receiver) = mpsc::channel();
-        let dispatch = tracing::dispatcher::get_default(Clone::clone);
-        let span = tracing::Span::current();
-        std::thread::spawn(move || {
-            tracing::dispatcher::with_default(&dispatch, || {
-                let _entered = span.entered();
-                // The receiver is dropped if the scene has changed since.
-                let _ = sender.send(prepare());
-            });
+        spawn_thread(move || {
+            // The receiver is dropped if the scene has changed since.
+            let _ = sender.send(prepare());
         });
         self.receive(receiver, cancel)?
     }

@@ -41,20 +41,22 @@ impl<T> Drop for Finish<T> {
     }
 }
 
+/// Runs `work` on another thread, with the subscriber and the span of this thread.
+pub(crate) fn spawn_thread(work: impl FnOnce() + Send + 'static) {
+    let dispatch = tracing::dispatcher::get_default(Clone::clone);
+    let span = tracing::Span::current();
+    std::thread::spawn(move || tracing::dispatcher::with_default(&dispatch, || span.in_scope(work)));
+}
+
 impl<T: Send + 'static> Task<T> {
     /// Runs `work` on another thread; on wasm32, which has no threads, at once. `cancel` is the token of the work.
     pub(crate) fn spawn(cancel: &CancelToken, work: impl FnOnce() -> T + Send + 'static) -> Task<T> {
         let slot = Arc::new(Mutex::new(Slot::Running(None)));
         let finish = Finish(Arc::clone(&slot));
-        let dispatch = tracing::dispatcher::get_default(Clone::clone);
-        let span = tracing::Span::current();
-        let run = move || {
-            let result = tracing::dispatcher::with_default(&dispatch, || span.in_scope(work));
-            finish.set(Slot::Finished(result));
-        };
+        let run = move || finish.set(Slot::Finished(work()));
         match cfg!(target_family = "wasm") {
             true => run(),
-            false => drop(std::thread::spawn(run)),
+            false => spawn_thread(run),
         }
         Task {
             slot,

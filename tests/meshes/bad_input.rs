@@ -290,7 +290,7 @@ fn counts_without_bytes_are_refused_at_once() {
             ),
             (
                 vertex("3", xyz) + "element face 18446744073709551615\nproperty list uchar int vertex_indices\n",
-                "take ",
+                "takes ",
             ),
         ] {
             let text = format!(
