@@ -43,7 +43,7 @@ test("the wheel over a focused number box scrolls the panel and changes no value
     await choose(page, "shapes[0]");
     const sent = await recordMessages(page, isChange);
     const scrollPosition = () => page.evaluate(() => document.querySelector("aside").scrollTop + scrollY);
-    for (const box of [control(page, "shapes[0].center"), page.locator("#exposure-number"), page.locator("#most-samples")]) {
+    for (const box of [control(page, "shapes[0].center"), page.locator("#exposure-number"), page.locator("#max-samples")]) {
       await box.scrollIntoViewIfNeeded();
       await box.click();
       assert.ok(await box.evaluate((box) => box === document.activeElement));
