@@ -7,8 +7,8 @@ use super::batch_mesh::BatchNode;
 use super::closest::STACK;
 use super::stack::BoxRay;
 
-/// Nodes and leaves to visit, as values of [`BatchNode::children`]. Visiting a node removes an entry and adds up to 8,
-/// so that there are at most [`STACK`] entries. Eight are written at a time.
+/// Nodes and leaves to visit, as values of `BatchNode::children`. Visiting a node removes an entry and adds up to 8,
+/// so that there are at most `STACK` entries. Eight are written at a time.
 #[derive(Clone, Debug)]
 pub struct MeshStack {
     near: Box<[f32; STACK + 8]>,

@@ -76,7 +76,7 @@ impl Entry {
     };
 }
 
-/// Nodes and leaves to visit. Visiting a node removes an entry and adds up to 8, as in [`STACK`].
+/// Nodes and leaves to visit. Visiting a node removes an entry and adds up to 8, as in `STACK`.
 #[derive(Clone, Debug, Default)]
 pub struct Stack {
     entries: ArrayVec<Entry, STACK>,
