@@ -450,8 +450,8 @@ fn the_page_has_the_limits() {
         format!("| `count` | required | 1 to {MAX_COUNT} |"),
         format!("sine of their angle must be above {}", number(MIN_SINE)),
         format!("unit vectors span must be above {}", number(MIN_SINE)),
-        format!("twice the area must be above {} times", number(MIN_SINE)),
-        format!("six times the volume must be above {} times", number(MIN_SINE)),
+        format!("twice the area is above {} times", number(MIN_SINE)),
+        format!("six times the volume is above {} times", number(MIN_SINE)),
     ] {
         assert!(page.contains(&limit), "{limit}");
     }
