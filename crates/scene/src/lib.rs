@@ -3,6 +3,7 @@
 //! Text is parsed into a [`Description`], field by field. [`Description::validate`] returns a [`Scene`] with resolved
 //! names and values in range, so that code that uses a scene need not validate it again.
 
+mod assets;
 mod builder;
 mod camera_at;
 mod camera_path;
@@ -20,7 +21,7 @@ pub mod framing;
 mod geometry;
 pub mod gltf;
 mod gltf_shape;
-pub mod image_file;
+mod image_file;
 mod key_path;
 pub mod ktx2;
 pub mod limits;
@@ -46,6 +47,7 @@ mod validate;
 mod visibility;
 mod write;
 
+pub use assets::Assets;
 pub use builder::{ImageId, MaterialId, MeshId, SceneBuilder, TextureId};
 pub use camera_path::CameraPath;
 pub use define::Define;
@@ -56,7 +58,6 @@ pub use file_system::{AssetSource, FolderFiles, MemoryFiles, NoFiles};
 pub use framing::{Framing, Orbit, View, framed};
 pub use geometry::{Bounds, Geometry, Parallelogram, Shape};
 pub use gltf::ModelContents;
-pub use image_file::Assets;
 pub use key_path::KeyPath;
 pub use key_path::{Segment, cut};
 pub use load::{GltfChoice, LoadOptions, Overrides, SceneFormat, is_gltf, is_mesh, is_model};

@@ -10,7 +10,7 @@ use std::sync::Arc;
 use glam::{DAffine3, DVec3};
 
 use self::fitting::longest_side;
-use super::image_file::AssetKey;
+use super::assets::AssetKey;
 use super::key_path::Segment;
 use super::key_path::list;
 use super::problem::{At, Problem};

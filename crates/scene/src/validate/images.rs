@@ -3,8 +3,9 @@
 use std::sync::Arc;
 
 use super::{BTreeMap, Checked, Problem};
+use crate::assets::AssetKey;
 use crate::decode::Header;
-use crate::image_file::{AssetKey, File, Part};
+use crate::image_file::{File, Part};
 use crate::texture::{environment_words, levels, words};
 use crate::{Assets, Image, ImageTextureDescription, Texels};
 

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 
-use super::super::image_file::AssetKey;
+use super::super::assets::AssetKey;
 use super::super::key_path::cut;
 use super::super::limits::{LENGTHS, MAX_COORDINATE, ROTATIONS, SCALES};
 use super::super::mesh_file;

@@ -9,7 +9,8 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::super::image_file::{AssetKey, Part};
+use super::super::assets::AssetKey;
+use super::super::image_file::Part;
 use super::super::key_path::{cut, cut_to};
 use super::super::limits::{MAX_COLOR, SHININESS};
 use super::super::{Color, ImageTextureDescription, Integrator, Material, Reflection, Texture};
