@@ -1,4 +1,4 @@
-//! Benchmarks of single twin functions, and of whole images on the first adapter and on the CPU.
+//! Benchmarks of single twin functions, and of full images on the first adapter and on the CPU.
 
 use std::hint::black_box;
 use std::path::Path;
@@ -74,7 +74,7 @@ fn twins(criterion: &mut Criterion) {
         scene
             .primitives
             .iter()
-            .position(|q| q.kind == kind)
+            .position(|primitive| primitive.kind == kind)
             .expect("scenes/cornell.toml has all of these kinds")
     };
     let [rectangle, triangle, ellipsoid] =
@@ -134,7 +134,8 @@ fn twins(criterion: &mut Criterion) {
     group.finish();
 }
 
-/// Measures renders of whole images. The throughput is in nominal rays.
+/// Measures renders of full images. The throughput is in nominal rays: a camera ray per sample, and a shadow ray per
+/// light sample.
 fn images(criterion: &mut Criterion) {
     let device = gpu::choose(&AdapterChoice::Auto).expect("benchmarks need an adapter");
     let adapter = device.info.name.clone();

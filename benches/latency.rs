@@ -1,9 +1,9 @@
-//! Latency of the development mode: the time from a change of a scene or shader to its image, measured on copies in a
-//! temporary folder.
+//! Latency of the development mode: the time from a change of a scene or shader to the new image. The benchmark changes
+//! copies in a temporary folder.
 //!
 //! ```sh
-//! cargo bench --bench latency                          # scenes/cornell.toml
-//! cargo bench --bench latency -- scenes/textures.toml  # a scene without other files
+//! cargo bench --bench latency                              # scenes/cornell.toml
+//! cargo bench --bench latency -- scenes/mirror-glass.toml  # any scene that refers to no other files
 //! ```
 
 use std::fs;

@@ -15,7 +15,8 @@ struct Surface {
 }
 
 impl Surface {
-    /// Returns a grid of `columns` x `rows` cells of two triangles each. `position` maps (0..1, 0..1) to a vertex.
+    /// Returns a grid of `columns` x `rows` cells of two triangles each. `position` maps two coordinates from 0 to 1 to
+    /// a vertex.
     fn grid(columns: u32, rows: u32, position: impl Fn(f32, f32) -> Vec3) -> Surface {
         let mut surface = Surface {
             corners: Vec::new(),
@@ -54,6 +55,7 @@ impl Surface {
         })
     }
 
+    /// Returns the bounding box of each triangle.
     fn boxes(&self) -> Vec<Aabb> {
         let bounds = |t: &[u32; 3]| {
             let [a, b, c] = t.map(|i| self.corners[i as usize]);
@@ -82,11 +84,13 @@ fn builds(criterion: &mut Criterion) {
     group.finish();
 }
 
+/// Width and height of the image in pixels.
 const SIDE: usize = 512;
+/// Padding of the boxes, for rounding errors.
 const PAD: f32 = 1e-6;
 
-/// Rays in a scene with a bumpy sphere on a floor, a camera and a square area light: one camera ray per pixel, and 16
-/// shadow rays from each hit to the light.
+/// A scene with a bumpy sphere on a floor, a camera and a square area light. The benchmark traces a camera ray per
+/// pixel, and 16 shadow rays from each hit to the light.
 struct View {
     surface: Surface,
     tree: Tree,
@@ -149,19 +153,23 @@ impl View {
     fn occluded(&self, level: Level, pixel: usize, hit: Nearest) -> Option<u32> {
         let triangle = self.surface.triangles.get(hit.triangle as usize)?;
         let [a, b, c] = triangle.map(|i| self.surface.corners[i as usize]);
-        let d = View::direction(pixel);
+        let ray_direction = View::direction(pixel);
         let normal = (b - a).cross(c - a).normalize();
-        let normal = if normal.dot(d) > 0.0 { -normal } else { normal };
-        let o = EYE + d * hit.t + normal * 1e-4;
+        let normal = if normal.dot(ray_direction) > 0.0 {
+            -normal
+        } else {
+            normal
+        };
+        let origin = EYE + ray_direction * hit.t + normal * 1e-4;
         let directions: [Vec3; 16] = std::array::from_fn(|i| {
             let (u, v) = ((i % 4) as f32 * 0.2 - 0.3, (i / 4) as f32 * 0.2 - 0.3);
-            Vec3::new(2.0 + u, -2.0 + v, 4.0) - o
+            Vec3::new(2.0 + u, -2.0 + v, 4.0) - origin
         });
         if directions.iter().all(|d| d.dot(normal) <= 0.0) {
             return None;
         }
         let segments = Segments {
-            o,
+            o: origin,
             pad: PAD,
             directions: &Directions::new(&directions),
             t_max: 1.0,

@@ -1,5 +1,5 @@
-//! Overhead of a view: the time of 8 x 8 pixels with 1 sample, from cameras on a circle, in a session and in separate
-//! renders: `cargo bench --bench views [-- MODEL...]`. Models are files that `wgray render` accepts.
+//! Overhead of a view: the time to render 8 x 8 pixels with 1 sample per pixel, from cameras on a circle, in a session
+//! and in separate renders: `cargo bench --bench views [-- MODEL...]`. Models are files that `wgray render` accepts.
 
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -30,9 +30,9 @@ fn main() {
         (file, scene)
     });
     let built_in = [
-        ("one sphere".to_owned(), trivial()),
-        ("texture of 4096 x 4096".to_owned(), textured()),
-        ("environment of 4096 x 2048".to_owned(), surrounded()),
+        ("one sphere".to_owned(), sphere_scene()),
+        ("texture of 4096 x 4096".to_owned(), textured_scene()),
+        ("environment of 4096 x 2048".to_owned(), environment_scene()),
     ];
     for (name, scene) in built_in.into_iter().chain(models) {
         for device in [Device::Cpu, Device::Gpu] {
@@ -50,7 +50,7 @@ fn main() {
     }
 }
 
-/// Returns the median times of a view by a separate render, and by a session.
+/// Returns the median time of a view in a separate render, and in a session.
 fn compare(scene: &Scene, device: &Device) -> Result<(Duration, Duration), Error> {
     let options = Options {
         device: device.clone(),
@@ -112,7 +112,7 @@ fn description() -> Description {
     description
 }
 
-fn trivial() -> Scene {
+fn sphere_scene() -> Scene {
     let description = description()
         .with_material("ball", PhongDescription::new([0.8, 0.1, 0.1]))
         .with_light(PointLightDescription::new([3.0, -4.0, 5.0], [1.0; 3]));
@@ -123,7 +123,7 @@ fn image(width: u32, height: u32, texels: Texels) -> Arc<Image> {
     Arc::new(Image { width, height, texels })
 }
 
-fn textured() -> Scene {
+fn textured_scene() -> Scene {
     let side = 4096;
     let texels = (0..side * side)
         .map(|i: u32| [(i % 251) as u8, (i / side % 241) as u8, 99])
@@ -140,7 +140,7 @@ fn textured() -> Scene {
     description.validate_with(&assets).expect("a valid scene")
 }
 
-fn surrounded() -> Scene {
+fn environment_scene() -> Scene {
     let (width, height) = (4096, 2048);
     let texels = (0..width * height)
         .map(|i: u32| [(i % 1001) as f32 * 1e-3, 0.5, (i / width) as f32 * 1e-3])

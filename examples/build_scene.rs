@@ -60,10 +60,10 @@ fn main() -> Result<(), Error> {
         aovs: vec![Aov::Depth, Aov::Normal],
         ..Options::default()
     };
-    let picture = wgray::render(&scene, &options)?;
-    picture.save(&file)?;
+    let image = wgray::render(&scene, &options)?;
+    image.save(&file)?;
 
-    if let Some(Channel::Floats(depths)) = picture.channel("depth.Z") {
+    if let Some(Channel::Floats(depths)) = image.channel("depth.Z") {
         let hits = depths.iter().filter(|depth| **depth > 0.0);
         let nearest = hits.copied().fold(f32::INFINITY, f32::min);
         println!("{file}: the nearest surface is at distance {nearest}");

@@ -1,4 +1,4 @@
-//! Renders step by step until a deadline, which another thread watches, and keeps the partial image.
+//! Renders step by step until another thread cancels the render at a deadline, and saves the partial image.
 //!
 //! ```sh
 //! cargo run --release --example cancel -- scenes/cornell-path.toml 2
@@ -23,14 +23,14 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut session = Session::new(&Context::new(), Scene::load_with(file, &overrides)?);
 
     let cancel = CancelToken::new();
-    let deadline = cancel.clone();
+    let timer_token = cancel.clone();
     thread::spawn(move || {
         thread::sleep(Duration::from_secs_f64(seconds));
-        deadline.cancel();
+        timer_token.cancel();
     });
 
     let start = Instant::now();
-    // Also returns when the deadline passes, with an error, because there is no image yet.
+    // If the deadline passes during this call, `start` returns an error, because no sample is rendered yet.
     let mut render = session.start(&Options::default(), &cancel)?;
     let status = loop {
         let status = render.step(&cancel)?;

@@ -1,5 +1,5 @@
-//! Renders views of a model from the bytes of its files, and encodes the images in memory. The renderer reads and writes
-//! no file.
+//! Renders views of a model from the bytes of its files, and encodes the images in memory. The renderer reads and
+//! writes no files.
 //!
 //! ```sh
 //! cargo run --release --example from_memory -- 50

@@ -36,30 +36,31 @@ const POINTS_ALONG: usize = 216;
 const POINTS_AROUND: usize = 12;
 
 /// Returns a closed tube along the (2, 3) torus knot as the text of an OBJ file, with unit normals and texture
-/// coordinates. The tube is 0.8 wide and rests on the plane z = 0.
+/// coordinates. The knot is scaled to a width of 0.8 and rests on the plane z = 0.
 pub fn knot() -> String {
-    const TORUS: f64 = 0.23;
-    const RING: f64 = 0.1;
-    const TUBE: f64 = 0.065;
+    // The major and the minor radius of the torus on which the knot lies, and the radius of the tube.
+    const MAJOR_RADIUS: f64 = 0.23;
+    const MINOR_RADIUS: f64 = 0.1;
+    const TUBE_RADIUS: f64 = 0.065;
     let mut positions = Vec::new();
     let mut normals = Vec::new();
     for i in 0..POINTS_ALONG {
         let t = TAU * i as f64 / POINTS_ALONG as f64;
         let ((sin_a, cos_a), (sin_b, cos_b)) = ((2.0 * t).sin_cos(), (3.0 * t).sin_cos());
-        let radius = TORUS + RING * cos_b;
-        let center = [radius * cos_a, radius * sin_a, RING * sin_b];
-        // The curve lies on a torus, whose normal is perpendicular to the curve.
+        let radius = MAJOR_RADIUS + MINOR_RADIUS * cos_b;
+        let center = [radius * cos_a, radius * sin_a, MINOR_RADIUS * sin_b];
+        // The curve lies on a torus, so the normal of the torus is perpendicular to the curve.
         let outward = [cos_b * cos_a, cos_b * sin_a, sin_b];
         let tangent = unit([
-            -3.0 * RING * sin_b * cos_a - 2.0 * radius * sin_a,
-            -3.0 * RING * sin_b * sin_a + 2.0 * radius * cos_a,
-            3.0 * RING * cos_b,
+            -3.0 * MINOR_RADIUS * sin_b * cos_a - 2.0 * radius * sin_a,
+            -3.0 * MINOR_RADIUS * sin_b * sin_a + 2.0 * radius * cos_a,
+            3.0 * MINOR_RADIUS * cos_b,
         ]);
         let side = cross(outward, tangent);
         for j in 0..POINTS_AROUND {
             let (sin, cos) = (TAU * j as f64 / POINTS_AROUND as f64).sin_cos();
             let normal: [f64; 3] = std::array::from_fn(|k| cos * outward[k] + sin * side[k]);
-            let position: [f64; 3] = std::array::from_fn(|k| center[k] + TUBE * normal[k]);
+            let position: [f64; 3] = std::array::from_fn(|k| center[k] + TUBE_RADIUS * normal[k]);
             positions.push(position);
             normals.push(normal);
         }
@@ -83,7 +84,7 @@ pub fn knot() -> String {
         let [x, y, z] = n.map(|x| (x * 1e3).round() / 1e3 + 0.0);
         line(format_args!("vn {x} {y} {z}"));
     }
-    // One repetition of the texture is about as long as wide.
+    // One repetition of the texture is about square on the tube.
     for i in 0..=POINTS_ALONG {
         for j in 0..=POINTS_AROUND {
             let (u, v) = (i as f64 / POINTS_AROUND as f64, j as f64 / POINTS_AROUND as f64);
@@ -208,8 +209,9 @@ impl Triangles {
     }
 }
 
-/// Returns hills of about `count` triangles, 2 wide, above z = 0.
+/// Returns hills of about `count` triangles over the square |x|, |y| <= 1, with z >= 0.
 pub fn terrain(count: usize) -> Triangles {
+    // Cells along an edge of the square.
     let side = ((count as f64 / 2.0).sqrt().round() as usize).max(1);
     let coordinate = |i: usize| 2.0 * i as f64 / side as f64 - 1.0;
     let mut positions = Vec::with_capacity((side + 1) * (side + 1));
@@ -228,8 +230,9 @@ pub fn terrain(count: usize) -> Triangles {
 }
 
 /// Returns a closed asteroid of about `count` triangles and a radius of about 0.4 around the origin: a cube projected
-/// onto a sphere, displaced by noise of all frequencies.
+/// onto a sphere, displaced by noise of ten octaves.
 pub fn rock(count: usize) -> Triangles {
+    // Cells along an edge of the cube.
     let side = ((count as f64 / 12.0).sqrt().round() as usize).max(1);
     let mut positions = Vec::with_capacity(6 * side * side + 2);
     let mut triangles = Vec::with_capacity(12 * side * side);
@@ -245,18 +248,18 @@ pub fn rock(count: usize) -> Triangles {
         })
     };
     for axis in 0..3 {
-        for (side_index, i, j) in [0, side]
+        for (face_position, i, j) in [0, side]
             .into_iter()
-            .flat_map(|side_index| (0..side).flat_map(move |i| (0..side).map(move |j| (side_index, i, j))))
+            .flat_map(|face_position| (0..side).flat_map(move |i| (0..side).map(move |j| (face_position, i, j))))
         {
             let mut corner = |i: usize, j: usize| {
-                let mut lattice = [side_index; 3];
+                let mut lattice = [face_position; 3];
                 (lattice[(axis + 1) % 3], lattice[(axis + 2) % 3]) = (i, j);
                 vertex(lattice)
             };
             let [a, b] = [corner(i, j), corner(i + 1, j)];
             let [c, d] = [corner(i + 1, j + 1), corner(i, j + 1)];
-            triangles.extend(match side_index {
+            triangles.extend(match face_position {
                 0 => [[a, c, b], [a, d, c]],
                 _ => [[a, b, c], [a, c, d]],
             });

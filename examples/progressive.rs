@@ -1,4 +1,4 @@
-//! Renders an image progressively and shows it in the terminal. Needs a terminal with 24-bit colors.
+//! Renders an image progressively and shows each intermediate image in the terminal, which needs 24-bit colors.
 //!
 //! ```sh
 //! cargo run --release --example progressive -- scenes/cornell.toml
@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 
 use wgray::{Error, Options, Overrides, Picture, Scene};
 
-/// The size of the image in pixels. A character shows two pixels, one above the other.
+/// The size of the image in pixels. Each character of the terminal shows two pixels, one above the other.
 const SIZE: (u32, u32) = (64, 48);
 
 fn main() -> Result<(), Error> {
@@ -24,7 +24,7 @@ fn main() -> Result<(), Error> {
     let scene = Scene::load_with(file, &overrides)?;
 
     let mut last_draw = Instant::now();
-    let picture = wgray::render_progressive(&scene, &Options::default(), &mut |progress| {
+    let image = wgray::render_progressive(&scene, &Options::default(), &mut |progress| {
         if last_draw.elapsed() > Duration::from_millis(100) {
             // Moves the cursor up, so that the next image overwrites this image.
             let lines = draw(&progress.picture()?);
@@ -37,13 +37,14 @@ fn main() -> Result<(), Error> {
             Err(_) => ControlFlow::Break(()),
         })
     })?;
-    draw(&picture);
-    println!("100 %, rendered on {}", picture.device().name);
+    draw(&image);
+    println!("100 %, rendered on {}", image.device().name);
     Ok(())
 }
 
-fn draw(picture: &Picture) -> usize {
-    let (width, bytes) = (picture.width() as usize, picture.rgb8());
+/// Draws an image and returns the number of lines.
+fn draw(image: &Picture) -> usize {
+    let (width, bytes) = (image.width() as usize, image.rgb8());
     let rows: Vec<&[u8]> = bytes.chunks(3 * width).collect();
     for pair in rows.chunks_exact(2) {
         for (upper, lower) in pair[0].chunks(3).zip(pair[1].chunks(3)) {

@@ -12,13 +12,10 @@ fn main() -> Result<(), Error> {
     let file = arguments.next().unwrap_or("target/render_file.png".to_string());
 
     let scene = Scene::load(scene)?;
-    let picture = wgray::render(&scene, &Options::default())?;
-    picture.save(&file)?;
+    let image = wgray::render(&scene, &Options::default())?;
+    image.save(&file)?;
 
-    let (width, height) = (picture.width(), picture.height());
-    println!(
-        "{file}: {width} x {height} pixels, rendered on {}",
-        picture.device().name
-    );
+    let (width, height) = (image.width(), image.height());
+    println!("{file}: {width} x {height} pixels, rendered on {}", image.device().name);
     Ok(())
 }

@@ -71,7 +71,7 @@ async fn render(
         pixel_samples: Some(spp),
         ..Overrides::default()
     };
-    // A source of files is not given: files to which the model refers are not read.
+    // The options have no source of files, so files to which the model refers cannot be read.
     let options = LoadOptions::new().with_name("model").with_overrides(overrides);
     let scene = Scene::from_slice(model, SceneFormat::Gltf, &options)?;
     let mut session = Session::new(context, scene);
@@ -81,7 +81,7 @@ async fn render(
     Ok(png.into_inner())
 }
 
-/// Sends a model to the server, and checks the response.
+/// Sends a model to the server, and checks that the response is an image.
 fn request(port: u16) -> Result<(), Box<dyn Error + Send + Sync>> {
     // A triangle, with its buffer in a data URI: three positions of three 32-bit floats.
     let model = r#"{

@@ -1,4 +1,4 @@
-//! Renders a scene from cameras on a circle, in one session: the device and the packed scene are used for all views.
+//! Renders a scene from cameras on a circle, in one session: all views share the device and the packed scene.
 //!
 //! ```sh
 //! cargo run --release --example views -- scenes/materials.toml 12
@@ -34,9 +34,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         );
         let camera = CameraDescription::from(PerspectiveDescription::new(target + rotated, target, 40.0));
         session.set_camera(camera.validate()?)?;
-        let picture = session.render(&Options::default())?;
+        let image = session.render(&Options::default())?;
         let file = format!("target/view-{view}.png");
-        picture.save(&file)?;
+        image.save(&file)?;
         println!("{file}: {:.0} ms", start.elapsed().as_secs_f64() * 1e3);
     }
     Ok(())

@@ -12,8 +12,8 @@ const ignored = [
 
 function filesIn(name) {
     if (!fs.statSync(name).isDirectory()) return [name];
-    const inside = fs.readdirSync(name).sort().map((entry) => path.join(name, entry));
-    return inside.flatMap((entry) =>
+    const entries = fs.readdirSync(name).sort().map((entry) => path.join(name, entry));
+    return entries.flatMap((entry) =>
         fs.statSync(entry).isDirectory() ? filesIn(entry) : /\.(gltf|glb)$/i.test(entry) ? [entry] : []);
 }
 

@@ -1,4 +1,4 @@
-# Shell functions: the packages of the workspace, as `cargo publish` would upload them.
+# Shell functions that build the packages of the workspace as `cargo publish` would upload them.
 
 # Builds the packages in a folder and unpacks them there. The unpacked packages depend on each other by path, because no
 # registry has them yet.

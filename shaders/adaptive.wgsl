@@ -1,8 +1,8 @@
 // Adaptive sampling: variance, and sample counts from neighbors' pilot samples.
 
-// Returns a pixel's moments after a sample; `sum` is the weighted sum before it. xyz are sums of squared deviations
-// from the mean, w the sample count. Weighted update by Welford ("Note on a Method for Calculating Corrected Sums of
-// Squares and Products", Technometrics 4(3), 1962).
+// Returns a pixel's moments after a sample; `sum` is the weighted sum before the sample. xyz are sums of squared
+// deviations from the mean, w the sample count. Weighted update by Welford ("Note on a Method for Calculating Corrected
+// Sums of Squares and Products", Technometrics 4(3), 1962).
 fn moments_with(moments: vec4f, sum: vec4f, sample: vec4f) -> vec4f {
     return moments + vec4f(squared_deviation(sum, sample), 1.0);
 }
@@ -43,8 +43,8 @@ fn display_slope_squared(value: f32) -> f32 {
     return slope * slope;
 }
 
-// Adds a sample to the pilot statistics. The squared deviations of a sample's channels are added; y is the sum over all
-// samples, z the sum of the squares.
+// Adds a sample to the pilot statistics. A sample contributes the sum of the squared deviations of its channels to y,
+// and the square of this sum to z.
 fn pilot_add(pilot: vec4f, sum: vec4f, sample: vec4f) -> vec4f {
     let deviation = squared_deviation(sum, sample);
     let total = deviation.x + deviation.y + deviation.z;

@@ -1,6 +1,6 @@
 // Detection of truncated loops. Mesa 22.3's lavapipe ends every loop of an invocation after its first iteration once
-// all loops together have run 65,535 iterations, without an error. A final loop of unpredictable length detects this.
-// The host repeats a truncated dispatch with fewer samples.
+// all loops together have run 65,535 iterations, without an error. A final loop, whose length the compiler cannot
+// predict, detects this truncation. The host repeats a truncated dispatch with fewer samples.
 
 struct Completion {
     groups_done: atomic<u32>, // number of workgroups that ended

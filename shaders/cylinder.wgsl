@@ -79,8 +79,8 @@ fn cylinder_height(q: Primitive, from_anchor: vec3f) -> f32 {
     return select(0.5 * levels.x, levels.y, is_on_cap(from_anchor - q.middle));
 }
 
-// Returns the texture coordinates. Side: the longitude, and 0 to 1 from start to end. Caps: as on a disk, mirrored on
-// the start cap, which faces the other way.
+// Returns the texture coordinates. On the side: u is the longitude, and v is 0 to 1 from start to end. On the caps: as
+// on a disk, mirrored on the start cap, which faces the opposite direction.
 fn cylinder_uv(local: vec3f) -> vec2f {
     let cap = vec2f(0.5 * local.x + 0.5, 0.5 * (local.y * cap_side(local)) + 0.5);
     return select(vec2f(longitude(local), 0.5 * local.z + 0.5), cap, is_on_cap(local));

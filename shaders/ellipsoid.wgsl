@@ -1,8 +1,8 @@
 // The ellipsoid: the unit sphere of local space.
 
 // Returns |l|^2 - 1 for a local position l = `from_anchor` - `q.middle`; negative inside. `from_anchor` is p - anchor
-// in local space. The square is expanded, and `q.level` is the precomputed |middle|^2 - 1. This avoids cancellation near
-// the anchor, where `from_anchor` is short.
+// in local space. The square is expanded, and `q.level` is the precomputed |middle|^2 - 1. This avoids cancellation
+// near the anchor, where `from_anchor` is short.
 fn ellipsoid_level(q: Primitive, from_anchor: vec3f) -> f32 {
     return dot(from_anchor, from_anchor - q.middle * 2.0) + q.level;
 }

@@ -1,13 +1,13 @@
 // Emitter selection and light sampling for next-event estimation (NEE).
 
-// Light that may arrive at a point.
+// Light from a sampled emitter that may arrive at a point.
 struct LightSample {
     to: vec3f,             // vector to the sampled point; direction to distant light
     radiance: vec3f,       // for a delta light, the contribution at a pdf of 1
     pdf: f32,              // per solid angle, including the selection; for a delta light, only the selection probability
     is_delta: bool,        // BSDF samples cannot hit the light
     t_max: f32,            // end of shadow rays, as a multiple of `to`
-    primitive: u32,        // the emitter, which does not occlude itself, or NO_INDEX
+    primitive: u32,        // emitting primitive, which does not occlude itself, or NO_INDEX
 }
 
 // Selects an emitter by power with two 32-bit random numbers: Walker's alias method, "An Efficient Method for

@@ -16,7 +16,7 @@ fn single_scatter_albedo(energy: u32, alpha: vec2f, wo: vec3f, side: f32) -> f32
 }
 
 // Returns the albedo of an anisotropic lobe, interpolated by direction, roughness and anisotropy. Each part of the
-// lobe's table is for one albedo.
+// table contains one albedo; `part` is the index of the part.
 fn single_scatter_albedo_aniso(material: Material, alpha: vec2f, wo: vec3f, part: u32) -> f32 {
     let start = material.aniso_table - 1u;
     let rows = vec2u(texel_word(start), texel_word(start + 1u));
@@ -50,8 +50,8 @@ fn single_scatter_albedo_aniso(material: Material, alpha: vec2f, wo: vec3f, part
 fn single_scatter_albedo_glass(material: Material, alpha: vec2f, wo: vec3f, side: f32) -> f32 {
     if ANISOTROPIC != 0u {
         if material.aniso_table != 0u {
-            // The table of rough glass has two parts: outside and inside. That of a principled material has two parts
-            // for reflection before these.
+            // The table of rough glass has two parts: outside and inside. The table of a principled material has two
+            // parts for reflection before these two parts.
             let part = select(2u, 0u, material.kind == ROUGH_GLASS) + select(1u, 0u, side > 0.0);
             return single_scatter_albedo_aniso(material, alpha, wo, part);
         }

@@ -13,7 +13,7 @@ struct EnvironmentEval {
 struct Interval {
     index: u32,
     width: f32,            // probability
-    position: f32,         // of the random number in it, 0 to 1
+    position: f32,         // of the random number in the interval, 0 to 1
 }
 
 fn environment_texel(row: u32, column: u32) -> vec3f {
@@ -31,8 +31,8 @@ fn block_distributions(normal: vec3f) -> u32 {
     return environment.blocks + rows * ENVIRONMENT_BLOCKS + normal_bin(normal) * (rows + 1u) * (ENVIRONMENT_BLOCKS + 1u);
 }
 
-// Finds the interval of a cumulative distribution over 32 intervals that contains u, which is never an empty interval.
-// `digits` extends the 24 binary digits of u.
+// Finds the interval that contains u, among the 32 intervals of a cumulative distribution. Never returns an empty
+// interval. `digits` extends the 24 binary digits of u.
 fn interval_at(distribution: u32, u: f32, digits: f32) -> Interval {
     var entry = distribution;
     entry += select(0u, 16u, u >= environment_float(entry + 16u));

@@ -1,7 +1,7 @@
 // Equirectangular mapping of the environment map, and its cells. The center is +x, left and right edges are -x, the
 // upper edge is +z. A cell lies between the centers of four texels, or of two texels and a pole.
 
-// A point in a cell. Rows have `width` cells. There is one more row of cells than of texels.
+// A point in a cell. Rows have `width` cells. The map has one more row of cells than rows of texels.
 struct EnvironmentCell {
     column: u32,
     row: u32,

@@ -1,8 +1,8 @@
-// The film: consecutive parts with one vector per pixel. The last parts hold layers.
+// The film: consecutive lists with one vector per pixel. The last lists are the layers.
 
 @group(0) @binding(1) var<storage, read_write> film: array<vec4f>;
 
-// Returns a pixel's layers. `part` is the index of the first part with a layer.
+// Returns a pixel's layers. `part` is the index of the first list that is a layer.
 fn stored_layers(index: u32, part: u32) -> Layers {
     let pixels = params.film_size.x * params.film_size.y;
     let first = part * pixels + index;

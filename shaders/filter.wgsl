@@ -1,6 +1,6 @@
-// Reconstruction filters by importance sampling: samples follow the filter's magnitude and are weighted by its sign, so
-// that a pixel needs no samples of neighboring pixels. Ernst, Stamminger and Greiner, "Filter Importance Sampling",
-// IEEE Symposium on Interactive Ray Tracing, 2006. `crates/render/src/pack/filter.rs` builds the bins.
+// Reconstruction filters by importance sampling: samples follow the filter's magnitude and are weighted by the filter's
+// sign, so that a pixel needs no samples of neighboring pixels. Ernst, Stamminger and Greiner, "Filter Importance
+// Sampling", IEEE Symposium on Interactive Ray Tracing, 2006. `crates/render/src/pack/filter.rs` builds the bins.
 
 // Returns the bin of a uniform number. Bins run symmetrically outwards from the center.
 fn filter_bin(u: f32, bins: u32) -> u32 {

@@ -1,7 +1,7 @@
 // Ray queries of integrators. A few primitives are tested one by one, from buffers (`buffers.wgsl`) or as constants;
-// BVHs hold all others (`bvh.wgsl`).
+// all others are in BVHs (`bvh.wgsl`).
 
-// Returns the closest hit except on `origin_prim`. The ray starts on the solid `inside_prim` and goes inwards.
+// Returns the closest hit except on `origin_prim`. The ray starts on the solid `inside_prim`, if any, and goes inwards.
 fn closest_hit(ray: Ray, origin_prim: vec2u, inside_prim: vec2u) -> Hit {
     if TLAS_KINDS == 0u {
         return closest_primitive(ray, origin_prim.y, inside_prim.y);

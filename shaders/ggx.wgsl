@@ -2,8 +2,8 @@
 // Each `alpha` is at least SMALLEST_ALPHA.
 
 // Returns the density of normals, per solid angle and area: Trowbridge and Reitz, "Average irregularity representation
-// of a rough surface for ray reflection", JOSA 65(5), 1975. Unlike 1 - cos^2, the tangential components of m are exact
-// on smooth surfaces.
+// of a rough surface for ray reflection", JOSA 65(5), 1975. Uses the tangential components of m, because 1 - cos^2
+// would lose precision on smooth surfaces.
 fn ggx_d(alpha: vec2f, m: vec3f) -> f32 {
     let x = m.x / alpha.x;
     let y = m.y / alpha.y;

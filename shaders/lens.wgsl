@@ -1,8 +1,9 @@
 // Thin lens cameras: depth of field by aperture shape (Kolb, Mitchell and Hanrahan, "A Realistic Camera Model for
 // Computer Graphics", SIGGRAPH 1995, section 3.1).
 
-// Returns the ray of the image point `raster` from the lens point p, in the unit disk. All lens points p have the same
-// point in focus. Lengths are divided by the focus distance, so that squares neither overflow nor vanish.
+// Returns the ray of the image point `raster` from the lens point p, in the unit disk. The rays from all lens points
+// meet at one point, which is in focus. Lengths are divided by the focus distance, so that squares neither overflow nor
+// vanish.
 fn lens_ray(camera: Camera, raster: vec2f, p: vec2f) -> Ray {
     let start = camera.lens_u * p.x + camera.lens_v * p.y;
     let through_middle = camera.forward + image_plane_offset(camera, raster);

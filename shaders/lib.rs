@@ -75,9 +75,9 @@ pub static KERNEL: &[File] = files![
 ];
 /// Functions that sample a pixel.
 pub static SAMPLES: &[File] = files!["pixel.wgsl"];
-/// The integrator `phong`.
+/// Files of the integrator `phong`.
 pub static PHONG: &[File] = files!["integrators/whole.wgsl", "integrators/phong.wgsl"];
-/// The integrator `path`.
+/// Files of the integrator `path`.
 pub static PATH: &[File] = files![
     "environment.wgsl",
     "light_choice.wgsl",
@@ -90,11 +90,11 @@ pub static PATH: &[File] = files![
 pub static FROM_BUFFERS: &[File] = files!["buffers.wgsl"];
 /// Functions that read texels from a single buffer.
 pub static TEXELS: &[File] = files!["texels.wgsl"];
-/// The kernel that accumulates samples.
+/// Files of the kernel that accumulates samples.
 pub static RENDER_FILES: &[File] = files!["film.wgsl", "kernels/render.wgsl"];
-/// The kernel that accumulates samples with adaptive sampling.
+/// Files of the kernel that accumulates samples with adaptive sampling.
 pub static ADAPTIVE_FILES: &[File] = files!["film.wgsl", "kernels/adaptive.wgsl"];
-/// The kernel that writes first hits.
+/// Files of the kernel that writes first hits.
 pub static FIRST_HITS_FILES: &[File] = files!["kernels/first_hits.wgsl"];
 
 /// Returns every file once, in the order in which [`hash`] reads them.
@@ -119,7 +119,8 @@ pub fn hash() -> String {
     hash_of(built_in())
 }
 
-/// Lengths precede names and texts, so that different lists of files never hash the same bytes.
+/// Hashes the length of each name and text before its bytes, so that different lists of files never hash the same
+/// bytes.
 fn hash_of<T: AsRef<str>>(files: impl Iterator<Item = (&'static str, T)>) -> String {
     let mut hasher = blake3::Hasher::new();
     for (name, text) in files {

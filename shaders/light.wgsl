@@ -20,8 +20,8 @@ fn segment(segments: LightSegments, at: vec2f) -> vec3f {
     return segments.towards + segments.u * (2.0 * at.x - 1.0) + segments.v * (2.0 * at.y - 1.0);
 }
 
-// Returns a spot light's relative intensity: a squared ramp in the cosine, as in glTF's KHR_lights_punctual. 1 - cosine
-// is computed from the difference of unit vectors, which is precise for small angles.
+// Returns a spot light's relative intensity: the square of a ramp in the cosine, as in glTF's KHR_lights_punctual.
+// Computes 1 - cosine from the difference of unit vectors, which is precise for small angles.
 fn spot_falloff(light: Light, to_light: vec3f) -> f32 {
     let difference = normalize(to_light) + light.normal;
     let ramp = (light.cone - 0.5 * dot(difference, difference)) * light.falloff;

@@ -19,7 +19,7 @@ fn ellipsoid_cap(level: f32) -> f32 {
     return select(2.0, sine2 / (1.0 + sqrt(max(1.0 - sine2, 0.0))), level > 0.0);
 }
 
-// Samples a vector from p to an ellipsoid, uniform over the local directions to its unit sphere.
+// Samples a vector from p to an ellipsoid, uniform over the local directions to the unit sphere of local space.
 fn ellipsoid_sample(q: Primitive, p: vec3f, u: vec2f) -> vec3f {
     let from_anchor = vector_to_local(q, p - q.anchor);
     let o = from_anchor - q.middle;
@@ -113,7 +113,7 @@ fn power_heuristic(pdf: f32, other_pdf: f32) -> f32 {
     return select(0.0, 1.0 / (1.0 + ratio * ratio), pdf > 0.0);
 }
 
-// Returns the upper 32 bits of the product: an integer below `count`, uniform for uniform bits.
+// Returns the upper 32 bits of the product of `bits` and `count`: an integer below `count`, uniform for uniform bits.
 fn uniform_below(bits: u32, count: u32) -> u32 {
     let low = (bits & 0xffffu) * (count & 0xffffu);
     let middle = (bits >> 16u) * (count & 0xffffu) + (low >> 16u);

@@ -8,7 +8,7 @@ fn mean_above(m: vec4f, r: vec4f) -> vec4f {
 
 // Returns the importances of the children at p, up to a factor: section 4.1, with each cosine replaced by a mean height
 // divided by the distance. The height is that of p above the plane of the emitters, or of the emitters above the plane
-// of the surface, averaged over the bounding sphere. The mean height is at least 0.03 of the radius: a sphere
+// of the surface, averaged over the bounding sphere. The mean height is at least 0.03 of the radius, because the sphere
 // overestimates the extent of its emitters. A tenth of the squared radius is added to the squared distance. n is the
 // surface normal, or 0 if light may arrive from both sides. Importances are positive where light can arrive, with a
 // margin for rounding.
@@ -29,7 +29,7 @@ fn light_importances(node: LightNode, p: vec3f, n: vec3f) -> vec4f {
     let mean_surface_height = max4(mean_above(surface_height, node.radius), min_height);
     let inverse = 1.0 / max4(sqrt(d2 + 0.1 * node.radius * node.radius), vec4f(1e-15));
     let value = node.intensity * (mean_emitter_height * inverse) * (mean_surface_height * inverse) * (inverse * inverse);
-    // The extent of the sphere adds at most pi / 2 * radius / d to the angle, and at most that to the cosine.
+    // The extent of the sphere changes the angle, and therefore the cosine, by at most pi / 2 * radius / d.
     let may_emit = emitter_height + 1.5707964 * node.radius > (node.edge - 1e-3) * d;
     let may_arrive = may_emit & (surface_height + node.radius > -1e-3 * d) & (node.intensity > vec4f(0.0));
     return select(vec4f(0.0), max4(value, vec4f(1e-36)), may_arrive);

@@ -20,7 +20,7 @@ fn is_polished(material: Material) -> bool {
     return plain_alpha(material).x < SMALLEST_ALPHA;
 }
 
-// Returns alpha, for lobes that are not deltas.
+// Returns alpha along the two axes, at least SMALLEST_ALPHA, for lobes that are not deltas.
 fn facet_alpha(material: Material) -> vec2f {
     let alpha = plain_alpha(material);
     return vec2f(max(alpha.x, SMALLEST_ALPHA), max(alpha.y, SMALLEST_ALPHA));
@@ -42,7 +42,7 @@ fn lobe_frame(surface: Surface, rotation: f32) -> Tangents {
 }
 
 // Decodes the direction in a texel's red and green channels, where 0 to 1 encode -1 to 1 (KHR_materials_anisotropy).
-// Returns its angle, measured from u towards v, in half turns; 0 for the zero vector.
+// Returns the angle of the direction, measured from u towards v, in half turns; 0 for the zero vector.
 fn direction_turn(color: vec3f) -> f32 {
     return atan2(2.0 * color.y - 1.0, 2.0 * color.x - 1.0) * 0.31830988618379067;
 }
@@ -62,7 +62,7 @@ fn half_vector(wo: vec3f, wi: vec3f) -> vec3f {
     return select(vec3f(0.0, 0.0, 1.0), sum * (1.0 / sqrt(length2)), length2 > 1e-20);
 }
 
-// Returns the BRDF with F = 1, times the cosine of wi: D G2 / (4 cos).
+// Returns the BRDF with a Fresnel term of 1, times the cosine of wi: D G2 / (4 cos).
 fn facet_eval(alpha: vec2f, wo: vec3f, wi: vec3f) -> f32 {
     let o = abs(wo.z);
     let i = abs(wi.z);
@@ -81,8 +81,9 @@ fn facet_weight(alpha: vec2f, wo: vec3f, wi: vec3f) -> f32 {
     return wi.z * (wo.z + length) / max(wo.z * ggx_length(alpha, wi) + wi.z * length, 1e-30);
 }
 
-// Returns the position of w in an anisotropic albedo table, 0 to 1. x is for the roughness in the azimuth of w, from
-// alpha.y to alpha.x, with steps finer near alpha.y. y is for the cosine, with steps finer near 0 at low roughness.
+// Returns the position of w in an anisotropic albedo table, 0 to 1. x depends on the roughness in the azimuth of w,
+// from alpha.y to alpha.x, with finer steps near alpha.y. y depends on the cosine, with finer steps near 0 at low
+// roughness.
 fn aniso_table_position(alpha: vec2f, w: vec3f) -> vec2f {
     let x = alpha.x * w.x;
     let y = alpha.y * w.y;

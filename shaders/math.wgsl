@@ -9,7 +9,7 @@ fn cross(a: vec3f, b: vec3f) -> vec3f {
     return vec3f(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x);
 }
 
-// Returns the unit vector, each component within 3 x 2^-24.
+// Returns the unit vector in the direction of v. The error of each component is within 3 x 2^-24.
 fn normalize(v: vec3f) -> vec3f {
     return v * (1.0 / sqrt(dot(v, v)));
 }
@@ -26,8 +26,8 @@ fn min(a: f32, b: f32) -> f32 {
     return select(b, a, a < b);
 }
 
-// Returns x, but 0 for -0. Operates on bits, since Mesa ignores the sign of zero: Mesa simplifies x + 0 to x, and a
-// selection of -1 or 0 to a negated boolean.
+// Returns x, but 0 for -0. Operates on bits, since Mesa ignores the sign of zero; for example, Mesa simplifies x + 0 to
+// x.
 fn positive_zero(x: f32) -> f32 {
     let bits = bitcast<u32>(x);
     return bitcast<f32>(select(bits, 0u, bits == 0x80000000u));
@@ -39,7 +39,7 @@ fn floor(x: f32) -> f32 {
     return select(x, select(integer, integer - 1.0, integer > x), small);
 }
 
-// Returns x^n by squaring, n below 2^bits. The relative error is within n x 2^-24 for x from 0 to 1.
+// Returns x^n by repeated squaring, for n below 2^bits. The relative error is within n x 2^-24 for x from 0 to 1.
 fn power_whole(x: f32, n: u32, bits: u32) -> f32 {
     var result = 1.0;
     var square = x;
@@ -69,8 +69,9 @@ fn log2(x: f32) -> f32 {
     return f32(exponent) + s * series * 2.8853900817779268;
 }
 
-// Returns 2^x; 0 below the normal numbers, infinite from 127.5 on. Splits off the nearest integer, for the series of
-// the exponential (Abramowitz and Stegun, 4.2.1). The error is within 1.5 units in the last place.
+// Returns 2^x; 0 below the normal numbers, infinite from 127.5 on. The nearest integer goes to the exponent; the series
+// of the exponential (Abramowitz and Stegun, 4.2.1) is evaluated for the remainder. The error is within 1.5 units in
+// the last place.
 fn exp2(x: f32) -> f32 {
     let p = min(max(x, -126.5), 128.0);
     let integer = i32(p + select(0.5, -0.5, p < 0.0));
@@ -96,7 +97,8 @@ fn atan2(y: f32, x: f32) -> f32 {
     return select(0.0, select(half, -half, y < 0.0), large > 0.0);
 }
 
-// Returns sin(pi x): the Taylor series from -pi / 2 to pi / 2. The error is within 3e-7 for |x| below 1000.
+// Returns sin(pi x), by the Taylor series after x is reduced to -1/2 to 1/2. The error is within 3e-7 for |x| below
+// 1000.
 fn sine(x: f32) -> f32 {
     let integer = floor(x + 0.5);
     let r = x - integer;

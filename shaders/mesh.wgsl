@@ -1,4 +1,4 @@
-// Mesh triangles: intersection and surface properties. Object-space directions keep their length, so that t is the
+// Mesh triangles: intersection and surface properties. Directions in object space are not normalized, so that t is the
 // world-space distance.
 
 // The shear that maps a ray to the z axis; `axis` is the axis of the direction's largest component.
@@ -31,9 +31,9 @@ struct Crossing {
     barycentric: vec2f,    // weights of the second and third vertex
 }
 
-// Intersects a triangle: Woop, Benthin and Wald, "Watertight Ray/Triangle Intersection", JCGT 2(1), 2013; edges are
-// inside. The ray must also hit the triangle's box, and t is clamped to the interval inside the box, so that a BVH
-// misses no hit (docs/decisions/trees.md).
+// Intersects a triangle: Woop, Benthin and Wald, "Watertight Ray/Triangle Intersection", JCGT 2(1), 2013. Points on an
+// edge count as inside. The ray must also hit the triangle's box, and t is clamped to the interval inside the box, so
+// that a BVH misses no hit (docs/decisions/trees.md).
 fn triangle_crossing(v0: vec3f, v1: vec3f, v2: vec3f, origin: vec3f, shear: Shear, s: Slabs) -> Crossing {
     let a = sheared(v0 - origin, shear);
     let b = sheared(v1 - origin, shear);
@@ -81,9 +81,9 @@ fn mesh_pad(i: Instance, origin: vec3f) -> f32 {
     return BOX_PAD * (largest(origin) + i.size);
 }
 
-// The primitive of a hit: standalone, with other fields 0, or a mesh triangle in world space.
+// The primitive of a hit: a standalone primitive, with all other fields 0, or a mesh triangle in world space.
 struct HitPrimitive {
-    primitive: Primitive,  // a mesh triangle in the form of a primitive
+    primitive: Primitive,  // the standalone primitive, or the mesh triangle as a primitive
     edge_1: vec3f,         // from the first to the second vertex
     edge_2: vec3f,
     uv_0: vec2f,           // texture coordinates of the vertices
@@ -96,7 +96,7 @@ struct HitPrimitive {
     tangents_1: Tangents,
     tangents_2: Tangents,
     anchor: vec3f,         // origin of object space
-    condition_number: f32, // condition number of the transform
+    condition_number: f32, // of the instance's transform
 }
 
 fn standalone_hit_primitive(q: Primitive) -> HitPrimitive {
@@ -110,7 +110,7 @@ fn standalone_hit_primitive(q: Primitive) -> HitPrimitive {
 fn face_primitive(i: Instance, v0: vec3f, edge_1: vec3f, edge_2: vec3f, material: u32) -> Primitive {
     let min_positive = 1.1754943508222875e-38;
     let scaled_normal = cross(edge_1 / max(largest(edge_1), min_positive), edge_2 / max(largest(edge_2), min_positive));
-    // A triangle too thin for 32 bits has the normal z.
+    // A triangle that is too thin for 32-bit floats gets the normal (0, 0, 1).
     let normal = select(vec3f(0.0, 0.0, 1.0), normalize(scaled_normal), dot(scaled_normal, scaled_normal) > 1e-30) * i.side;
     let area = dot(cross(edge_1, edge_2), normal);
     let determinant = select(min_positive, area, abs(area) > min_positive);
@@ -154,7 +154,7 @@ fn face_normal(face: HitPrimitive, b: vec2f) -> vec3f {
     return select(face.primitive.z, flipped_to(unit, face.primitive.z), length2 > 1e-12);
 }
 
-// Returns v or -v, whichever points towards `side`: normals in files may be on either side.
+// Returns v or -v, whichever points towards `side`, because normals in files may be on either side.
 fn flipped_to(v: vec3f, side: vec3f) -> vec3f {
     return v * select(1.0, -1.0, dot(v, side) < 0.0);
 }

@@ -1,4 +1,5 @@
-// Access to mesh buffers: `nodes` holds BVH nodes, items, instances and group words, `meshes` triangles and vertices.
+// Access to mesh buffers: `nodes` contains BVH nodes, items, instances and group words; `meshes` contains triangles and
+// vertex attributes.
 
 fn load_position(i: Instance, vertex: u32) -> vec3f {
     return bitcast<vec3f>(meshes[i.vertices + vertex].xyz);

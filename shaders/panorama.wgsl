@@ -1,6 +1,6 @@
 // Equirectangular camera: longitude along the image width, latitude along its height.
 
-// Returns the ray of the image point `raster`, wrapped around poles and edges.
+// Returns the ray of the image point `raster`. Points beyond the image wrap around poles and edges.
 fn panorama_ray(camera: Camera, raster: vec2f) -> Ray {
     let east = circle_point(panorama_angles(camera, raster).x);
     let north = circle_point(panorama_angles(camera, raster).y);

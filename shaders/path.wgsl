@@ -3,7 +3,7 @@
 struct Path {
     ray: Ray,
     differential: Differential,
-    throughput: vec3f,     // factor of the radiance that the path finds
+    throughput: vec3f,     // factor of the radiance that arrives along the ray
     depth: u32,            // number of bounces
     branch: u32,           // bit i is set for the reflection at the split of bounce i
     origin_prim: vec2u,    // instance and primitive that the ray cannot hit again, else NO_PRIMITIVE
@@ -25,7 +25,7 @@ fn mirrored_path(path: Path, surface: Surface, hit_diff: HitDifferential, materi
     return SpecularSplit(primary, primary, false);
 }
 
-// Returns the first usable normal: mapped, smooth or geometric.
+// Returns `normal` if it is usable, else the smooth normal if it is usable, else the geometric normal.
 fn usable_normal(surface: Surface, normal: vec3f) -> vec3f {
     let fallback = select(surface.normal, surface.smooth_normal, is_usable(surface, surface.smooth_normal));
     return select(fallback, normal, is_usable(surface, normal));

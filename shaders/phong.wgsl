@@ -6,8 +6,8 @@ struct Lobes {
     specular: f32,
 }
 
-// Returns the lobes of one light sample, in the direction `to_light` of any length; 0 if the sample does not light the
-// surface.
+// Returns the lobes of one light sample, in the direction `to_light`, whose length is arbitrary; 0 if the sample does
+// not light the surface.
 fn phong_lobes(surface: Surface, material: Material, to_light: vec3f, exponent_bits: u32) -> Lobes {
     let inverse_length = 1.0 / sqrt(dot(to_light, to_light));
     let n_l = dot(surface.shading_normal, to_light);

@@ -91,7 +91,8 @@ fn primitive_normal(q: Primitive, local: vec3f) -> vec3f {
 
 // Returns the texture coordinates of a local point. Rectangle, disk: 0 to 1 along tangent and bitangent. Triangle:
 // barycentric, of the second and third vertex. Plane: lengths along tangent and bitangent. Ellipsoid: longitude from
-// the first towards the second axis, latitude from the foot of the third, each 0 to 1. Cylinder: `cylinder_uv`.
+// the first towards the second axis, latitude from the negative to the positive end of the third axis, each 0 to 1.
+// Cylinder: `cylinder_uv`.
 fn primitive_uv(q: Primitive, local: vec3f) -> vec2f {
     if is_centered(q.kind) {
         return vec2f(0.5 * local.x + 0.5, 0.5 * local.y + 0.5);

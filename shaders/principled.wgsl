@@ -157,7 +157,7 @@ fn is_flat(alpha: vec2f) -> bool {
     return max(alpha.x, alpha.y) <= SMALLEST_ALPHA;
 }
 
-// Returns the specular BRDF with F = 1, times the cosine of wi.
+// Returns the specular BRDF with a Fresnel term of 1, times the cosine of wi.
 fn facets_eval(alpha: vec2f, wo: vec3f, wi: vec3f, half: vec3f) -> f32 {
     return ggx_d(alpha, half) * ggx_g2(alpha, wo, wi) / (4.0 * max(wo.z, 1e-6));
 }
@@ -376,8 +376,9 @@ fn sheen_lobe(alpha: f32, wo: vec3f, wi: vec3f) -> f32 {
     return d / (4.0 * max(wi.z + wo.z - wi.z * wo.z, 1e-4));
 }
 
-// Returns the directional albedo of sheen, which is above 1 at grazing angles for low roughness. Fits its logarithm as
-// a function of the square root of the cosine; at most 2 % above the result of numerical quadrature.
+// Returns the directional albedo of sheen, which is above 1 at grazing angles for low roughness. The logarithm of the
+// albedo is fitted as a function of the square root of the cosine. The result is at most 2 % above numerical
+// quadrature.
 fn sheen_albedo(roughness: f32, cosine: f32) -> f32 {
     let r = roughness;
     let q = 1.0 / r;

@@ -1,8 +1,8 @@
 // Checker and line textures, filtered analytically. The textures combine a pulse in u and a pulse in v. A pulse has
-// period 1; it is 1 on the fraction `duty` of a period, else 0. A wave is a pulse minus its mean. The integrals of a
-// wave, and the mean of the product of two waves over a parallelogram, have closed forms.
+// period 1: its value is 1 on the fraction `duty` of a period, else 0. A wave is a pulse minus its mean. The integrals
+// of a wave, and the mean of the product of two waves over a parallelogram, have closed forms.
 
-// Returns the mean fraction of the second color.
+// Returns the mean fraction of the second color over the footprint.
 fn procedural_share(kind: u32, line_width: f32, f: Footprint) -> f32 {
     let checker = kind == CHECKER;
     let scale = select(1.0, 0.5, checker);
@@ -48,7 +48,7 @@ fn procedural_share(kind: u32, line_width: f32, f: Footprint) -> f32 {
 }
 
 fn phase(x: f32) -> f32 {
-    let small = select(0.0, x, abs(x) < 8388608.0); // larger numbers have no fraction
+    let small = select(0.0, x, abs(x) < 8388608.0); // larger numbers are integers
     return small - floor(small);
 }
 
@@ -177,9 +177,10 @@ fn sine_ratio(x: f32) -> f32 {
     return select(sine(x) / (3.1415927 * x), 1.0, abs(x) < 0.001);
 }
 
-// Number of Fourier terms.
+// Number of Fourier terms that `far_product` adds.
 const MAX_HARMONICS: f32 = 8.0;
-// Maximum number of periods of an edge, along both axes, without Fourier series; limits the cost.
+// Maximum number of periods that an edge crosses along both axes; beyond, Fourier terms replace the exact integral to
+// limit the cost.
 const MAX_PERIODS: f32 = 32.0;
 // Minimum width of a footprint, relative to its length or to a period, whichever is shorter.
 const MIN_WIDTH: f32 = 0.001;

@@ -1,6 +1,6 @@
 // The rough material `dielectric`: Walter, Marschner, Li and Torrance, "Microfacet Models for Refraction through Rough
 // Surfaces", EGSR 2007, with GGX microfacets. `ior` is the index behind the surface relative to the viewer's side;
-// radiance scales with its square.
+// radiance scales with the square of `ior`.
 
 // Returns the factor of reflection and transmission that compensates for multiple scattering.
 fn dielectric_gain(material: Material) -> f32 {

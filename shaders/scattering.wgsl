@@ -123,7 +123,7 @@ fn facet_frame(surface: Surface, material: Material) -> Tangents {
 }
 
 // Returns a microfacet material with the values for the viewer's direction: the relative index behind the surface, and
-// the energy that single scattering loses. du and dv are the frame.
+// the energy that single scattering loses. `surface.du` and `surface.dv` are the axes of the frame.
 fn facets_of(surface: Surface, original: Material) -> Material {
     var material = original;
     let wo = vector_to_lobe(Tangents(surface.du, surface.dv), surface.shading_normal, surface.wo);
@@ -233,7 +233,7 @@ fn lit_normal(surface: Surface, material: Material) -> vec3f {
     return select(surface.shading_normal, vec3f(0.0), is_transmissive(material));
 }
 
-// Returns the surface for rays that leave on the other side.
+// Returns the surface with its sides exchanged, for rays that leave on the side away from the viewer.
 fn flipped(surface: Surface) -> Surface {
     var result = surface;
     result.ray_origin = surface.position - (surface.ray_origin - surface.position);

@@ -14,8 +14,9 @@ fn sobol_bits(index: u32, key: vec2u) -> vec2u {
 }
 
 // Returns the second coordinate of Sobol' point i as 32 digits, with the first digit in the lowest bit. The first
-// coordinate in this form is i. Digit j is the sum of the bits k of i with C(k, j) odd: Pascal's triangle modulo 2 in
-// five factors (Ahmed, "An Implementation Algorithm of 2D Sobol Sequence Fast, Elegant, and Compact", EGSR 2024).
+// coordinate in this representation is i. Digit j is the sum of the bits k of i with C(k, j) odd: Pascal's triangle
+// modulo 2 in five factors (Ahmed, "An Implementation Algorithm of 2D Sobol Sequence Fast, Elegant, and Compact", EGSR
+// 2024).
 fn sobol_reversed(i: u32) -> u32 {
     var x = i;
     x ^= (x >> 1u) & 0x55555555u;

@@ -51,9 +51,9 @@ fn light_frustum(light: Light, p: vec3f) -> ShadowFrustum {
     return ShadowFrustum(p, segments, length2, select(-1.0, 1.0 / depth, depth > 0.0));
 }
 
-// Returns false if a plane through the apex separates the sphere from the frustum. The plane's normal is n = m -
-// towards slope, where m is the part of the vector to the sphere's center that is perpendicular to `towards`, and
-// `slope` is the smallest slope with which all rays stay below the plane.
+// Returns false if a plane through the apex separates the sphere from the frustum. The plane's normal is n = m - slope
+// * `towards`, where m is the part of the vector to the sphere's center that is perpendicular to `towards`, and `slope`
+// is the smallest slope with which all rays stay below the plane.
 fn may_block(sphere: Sphere, frustum: ShadowFrustum) -> bool {
     let w = sphere.center - frustum.apex;
     let along = dot(w, frustum.segments.towards);

@@ -2,8 +2,8 @@
 
 struct Surface {
     position: vec3f,
-    normal: vec3f,            // unit geometric normal towards the viewer; it defines the sides of the surface
-    smooth_normal: vec3f,     // interpolated vertex normal of a mesh, else `normal`; light behind it is ignored
+    normal: vec3f,            // unit geometric normal towards the viewer, which defines the sides of the surface
+    smooth_normal: vec3f,     // interpolated vertex normal of a mesh, else `normal`; light from behind is ignored
     shading_normal: vec3f,    // from the normal map, else `smooth_normal`
     wo: vec3f,                // unit vector to the viewer
     ray_origin: vec3f,        // origin of rays that leave the surface, slightly above it
@@ -12,7 +12,7 @@ struct Surface {
     exclude_front: vec2u,     // primitive that rays on the viewer's side cannot hit again, else NO_PRIMITIVE
     exclude_back: vec2u,      // primitive that rays on the other side cannot hit again, else NO_PRIMITIVE
     uv: vec2f,                // texture coordinates
-    du: vec3f,                // derivatives of the position, which span the tangent frame
+    du: vec3f,                // derivatives of the position by u and v, which span the tangent frame
     dv: vec3f,
 }
 

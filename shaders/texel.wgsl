@@ -2,7 +2,7 @@
 
 // Returns an equivalent coordinate: from 0 to 1 for repeated textures, 0 to 2 for mirrored, -8 to 9 for clamped ones.
 fn near_coordinate(u: f32, wrap: u32) -> f32 {
-    let small = select(0.0, u, abs(u) < 8388608.0); // larger numbers have no fraction
+    let small = select(0.0, u, abs(u) < 8388608.0); // larger numbers are integers
     let repeated = small - floor(small);
     let mirrored = small - 2.0 * floor(0.5 * small);
     let clamped = min(max(u, -8.0), 9.0);

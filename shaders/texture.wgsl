@@ -28,7 +28,7 @@ fn texture_color(t: Texture, surface: Footprint) -> vec3f {
 
 // A level of an image pyramid.
 struct Level {
-    start: u32,            // of its texels
+    start: u32,            // offset of the first texel
     width: u32,
     height: u32,
 }
@@ -190,14 +190,14 @@ fn with_principled(before: Material, color: vec3f, lookup: Lookup) -> Material {
     return m;
 }
 
-// A textured material and the shading normals.
+// A material with the results of its texture lookups, and the shading normals.
 struct EvaluatedMaterial {
     material: Material,
     normal: vec3f,
     coat_normal: vec3f,    // of the clearcoat
 }
 
-// Evaluates the textures and normal maps of a material, which has at most `lookups` textures.
+// Evaluates the textures and normal maps of a material with at most `lookups` texture lookups.
 fn evaluate_material(prim: HitPrimitive, hit: Hit, material: Material, surface: Surface, hit_diff: HitDifferential, lookups: u32) -> EvaluatedMaterial {
     var shading = EvaluatedMaterial(material, surface.shading_normal, surface.shading_normal);
     if lookups == 0u {

@@ -5,8 +5,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Cancels a render, from any thread. Clones share the state.
 ///
-/// Rendering observes the token after each dispatch, and while the scene is packed and the device opened: within about
-/// 100 ms. A token stays cancelled.
+/// A render observes the token after each dispatch, while the scene is packed, and while the device is opened, and ends
+/// within about 100 ms. A token stays cancelled.
 #[derive(Clone, Debug, Default)]
 pub struct CancelToken {
     flag: Arc<AtomicBool>,
@@ -19,7 +19,7 @@ impl CancelToken {
         CancelToken::default()
     }
 
-    /// Returns a token that is also cancelled when this token is.
+    /// Returns a token that is cancelled if this token is, but can also be cancelled alone.
     pub fn child(&self) -> CancelToken {
         CancelToken {
             flag: Arc::default(),
@@ -27,7 +27,7 @@ impl CancelToken {
         }
     }
 
-    /// Cancels all renders that have this token or one of its children.
+    /// Cancels all renders that use this token or one of its children.
     pub fn cancel(&self) {
         self.flag.store(true, Ordering::Relaxed);
     }

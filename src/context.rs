@@ -12,8 +12,8 @@ use crate::device::Device;
 /// Keeps devices open, with their compiled kernels, so that later renders need not open a device or compile a kernel
 /// again. Clones share the devices.
 ///
-/// A device is opened by the first render that requests it, and closed with the last clone of the context. A lost device
-/// is opened again.
+/// A device is opened by the first render that requests it, and closed with the last clone of the context. A lost
+/// device is opened again.
 #[derive(Clone, Debug, Default)]
 pub struct Context {
     #[cfg(feature = "gpu")]
@@ -27,12 +27,12 @@ impl Context {
     }
 }
 
-/// The devices that a context has opened, by request.
+/// The devices that a context has opened, each with its request.
 #[cfg(feature = "gpu")]
 #[derive(Default)]
 pub(crate) struct OpenDevices {
     opened: Mutex<Vec<(Device, gpu::Device)>>,
-    /// The best adapter, as listed once.
+    /// The best adapter, determined at the first request.
     best: OnceLock<Option<gpu::GpuInfo>>,
 }
 
@@ -60,13 +60,13 @@ impl OpenDevices {
         opened.push((request.clone(), device.clone()));
     }
 
-    /// Closes a lost device, unless other sessions still use it.
+    /// Removes a lost device from the context. The device closes when no session uses it.
     pub(crate) fn remove(&self, name: &str) {
         let mut opened = self.opened.lock().unwrap_or_else(PoisonError::into_inner);
         opened.retain(|(_, device)| device.info.name != name);
     }
 
-    /// Returns the best adapter, as it was when first requested.
+    /// Returns the best adapter that existed at the first request; `None` if none did.
     pub(crate) fn best(&self) -> Option<&gpu::GpuInfo> {
         self.best.get_or_init(|| gpu::adapters().into_iter().next()).as_ref()
     }

@@ -1,4 +1,4 @@
-//! The device that a render would use, without opening it.
+//! Determines the device that a render would use, without opening the device.
 
 #[cfg(feature = "gpu")]
 use wgray_render::gpu;
@@ -13,11 +13,11 @@ use crate::open::faster_on_cpu;
 #[cfg(not(feature = "gpu"))]
 use crate::open::gpu_missing;
 
-/// The device of a render, and why it was chosen.
+/// The device of a render, and the reason for its choice.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct DevicePlan {
     pub info: DeviceInfo,
-    pub why: String,
+    pub reason: String,
     /// `None` for the CPU.
     #[cfg(feature = "gpu")]
     pub adapter: Option<(gpu::GpuInfo, gpu::KernelPlan)>,
@@ -30,9 +30,9 @@ pub struct DevicePlan {
 ///
 /// [`RenderError::NoDevice`] if no device matches the request.
 pub fn plan_device(scene: &Packed, device: &Device) -> Result<DevicePlan, RenderError> {
-    let on_cpu = |why: String| DevicePlan {
+    let on_cpu = |reason: String| DevicePlan {
         info: DeviceInfo::cpu(),
-        why,
+        reason,
         #[cfg(feature = "gpu")]
         adapter: None,
     };
@@ -42,14 +42,14 @@ pub fn plan_device(scene: &Packed, device: &Device) -> Result<DevicePlan, Render
             return Ok(on_cpu("this build has no GPU support (feature \"gpu\")".to_owned()));
         }
         Device::Auto => {
-            if let Some(why) = faster_on_cpu(&Context::new(), scene) {
-                return Ok(on_cpu(why));
+            if let Some(reason) = faster_on_cpu(&Context::new(), scene) {
+                return Ok(on_cpu(reason));
             }
         }
         _ => {}
     }
     match preferred(scene, device) {
-        Err(RenderError::NoDevice(why)) if *device == Device::Auto => Ok(on_cpu(why.to_string())),
+        Err(RenderError::NoDevice(reason)) if *device == Device::Auto => Ok(on_cpu(reason.to_string())),
         other => other,
     }
 }
@@ -57,19 +57,19 @@ pub fn plan_device(scene: &Packed, device: &Device) -> Result<DevicePlan, Render
 #[cfg(feature = "gpu")]
 fn preferred(scene: &Packed, device: &Device) -> Result<DevicePlan, RenderError> {
     let info = gpu::preferred(&choice_of(device))?;
-    let why = match (device, info.is_software()) {
+    let reason = match (device, info.is_software()) {
         (Device::Named(_), _) => "requested",
         (_, true) => "no hardware GPU found, and software Vulkan is faster than the CPU for a scene without a BVH",
         _ => "the first hardware GPU",
     };
-    let why = match device {
+    let reason = match device {
         Device::Gpu if info.is_software() => "no hardware GPU found",
-        _ => why,
+        _ => reason,
     };
     let kernel = gpu::plan_kernel(scene, &info);
     Ok(DevicePlan {
         info: DeviceInfo::from(&info),
-        why: why.to_owned(),
+        reason: reason.to_owned(),
         adapter: Some((info, kernel)),
     })
 }

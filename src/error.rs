@@ -5,7 +5,7 @@ use thiserror::Error;
 pub use wgray_render::error::{DeviceError, RenderError, ShaderError, ShaderErrors};
 use wgray_scene::{Problem, SceneError};
 
-/// An error of loading, rendering or saving a scene.
+/// An error of loading a scene, rendering it, or saving the image.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum Error {

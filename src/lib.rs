@@ -1,7 +1,7 @@
 //! A ray tracer written as WGSL compute shaders on wgpu, with a CPU twin that computes the same bits.
 //!
-//! Images are rendered on a GPU, on software Vulkan or on the CPU, whichever is available. `docs/scene-format.md` documents
-//! the scene format. The four uses of the library:
+//! Images are rendered on a GPU, on software Vulkan or on the CPU. `docs/scene-format.md` documents the scene format.
+//! The library has four main uses:
 //!
 //! # Render a file
 //!
@@ -77,7 +77,7 @@
 //!
 //! # More
 //!
-//! - [`Options`] selects the device, a region of the image, and layers such as depth and normals. [`Overrides`] replaces
+//! - [`Options`] selects the device, a region of the image, and layers such as depth and normals. [`Overrides`] changes
 //!   the size, number of samples or seed of a scene.
 //! - [`Session::start`] renders step by step, with the image so far at any time; [`CancelToken`] cancels from another
 //!   thread. [`Session::render_async`] returns a future. [`render_progressive`] calls a function with the image so far.
@@ -100,7 +100,7 @@
 //!
 //! The public API consists of the items at the root of the crate and the modules listed on this page. Other public
 //! modules are internal, and may change at any time.
-// These macros panic if the stream is closed or full.
+// `print!` and `eprint!` panic if the stream is closed or full.
 #![warn(clippy::print_stderr, clippy::print_stdout)]
 
 // Compiles the program in the README.

@@ -1,5 +1,5 @@
 //! The program `wgray`.
-// These macros panic if the stream is closed or full.
+// `print!` and `eprint!` panic if the stream is closed or full.
 #![warn(clippy::print_stderr, clippy::print_stdout)]
 
 use wgray::cli::Allocator;

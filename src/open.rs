@@ -14,7 +14,7 @@ use crate::context::Context;
 use crate::device::{Device, DeviceInfo};
 use crate::error::{DeviceError, Error, RenderError};
 
-/// Returns whether to use an adapter, given its name and whether it is software.
+/// Returns true if an adapter may be used. The arguments are the name of the adapter and whether it is software.
 pub(crate) type AcceptAdapter<'a> = &'a dyn Fn(&str, bool) -> bool;
 
 /// A scene on the CPU or on an adapter.
@@ -97,8 +97,8 @@ pub(crate) fn choice_of(device: &Device) -> gpu::AdapterChoice {
     }
 }
 
-/// Opens the first adapter that matches `device` and that `accept` accepts, and creates an engine for the scene. Without
-/// `accept`, uses a device that the context has already opened for the same request.
+/// Opens the first adapter that matches `device` and that `accept` accepts, and creates an engine for the scene.
+/// Without `accept`, uses a device that the context has already opened for this request.
 #[cfg(feature = "gpu")]
 pub(crate) fn open_adapter(
     context: &Context,

@@ -27,14 +27,13 @@ impl Options {
     ///
     /// # Errors
     ///
-    /// The first option that does not apply to the scene.
+    /// The crop is empty or exceeds the image, or the scene cannot provide a requested layer.
     pub fn region(&self, scene: &Scene) -> Result<Region, Problem> {
         let (width, height) = (scene.width, scene.height);
-        let whole = Region::whole(width, height);
-        let region = self.crop.unwrap_or(whole);
+        let region = self.crop.unwrap_or(Region::whole(width, height));
         let Region { x0, y0, x1, y1 } = region;
         let integrator = scene.render.integrator;
-        let unknown = self.aovs.iter().find_map(|aov| {
+        let unsupported = self.aovs.iter().find_map(|aov| {
             let rule = aov.missing(integrator, scene.render.adaptive.is_some());
             rule.map(|rule| (aov, rule))
         });
@@ -42,7 +41,7 @@ impl Options {
             "must have x0 < x1 and y0 < y1".to_string()
         } else if x1 > width || y1 > height {
             format!("must lie within the image of {width} x {height} pixels")
-        } else if let Some((aov, rule)) = unknown {
+        } else if let Some((aov, rule)) = unsupported {
             return Err(Problem::of(aov.name(), rule).inside("aov"));
         } else {
             return Ok(region);

@@ -22,9 +22,9 @@ pub struct Picture {
 /// Values of a channel in row-major order, top row first.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Channel {
-    /// Values of `R`, `A`, `normal.X` and other measurements.
+    /// Values of a floating-point channel, such as `R`, `A` or `normal.X`.
     Floats(Vec<f32>),
-    /// Values of `primitive.ID` and `sample_count.N`.
+    /// Values of an integer channel: `primitive.ID` or `sample_count.N`.
     Whole(Vec<u32>),
 }
 
@@ -72,8 +72,8 @@ impl Picture {
         self.film.means().flat_map(|mean| self.layout.view.rgb8(mean)).collect()
     }
 
-    /// Returns the pixels as 8-bit RGBA in row-major order, top row first, as in a PNG with alpha: straight colors,
-    /// encoded as in [`Picture::rgb8`], and linear alpha, which is 255 if the image has no alpha.
+    /// Returns the pixels as 8-bit RGBA in row-major order, top row first, as in a PNG with alpha. The colors are
+    /// straight and encoded as in [`Picture::rgb8`]. Alpha is linear, and 255 if the image has no alpha.
     pub fn rgba8(&self) -> Vec<u8> {
         let pixel = |(i, mean)| match self.layout.alpha {
             true => self.layout.view.rgba8(mean, self.film.alpha(i)),
@@ -126,13 +126,13 @@ impl Picture {
     /// The errors of [`Picture::save`].
     pub fn save_with(&self, path: impl AsRef<Path>, options: &SaveOptions) -> Result<(), Error> {
         let path = path.as_ref();
-        let refused = |rule: &str| {
+        let invalid_input = |rule: &str| {
             let message = format!("{}: {rule}", path.display());
             RenderError::Output(io::Error::new(io::ErrorKind::InvalidInput, message))
         };
-        let format = Format::of(path).ok_or_else(|| refused("must end in .png, .exr, .jpg, .jpeg or .webp"))?;
+        let format = Format::of(path).ok_or_else(|| invalid_input("must end in .png, .exr, .jpg, .jpeg or .webp"))?;
         let size = format.check_size(self.width(), self.height());
-        size.map_err(|rule| refused(&rule))?;
+        size.map_err(|rule| invalid_input(&rule))?;
         let files = image::files(path, format, &self.layout.aovs);
         let files = files.iter().map(|file| Pending::start(Output::find(file)?));
         let files = files.collect::<Result<_, _>>().map_err(RenderError::Output)?;

@@ -25,7 +25,7 @@ const MAX_SAMPLES: u32 = 65_536;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Status {
-    /// Samples are left.
+    /// Samples remain.
     Running,
     /// All samples are rendered.
     Finished,
@@ -35,7 +35,7 @@ pub enum Status {
 
 /// A render that is continued step by step; [`Session::start`](crate::Session::start) returns it.
 ///
-/// All steps together give the bits of [`Session::render`](crate::Session::render), in spite of cancellations.
+/// The final image has the bits of [`Session::render`](crate::Session::render), even if steps were cancelled.
 ///
 /// ```
 /// use wgray::{CancelToken, Context, Options, Scene, Session, Status};
@@ -77,7 +77,7 @@ impl<'s> ProgressiveRender<'s> {
             largest_film,
             NoCheckpoint,
         );
-        // For `snapshot`, which cannot fail.
+        // `snapshot` returns no errors, so the memory for its film is checked here.
         drop(empty(setup.layout.region, film_layout)?);
         Ok(ProgressiveRender {
             open,
@@ -87,7 +87,8 @@ impl<'s> ProgressiveRender<'s> {
         })
     }
 
-    /// Renders one or more samples of every pixel, for about a quarter of a second if that is enough.
+    /// Renders at least one sample of every pixel, and more samples if a step would otherwise take less than about a
+    /// quarter of a second.
     ///
     /// # Errors
     ///
@@ -96,9 +97,9 @@ impl<'s> ProgressiveRender<'s> {
         if cancel.is_cancelled() {
             return Ok(Status::Cancelled);
         }
-        let progress = self.open.progress();
+        let counter = self.open.progress_counter();
         let on_fault = FaultHandler {
-            stopped: Box::new(|| cancel.is_cancelled()),
+            is_stopped: Box::new(|| cancel.is_cancelled()),
             ..warnings()
         };
         let mut renderer = Renderer::new(self.open, on_fault);
@@ -107,7 +108,7 @@ impl<'s> ProgressiveRender<'s> {
             Ok((!cancel.is_cancelled()).into())
         };
         let bands = &mut self.bands;
-        let rendered = renderer.work(|backend, _| bands.next_pass(backend, &mut watch, &mut || progress.made()));
+        let rendered = renderer.work(|backend, _| bands.next_pass(backend, &mut watch, &mut || counter.increment()));
         match rendered {
             Ok(Some(samples)) if samples < bands.requested_samples() => Ok(Status::Running),
             Ok(_) => Ok(Status::Finished),
@@ -116,7 +117,7 @@ impl<'s> ProgressiveRender<'s> {
         }
     }
 
-    /// Renders all samples that are left.
+    /// Renders all remaining samples.
     ///
     /// # Errors
     ///
@@ -130,8 +131,8 @@ impl<'s> ProgressiveRender<'s> {
         }
     }
 
-    /// Returns the number of samples that every pixel has; with adaptive sampling, the number of samples up to which
-    /// every pixel was considered. Some pixels have more after a cancellation.
+    /// Returns the number of samples that every pixel has. With adaptive sampling, pixels that needed no more samples
+    /// have fewer. After a cancellation, some pixels may have more.
     pub fn samples(&self) -> u32 {
         self.bands.passed_samples()
     }
@@ -141,9 +142,10 @@ impl<'s> ProgressiveRender<'s> {
         self.bands.fraction()
     }
 
-    /// Requests more samples per pixel than the scene does, after or before the others are finished. The total is at
-    /// most 65,536. The image is the same however the samples are added, but differs slightly from that of a scene with
-    /// the larger number: patterns are repeated with another seed, and textures keep the level of detail.
+    /// Requests more samples per pixel than the scene, at any time before or after the scene's samples are finished.
+    /// The total is at most 65,536. The image does not depend on when samples are added and in which portions, but
+    /// differs slightly from the image of a scene with the larger number: patterns are repeated with another seed, and
+    /// textures keep their level of detail.
     ///
     /// # Errors
     ///
@@ -174,7 +176,7 @@ impl<'s> ProgressiveRender<'s> {
         }
     }
 
-    /// Like [`ProgressiveRender::snapshot`], and uses the memory of an earlier snapshot of this render.
+    /// Like [`ProgressiveRender::snapshot`], but reuses the memory of an earlier snapshot of this render.
     pub fn snapshot_into(&self, picture: &mut Picture) {
         let layout = &self.setup.layout;
         if picture.film.region != layout.region || picture.film.film_layout() != self.film_layout {

@@ -20,10 +20,11 @@ use wgray_scene::Scene;
 /// Renders a scene. The image takes 16 bytes of memory per pixel, and 80 more if it has alpha or layers that are
 /// averaged over samples.
 ///
-/// With [`Device::Auto`](crate::Device::Auto), the CPU renders if no adapter exists, or if the scene or image does not
-/// fit into the adapter's memory. With any device, the CPU renders if the driver truncates long loops and a single
-/// sample exceeds the limit. A lost device is re-opened a few times, to resume from the last finished part; if
-/// re-opening fails, [`Device::Auto`](crate::Device::Auto) resumes on the CPU. `tracing` warnings give the reason, and
+/// With [`Device::Auto`](crate::Device::Auto), the CPU renders if no adapter exists, if the CPU is faster than the
+/// adapter for this scene, or if the scene or image does not fit into the adapter's memory. With any device, the CPU
+/// renders if the driver truncates long loops and a single sample exceeds the limit. A lost device is re-opened a few
+/// times, and the render resumes from its finished samples; if re-opening fails,
+/// [`Device::Auto`](crate::Device::Auto) resumes on the CPU. `tracing` warnings report the reason, and
 /// [`Picture::device`] returns the device that rendered last.
 ///
 /// wgpu panics at some device losses. Such a panic is caught, but panic hooks observe it, and `panic = "abort"` aborts
@@ -47,10 +48,10 @@ fn open(scene: &Scene, options: &Options) -> Result<OpenScene, Error> {
 pub(crate) fn render_with(renderer: Renderer, scene: &Scene, options: &Options) -> Result<Picture, Error> {
     let _span = render_span(&renderer);
     let packed = Arc::clone(renderer.scene());
-    let mut prepared = RenderSetup::new(scene, renderer, options)?;
-    let region = prepared.layout.region;
+    let mut setup = RenderSetup::new(scene, renderer, options)?;
+    let region = setup.layout.region;
     let mut film = empty(region, packed.film_layout())?;
-    let (split, largest_film) = (WorkSplit::of(packed.film_layout()), prepared.renderer.largest_film());
+    let (split, largest_film) = (WorkSplit::of(packed.film_layout()), setup.renderer.largest_film());
     let mut no_checkpoint = NoCheckpoint;
     let mut bands = Bands::new(
         region,
@@ -60,26 +61,26 @@ pub(crate) fn render_with(renderer: Renderer, scene: &Scene, options: &Options) 
         largest_film,
         &mut no_checkpoint,
     );
-    let progress = prepared.renderer.progress();
+    let counter = setup.renderer.progress_counter();
     let mut next = || {
-        prepared
-            .renderer
-            .work(|backend, _| bands.render_next(backend, &mut |_, _, _| Ok(Flow::Continue), &mut || progress.made()))
+        setup.renderer.work(|backend, _| {
+            bands.render_next(backend, &mut |_, _, _| Ok(Flow::Continue), &mut || counter.increment())
+        })
     };
     while let Some(band) = next()? {
         copy_band(&mut film, &band.film);
     }
-    Ok(prepared.picture(film))
+    Ok(setup.picture(film))
 }
 
 pub(crate) fn render_span(renderer: &Renderer) -> tracing::span::EnteredSpan {
     tracing::debug_span!("render", device = renderer.info().name).entered()
 }
 
-/// Renders a scene progressively. `watch` is called at least about ten times per second with the current image, and
-/// returns whether to continue. All pixels get a few samples before any pixel gets more, except that an image too large
-/// for one film of the device is rendered part by part, top to bottom. The result is bit-identical to the result of
-/// [`render`].
+/// Renders a scene progressively. `watch` is called about ten times per second or more often with the current image,
+/// and returns whether to continue. All pixels get a few samples before any pixel gets more. If the image is too large
+/// for one film of the device, this is true for each band of the image, from top to bottom. The result is bit-identical
+/// to the result of [`render`].
 ///
 /// # Errors
 ///
@@ -100,9 +101,9 @@ pub(crate) fn render_progressive_with(
     watch: &mut dyn FnMut(&mut Progressive) -> Result<ControlFlow<()>, Error>,
 ) -> Result<Picture, Error> {
     let packed = Arc::clone(renderer.scene());
-    let mut prepared = RenderSetup::new(scene, renderer, options)?;
-    let _span = render_span(&prepared.renderer);
-    let RenderSetup { renderer, hits, layout } = &mut prepared;
+    let mut setup = RenderSetup::new(scene, renderer, options)?;
+    let _span = render_span(&setup.renderer);
+    let RenderSetup { renderer, hits, layout } = &mut setup;
     let (split, order) = (WorkSplit::of(packed.film_layout()), Order::Pixels);
     let largest_film = renderer.largest_film();
     let mut no_checkpoint = NoCheckpoint;
@@ -114,14 +115,14 @@ pub(crate) fn render_progressive_with(
         largest_film,
         &mut no_checkpoint,
     );
-    let progress = renderer.progress();
+    let counter = renderer.progress_counter();
     let mut full_film = empty(layout.region, packed.film_layout())?;
-    let mut failed = None;
+    let mut watch_error = None;
     let mut render_next = || {
         renderer.work(|backend, device| {
-            let mut report_progress = |backend: &mut dyn Backend, band: Region, share: f64| {
+            let mut report_progress = |backend: &mut dyn Backend, band: Region, fraction: f64| {
                 let mut progress = Progressive {
-                    share,
+                    fraction,
                     backend,
                     device,
                     band,
@@ -136,12 +137,12 @@ pub(crate) fn render_progressive_with(
                         Err(error)
                     }
                     Err(error) => {
-                        failed = Some(error);
+                        watch_error = Some(error);
                         Ok(Flow::Cancel)
                     }
                 }
             };
-            let band = bands.render_next(backend, &mut report_progress, &mut || progress.made())?;
+            let band = bands.render_next(backend, &mut report_progress, &mut || counter.increment())?;
             Ok(band.map(|band| copy_band(&mut full_film, &band.film)))
         })
     };
@@ -152,18 +153,18 @@ pub(crate) fn render_progressive_with(
             Err(error) => break Err(error),
         }
     };
-    match failed {
+    match watch_error {
         Some(error) => Err(error),
         None => {
             rendered?;
-            Ok(prepared.picture(full_film))
+            Ok(setup.picture(full_film))
         }
     }
 }
 
 /// An image that is being rendered.
 pub struct Progressive<'a> {
-    share: f64,
+    fraction: f64,
     backend: &'a mut dyn Backend,
     device: &'a DeviceInfo,
     band: Region,
@@ -175,14 +176,14 @@ pub struct Progressive<'a> {
 impl Progressive<'_> {
     /// Returns the fraction of the work that is done, 0 to 1.
     pub fn share(&self) -> f64 {
-        self.share
+        self.fraction
     }
 
     /// Returns the current image, copied from the device. Pixels without samples are black.
     ///
     /// # Errors
     ///
-    /// The driver of the device reports an error or a loss.
+    /// The device is lost, or its driver reports an error.
     pub fn picture(&mut self) -> Result<Picture, Error> {
         copy_band(self.full_film, &self.backend.film()?.part(self.band));
         Ok(Picture {
@@ -250,9 +251,10 @@ impl<'a> RenderSetup<'a> {
     }
 }
 
-pub(crate) fn empty(region: Region, form: FilmLayout) -> Result<Film, RenderError> {
-    job::check_memory(region.pixels().saturating_mul(form.bytes() as u64))?;
-    Ok(Film::of(region, form))
+/// Returns a film without samples, if it fits into the memory.
+pub(crate) fn empty(region: Region, film_layout: FilmLayout) -> Result<Film, RenderError> {
+    job::check_memory(region.pixels().saturating_mul(film_layout.bytes() as u64))?;
+    Ok(Film::of(region, film_layout))
 }
 
 /// Copies the rows of a band to the film of the full image.
@@ -276,7 +278,7 @@ pub fn needs_first_hits(scene: &Packed, aovs: &[Aov]) -> bool {
 ///
 /// # Errors
 ///
-/// The driver of the device reports an error or a loss.
+/// The device is lost, or its driver reports an error.
 pub fn middle_depth(scene: &Packed, aovs: &[Aov], backend: &mut dyn Backend) -> Result<f32, RenderError> {
     if !aovs.contains(&Aov::Depth) {
         return Ok(1.0);

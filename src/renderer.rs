@@ -1,4 +1,4 @@
-//! A scene on a device, which is opened again if it is lost, with the CPU as a fallback.
+//! A scene on a device. A lost device is opened again; if this fails, the CPU can replace it.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -19,34 +19,37 @@ use crate::options::Options;
 /// Prefix of messages that explain why the CPU is used.
 const ON_CPU: &str = "rendering on the CPU: ";
 
+/// The recovery from a fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Recovery {
+    /// The lost device is opened again.
     Reopen,
+    /// The CPU renders.
     Cpu,
 }
 
 /// The callback that reports a fault from which the renderer recovers.
-pub type Tell<'a> = Box<dyn FnMut(&RenderError, Recovery) + 'a>;
+pub type FaultCallback<'a> = Box<dyn FnMut(&RenderError, Recovery) + 'a>;
 
 pub struct FaultHandler<'a> {
-    pub tell: Tell<'a>,
-    /// Returns true to give up waiting for a lost device.
-    pub stopped: Box<dyn Fn() -> bool + 'a>,
+    pub report: FaultCallback<'a>,
+    /// Returns true if the renderer should stop waiting for a lost device.
+    pub is_stopped: Box<dyn Fn() -> bool + 'a>,
 }
 
-/// Pauses before successive attempts to open a lost device; the attempts are counted again after any progress.
+/// Pauses before successive attempts to open a lost device. Any progress resets the count of attempts.
 const PAUSES: [Duration; 3] = [Duration::ZERO, Duration::from_millis(500), Duration::from_secs(2)];
 
 /// Interval at which the stop callback is polled during a pause.
 const STOP_INTERVAL: Duration = Duration::from_millis(20);
 
-/// Counts results that remain valid if the device is lost. The work is only given up after several losses without
+/// Counts results that remain valid if the device is lost. The renderer gives up only after several losses without
 /// progress in between.
 #[derive(Clone, Debug, Default)]
-pub struct Progress(Arc<AtomicU64>);
+pub struct ProgressCounter(Arc<AtomicU64>);
 
-impl Progress {
-    pub fn made(&self) {
+impl ProgressCounter {
+    pub fn increment(&self) {
         self.0.fetch_add(1, Ordering::Relaxed);
     }
 
@@ -62,15 +65,17 @@ pub struct OpenScene {
     exact_rounding: bool,
     engine: Engine,
     info: DeviceInfo,
-    why: Option<String>,
-    /// Maximum size of a film in pixels, which divides the work; a replacement device must support this size.
+    /// Why [`Device::Auto`] selected the CPU although an adapter exists.
+    cpu_reason: Option<String>,
+    /// Maximum size of a film in pixels. The bands depend on it, so a replacement device must support this size.
     largest_film: u64,
-    /// The lost device and the reason, while no device is open.
-    gone: Option<(String, String)>,
+    /// The lost device and the error message, while no device is open.
+    lost: Option<(String, String)>,
+    /// Losses without progress in between.
     losses: usize,
-    progress: Progress,
-    /// Value of `progress` at the last loss.
-    known_progress: u64,
+    progress: ProgressCounter,
+    /// Count of `progress` at the last loss.
+    progress_at_loss: u64,
 }
 
 /// Renders an open scene, and recovers from faults of its device.
@@ -93,8 +98,8 @@ impl OpenScene {
         options: &Options,
         on_fault: &mut FaultHandler,
     ) -> Result<OpenScene, Error> {
-        let why = match options.device {
-            Device::Auto => faster_on_cpu(context, &scene).map(|why| format!("{ON_CPU}{why}")),
+        let cpu_reason = match options.device {
+            Device::Auto => faster_on_cpu(context, &scene).map(|reason| format!("{ON_CPU}{reason}")),
             _ => None,
         };
         let mut open = OpenScene {
@@ -103,31 +108,31 @@ impl OpenScene {
             exact_rounding: options.exact_rounding,
             engine: Engine::cpu(scene),
             info: DeviceInfo::cpu(),
-            why,
+            cpu_reason,
             largest_film: 0,
-            gone: None,
+            lost: None,
             losses: 0,
-            progress: Progress::default(),
-            known_progress: 0,
+            progress: ProgressCounter::default(),
+            progress_at_loss: 0,
         };
         let on_cpu = match &options.device {
             Device::Cpu => true,
-            Device::Auto => !cfg!(feature = "gpu") || open.why.is_some(),
+            Device::Auto => !cfg!(feature = "gpu") || open.cpu_reason.is_some(),
             _ => false,
         };
         if !on_cpu {
-            match open.adapter(None) {
-                Ok((engine, info)) => open.take(engine, info),
-                Err(Error::Render(why @ RenderError::NoDevice(_))) if options.device == Device::Auto => {
-                    open.go_on_cpu(&why, on_fault);
+            match open.open_adapter(None) {
+                Ok((engine, info)) => open.use_engine(engine, info),
+                Err(Error::Render(error @ RenderError::NoDevice(_))) if options.device == Device::Auto => {
+                    open.fall_back_to_cpu(&error, on_fault);
                 }
-                Err(Error::Render(error)) => open.mend(error, on_fault)?,
+                Err(Error::Render(error)) => open.recover(error, on_fault)?,
                 Err(error) => return Err(error),
             }
         }
         open.largest_film = open.engine.backend().largest_film();
-        let reason = match (&open.why, &options.device) {
-            (Some(why), _) => why.strip_prefix(ON_CPU).unwrap_or(why),
+        let reason = match (&open.cpu_reason, &options.device) {
+            (Some(reason), _) => reason.strip_prefix(ON_CPU).unwrap_or(reason),
             (None, Device::Auto) if open.info == DeviceInfo::cpu() => "no adapter can render the scene",
             (None, Device::Auto) => "it is the best device",
             (None, _) => "it was requested",
@@ -136,11 +141,12 @@ impl OpenScene {
         Ok(open)
     }
 
-    /// Returns true if a render with these options can use this device and kernel. `layers`: the film has layers.
+    /// Returns true if a render with these options can use this device and kernel. `layers` is true if its film needs
+    /// layers.
     pub fn suits(&self, options: &Options, layers: bool) -> bool {
         let requested = (&options.device, options.exact_rounding);
         (&self.device, self.exact_rounding) == requested
-            && self.gone.is_none()
+            && self.lost.is_none()
             && self.engine.scene().film_layout().layers == layers
     }
 
@@ -157,7 +163,7 @@ impl OpenScene {
         &self.info
     }
 
-    pub fn progress(&self) -> Progress {
+    pub fn progress_counter(&self) -> ProgressCounter {
         self.progress.clone()
     }
 
@@ -165,39 +171,40 @@ impl OpenScene {
     ///
     /// # Errors
     ///
-    /// The driver of the device reports an error or a loss.
+    /// The device is lost, or its driver reports an error.
     pub fn edit_camera(&mut self, edit: impl FnOnce(&mut Packed)) -> Result<(), RenderError> {
         self.engine.edit_camera(edit)
     }
 
-    fn adapter(&self, wanted: Option<AcceptAdapter>) -> Result<(Engine, DeviceInfo), Error> {
+    /// Opens an adapter for the scene: any that matches the request, or with `accept` only one that is accepted.
+    fn open_adapter(&self, accept: Option<AcceptAdapter>) -> Result<(Engine, DeviceInfo), Error> {
         let scene = self.engine.scene();
-        open_adapter(&self.context, scene, &self.device, self.exact_rounding, wanted)
+        open_adapter(&self.context, scene, &self.device, self.exact_rounding, accept)
     }
 
     /// Recovers from an error so that the work can be repeated, or returns the error.
-    fn mend(&mut self, error: RenderError, on_fault: &mut FaultHandler) -> Result<(), RenderError> {
+    fn recover(&mut self, error: RenderError, on_fault: &mut FaultHandler) -> Result<(), RenderError> {
         match error {
             RenderError::Lost { device, message } => self.reopen(device, message, on_fault),
             RenderError::LoopTruncated { .. } => {
-                self.go_on_cpu(&error, on_fault);
+                self.fall_back_to_cpu(&error, on_fault);
                 Ok(())
             }
             RenderError::OutOfMemory { .. } | RenderError::TooLarge { .. } if self.device == Device::Auto => {
-                self.go_on_cpu(&error, on_fault);
+                self.fall_back_to_cpu(&error, on_fault);
                 Ok(())
             }
-            other => Err(other),
+            error => Err(error),
         }
     }
 
     /// Opens the lost device again, or a replacement.
     fn reopen(&mut self, lost: String, message: String, on_fault: &mut FaultHandler) -> Result<(), RenderError> {
         let progress = self.progress.count();
-        if progress > std::mem::replace(&mut self.known_progress, progress) {
+        if progress > std::mem::replace(&mut self.progress_at_loss, progress) {
             self.losses = 0;
         }
-        let of = |message: String| RenderError::Lost {
+        let lost_error = |message: String| RenderError::Lost {
             device: lost.clone(),
             message,
         };
@@ -206,76 +213,78 @@ impl OpenScene {
         while let Some(pause) = PAUSES.get(self.losses) {
             self.losses += 1;
             if reason.is_none() {
-                (on_fault.tell)(&of(message.clone()), Recovery::Reopen);
+                (on_fault.report)(&lost_error(message.clone()), Recovery::Reopen);
             }
             on_fault.pause(*pause)?;
-            let last = self.losses == PAUSES.len();
-            let wanted = |name: &str, is_software: bool| match &self.device {
+            let is_last = self.losses == PAUSES.len();
+            let accept = |name: &str, is_software: bool| match &self.device {
                 _ if name == lost => true,
-                Device::Gpu => last,
-                Device::Auto => last && !is_software, // the CPU is faster
+                Device::Gpu => is_last,
+                Device::Auto => is_last && !is_software, // the CPU is faster
                 Device::Named(_) | Device::Cpu => false,
             };
-            match self.adapter(Some(&wanted)) {
+            match self.open_adapter(Some(&accept)) {
                 Ok((mut engine, info)) => {
                     if self.largest_film <= engine.backend().largest_film() {
-                        self.take(engine, info);
+                        self.use_engine(engine, info);
                         return Ok(());
                     }
                     reason = Some(format!("{} has too little memory for the film", info.name));
                 }
                 Err(Error::Render(RenderError::Lost { message, .. })) => reason = Some(message),
-                Err(why) => reason = Some(why.to_string()),
+                Err(error) => reason = Some(error.to_string()),
             }
         }
         let message = match reason {
-            Some(why) => format!("{message}; it could not be opened again: {why}"),
+            Some(reason) => format!("{message}; it could not be opened again: {reason}"),
             None => format!("{message}, repeatedly"),
         };
-        let error = of(message.clone());
+        let error = lost_error(message.clone());
         match self.device {
             Device::Auto => {
-                self.go_on_cpu(&error, on_fault);
+                self.fall_back_to_cpu(&error, on_fault);
                 Ok(())
             }
             _ => {
-                self.gone = Some((lost, message));
+                self.lost = Some((lost, message));
                 Err(error)
             }
         }
     }
 
+    /// Closes the lost device.
     fn release(&mut self, lost: &str, message: &str) {
         let scene = Arc::clone(self.engine.scene());
         let engine = std::mem::replace(&mut self.engine, Engine::cpu(scene));
-        let _ = catch_panic(|| drop(engine)); // wgpu may panic, which has no consequence here
+        let _ = catch_panic(|| drop(engine)); // wgpu may panic; the device is lost anyway
         #[cfg(feature = "gpu")]
         self.context.devices.remove(lost);
-        self.gone = Some((lost.to_string(), message.to_string()));
+        self.lost = Some((lost.to_string(), message.to_string()));
     }
 
-    fn take(&mut self, engine: Engine, info: DeviceInfo) {
+    fn use_engine(&mut self, engine: Engine, info: DeviceInfo) {
         (self.engine, self.info) = (engine, info);
-        self.gone = None;
+        self.lost = None;
     }
 
-    fn go_on_cpu(&mut self, why: &RenderError, on_fault: &mut FaultHandler) {
-        (on_fault.tell)(why, Recovery::Cpu);
+    fn fall_back_to_cpu(&mut self, error: &RenderError, on_fault: &mut FaultHandler) {
+        (on_fault.report)(error, Recovery::Cpu);
         let scene = Arc::clone(self.engine.scene());
-        self.take(Engine::cpu(scene), DeviceInfo::cpu());
+        self.use_engine(Engine::cpu(scene), DeviceInfo::cpu());
     }
 }
 
 impl FaultHandler<'_> {
-    fn pause(&self, length: Duration) -> Result<(), RenderError> {
+    /// Waits; fails if the renderer is stopped.
+    fn pause(&self, duration: Duration) -> Result<(), RenderError> {
         let start = Instant::now();
         loop {
-            if (self.stopped)() {
+            if (self.is_stopped)() {
                 return Err(RenderError::Cancelled);
             }
-            match length.saturating_sub(start.elapsed()) {
+            match duration.saturating_sub(start.elapsed()) {
                 Duration::ZERO => return Ok(()),
-                left => std::thread::sleep(left.min(STOP_INTERVAL)),
+                remaining => std::thread::sleep(remaining.min(STOP_INTERVAL)),
             }
         }
     }
@@ -288,8 +297,8 @@ impl<'a> Renderer<'a> {
 
     /// Returns the reason why [`Device::Auto`] chose the CPU although an adapter exists.
     #[cfg(feature = "cli")]
-    pub fn why(&self) -> Option<&str> {
-        self.open.why.as_deref()
+    pub fn cpu_reason(&self) -> Option<&str> {
+        self.open.cpu_reason.as_deref()
     }
 
     pub fn info(&self) -> &DeviceInfo {
@@ -306,8 +315,8 @@ impl<'a> Renderer<'a> {
         self.open.largest_film
     }
 
-    pub fn progress(&self) -> Progress {
-        self.open.progress()
+    pub fn progress_counter(&self) -> ProgressCounter {
+        self.open.progress_counter()
     }
 
     /// Runs `work`, and repeats it after reopening a lost device. With [`Device::Auto`], the CPU takes over permanently
@@ -316,14 +325,14 @@ impl<'a> Renderer<'a> {
     /// # Errors
     ///
     /// Any error returned by `work`; [`RenderError::Lost`] if the device cannot be opened again;
-    /// [`RenderError::Cancelled`] if the renderer was stopped while it waited.
+    /// [`RenderError::Cancelled`] if the renderer is stopped while it waits for a lost device.
     pub fn work<T>(
         &mut self,
         mut work: impl FnMut(&mut dyn Backend, &DeviceInfo) -> Result<T, RenderError>,
     ) -> Result<T, RenderError> {
         let open = &mut *self.open;
         loop {
-            if let Some((device, message)) = open.gone.clone() {
+            if let Some((device, message)) = open.lost.clone() {
                 return Err(RenderError::Lost { device, message });
             }
             match work(open.engine.backend(), &open.info) {
@@ -331,7 +340,7 @@ impl<'a> Renderer<'a> {
                     open.losses = 0;
                     return Ok(value);
                 }
-                Err(error) => open.mend(error, &mut self.on_fault)?,
+                Err(error) => open.recover(error, &mut self.on_fault)?,
             }
         }
     }
@@ -340,10 +349,10 @@ impl<'a> Renderer<'a> {
 /// Reports faults as `tracing` warnings.
 pub(crate) fn warnings() -> FaultHandler<'static> {
     FaultHandler {
-        tell: Box::new(|why, remedy| match remedy {
-            Recovery::Reopen => warn!("{why}; re-opening it"),
-            Recovery::Cpu => warn!("rendering on the CPU: {why}"),
+        report: Box::new(|error, recovery| match recovery {
+            Recovery::Reopen => warn!("{error}; re-opening it"),
+            Recovery::Cpu => warn!("rendering on the CPU: {error}"),
         }),
-        stopped: Box::new(|| false), // the pauses are short
+        is_stopped: Box::new(|| false), // the pauses are short
     }
 }

@@ -20,7 +20,7 @@ use crate::renderer::{FaultHandler, OpenScene, Renderer, warnings};
 use crate::task::{Task, spawn_thread};
 
 /// A scene to be rendered several times. The first render packs the scene (BVHs, textures, tables of the environment)
-/// and opens the device; later renders use them again. Every image has the bits that [`render`](crate::render()) gives.
+/// and opens the device; later renders reuse both. Every image has the bits of [`render`](crate::render()).
 ///
 /// ```
 /// # fn main() -> Result<(), wgray::Error> {
@@ -60,12 +60,12 @@ impl Session {
         &self.scene
     }
 
-    /// Changes the camera. Only the camera's record is packed again, unless the camera's target moves so far that
-    /// coordinates need another origin: then shapes and lights are packed again.
+    /// Changes the camera. Only the camera's record is packed again, unless the camera's target moves so far that the
+    /// coordinates need another origin. Then shapes and lights are packed again, too.
     ///
     /// # Errors
     ///
-    /// The driver of the device reports an error. The next render opens the device again.
+    /// The device is lost, or its driver reports an error. The next render opens the device again.
     pub fn set_camera(&mut self, camera: Camera) -> Result<(), Error> {
         self.drop_cancelled();
         let scene = Arc::make_mut(&mut self.scene);
@@ -111,7 +111,8 @@ impl Session {
     /// computes the first hits, if layers need them. No sample is rendered yet.
     ///
     /// This work runs on another thread, except on a thread of a rayon pool and on wasm32, where `cancel` is observed
-    /// before and after it. If it is cancelled, it continues in the background, and the next render uses the result.
+    /// only before and after the work. Work that is cancelled continues in the background, and the next render uses its
+    /// result.
     ///
     /// # Errors
     ///
@@ -123,7 +124,7 @@ impl Session {
         ProgressiveRender::new(open, setup)
     }
 
-    /// Renders the scene on another thread, so that the future never blocks. wasm32 has no threads: there, this call
+    /// Renders the scene on another thread, so that the future never blocks. On wasm32, which has no threads, this call
     /// renders before it returns the future.
     ///
     /// Dropping the future cancels the render; the next render packs the scene again.
@@ -204,7 +205,8 @@ impl Session {
         self.receive(receiver, cancel)?
     }
 
-    /// Waits for a preparation. The error is [`RenderError::Cancelled`].
+    /// Waits for a preparation. The outer error is [`RenderError::Cancelled`]; the inner result is the result of the
+    /// preparation.
     fn receive(
         &mut self,
         receiver: Receiver<(SceneState, Result<ImageSetup, Error>)>,
@@ -227,7 +229,7 @@ impl Session {
         }
     }
 
-    /// Takes the result of a cancelled preparation if it is complete; otherwise drops it.
+    /// Ends the wait for a cancelled preparation. Keeps its result if the preparation is complete.
     fn drop_cancelled(&mut self) {
         if let Some((state, _)) = self.cancelled.take().and_then(|receiver| receiver.try_recv().ok()) {
             self.state = state;

@@ -1,4 +1,4 @@
-//! Work on another thread as a future.
+//! A future for the result of work on another thread.
 
 use std::future::Future;
 use std::pin::Pin;
@@ -49,7 +49,8 @@ pub(crate) fn spawn_thread(work: impl FnOnce() + Send + 'static) {
 }
 
 impl<T: Send + 'static> Task<T> {
-    /// Runs `work` on another thread; on wasm32, which has no threads, at once. `cancel` is the token of the work.
+    /// Runs `work` on another thread; on wasm32, which has no threads, on this thread. `cancel` is the token of the
+    /// work.
     pub(crate) fn spawn(cancel: &CancelToken, work: impl FnOnce() -> T + Send + 'static) -> Task<T> {
         let slot = Arc::new(Mutex::new(Slot::Running(None)));
         let finish = Finish(Arc::clone(&slot));
@@ -70,7 +71,7 @@ impl<T> Future for Task<T> {
 
     /// # Panics
     ///
-    /// If the work panicked.
+    /// Panics if the work panicked.
     fn poll(self: Pin<&mut Self>, context: &mut Context) -> Poll<T> {
         let mut slot = self.slot.lock().unwrap_or_else(PoisonError::into_inner);
         match std::mem::replace(&mut *slot, Slot::Empty) {

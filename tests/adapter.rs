@@ -5,9 +5,9 @@ use std::sync::OnceLock;
 
 use wgray_render::gpu::{AdapterChoice, Device, choose};
 
-/// Environment variable: part of the name, driver or type of the adapter under test.
+/// Environment variable that selects the adapter by a part of its name, driver or type.
 const ADAPTER: &str = "WGRAY_TEST_ADAPTER";
-/// Environment variable: 1 runs only the tests that need no adapter.
+/// Environment variable that, if 1, restricts the tests to those that need no adapter.
 const WITHOUT_GPU: &str = "WGRAY_TEST_WITHOUT_GPU";
 
 /// Returns the adapter under test, or `None` if `WGRAY_TEST_WITHOUT_GPU` is 1. Panics if no adapter is found.
@@ -66,7 +66,8 @@ pub const KNOWN_DIFFERENCES: &[KnownDifference] = &[
     swiftshader("filter_offset", ROUNDED_TWICE, 0.0115),
 ];
 
-/// The driver rounds twice when it converts these integers to floats. Indices in scenes are below 2^31.
+/// The driver rounds twice when it converts these integers to floats. Indices in scenes are below 2^31, so
+/// images are not affected.
 pub const ROUNDED_TWICE: &str = "unsigned integers of 2^31 or more are rounded twice";
 
 const fn swiftshader(check: &'static str, reason: &'static str, max_fraction: f64) -> KnownDifference {
@@ -101,7 +102,8 @@ pub fn judge(entry: Option<&KnownDifference>, check: &str, fraction: f64) -> Res
             entry.reason
         )),
         Some(entry) if fraction > entry.max_fraction => Err(format!(
-            "{check}: {fraction} of the results differ, more than this entry allows: {}",
+            "{check}: {:.4} % of the results differ, more than this entry allows: {}",
+            fraction * 100.0,
             entry.reason
         )),
         Some(_) => Ok(()),

@@ -11,7 +11,7 @@ use crate::scenes;
 /// Tolerance of a value `v`, relative to `1 + v`: the size of f32 rounding errors after a specular exponent of 50.
 const TOLERANCE: f64 = 1e-5;
 
-/// Maximum fraction of differing pixels. At an edge, rounding can move a sample to the other side.
+/// Maximum fraction of differing pixels. Rounding can move a sample to the other side of an edge.
 const MAX_EDGE_FRACTION: f64 = 0.0005;
 
 /// Scenes with more edges: name, maximum fraction of differing pixels, and reason.
@@ -24,7 +24,7 @@ const EDGE_FRACTIONS_BY_SCENE: &[(&str, f64, &str)] = &[
     (
         "twisted-tube.toml",
         0.003,
-        "edges of thousands of triangles bound the shadows on meshes, and a mirror reflects the shadows",
+        "shadows on meshes end at the edges of thousands of triangles, and a mirror reflects the shadows",
     ),
 ];
 
@@ -37,32 +37,32 @@ fn max_edge_fraction(scene: &str) -> f64 {
 
 /// Scenes that the oracle does not support: name and unsupported features.
 const UNSUPPORTED: &[(&str, &str)] = &[
-    ("textures.toml", "images and normal maps"),
-    ("ground-grid.toml", "an image"),
+    ("textures.toml", "image textures and normal maps"),
+    ("ground-grid.toml", "an image texture"),
     ("cornell-path.toml", "indirect light"),
     ("pillars.toml", "indirect light"),
-    ("lens.toml", "indirect light, and a lens"),
-    ("panorama.toml", "indirect light, and another camera"),
-    ("materials.toml", "indirect light, and all materials"),
+    ("lens.toml", "indirect light and a thin lens"),
+    ("panorama.toml", "indirect light and a panorama camera"),
+    ("materials.toml", "indirect light and most materials"),
 ];
 
 fn reduced(description: &Description) -> Description {
-    let mut d = description.clone();
-    let scale = f64::from(d.image.width) / 96.0;
-    d.image.width = 96;
-    d.image.height = (f64::from(d.image.height) / scale) as u32;
-    d.render.pixel_samples = SamplesDescription {
+    let mut description = description.clone();
+    let scale = f64::from(description.image.width) / 96.0;
+    description.image.width = 96;
+    description.image.height = (f64::from(description.image.height) / scale) as u32;
+    description.render.pixel_samples = SamplesDescription {
         pattern: Some(Pattern::Grid),
         count: 4,
     };
     // The oracle point-samples textures and follows both branches at glass, as the renderer does up to depth 2.
-    d.render.ray_differentials = false;
-    d.render.max_depth = 2;
-    d.render.light_samples = SamplesDescription {
+    description.render.ray_differentials = false;
+    description.render.max_depth = 2;
+    description.render.light_samples = SamplesDescription {
         pattern: Some(Pattern::Grid),
         count: 16,
     };
-    d
+    description
 }
 
 /// Cylinders with each material that the oracle supports. The camera is inside one of them.
@@ -119,10 +119,10 @@ fn supported_scenes() -> impl Iterator<Item = (String, Description)> {
         .chain([("cylinders".to_owned(), cylinders)]);
     scenes
         .filter(|(name, _)| !UNSUPPORTED.iter().any(|(unsupported, _)| unsupported == name))
-        .map(|(name, d)| (name, reduced(&d)))
+        .map(|(name, description)| (name, reduced(&description)))
 }
 
-fn differing(a: &[[f64; 3]], b: &[[f64; 3]]) -> f64 {
+fn differing_fraction(a: &[[f64; 3]], b: &[[f64; 3]]) -> f64 {
     assert_eq!(a.len(), b.len());
     let agree = |a: &f64, b: &f64| (a - b).abs() <= TOLERANCE * (1.0 + b.abs());
     let differ = a
@@ -139,7 +139,7 @@ fn images_match_the_oracle() {
         let expected = Oracle::new(&description, Flaw::None).picture();
         for mode in both() {
             let picture = means(&render(&scenes::packed(&description), mode));
-            let fraction = differing(&picture, &expected);
+            let fraction = differing_fraction(&picture, &expected);
             let errors = picture
                 .iter()
                 .flatten()
@@ -155,7 +155,7 @@ fn images_match_the_oracle() {
             );
             assert!(
                 fraction <= max_edge_fraction(&name),
-                "{name}, {mode:?}: {fraction} of the pixels differ"
+                "{name}, {mode:?}: a fraction of {fraction} of the pixels differs"
             );
             let mean_error = (mean(&picture) / mean(&expected) - 1.0).abs();
             assert!(
@@ -168,7 +168,7 @@ fn images_match_the_oracle() {
 
 /// At least one scene detects each flaw; every scene detects the flaws that affect all scenes.
 #[test]
-fn a_flawed_oracle_is_found() {
+fn flaws_of_the_oracle_are_detected() {
     let mode = *both().last().expect("the CPU at least");
     let mut found = Vec::new();
     for (name, description) in supported_scenes() {
@@ -189,13 +189,13 @@ fn a_flawed_oracle_is_found() {
             if !affects_all_scenes && found.contains(&flaw) {
                 continue;
             }
-            let fraction = differing(&picture, &Oracle::new(&description, flaw).picture());
+            let fraction = differing_fraction(&picture, &Oracle::new(&description, flaw).picture());
             if fraction > 10.0 * MAX_EDGE_FRACTION {
                 found.push(flaw);
             }
             assert!(
                 !affects_all_scenes || fraction > 10.0 * MAX_EDGE_FRACTION,
-                "{name}: {flaw:?} changes only {fraction} of the pixels"
+                "{name}: {flaw:?} changes only a fraction of {fraction} of the pixels"
             );
         }
     }
@@ -236,7 +236,7 @@ fn first_hits_match_the_oracle() {
         let shifted = Oracle::new(&description, Flaw::ShiftedPixel).intersections();
         for mode in both() {
             let hits = first_hits(&scenes::packed(&description), mode);
-            let differing = |expected: &[Option<Intersection>]| {
+            let differing_fraction = |expected: &[Option<Intersection>]| {
                 assert_eq!(hits.len(), expected.len());
                 let differ = hits
                     .iter()
@@ -245,13 +245,16 @@ fn first_hits_match_the_oracle() {
                     .count();
                 differ as f64 / hits.len() as f64
             };
-            let fraction = differing(&expected);
-            println!("{name} {mode:?}: the first hits of {fraction} of the pixels differ");
+            let fraction = differing_fraction(&expected);
+            println!("{name} {mode:?}: the first hits differ in a fraction of {fraction} of the pixels");
             assert!(
                 fraction <= MAX_EDGE_FRACTION,
-                "{name}, {mode:?}: the first hits of {fraction} of the pixels differ"
+                "{name}, {mode:?}: the first hits differ in a fraction of {fraction} of the pixels"
             );
-            assert!(differing(&shifted) > 0.1, "{name}: a shifted pixel is not found");
+            assert!(
+                differing_fraction(&shifted) > 0.1,
+                "{name}: an image shifted by one pixel is not detected"
+            );
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Images with closed-form pixel values, rendered on CPU and GPU. Each test also checks that a wrong value fails.
+//! Images with closed-form pixel values, rendered on CPU and GPU. Most tests also check that wrong values are rejected.
 
 use std::f64::consts::PI;
 
@@ -23,10 +23,10 @@ fn grid(count: u32) -> SamplesDescription {
     }
 }
 
-fn empty_scene(from: DVec3, to: DVec3, up: DVec3, height: f64) -> Description {
+fn empty_scene(camera_position: DVec3, look_at: DVec3, up: DVec3, height: f64) -> Description {
     let camera = OrthographicDescription {
-        position: from,
-        look_at: to,
+        position: camera_position,
+        look_at,
         up,
         height,
         path: None,
@@ -50,8 +50,18 @@ fn empty_scene(from: DVec3, to: DVec3, up: DVec3, height: f64) -> Description {
 }
 
 /// Returns a scene with the plane z = 0 and a camera above it.
-fn floor_scene(from: DVec3, height: f64, [ambient, diffuse, specular]: [f64; 3], shininess: f64) -> Description {
-    let mut scene = empty_scene(from, DVec3::new(from.x, from.y, 0.0), DVec3::Y, height);
+fn floor_scene(
+    camera_position: DVec3,
+    height: f64,
+    [ambient, diffuse, specular]: [f64; 3],
+    shininess: f64,
+) -> Description {
+    let mut scene = empty_scene(
+        camera_position,
+        DVec3::new(camera_position.x, camera_position.y, 0.0),
+        DVec3::Y,
+        height,
+    );
     let factor = |x| Some(ColorDescription::Plain(DVec3::splat(x)));
     let phong = PhongDescription {
         color: None,
@@ -73,12 +83,12 @@ fn floor_scene(from: DVec3, height: f64, [ambient, diffuse, specular]: [f64; 3],
     scene
 }
 
-fn floor_point(from: DVec3, height: f64, pixel: u32) -> DVec2 {
+fn floor_point(camera_position: DVec3, height: f64, pixel: u32) -> DVec2 {
     let step = height / f64::from(SIDE);
     let (column, row) = (f64::from(pixel % SIDE) + 0.5, f64::from(pixel / SIDE) + 0.5);
     DVec2::new(
-        from.x + column * step - height / 2.0,
-        from.y + height / 2.0 - row * step,
+        camera_position.x + column * step - height / 2.0,
+        camera_position.y + height / 2.0 - row * step,
     )
 }
 
@@ -98,8 +108,8 @@ fn antiderivative(x: f64, y: f64, h: f64) -> f64 {
     x * (y / (x * x + h * h).sqrt()).asinh() + y * (x / (y * y + h * h).sqrt()).asinh() - h * (x * y / (h * r)).atan()
 }
 
-/// Returns the mean of h / r from a point to a parallel rectangle at height h: the mean cosine at the plane. `point` is
-/// relative to the rectangle's center.
+/// Returns the mean of h / r, the cosine at the plane, over a parallel rectangle at height h, where r is the distance
+/// from a point in the plane. `point` is relative to the rectangle's center.
 fn mean_cosine([width, height]: [f64; 2], h: f64, point: DVec2) -> f64 {
     let (x0, x1) = (-width / 2.0 - point.x, width / 2.0 - point.x);
     let (y0, y1) = (-height / 2.0 - point.y, height / 2.0 - point.y);
@@ -126,10 +136,10 @@ fn the_closed_form_of_the_mean_cosine_is_correct() {
 
 /// Pixels equal the mean cosine up to the error of the sample grid, which is a midpoint rule.
 #[test]
-fn light_of_a_rectangle_on_a_plane() {
-    let (from, height) = (DVec3::new(0.3, 0.2, 0.5), 4.0);
+fn a_rectangle_light_gives_the_mean_cosine_on_a_plane() {
+    let (camera_position, height) = (DVec3::new(0.3, 0.2, 0.5), 4.0);
     let (size, h) = ([1.5, 0.5], 0.8);
-    let mut scene = floor_scene(from, height, [0.0, 0.7, 0.0], 1.0);
+    let mut scene = floor_scene(camera_position, height, [0.0, 0.7, 0.0], 1.0);
     scene.render.light_samples = grid(1024);
     scene
         .lights
@@ -145,11 +155,11 @@ fn light_of_a_rectangle_on_a_plane() {
     for mode in both() {
         let error_against = |expected: &dyn Fn(DVec2) -> f64| {
             max_error(&scene, mode, |pixel| {
-                0.9 * 0.7 * expected(floor_point(from, height, pixel))
+                0.9 * 0.7 * expected(floor_point(camera_position, height, pixel))
             })
         };
         let error = error_against(&|point| mean_cosine(size, h, point));
-        println!("{mode:?}: light of a rectangle within {error:.1e}");
+        println!("{mode:?}: the maximum error of the light of a rectangle is {error:.1e}");
         assert!(error < 1e-4, "{mode:?}: {error}");
         assert!(!(error_against(&|_| 1.0) < 1e-2), "a missing cosine is accepted");
         assert!(
@@ -166,10 +176,10 @@ fn light_of_a_rectangle_on_a_plane() {
 
 /// The outline of the shadow is a conic section, here an ellipse.
 #[test]
-fn shadow_of_a_sphere() {
-    let (from, height) = (DVec3::new(1.6, 0.0, 1.0), 2.4);
+fn the_shadow_of_a_sphere_is_an_ellipse() {
+    let (camera_position, height) = (DVec3::new(1.6, 0.0, 1.0), 2.4);
     let (center, radius, light) = (DVec3::new(0.0, 0.0, 2.0), 0.5, DVec3::new(-3.0, 0.0, 6.0));
-    let mut scene = floor_scene(from, height, [0.0, 1.0, 0.0], 1.0);
+    let mut scene = floor_scene(camera_position, height, [0.0, 1.0, 0.0], 1.0);
     scene.materials.insert("s".into(), scene.materials["m"].clone());
     scene.shapes.push(ShapeDescription::Sphere(SphereDescription {
         material: "s".into(),
@@ -189,19 +199,20 @@ fn shadow_of_a_sphere() {
         let picture = means(&render(&packed(&scene), mode));
         let lit = |pixel: u32| picture[pixel as usize][1] > 0.0;
         let wrong_pixels = |shift: DVec2, margin: f64| {
-            let pixels = (0..SIDE * SIDE).filter(|pixel| inside(floor_point(from, height, *pixel)).abs() > margin);
+            let pixels =
+                (0..SIDE * SIDE).filter(|pixel| inside(floor_point(camera_position, height, *pixel)).abs() > margin);
             pixels
-                .filter(|pixel| lit(*pixel) == (inside(floor_point(from, height, *pixel) + shift) > 0.0))
+                .filter(|pixel| lit(*pixel) == (inside(floor_point(camera_position, height, *pixel) + shift) > 0.0))
                 .count()
         };
         assert_eq!(wrong_pixels(DVec2::ZERO, 1e-5), 0, "{mode:?}");
         let pixel = height / f64::from(SIDE);
         assert!(wrong_pixels(DVec2::X * pixel, 1e-5) > 20, "a shifted pixel is accepted");
         assert!(wrong_pixels(DVec2::Y * pixel, 1e-5) > 20, "a shifted pixel is accepted");
-        // Semi-axes of the ellipse; `lean` is the angle between the cone's axis and the vertical.
-        let lean = (axis.x / axis.z).abs().atan();
-        let major_axis = light.z * ((lean + half_angle).tan() - (lean - half_angle).tan()) / 2.0;
-        let minor_axis = major_axis * (1.0 - (lean.sin() / half_angle.cos()).powi(2)).sqrt();
+        // Semi-axes of the ellipse; `tilt` is the angle between the cone's axis and the vertical.
+        let tilt = (axis.x / axis.z).abs().atan();
+        let major_axis = light.z * ((tilt + half_angle).tan() - (tilt - half_angle).tan()) / 2.0;
+        let minor_axis = major_axis * (1.0 - (tilt.sin() / half_angle.cos()).powi(2)).sqrt();
         let shadow_area = (0..SIDE * SIDE).filter(|pixel| !lit(*pixel)).count() as f64 * pixel * pixel;
         println!(
             "{mode:?}: the area of the shadow is {shadow_area:.4}, expected {:.4}",
@@ -217,7 +228,7 @@ fn shadow_of_a_sphere() {
         );
         // Outside the shadow, only the cosine remains, because a point light has no falloff.
         let errors = (0..SIDE * SIDE).filter(|pixel| lit(*pixel)).map(|pixel| {
-            let to_light = light - floor_point(from, height, pixel).extend(0.0);
+            let to_light = light - floor_point(camera_position, height, pixel).extend(0.0);
             (picture[pixel as usize][1] - to_light.z / to_light.length()).abs()
         });
         assert!(errors.fold(0.0, f64::max) < 1e-5);
@@ -226,7 +237,7 @@ fn shadow_of_a_sphere() {
 
 /// The projected area of an ellipsoid with axes a, b, c along d is pi |((a x b).d, (b x c).d, (c x a).d)|.
 #[test]
-fn outlines_of_ellipsoids() {
+fn outlines_of_ellipsoids_have_the_projected_area() {
     let ellipsoids = [
         (
             DVec3::new(0.1, 0.2, -0.1),
@@ -315,7 +326,7 @@ fn outlines_of_ellipsoids() {
 
 /// The radiance along the normal is constant: kd n.l + ks (r.v)^s.
 #[test]
-fn directional_light_on_a_plane() {
+fn a_directional_light_gives_constant_radiance_on_a_plane() {
     for (exponent, wrong_exponent) in [(16.0, 15.0), (2.5, 2.4), (0.5, 0.6), (1.0, 1.5)] {
         let mut scene = floor_scene(DVec3::new(5.0, -3.0, 2.0), 1.0, [0.0, 0.4, 0.6], exponent);
         let direction = DVec3::new(0.3, -0.2, -1.0);

@@ -1,4 +1,5 @@
-//! Error bounds of the functions in `shaders/math.wgsl` against f64, on CPU and GPU.
+//! The errors of the functions in `shaders/math.wgsl`, compared with f64, are within the documented bounds on CPU and
+//! GPU.
 
 use crate::adapter;
 use crate::kernel::functions;
@@ -28,7 +29,7 @@ fn ulps(result: f64, exact: f64) -> f64 {
 const BOUNDS: &[Bound] = &[
     Bound {
         function: "log2",
-        unit: "units in the last place, x a normal number",
+        unit: "units in the last place, for normal x",
         max_error: 4.5,
         arguments: |random| {
             let (any_magnitude, near_one) = (random.magnitude(-37.9, 38.5), random.between(0.9, 1.1));
@@ -38,14 +39,14 @@ const BOUNDS: &[Bound] = &[
     },
     Bound {
         function: "exp2",
-        unit: "units in the last place, x from -126 to 127.4",
+        unit: "units in the last place, for x from -126 to 127.4",
         max_error: 1.5,
         arguments: |random| vec![random.between(-126.0, 127.4) as f32],
         error: |x, result| ulps(result, f64::from(x[0]).exp2()),
     },
     Bound {
         function: "power",
-        unit: "2^-23 (1 + |y log2 x|) relative, where the power is a normal number",
+        unit: "2^-23 (1 + |y log2 x|), relative, for normal powers",
         max_error: 1.7,
         arguments: |random| loop {
             let x = if random.once_in(2) {
@@ -66,7 +67,7 @@ const BOUNDS: &[Bound] = &[
     },
     Bound {
         function: "power_whole",
-        unit: "2^-24 n relative, n below 4096, where the power is a normal number",
+        unit: "2^-24 n, relative, for n below 4096 and normal powers",
         max_error: 1.0,
         arguments: |random| loop {
             let n = random.magnitude(0.0, 3.6) as u32;
@@ -105,7 +106,7 @@ const BOUNDS: &[Bound] = &[
     },
     Bound {
         function: "sine",
-        unit: "10^-7, |x| below 1000",
+        unit: "10^-7, for |x| below 1000",
         max_error: 3.0,
         arguments: |random| {
             let size = random.pick(&[0.6, 3.0, 1000.0]);
@@ -118,7 +119,7 @@ const BOUNDS: &[Bound] = &[
     },
     Bound {
         function: "normalize",
-        unit: "2^-24, first component",
+        unit: "2^-24, for the first component",
         max_error: 3.0,
         arguments: |random| {
             let size = random.magnitude(-9.0, 9.0);
@@ -147,7 +148,7 @@ fn largest_error(bound: &Bound, evaluate: &dyn Fn(&[u32]) -> Vec<u32>) -> f64 {
 }
 
 #[test]
-fn functions_keep_their_documented_error_bounds() {
+fn function_errors_are_within_the_documented_bounds() {
     let source = shared_source();
     let module = parse(&source);
     let functions = functions(&module, &source);
@@ -214,7 +215,7 @@ fn functions_are_exact_at_special_values() {
         ("atan2", &[-2.0, -2.0], -3.0 * std::f32::consts::FRAC_PI_4),
         ("min", &[1.0, 2.0], 1.0),
         ("max", &[1.0, 2.0], 2.0),
-        ("min", &[0.0, -0.0], -0.0), // equal arguments: the second
+        ("min", &[0.0, -0.0], -0.0), // the second of two equal arguments
         ("max", &[f32::NAN, 0.0], 0.0),
         ("positive_zero", &[-0.0], 0.0),
         ("positive_zero", &[-1.5], -1.5),
@@ -254,7 +255,7 @@ fn the_hash_is_pcg4d() {
 }
 
 #[test]
-fn a_function_beyond_its_error_bound_is_found() {
+fn a_function_that_exceeds_its_error_bound_is_detected() {
     let Some(device) = adapter::device() else { return };
     for (index, from, to) in [
         (0, "s2 * (0.2 +", "s2 * (0.201 +"),

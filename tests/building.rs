@@ -119,7 +119,7 @@ fn invalid_meshes_are_errors() {
         let error = builder.build().expect_err(rule).to_string();
         assert!(error.contains(rule), "{error}");
     }
-    // Groups without names get one group.
+    // Without group names, the mesh has one group.
     assert_eq!(valid().groups(&[], &[]).build().expect("a mesh").groups.len(), 1);
 }
 

@@ -1,4 +1,4 @@
-//! Image metrics, compared with closed forms and with the values of NVIDIA's FLIP and of scikit-image, which
+//! Image metrics, compared with closed-form values and with the values of NVIDIA's FLIP and of scikit-image, which
 //! `benches/peers/diff_check.py --values` prints.
 
 use std::sync::Arc;
@@ -7,7 +7,7 @@ use wgray_image::compare::{
     self, COLOR, Channel, Difference, Kind, PIXELS_PER_DEGREE, Picture, PixelCoord, Plane, layers,
 };
 
-/// Returns an RGB image with `value(column, row, channel)`.
+/// Returns an RGB image whose values are `value(column, row, channel)`.
 fn picture(width: u32, height: u32, kind: Kind, value: impl Fn(u32, u32, u32) -> f32) -> Picture {
     let pixels = || (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
     let channels = ["R", "G", "B"].into_iter().zip(0..).map(|(name, c)| {
@@ -32,7 +32,7 @@ fn picture(width: u32, height: u32, kind: Kind, value: impl Fn(u32, u32, u32) ->
 
 const BYTES: Kind = Kind::Display { bits: 8 };
 
-/// Returns the two images that `formula` in the script defines.
+/// Returns the two images that the function `formula` of `diff_check.py` defines.
 fn formula(kind: Kind) -> (Picture, Picture) {
     let smooth = |x: u32, y: u32, c: u32| ((x * 5 + y * 3 + c * 40) % 256) as i32;
     let noise = |x: u32, y: u32, c: u32| ((x * 7919 + y * 104_729 + c * 1_299_709 + x * y * 31) % 101) as i32 - 50;
@@ -86,7 +86,7 @@ fn metrics_match_the_reference_implementations() {
         for (found, expected) in [found.rmse, found.rel_mse, found.psnr, ssim].into_iter().zip(expected) {
             assert_near(found, expected, 1e-12 * expected.abs());
         }
-        // both implementations use f32
+        // Both implementations of FLIP use f32.
         assert_near(flip(&a, &b), expected[4], 2e-6);
     }
 }
@@ -110,7 +110,7 @@ fn an_image_equals_itself_and_the_second_image_is_the_reference() {
 }
 
 #[test]
-fn extremes_have_closed_forms() {
+fn metrics_of_extreme_images_match_closed_forms() {
     let flat =
         |r: f32, g: f32, b: f32, (width, height)| picture(width, height, BYTES, move |_, _, c| [r, g, b][c as usize]);
     for size in [(1, 1), (3, 7), (40, 1), (1, 40), (31, 23)] {
@@ -118,9 +118,9 @@ fn extremes_have_closed_forms() {
         let found = color(&black, &white);
         assert_eq!((found.rmse, found.psnr), (1.0, 0.0));
         assert_near(found.rel_mse, 1.0 / 1.01, 1e-12);
-        // zero variance and means of 0 and 1: (0 + C1) (0 + C2) / ((1 + C1) (0 + C2))
+        // Zero variance and means of 0 and 1: (0 + C1) (0 + C2) / ((1 + C1) (0 + C2))
         assert_near(compare::ssim(&black, &white).unwrap(), 1e-4 / (1.0 + 1e-4), 1e-12);
-        // green and blue have the maximum distance by definition
+        // Green and blue have the maximum distance by definition.
         assert_near(
             flip(&flat(0.0, 255.0, 0.0, size), &flat(0.0, 0.0, 255.0, size)),
             1.0,
@@ -131,7 +131,7 @@ fn extremes_have_closed_forms() {
 
 #[test]
 fn windows_wider_than_the_image_are_clipped_and_renormalized() {
-    // the definition in one dimension: (2 ma mb + C1) (2 cov + C2) / ((ma² + mb² + C1) (va + vb + C2))
+    // The definition of SSIM in one dimension: (2 ma mb + C1) (2 cov + C2) / ((ma² + mb² + C1) (va + vb + C2))
     let (a, b) = ([0.0, 51.0, 255.0, 102.0], [10.0, 51.0, 200.0, 0.0]);
     let mut sum = 0.0;
     for center in 0..4 {
@@ -195,13 +195,13 @@ fn flip_decreases_with_the_viewing_distance() {
 #[test]
 fn flip_of_linear_values_adapts_its_exposures_to_the_reference() {
     let flat = |value: f32| picture(12, 12, Kind::Linear, move |_, _, _| value);
-    // the exposures follow the reference, so a common factor cancels
+    // The exposures follow the reference, so a common factor cancels.
     let found = flip(&flat(1.1), &flat(1.0));
     assert!(found > 0.01);
     for scale in [1e-30_f32, 1e-3, 1e3, 1e30] {
         assert_near(flip(&flat(1.1 * scale), &flat(scale)), found, 1e-4);
     }
-    // black, mostly black, negative and infinite images
+    // Black, mostly black, negative and infinite images.
     let single_pixel = |value: f32| {
         picture(
             12,

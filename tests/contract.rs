@@ -17,7 +17,8 @@ use crate::{patterns, scenes};
 const SIZE: (u32, u32) = (20, 12);
 const SAMPLES: u32 = 40;
 
-/// Returns a small scene with and without adaptive sampling, for direct lighting and for paths with layers.
+/// Returns four variants of a small scene: direct lighting, and path tracing with layers, each with uniform and with
+/// adaptive sampling.
 pub fn subjects() -> [Packed; 4] {
     let mut base = scenes::scene("cornell.toml");
     (base.image.width, base.image.height) = SIZE;
@@ -86,33 +87,33 @@ fn check(condition: bool, deviation: &str) -> Result<(), String> {
 
 const SENTENCES: &[Sentence] = &[
     ("a new backend has no film", |_, make| {
-        let mut b = make();
+        let mut backend = make();
         check(
-            matches!(b.film(), Err(RenderError::NoFilm)),
+            matches!(backend.film(), Err(RenderError::NoFilm)),
             "a film can be read before `begin`",
         )?;
-        let rendered = b.render(full_region(), 0..1);
+        let rendered = backend.render(full_region(), 0..1);
         check(
             matches!(rendered, Err(RenderError::NoFilm)),
             "samples are accepted without a film",
         )
     }),
     ("a film starts empty", |_, make| {
-        let mut b = make();
-        complete_film(&mut *b);
-        b.begin(region(2, 3, 7, 9)).map_err(|e| e.to_string())?;
-        let film = b.film().map_err(|e| e.to_string())?;
-        check(film.region == region(2, 3, 7, 9), "another region")?;
+        let mut backend = make();
+        complete_film(&mut *backend);
+        backend.begin(region(2, 3, 7, 9)).map_err(|e| e.to_string())?;
+        let film = backend.film().map_err(|e| e.to_string())?;
+        check(film.region == region(2, 3, 7, 9), "the film has another region")?;
         check(
             film.lists().flatten().all(|sum| *sum == glam::Vec4::ZERO),
             "the sums of the previous film remain",
         )
     }),
     ("a film has the scene's layout", |packed, make| {
-        let mut b = make();
+        let mut backend = make();
         for film_region in [full_region(), region(2, 3, 7, 9)] {
-            b.begin(film_region).map_err(|e| e.to_string())?;
-            let film = b.film().map_err(|e| e.to_string())?;
+            backend.begin(film_region).map_err(|e| e.to_string())?;
+            let film = backend.film().map_err(|e| e.to_string())?;
             let lengths = |film: &Film| film.lists().map(Vec::len).collect::<Vec<_>>();
             check(
                 lengths(&film) == lengths(&Film::of(film_region, packed.film_layout())),
@@ -120,7 +121,7 @@ const SENTENCES: &[Sentence] = &[
             )?;
             check(
                 film.has_layers() == packed.film_layout().layers,
-                "layers are missing or unrequested",
+                "layers are missing, or were not requested",
             )?;
         }
         Ok(())
@@ -140,24 +141,24 @@ const SENTENCES: &[Sentence] = &[
         )
     }),
     ("reading a film changes nothing", |_, make| {
-        let mut b = make();
-        b.begin(full_region()).map_err(|e| e.to_string())?;
-        b.render(full_region(), 0..4).map_err(|e| e.to_string())?;
-        let first = film_bits(&mut *b);
-        check(first == film_bits(&mut *b), "the second copy differs")?;
-        b.render(full_region(), 4..8).map_err(|e| e.to_string())?;
+        let mut backend = make();
+        backend.begin(full_region()).map_err(|e| e.to_string())?;
+        backend.render(full_region(), 0..4).map_err(|e| e.to_string())?;
+        let first = film_bits(&mut *backend);
+        check(first == film_bits(&mut *backend), "the second copy differs")?;
+        backend.render(full_region(), 4..8).map_err(|e| e.to_string())?;
         let mut uninterrupted = make();
         uninterrupted.begin(full_region()).map_err(|e| e.to_string())?;
         uninterrupted.render(full_region(), 0..8).map_err(|e| e.to_string())?;
         check(
-            film_bits(&mut *b) == film_bits(&mut *uninterrupted),
+            film_bits(&mut *backend) == film_bits(&mut *uninterrupted),
             "samples after a copy differ",
         )
     }),
     ("any backend resumes a film", |packed, make| {
-        let mut b = make();
-        let expected = bits(&complete_film(&mut *b));
-        let pilot = b.samples_of_all().min(SAMPLES);
+        let mut backend = make();
+        let expected = bits(&complete_film(&mut *backend));
+        let pilot = backend.samples_of_all().min(SAMPLES);
         for sample in [1, pilot / 2, pilot, pilot + (SAMPLES - pilot) / 2] {
             let mut interrupted = Cpu::new(packed);
             interrupted.begin(full_region()).map_err(|e| e.to_string())?;
@@ -168,21 +169,26 @@ const SENTENCES: &[Sentence] = &[
                 .render(full_region(), pilot..sample.max(pilot))
                 .map_err(|e| e.to_string())?;
             let film = interrupted.film().map_err(|e| e.to_string())?;
-            let mut b = make();
-            b.resume(film.clone()).map_err(|e| e.to_string())?;
-            check(film_bits(&mut *b) == bits(&film), "resuming changes the film")?;
-            b.render(full_region(), sample..pilot.max(sample))
+            let mut backend = make();
+            backend.resume(film.clone()).map_err(|e| e.to_string())?;
+            check(film_bits(&mut *backend) == bits(&film), "resuming changes the film")?;
+            backend
+                .render(full_region(), sample..pilot.max(sample))
                 .map_err(|e| e.to_string())?;
-            b.render(full_region(), sample.max(pilot)..SAMPLES)
+            backend
+                .render(full_region(), sample.max(pilot)..SAMPLES)
                 .map_err(|e| e.to_string())?;
-            check(film_bits(&mut *b) == expected, "a resumed and completed film differs")?;
+            check(
+                film_bits(&mut *backend) == expected,
+                "a resumed and completed film differs",
+            )?;
         }
         Ok(())
     }),
     ("a film of another layout is rejected", |packed, make| {
-        let mut b = make();
-        let film = complete_film(&mut *b);
-        let before = film_bits(&mut *b);
+        let mut backend = make();
+        let film = complete_film(&mut *backend);
+        let before = film_bits(&mut *backend);
         for wrong in [
             Film {
                 sums: film.sums[1..].to_vec(),
@@ -212,26 +218,26 @@ const SENTENCES: &[Sentence] = &[
                 ..film.clone()
             },
         ] {
-            let result = b.resume(wrong);
+            let result = backend.resume(wrong);
             check(
                 matches!(result, Err(RenderError::FilmMismatch(_))),
                 "a film of another layout is accepted",
             )?;
         }
-        check(film_bits(&mut *b) == before, "a rejection changes the film")
+        check(film_bits(&mut *backend) == before, "a rejection changes the film")
     }),
     ("every partition of the work gives the same film", |_, make| {
-        let mut b = make();
-        let expected = bits(&complete_film(&mut *b));
-        let pilot = b.samples_of_all().min(SAMPLES);
+        let mut backend = make();
+        let expected = bits(&complete_film(&mut *backend));
+        let pilot = backend.samples_of_all().min(SAMPLES);
         let tiles = [region(0, 0, 20, 1), region(0, 1, 9, 12), region(9, 1, 20, 12)];
-        b.begin(full_region()).map_err(|e| e.to_string())?;
+        backend.begin(full_region()).map_err(|e| e.to_string())?;
         for (start, end) in [(0, pilot), (pilot, SAMPLES)] {
             for tile in tiles.iter().rev() {
                 let mut first = start;
                 for length in (1..).map(|i| i * i) {
                     let next = (first + length).min(end);
-                    b.render(*tile, first..next).map_err(|e| e.to_string())?;
+                    backend.render(*tile, first..next).map_err(|e| e.to_string())?;
                     first = next;
                     if first >= end {
                         break;
@@ -239,65 +245,89 @@ const SENTENCES: &[Sentence] = &[
                 }
             }
         }
-        check(film_bits(&mut *b) == expected, "small tiles and ranges change the film")
+        check(
+            film_bits(&mut *backend) == expected,
+            "small tiles and ranges change the film",
+        )
     }),
     ("empty tiles and ranges change nothing", |_, make| {
-        let mut b = make();
-        let expected = bits(&complete_film(&mut *b));
+        let mut backend = make();
+        let expected = bits(&complete_film(&mut *backend));
         for (tile, samples) in [
             (full_region(), 7..7),
             (region(3, 3, 3, 9), 0..4),
             (region(99, 99, 99, 99), 0..4),
             (full_region(), Range { start: 9, end: 3 }),
         ] {
-            b.render(tile, samples).map_err(|e| e.to_string())?;
+            backend.render(tile, samples).map_err(|e| e.to_string())?;
         }
-        check(film_bits(&mut *b) == expected, "empty work changes the film")?;
-        b.begin(region(5, 5, 5, 5)).map_err(|e| e.to_string())?;
-        let film = b.film().map_err(|e| e.to_string())?;
+        check(
+            film_bits(&mut *backend) == expected,
+            "an empty tile or range changes the film",
+        )?;
+        backend.begin(region(5, 5, 5, 5)).map_err(|e| e.to_string())?;
+        let film = backend.film().map_err(|e| e.to_string())?;
         check(film.sums.is_empty(), "an empty film has pixels")
     }),
     ("regions outside are rejected", |_, make| {
-        let mut b = make();
+        let mut backend = make();
         let outside = |result: Result<(), RenderError>| matches!(result, Err(RenderError::Outside { .. }));
-        check(outside(b.begin(region(0, 0, 21, 12))), "a film may exceed the image")?;
-        b.begin(region(4, 4, 10, 10)).map_err(|e| e.to_string())?;
+        check(
+            outside(backend.begin(region(0, 0, 21, 12))),
+            "a film may exceed the image",
+        )?;
+        backend.begin(region(4, 4, 10, 10)).map_err(|e| e.to_string())?;
         for tile in [region(3, 4, 10, 10), region(4, 4, 11, 10), full_region()] {
-            check(outside(b.render(tile, 0..1)), "a tile may exceed the film")?;
+            check(outside(backend.render(tile, 0..1)), "a tile may exceed the film")?;
         }
-        let hits = b.first_hits(region(0, 0, 20, 13)).map(|_| ());
+        let hits = backend.first_hits(region(0, 0, 20, 13)).map(|_| ());
         check(outside(hits), "first hits may exceed the image")?;
-        let film = b.film().map_err(|e| e.to_string())?;
+        let film = backend.film().map_err(|e| e.to_string())?;
         check(
             film.sums.iter().all(|sum| *sum == glam::Vec4::ZERO),
             "a rejection changes the film",
         )
     }),
     ("submitted work is pending until polled or waited for", |_, make| {
-        let mut b = make();
-        check(b.poll().map_err(|e| e.to_string())?, "work is pending before a submit")?;
-        b.wait().map_err(|e| e.to_string())?;
-        b.begin(full_region()).map_err(|e| e.to_string())?;
-        b.submit(full_region(), 0..8).map_err(|e| e.to_string())?;
-        let pending = |result: Result<(), RenderError>| matches!(result, Err(RenderError::Pending));
-        check(pending(b.submit(full_region(), 8..9)), "a second submit is accepted")?;
-        check(pending(b.film().map(|_| ())), "a film is read while work is pending")?;
-        check(pending(b.begin(full_region())), "a film is begun while work is pending")?;
+        let mut backend = make();
         check(
-            pending(b.resume(Film::new(full_region()))),
+            backend.poll().map_err(|e| e.to_string())?,
+            "work is pending before a submit",
+        )?;
+        backend.wait().map_err(|e| e.to_string())?;
+        backend.begin(full_region()).map_err(|e| e.to_string())?;
+        backend.submit(full_region(), 0..8).map_err(|e| e.to_string())?;
+        let pending = |result: Result<(), RenderError>| matches!(result, Err(RenderError::Pending));
+        check(
+            pending(backend.submit(full_region(), 8..9)),
+            "a second submit is accepted",
+        )?;
+        check(
+            pending(backend.film().map(|_| ())),
+            "a film is read while work is pending",
+        )?;
+        check(
+            pending(backend.begin(full_region())),
+            "a film is begun while work is pending",
+        )?;
+        check(
+            pending(backend.resume(Film::new(full_region()))),
             "a film is resumed while work is pending",
         )?;
         check(
-            pending(b.first_hits(full_region()).map(|_| ())),
+            pending(backend.first_hits(full_region()).map(|_| ())),
             "first hits are computed while work is pending",
         )?;
-        while !b.poll().map_err(|e| e.to_string())? {
+        while !backend.poll().map_err(|e| e.to_string())? {
             std::thread::yield_now();
         }
-        let polled = film_bits(&mut *b);
-        b.begin(full_region()).map_err(|e| e.to_string())?;
-        b.render(full_region(), 0..8).map_err(|e| e.to_string())?;
-        check(film_bits(&mut *b) == polled, "polling and waiting give different films")
+        let polled = film_bits(&mut *backend);
+        backend.begin(full_region()).map_err(|e| e.to_string())?;
+        backend.render(full_region(), 0..8).map_err(|e| e.to_string())?;
+        check(
+            film_bits(&mut *backend) == polled,
+            "polling and waiting give different films",
+        )
     }),
     (
         "the pilot samples of all pixels precede further samples",
@@ -305,48 +335,55 @@ const SENTENCES: &[Sentence] = &[
             if !packed.sampling.adaptive {
                 return Ok(());
             }
-            let mut b = make();
-            let pilot = b.samples_of_all();
-            b.begin(full_region()).map_err(|e| e.to_string())?;
-            b.render(region(0, 0, 20, 11), 0..pilot).map_err(|e| e.to_string())?;
-            let result = b.render(region(0, 0, 20, 1), pilot..pilot + 1);
+            let mut backend = make();
+            let pilot = backend.samples_of_all();
+            backend.begin(full_region()).map_err(|e| e.to_string())?;
+            backend
+                .render(region(0, 0, 20, 11), 0..pilot)
+                .map_err(|e| e.to_string())?;
+            let result = backend.render(region(0, 0, 20, 1), pilot..pilot + 1);
             check(
                 matches!(result, Err(RenderError::PilotIncomplete { .. })),
                 "further samples are accepted before the pilot samples are complete",
             )?;
-            b.render(region(0, 11, 20, 12), 0..pilot).map_err(|e| e.to_string())?;
-            b.render(region(0, 0, 20, 1), pilot..pilot + 1)
+            backend
+                .render(region(0, 11, 20, 12), 0..pilot)
                 .map_err(|e| e.to_string())?;
-            let expected = bits(&complete_film(&mut *b));
-            b.begin(full_region()).map_err(|e| e.to_string())?;
+            backend
+                .render(region(0, 0, 20, 1), pilot..pilot + 1)
+                .map_err(|e| e.to_string())?;
+            let expected = bits(&complete_film(&mut *backend));
+            backend.begin(full_region()).map_err(|e| e.to_string())?;
             let upper_rows = region(0, 0, 20, 11);
-            b.render(upper_rows, 0..pilot).map_err(|e| e.to_string())?;
-            b.render(region(0, 11, 20, 12), 0..SAMPLES).map_err(|e| e.to_string())?;
-            b.render(upper_rows, pilot..SAMPLES).map_err(|e| e.to_string())?;
+            backend.render(upper_rows, 0..pilot).map_err(|e| e.to_string())?;
+            backend
+                .render(region(0, 11, 20, 12), 0..SAMPLES)
+                .map_err(|e| e.to_string())?;
+            backend.render(upper_rows, pilot..SAMPLES).map_err(|e| e.to_string())?;
             check(
-                film_bits(&mut *b) == expected,
+                film_bits(&mut *backend) == expected,
                 "a range with pilot and further samples of the last tile changes the film",
             )
         },
     ),
     ("first hits need no film and do not change it", |_, make| {
-        let mut b = make();
-        let hits = b.first_hits(full_region()).map_err(|e| e.to_string())?;
+        let mut backend = make();
+        let hits = backend.first_hits(full_region()).map_err(|e| e.to_string())?;
         check(hits.len() == 240, "wrong number of first hits")?;
-        let before = bits(&complete_film(&mut *b));
-        let part = b.first_hits(region(0, 0, 20, 2)).map_err(|e| e.to_string())?;
+        let before = bits(&complete_film(&mut *backend));
+        let upper_hits = backend.first_hits(region(0, 0, 20, 2)).map_err(|e| e.to_string())?;
         check(
-            bytemuck::cast_slice::<_, u8>(&part) == bytemuck::cast_slice::<_, u8>(&hits[..40]),
-            "the first hits of a part differ",
+            bytemuck::cast_slice::<_, u8>(&upper_hits) == bytemuck::cast_slice::<_, u8>(&hits[..40]),
+            "the first hits of the upper rows differ",
         )?;
-        check(film_bits(&mut *b) == before, "first hits change the film")
+        check(film_bits(&mut *backend) == before, "first hits change the film")
     }),
 ];
 
 /// Returns the violated sentences with the deviations.
 fn violations<'a>(packed: &'a Packed, make: &MakeBackend<'a>) -> Vec<String> {
-    let found = SENTENCES.iter().filter_map(|(sentence, holds)| {
-        let deviation = holds(packed, make).err()?;
+    let found = SENTENCES.iter().filter_map(|(sentence, test)| {
+        let deviation = test(packed, make).err()?;
         Some(format!("{sentence}: {deviation}"))
     });
     found.collect()
@@ -475,7 +512,7 @@ impl Backend for DefectiveBackend<'_> {
 }
 
 #[test]
-fn a_contract_violation_is_found() {
+fn a_contract_violation_is_detected() {
     let subjects = subjects();
     for defect in DEFECTS {
         let found = subjects.iter().any(|packed| {

@@ -30,8 +30,8 @@ normal = [0, 0, 1]
 tangent = [1, 0, 0]
 ";
 
-/// Returns a scene with n copies of `element`, in which `{i}` is the number of the copy, and `{x}`, `{y}` and `{z}` are
-/// coordinates.
+/// Returns a scene with n copies of `element`. In each copy, `{i}` is replaced by the number of the copy, and `{x}`,
+/// `{y}` and `{z}` by coordinates.
 fn scene(n: usize, element: &str) -> String {
     let mut text = START.to_owned();
     for i in 0..n {
@@ -109,14 +109,15 @@ fn packed(text: &str) -> Option<Packed> {
     scene.ok().map(|scene| pack(&scene))
 }
 
-/// Returns the CPU time of `work` in seconds. The resolution of `/proc`, several milliseconds, is too coarse.
-fn processor_time(work: impl Fn()) -> f64 {
+/// Returns the CPU time of `task` in seconds, by the clock of the thread: the resolution of `/proc`, several
+/// milliseconds, is too coarse.
+fn cpu_time(task: impl Fn()) -> f64 {
     #[cfg(unix)]
     let now = || {
         let mut time = libc::timespec { tv_sec: 0, tv_nsec: 0 };
         // SAFETY: the clock writes to a valid `timespec`.
         let result = unsafe { libc::clock_gettime(libc::CLOCK_THREAD_CPUTIME_ID, &raw mut time) };
-        assert_eq!(result, 0, "threads have no clock");
+        assert_eq!(result, 0, "the CPU time of the thread is not available");
         time.tv_sec as f64 + time.tv_nsec as f64 * 1e-9
     };
     #[cfg(not(unix))]
@@ -125,17 +126,17 @@ fn processor_time(work: impl Fn()) -> f64 {
         move || start.elapsed().as_secs_f64()
     };
     let start = now();
-    work();
+    task();
     now() - start
 }
 
-/// Returns the minimum of three measurements, in a pool of one thread that runs no work of other tests.
-fn min_of_three(work: impl Fn() + Sync) -> f64 {
+/// Returns the minimum of three measurements, in a thread pool of one thread, which runs no code of other tests.
+fn min_of_three(task: impl Fn() + Sync) -> f64 {
     let thread = rayon::ThreadPoolBuilder::new()
         .num_threads(1)
         .build()
         .expect("a thread");
-    let times = || (0..3).map(|_| processor_time(&work)).fold(f64::INFINITY, f64::min);
+    let times = || (0..3).map(|_| cpu_time(&task)).fold(f64::INFINITY, f64::min);
     thread.install(times)
 }
 
@@ -169,7 +170,7 @@ fn parsing_and_packing_take_linear_time() {
 }
 
 #[test]
-fn quadratic_work_is_found() {
+fn quadratic_time_is_detected() {
     let square = |n: u64| {
         let pairs = (0..n).flat_map(|i| (0..n).map(move |j| i ^ j));
         assert!(std::hint::black_box(pairs.max()).is_some());
@@ -179,10 +180,10 @@ fn quadratic_work_is_found() {
 }
 
 #[test]
-fn kernels_do_not_grow_with_materials_lights_and_textures() {
+fn kernels_for_large_scenes_take_no_longer_to_check() {
     for (name, element) in KINDS {
         if packed(&scene(2, element)).is_none() {
-            continue; // an invalid scene
+            continue; // only the parser is tested with this element
         }
         let [small, large] = [600, 6000].map(|n| packed(&scene(n, element)).expect("a scene"));
         let check = |packed: &Packed| check_kernels(packed, sources::shaders(), Forms::All).expect("valid kernels");
@@ -232,7 +233,7 @@ fn memory_is_a_small_multiple_of_the_scene_file() {
     let small = folder.path().join("small.toml");
     std::fs::write(&small, scene(1, SPHERE)).unwrap();
     let program = address_space(&small);
-    // docs/performance.md states 400 bytes for a sphere with its text; memory is allocated in larger pieces.
+    // docs/performance.md states 400 bytes for a sphere with its text; memory is allocated in larger chunks.
     let (code, message) = check_within(program + 65_000, &path);
     assert_eq!(code, Some(0), "{message}");
     assert!(message.contains("; 100001 shapes; "), "{message}");

@@ -63,7 +63,7 @@ fn count_culled(scenes: &[Packed], change_sphere: impl Fn(Sphere) -> Sphere) -> 
 fn culled_primitives_occlude_nothing() {
     let scenes = generated_scenes(400);
     let (culled, wrong) = count_culled(&scenes, |sphere| sphere);
-    println!("{culled} primitives were left out as occluders, {wrong} of them wrongly");
+    println!("{culled} primitives were culled, {wrong} of them wrongly");
     assert!(culled > 10_000, "only {culled} primitives were culled");
     assert_eq!(wrong, 0);
     let smaller = |sphere: Sphere| Sphere {
@@ -72,6 +72,6 @@ fn culled_primitives_occlude_nothing() {
     };
     assert!(
         count_culled(&scenes, smaller).1 > 0,
-        "spheres that are too small are not found"
+        "spheres that are too small are not detected"
     );
 }

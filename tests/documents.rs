@@ -36,9 +36,9 @@ fn prose(page: &str) -> impl Iterator<Item = &str> {
 
 fn links(page: &str) -> Vec<String> {
     let targets = |line: &str| -> Vec<String> {
-        let parts = line.split("](").skip(1);
-        parts
-            .filter_map(|part| Some(part.split_once(')')?.0.to_owned()))
+        let link_ends = line.split("](").skip(1);
+        link_ends
+            .filter_map(|link_end| Some(link_end.split_once(')')?.0.to_owned()))
             .collect()
     };
     prose(page).flat_map(targets).collect()
@@ -102,7 +102,7 @@ fn relative_links_have_existing_targets() {
 }
 
 #[test]
-fn broken_links_are_found() {
+fn broken_links_are_detected() {
     let page = "# A `b`, c\n[1](../README.md) [2](gltf.md#extensions) [3](#a-b-c) [4](https://example.com/x)\n";
     assert_eq!(broken_links(Path::new("docs/page.md"), page), Vec::<String>::new());
     for link in ["missing.md", "gltf.md#missing", "#missing", "README.md.png"] {

@@ -32,7 +32,7 @@ impl Setting {
         )
     }
 
-    fn scene(&self, from: [f64; 3], to: [f64; 3], light: [f64; 3], shapes: &str) -> Description {
+    fn scene(&self, position: [f64; 3], look_at: [f64; 3], light: [f64; 3], shapes: &str) -> Description {
         let text = format!(
             "[image]\nwidth = 48\nheight = 36\n\
              [camera]\nposition = {}\nlook_at = {}\nfov = 40\n\
@@ -41,8 +41,8 @@ impl Setting {
              [materials.dull]\ntype = 'phong'\ncolor = [0.7, 0.6, 0.5]\nspecular = [0, 0, 0]\n\
              [materials.mirror]\ntype = 'mirror'\n[materials.glass]\ntype = 'glass'\nior = 1.4\n\
              [[lights]]\ntype = 'point'\nposition = {}\ncolor = [0.8, 0.8, 0.8]\n{shapes}",
-            self.point(from),
-            self.point(to),
+            self.point(position),
+            self.point(look_at),
             self.point(light)
         );
         Description::parse(&text, "test").unwrap_or_else(|error| panic!("{error}\n{text}"))
@@ -63,8 +63,8 @@ fn settings() -> Vec<Setting> {
 const CAMERA: [f64; 3] = [0.3, -4.0, 1.5];
 const LIGHT: [f64; 3] = [2.0, -2.5, 4.0];
 
-fn assert_equal_on_all_backends(d: &Description) {
-    let packed = packed(d);
+fn assert_equal_on_all_backends(description: &Description) {
+    let packed = packed(description);
     let cpu = reference(&packed);
     for mode in exact_modes() {
         assert_eq!(differing(&render(&packed, mode), &cpu), 0, "{mode:?}");
@@ -75,9 +75,9 @@ fn assert_equal_on_all_backends(d: &Description) {
 /// than this tolerance.
 const TOLERANCE: f64 = 1e-3;
 
-fn count_wrong_pixels(d: &Description) -> usize {
-    let expected = Oracle::new(d, Flaw::None).picture();
-    let cpu = reference(&packed(d));
+fn count_wrong_pixels(description: &Description) -> usize {
+    let expected = Oracle::new(description, Flaw::None).picture();
+    let cpu = reference(&packed(description));
     let close = |(a, b): (&f64, &f64)| (a - b).abs() <= TOLERANCE;
     let pixels = means(&cpu).into_iter().zip(&expected);
     pixels.filter(|(a, b)| !a.iter().zip(*b).all(close)).count()
@@ -87,10 +87,10 @@ fn count_wrong_pixels(d: &Description) -> usize {
 fn check(radii: &[f64], max_wrong: usize, shapes: impl Fn(&Setting, f64) -> String) {
     for setting in settings() {
         for &radius in radii {
-            let d = setting.scene(CAMERA, [0.0, 0.0, 0.2], LIGHT, &shapes(&setting, radius));
-            let wrong_pixels = count_wrong_pixels(&d);
+            let description = setting.scene(CAMERA, [0.0, 0.0, 0.2], LIGHT, &shapes(&setting, radius));
+            let wrong_pixels = count_wrong_pixels(&description);
             if radius == 1e3 && setting.size == 1.0 && setting.offset != DVec3::ZERO {
-                assert_equal_on_all_backends(&d);
+                assert_equal_on_all_backends(&description);
             }
             let (size, offset) = (setting.size, setting.offset);
             assert!(
@@ -109,7 +109,7 @@ fn spheres_do_not_shadow_themselves() {
 }
 
 #[test]
-fn small_spheres_on_large_spheres_have_their_contact_shadows() {
+fn small_spheres_on_large_spheres_cast_contact_shadows() {
     check(&[100.0, 1e3, 1e4], 4, |s, radius| {
         let on_ground = |x: f64, r: f64| {
             let height = ((radius + r).powi(2) - x * x).sqrt() - radius;
@@ -120,16 +120,16 @@ fn small_spheres_on_large_spheres_have_their_contact_shadows() {
     });
 }
 
-/// The camera is near a grain of radius 1e-3. The ground is up to ten million times as large.
+/// The camera is near a grain of radius 1e-3. The sphere below the grain is up to ten million times as large.
 #[test]
-fn a_grain_on_the_largest_ground_has_its_contact_shadow() {
+fn a_grain_on_a_huge_sphere_casts_a_contact_shadow() {
     for offset in [DVec3::ZERO, DVec3::splat(1000.7)] {
         let setting = Setting { size: 1.0, offset };
         for radius in [1.0, 1e4] {
             let shapes =
                 setting.sphere("dull", [0.0, 0.0, -radius], radius) + &setting.sphere("dull", [0.0, 0.0, 1e-3], 1e-3);
-            let d = setting.scene([0.0, -0.006, 0.003], [0.0, 0.0, 0.0005], LIGHT, &shapes);
-            let found = count_wrong_pixels(&d);
+            let description = setting.scene([0.0, -0.006, 0.003], [0.0, 0.0, 0.0005], LIGHT, &shapes);
+            let found = count_wrong_pixels(&description);
             assert!(found <= 4, "radius {radius}, offset {offset}: {found} pixels");
         }
     }
@@ -156,8 +156,8 @@ fn the_inside_of_a_sphere_is_lit_from_inside_only() {
             if radius == 100.0 && setting.size == 1.0 {
                 assert_equal_on_all_backends(&outside);
             }
-            for d in [outside, inside] {
-                let found = count_wrong_pixels(&d);
+            for description in [outside, inside] {
+                let found = count_wrong_pixels(&description);
                 assert!(found <= 1, "radius {radius}, size {}: {found} pixels", setting.size);
             }
         }
@@ -169,28 +169,28 @@ fn the_inside_of_a_sphere_is_lit_from_inside_only() {
 fn adjacent_faces_do_not_shadow_each_other_at_shared_edges() {
     for setting in settings() {
         let p = |p: [f64; 3]| setting.point(p);
-        let floor = |a: [f64; 3], b: [f64; 3], c: [f64; 3]| {
+        let triangle = |a: [f64; 3], b: [f64; 3], c: [f64; 3]| {
             let vertices = [a, b, c].map(p).join(", ");
             format!("[[shapes]]\ntype = 'triangle'\nmaterial = 'dull'\nvertices = [{vertices}]\n")
         };
-        // a tilted square of two triangles, and a third triangle below as a shadow receiver
+        // A tilted square of two triangles, and a third triangle below the square that receives the shadow.
         let tilt = |x: f64, y: f64| [x, y, 0.3 * x + 0.1 * y];
         let corners = [tilt(-3.0, -3.0), tilt(3.0, -3.0), tilt(3.0, 3.0), tilt(-3.0, 3.0)];
-        let receiver = floor([-1.0, -1.0, -3.0], [1.0, -1.0, -3.0], [0.0, 1.0, -3.0]);
-        let square = floor(corners[0], corners[1], corners[2]) + &floor(corners[0], corners[2], corners[3]);
-        let d = setting.scene(
+        let receiver = triangle([-1.0, -1.0, -3.0], [1.0, -1.0, -3.0], [0.0, 1.0, -3.0]);
+        let square = triangle(corners[0], corners[1], corners[2]) + &triangle(corners[0], corners[2], corners[3]);
+        let description = setting.scene(
             [0.0, -0.01, 5.0],
             [0.0, 0.0, 0.0],
             [-6.0, 5.5, 2.0],
             &(receiver + &square),
         );
         assert_eq!(
-            count_wrong_pixels(&d),
+            count_wrong_pixels(&description),
             0,
             "a square of triangles, size {}",
             setting.size
         );
-        // a box of rectangles on a floor, and a tetrahedron beside it
+        // A box of rectangles on a floor, and a tetrahedron next to the box.
         let face = |center: [f64; 3], side: f64, normal: [f64; 3], tangent: [f64; 3]| {
             format!(
                 "[[shapes]]\ntype = 'rectangle'\nmaterial = 'dull'\ncenter = {}\nsize = [{side:?}, {side:?}]\n\
@@ -211,8 +211,8 @@ fn adjacent_faces_do_not_shadow_each_other_at_shared_edges() {
             "[[shapes]]\ntype = 'tetrahedron'\nmaterial = 'dull'\nvertices = [{}]\n",
             corners.join(", ")
         );
-        let d = setting.scene(CAMERA, [0.2, 0.0, 0.4], [-3.0, -2.0, 3.0], &(box_faces + &solid));
-        let found = count_wrong_pixels(&d);
+        let description = setting.scene(CAMERA, [0.2, 0.0, 0.4], [-3.0, -2.0, 3.0], &(box_faces + &solid));
+        let found = count_wrong_pixels(&description);
         assert!(
             found <= 2,
             "a box, size {}, offset {}: {found} pixels",
@@ -224,15 +224,15 @@ fn adjacent_faces_do_not_shadow_each_other_at_shared_edges() {
 
 /// In f64, `ray_origin` is above the surface for all sizes, by less than 1e-5 of the coordinates.
 #[test]
-fn ray_origins_are_slightly_above_their_surface() {
+fn ray_origins_are_slightly_above_the_surface() {
     let random = Random::new(5);
     let mut max_height = 0.0f64;
     for setting in settings() {
         for radius in [1e-3, 0.1, 1.0, 1e2, 1e4] {
             let shapes = setting.sphere("dull", [0.0, 0.0, -radius], radius);
             let distance = 3.0 * radius.min(1.0);
-            let d = setting.scene([0.0, -distance, 0.4 * distance], [0.0, 0.0, 0.0], LIGHT, &shapes);
-            let (scene, size) = (packed(&d), setting.size);
+            let description = setting.scene([0.0, -distance, 0.4 * distance], [0.0, 0.0, 0.0], LIGHT, &shapes);
+            let (scene, size) = (packed(&description), setting.size);
             let center = DVec3::new(0.0, 0.0, -radius) * size + setting.offset - scene.origin;
             for _ in 0..2000 {
                 let pixel = glam::Vec2::new((random.unit() * 48.0) as f32, (random.unit() * 36.0) as f32);
@@ -251,6 +251,8 @@ fn ray_origins_are_slightly_above_their_surface() {
             }
         }
     }
-    println!("ray origins are at most {max_height:.1e} of the distance above their surface");
+    println!(
+        "the maximum height of ray origins above the surface is {max_height:.1e}, relative to the largest coordinate or the distance"
+    );
     assert!(max_height < 1e-5, "{max_height}");
 }

@@ -1,7 +1,7 @@
 //! Random inputs for the probes of CPU and GPU functions. To cover every branch, most arguments are consistent, such as
 //! a primitive and a ray to the primitive's interior, to its edge or past it. Some components are replaced: by edge
-//! values, by other components, by multiples of 1/2 so that comparisons find equal values, or by values of any
-//! magnitude.
+//! values, by neighboring floats, by other components, by multiples of 1/2 so that comparisons find equal values, or
+//! by values of any magnitude.
 
 use bytemuck::Zeroable as _;
 use glam::{DMat3, DVec2, DVec3, UVec2, UVec4, Vec2, Vec3, Vec4};
@@ -56,8 +56,8 @@ const EDGES: &[f32] = &[
     8_388_608.0,
     16_777_216.0,
     -126.5,
-    0.0001, // minimum and maximum width in procedural.wgsl
-    4096.0,
+    0.0001,
+    4096.0, // MAX_EXTENT in procedural.wgsl
     0.333_333_34,
 ];
 
@@ -84,7 +84,7 @@ fn write_call(function: &Function, random: &Random, words: &mut Vec<u32>) {
                 *word = match mode {
                     0 => any_float(random),
                     1 if random.once_in(4) => random.pick(EDGES),
-                    2 if random.once_in(8) => neighbour(x, random),
+                    2 if random.once_in(8) => neighbor(x, random),
                     3 => (x * 2.0).round() / 2.0,
                     4 if random.once_in(4) => previous,
                     _ => x,
@@ -101,7 +101,7 @@ fn any_float(random: &Random) -> f32 {
     (sign * random.magnitude(-44.0, 38.0)) as f32
 }
 
-fn neighbour(x: f32, random: &Random) -> f32 {
+fn neighbor(x: f32, random: &Random) -> f32 {
     let step = random.pick(&[-2, -1, 1, 2]);
     f32::from_bits(x.to_bits().wrapping_add_signed(step))
 }
@@ -193,8 +193,8 @@ impl Face {
     }
 
     fn hit_primitive(&self, random: &Random) -> HitPrimitive {
-        let i = &self.instance;
-        let columns = [i.u, i.v, i.w].map(Vec3::as_dvec3);
+        let instance = &self.instance;
+        let columns = [instance.u, instance.v, instance.w].map(Vec3::as_dvec3);
         let to_world = DMat3::from_cols(columns[0], columns[1], columns[2]);
         let [edge_1, edge_2] = self.edges().map(|edge| (to_world * edge).as_vec3());
         let normal = edge_1.as_dvec3().cross(edge_2.as_dvec3()).normalize_or(DVec3::Z);
@@ -212,7 +212,7 @@ impl Face {
         let uv = || Vec2::new(random.unit() as f32, random.unit() as f32);
         let uv_0 = uv();
         HitPrimitive {
-            primitive: face_primitive(i, self.corners[0].as_vec3(), edge_1, edge_2, random.below(4)),
+            primitive: face_primitive(instance, self.corners[0].as_vec3(), edge_1, edge_2, random.below(4)),
             edge_1,
             edge_2,
             uv_0,
@@ -224,8 +224,8 @@ impl Face {
             tangents_0,
             tangents_1,
             tangents_2,
-            anchor: i.anchor,
-            condition_number: i.condition_number,
+            anchor: instance.anchor,
+            condition_number: instance.condition_number,
         }
     }
 
@@ -283,7 +283,7 @@ fn point_of(corners: &[DVec3; 3], barycentric: DVec2) -> DVec3 {
     a + (b - a) * barycentric.x + (c - a) * barycentric.y
 }
 
-/// Functions whose arguments come from a [`Face`].
+/// Functions whose vector arguments come from a [`Face`].
 const FACE_FUNCTIONS: &[&str] = &[
     "slabs",
     "box_interval",
@@ -316,7 +316,7 @@ impl Situation {
             .iter()
             .position(|kind| function.contains(&kind.name.to_lowercase()));
         let kind = kind_in_name.map_or(random_kind, |kind| kind as u32);
-        // The anchor of a solid is on or near the surface of the solid.
+        // Half of the solids have their anchor on or near the surface, the others at the center.
         let (mut middle, mut level) = (DVec3::ZERO, -1.0);
         if kind == ELLIPSOID && random.once_in(2) {
             middle = -local_point(kind, random).normalize_or(DVec3::Z) * random.pick(&[1.0, 1.0, 1.1]);
@@ -561,7 +561,7 @@ impl Situation {
         }
     }
 
-    /// Returns a light-tree node with children around the target or the shaded point.
+    /// Returns a light-tree node whose children are at the target or around it.
     fn light_node(&self, random: &Random) -> LightNode {
         let children = [(); 4].map(|()| {
             let center = self.target + vector(random) * random.pick(&[0.0, 0.0, self.direction.length()]);
@@ -657,7 +657,7 @@ fn alpha(random: &Random) -> Vec2 {
     random.pick(&[Vec2::splat(x), Vec2::new(x, component())])
 }
 
-/// Returns a vector of a length above 0.1.
+/// Returns a vector that is longer than 0.1, with components from -1 to 1.
 fn vector(random: &Random) -> DVec3 {
     loop {
         let v = DVec3::from_array([(); 3].map(|()| random.between(-1.0, 1.0)));
@@ -671,7 +671,7 @@ fn color(random: &Random) -> Vec3 {
     Vec3::from_array([(); 3].map(|()| random.unit() as f32))
 }
 
-/// Returns a point in local space on or near a primitive of a kind, sometimes at an edge or a corner.
+/// Returns a point in local space on or near a primitive of kind `kind`, sometimes at an edge or a corner.
 fn local_point(kind: u32, random: &Random) -> DVec3 {
     let coordinate = || random.between(-1.2, 1.2);
     let p = DVec3::new(coordinate(), coordinate(), coordinate());
@@ -719,7 +719,7 @@ fn hit_differential(random: &Random) -> HitDifferential {
     }
 }
 
-/// Returns a footprint from a point to many repetitions of a texture, axis-aligned or not.
+/// Returns a footprint of any size from a point to many repetitions of the texture, axis-aligned or not.
 fn footprint(random: &Random) -> Footprint {
     let uv = Vec2::new(random.between(-3.0, 3.0) as f32, random.between(-3.0, 3.0) as f32);
     let size = random.magnitude(-4.0, 1.5);

@@ -24,7 +24,7 @@ use crate::scenes;
 #[derive(Default)]
 struct MemoryStore {
     pieces: BTreeMap<u32, FilmPiece>,
-    /// Negative control: loses the progress of unfinished pieces.
+    /// True for a negative control that loses the progress of unfinished pieces.
     forgetful: bool,
 }
 
@@ -87,8 +87,8 @@ fn render_dispatches(
         bands = bands.as_a_whole(packed.film_layout()).expect("memory");
     }
     let mut dispatches = 0;
-    let mut watch = |_: &mut dyn Backend, _: Region, share: f64| {
-        assert!((0.0..=1.0 + 1e-9).contains(&share), "{share}");
+    let mut watch = |_: &mut dyn Backend, _: Region, fraction: f64| {
+        assert!((0.0..=1.0 + 1e-9).contains(&fraction), "{fraction}");
         dispatches += 1;
         Ok(Flow::from(dispatches < max_dispatches))
     };
@@ -146,7 +146,7 @@ fn splits() -> [WorkSplit; 3] {
 }
 
 #[test]
-fn interrupted_and_resumed_work_gives_the_same_film() {
+fn interrupted_and_resumed_jobs_give_the_same_film() {
     for packed in subjects() {
         let expected = bits(&pictures::film(
             &mut Cpu::new(&packed),
@@ -157,7 +157,8 @@ fn interrupted_and_resumed_work_gives_the_same_film() {
         for (split, max_dispatches) in splits().into_iter().zip([1, 23, 57]) {
             for at_once in [false, true] {
                 let mut store = MemoryStore::default();
-                let film = render_interrupted(&packed, &mut store, &split, at_once, max_dispatches).expect("an end");
+                let film =
+                    render_interrupted(&packed, &mut store, &split, at_once, max_dispatches).expect("a complete film");
                 assert!(
                     bits(&film) == expected,
                     "{split:?}, all at once: {at_once}, {:?}",
@@ -168,9 +169,9 @@ fn interrupted_and_resumed_work_gives_the_same_film() {
     }
 }
 
-/// Negative control: the film differs.
+/// Negative control: the film differs, or the job does not complete.
 #[test]
-fn a_store_that_loses_progress_is_found() {
+fn a_store_that_loses_progress_is_detected() {
     let [packed, ..] = subjects();
     let expected = bits(&pictures::film(
         &mut Cpu::new(&packed),
@@ -318,11 +319,11 @@ fn open(
 ) -> Result<(Checkpoint<'static>, Vec<String>), CheckpointError> {
     let (sender, warnings) = std::sync::mpsc::channel();
     let mut rounds = 0;
-    let opening = CheckpointOptions {
+    let options = CheckpointOptions {
         path: path.to_owned(),
         resume: true,
         interval: Duration::ZERO,
-        // A child process of another test briefly inherits the file and the lock.
+        // A child process of another test may inherit the file and the lock for a short time.
         wait: Box::new(move || {
             rounds += 1;
             assert!(rounds < 200, "another process still writes the checkpoint");
@@ -330,7 +331,7 @@ fn open(
         }),
         report: Box::new(move |warning| sender.send(warning.to_owned()).expect("a receiver")),
     };
-    let checkpoint = Checkpoint::open(opening, identity.clone(), packed.film_layout())?;
+    let checkpoint = Checkpoint::open(options, identity.clone(), packed.film_layout())?;
     Ok((checkpoint, warnings.try_iter().collect()))
 }
 

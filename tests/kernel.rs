@@ -101,7 +101,7 @@ impl Function<'_> {
 
     /// Returns an expression that reads a value of a type from `probe_in`, starting at word `next`.
     fn read(&self, ty: Handle<Type>, next: &mut u32) -> String {
-        let list = |parts: Vec<String>| format!("{}({})", type_name(self.module, ty), parts.join(", "));
+        let list = |components: Vec<String>| format!("{}({})", type_name(self.module, ty), components.join(", "));
         match &self.module.types[ty].inner {
             TypeInner::Scalar(s) => read_word(s.kind, next),
             TypeInner::Vector { size, scalar } => {
@@ -153,7 +153,7 @@ impl Function<'_> {
         self.run_rounded(device, shared, words, Rounding::Device)
     }
 
-    /// Like [`Function::run_in`], but with software or native division and square roots.
+    /// Like [`Function::run_in`], but `rounding` selects software or device division and square roots.
     pub fn run_rounded(&self, device: &Device, shared: &Source, words: &[u32], rounding: Rounding) -> Vec<u32> {
         let mut source = shared.clone();
         source.append("probe", &self.kernel());

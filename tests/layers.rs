@@ -1,4 +1,4 @@
-//! Averaged layers and alpha: sums, closed forms, and equal bits on all backends.
+//! Averaged layers and alpha: sums, closed-form values, and equal bits on all backends.
 
 use glam::{Vec3, Vec4};
 use wgray::scene::ViewSettings;
@@ -120,9 +120,13 @@ fn layers_do_not_depend_on_backend_or_work_split() {
                 assert_eq!(differing(&found, &expected), 0, "{name}, {mode:?}, {split:?}");
             }
             for (x0, y0, x1, y1) in [(0, 0, 1, 1), (3, 2, 20, 11), (23, 15, 24, 16)] {
-                let part = Region { x0, y0, x1, y1 };
-                let found = film(&mut *backend, &packed, part, &WorkSplit::default());
-                assert_eq!(differing(&found, &crop(&expected, part)), 0, "{name}, {mode:?}, {part}");
+                let region = Region { x0, y0, x1, y1 };
+                let found = film(&mut *backend, &packed, region, &WorkSplit::default());
+                assert_eq!(
+                    differing(&found, &crop(&expected, region)),
+                    0,
+                    "{name}, {mode:?}, {region}"
+                );
             }
         }
         let mut reseeded = packed.clone();
@@ -226,7 +230,7 @@ tangent = [1, 0, 0]
     )
 }
 
-/// Returns the film, which must be equal for all exact configurations.
+/// Asserts that all exact modes render the same film, and returns the film.
 fn render_all_modes(packed: &Packed) -> Film {
     let expected = reference(packed);
     for mode in exact_modes() {
@@ -236,13 +240,13 @@ fn render_all_modes(packed: &Packed) -> Film {
 }
 
 #[test]
-fn layers_of_a_flat_shape() {
+fn layers_of_a_flat_shape_match_its_normal_and_material() {
     for behind in [false, true] {
         let film = render_all_modes(&parse(&rectangle_scene((3, 1), [0.0, 0.0], "", behind)).with_layers());
         for (pixel, alpha) in [(0, 0.0), (1, 1.0), (2, 0.0)] {
             let layer = |layer| Vec3::from(film.layer(layer, pixel));
             assert_eq!(film.alpha(pixel), alpha);
-            assert_eq!(layer(Layer::Normal), Vec3::NEG_Y * alpha, "behind {behind}");
+            assert_eq!(layer(Layer::Normal), Vec3::NEG_Y * alpha, "from behind: {behind}");
             assert_eq!(layer(Layer::Albedo), Vec3::new(0.25, 0.5, 0.75) * alpha);
             let background = Vec3::new(0.5, 0.25, 2.0) * (1.0 - alpha);
             assert_eq!(layer(Layer::Emission), Vec3::new(0.5, 0.25, 4.0) * alpha + background);
@@ -251,7 +255,7 @@ fn layers_of_a_flat_shape() {
 }
 
 #[test]
-fn mean_normals_of_flat_surfaces_equal_the_first_hits() {
+fn mean_normals_of_flat_surfaces_equal_the_normals_of_first_hits() {
     let packed = parse(SCENE).with_layers();
     let (film, hits) = (reference(&packed), first_hits(&packed, RenderMode::Cpu));
     let (mut flat, mut shortened) = (0, 0);
@@ -270,7 +274,7 @@ fn mean_normals_of_flat_surfaces_equal_the_first_hits() {
     );
     assert!(
         shortened > 20,
-        "mean normals are normalized: only {shortened} pixels of the sphere are shorter"
+        "mean normals are normalized: only {shortened} normals of the sphere are shorter than 1"
     );
 }
 
@@ -327,7 +331,7 @@ tangent = [1, 0, 0]
     assert_eq!(
         film.layer(Layer::Normal, 0),
         [0.0, -1.0, 0.0],
-        "the layer does not have the normal of the mirror"
+        "the layer does not contain the normal of the mirror"
     );
 }
 
@@ -363,7 +367,7 @@ fn alpha_is_the_fraction_of_samples_that_hit() {
 }
 
 #[test]
-fn negative_filter_lobes_exceed_the_range_of_alpha() {
+fn negative_filter_lobes_give_negative_alpha() {
     let filter = "filter = { type = \"mitchell\" }\nalpha = true";
     let text =
         rectangle_scene((7, 1), [-1.0, 0.0], filter, false).replace("\"grid\", count = 16", "\"sobol\", count = 1024");
@@ -408,7 +412,7 @@ fn floats(picture: &Picture, name: &str) -> Vec<f32> {
 }
 
 #[test]
-fn the_library_has_layers_and_alpha() {
+fn the_library_returns_layers_and_alpha() {
     let text = rectangle_scene((3, 1), [0.5, 0.0], "alpha = true", false);
     let with_alpha = picture(&text, vec![Aov::Albedo, Aov::ShadingNormal, Aov::Depth]);
     assert_eq!(with_alpha.alpha(), Some(vec![0.0, 0.5, 0.5]));
@@ -475,7 +479,11 @@ fn path_layers_are_rejected_with_other_integrators() {
         assert_eq!(message, expected, "{name}");
     }
     let packed = wgray_render::pack::pack(&scene);
-    assert_eq!(packed.clone().with_layers(), packed, "layers change the film");
+    assert_eq!(
+        packed.clone().with_layers(),
+        packed,
+        "`with_layers` changes a scene of another integrator"
+    );
 }
 
 #[test]

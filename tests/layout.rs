@@ -39,13 +39,15 @@ fn layout_problems(module: &Module, (name, bytes): (&str, u32)) -> Vec<String> {
         offset = member.offset + layouter[member.ty].size;
     }
     if (offset, *span) != (bytes, bytes) {
-        problems.push(format!("{name} has {offset} bytes of {span} in WGSL, {bytes} in Rust"));
+        problems.push(format!(
+            "{name} ends at byte {offset} and has a size of {span} bytes in WGSL, {bytes} bytes in Rust"
+        ));
     }
     problems
 }
 
 #[test]
-fn records_have_the_same_layout() {
+fn records_have_the_same_layout_in_wgsl_and_rust() {
     let module = parse(&shared_source());
     let sizes = [
         size::<Camera>(),
@@ -73,7 +75,7 @@ fn records_have_the_same_layout() {
 }
 
 #[test]
-fn a_record_with_padding_is_found() {
+fn a_record_with_padding_is_detected() {
     for text in [
         "struct Odd { a: f32, b: vec3f, c: f32 }",
         "struct Odd { a: vec3f, b: u32, c: vec2u }",
@@ -87,7 +89,7 @@ fn a_record_with_padding_is_found() {
 }
 
 #[test]
-fn constants_match() {
+fn constants_match_in_wgsl_and_rust() {
     let module = parse(&shared_source());
     let value = |name: &str| {
         let (_, constant) = module

@@ -15,8 +15,8 @@ const SIDE: u32 = 64;
 /// Field of view in degrees.
 const FOV: f64 = 10.0;
 
-/// Returns a scene with an emissive disk of radius 0.005 `distance`. The camera is at the origin and looks along y;
-/// `lens` holds lines of `[camera]`.
+/// Returns a scene with an emissive disk of radius 0.005 * `distance`. The camera is at the origin and looks along y;
+/// `lens` contains more lines of the `[camera]` table.
 fn disk_scene(distance: f64, lens: &str, samples: u32) -> Packed {
     let radius = 0.005 * distance;
     parse(&format!(
@@ -43,8 +43,8 @@ fn disk_scene(distance: f64, lens: &str, samples: u32) -> Packed {
     ))
 }
 
-/// Returns the number of pixels per unit at distance 1.
-fn pixels() -> f64 {
+/// Returns the number of pixels per unit of length at distance 1.
+fn pixels_per_unit() -> f64 {
     f64::from(SIDE) / 2.0 / (FOV / 2.0).to_radians().tan()
 }
 
@@ -58,7 +58,7 @@ fn pixel_offset(i: usize) -> (f64, f64) {
 /// Returns two relative errors in the image of a disk that is blurred to `radius` at distance 1: the maximum error of
 /// the mean radiance in rings, and the error of the total radiance.
 fn relative_errors(picture: &[[f64; 3]], radius: f64) -> (f64, f64) {
-    let (circle_radius, disk_radius) = (radius * pixels(), 0.005 * pixels());
+    let (circle_radius, disk_radius) = (radius * pixels_per_unit(), 0.005 * pixels_per_unit());
     // The fraction of the aperture that sees the disk.
     let aperture_fraction = disk_radius * disk_radius / (circle_radius * circle_radius);
     let mut worst = 0.0_f64;
@@ -130,7 +130,7 @@ fn the_focus_plane_is_sharp() {
         let focused = means(&render(&disk_scene(5.0, lens, 256), mode));
         let pinhole = means(&render(&disk_scene(5.0, "", 256), mode));
         let defocused = means(&render(&disk_scene(5.5, lens, 256), mode));
-        // The pixel samples are equal up to rounding at the edge of the disk.
+        // In focus, the images differ only by rounding at the edge of the disk, because the pixel samples are the same.
         let difference = |a: &[[f64; 3]]| a.iter().zip(&pinhole).map(|(a, b)| (a[0] - b[0]).abs()).sum::<f64>();
         assert!(difference(&focused) < 0.05, "{mode:?}: {}", difference(&focused));
         assert!(difference(&defocused) > 1.0, "{mode:?}: {}", difference(&defocused));
@@ -150,7 +150,7 @@ fn blades_give_a_polygon_with_a_corner_at_the_top() {
             > 0.0
     };
     for mode in both() {
-        let circle_radius = 0.2 * (1.0 / 4.0 - 1.0 / 12.0) * pixels();
+        let circle_radius = 0.2 * (1.0 / 4.0 - 1.0 / 12.0) * pixels_per_unit();
         let point_at = |degrees: f64| {
             let (sin, cos) = (90.0 + degrees).to_radians().sin_cos();
             (0.8 * circle_radius * cos, 0.8 * circle_radius * sin)
@@ -206,8 +206,8 @@ fn apertures_are_sampled_uniformly() {
 
 #[test]
 fn lens_samples_are_stratified_and_independent_of_pixel_samples() {
-    // Each quarter of the lens gets 4 of 16 samples. Over 64 pixels, each pair of a pixel quarter and a
-    // lens quarter gets 64 samples.
+    // Each quarter of the lens gets about 4 of the 16 samples of a pixel. Over 64 pixels, each pair of a pixel quarter
+    // and a lens quarter gets about 64 samples.
     let packed = disk_scene(12.0, "aperture = 2\nfocus_distance = 1", 16);
     let mut counts = [[0_u32; 4]; 4];
     for pixel in 0..64 {
@@ -217,7 +217,7 @@ fn lens_samples_are_stratified_and_independent_of_pixel_samples() {
             let ray = wgray_render::cpu::pixel::camera_sample(&packed, pixel, sample).ray;
             let lens = ray.origin / packed.camera.lens_u.length();
             let image_point =
-                (ray.direction / ray.direction.y + ray.origin * packed.camera.inverse_focus) * pixels() as f32;
+                (ray.direction / ray.direction.y + ray.origin * packed.camera.inverse_focus) * pixels_per_unit() as f32;
             let sample_point =
                 Vec2::new(image_point.x + SIDE as f32 / 2.0, SIDE as f32 / 2.0 - image_point.z) - pixel.as_vec2();
             // The square-to-disk mapping preserves the sectors between the diagonals, which have equal areas.
@@ -258,7 +258,7 @@ fn lens_rays_converge_in_the_focus_plane() {
 }
 
 #[test]
-fn limits_of_the_ranges_render_equally() {
+fn parameter_limits_render_equally_in_all_modes() {
     let pinhole = disk_scene(12.0, "", 16);
     for aperture in ["0", "1e-300", "1e-9", "1", "1e9"] {
         for focus in ["1e-9", "1e-3", "1e9"] {

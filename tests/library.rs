@@ -158,7 +158,7 @@ fn invalid_options_are_rejected() {
 }
 
 #[test]
-fn a_crop_equals_its_part_of_the_image() {
+fn a_crop_equals_the_region_of_the_full_image() {
     let region = Region {
         x0: 5,
         y0: 3,
@@ -167,25 +167,25 @@ fn a_crop_equals_its_part_of_the_image() {
     };
     let aovs = vec![Aov::Depth, Aov::Normal, Aov::Primitive];
     let full = Options { aovs, ..cpu_options() };
-    let part = Options {
+    let crop = Options {
         crop: Some(region),
         ..full.clone()
     };
-    let (full, part) = (
+    let (full, crop) = (
         wgray::render(&scene(), &full).unwrap(),
-        wgray::render(&scene(), &part).unwrap(),
+        wgray::render(&scene(), &crop).unwrap(),
     );
-    assert_eq!(part.region(), region);
+    assert_eq!(crop.region(), region);
     for name in ["R", "G", "B", "depth.Z", "normal.X", "normal.Z"] {
         let rows = floats(&full, name);
         let cropped = rows.chunks(24).take(11).skip(3).flat_map(|row| row[5..20].to_vec());
-        assert_eq!(floats(&part, name), cropped.collect::<Vec<_>>(), "{name}");
+        assert_eq!(floats(&crop, name), cropped.collect::<Vec<_>>(), "{name}");
     }
-    let Some(Channel::Whole(shapes)) = part.channel("primitive.ID") else {
+    let Some(Channel::Whole(shapes)) = crop.channel("primitive.ID") else {
         panic!("no shapes")
     };
     assert!(shapes.contains(&0) && shapes.contains(&1));
-    assert_eq!(part.channel("uv.U"), None);
+    assert_eq!(crop.channel("uv.U"), None);
 }
 
 #[test]

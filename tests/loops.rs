@@ -13,19 +13,19 @@ use crate::sources::{self, edited, edited_shaders, with};
 use crate::{adapter, patterns, scenes};
 
 fn small(name: &str, size: (u32, u32), pixel_samples: u32, light_samples: u32) -> Description {
-    let mut d = scenes::scene(name);
-    (d.image.width, d.image.height) = size;
-    d.render.pixel_samples = patterns::samples(Pattern::Grid, pixel_samples);
-    d.render.light_samples = patterns::samples(Pattern::Grid, light_samples);
-    d
+    let mut description = scenes::scene(name);
+    (description.image.width, description.image.height) = size;
+    description.render.pixel_samples = patterns::samples(Pattern::Grid, pixel_samples);
+    description.render.light_samples = patterns::samples(Pattern::Grid, light_samples);
+    description
 }
 
 fn spheres(count: u32) -> Description {
-    let mut d = small("cornell.toml", (4, 3), 1, 1);
-    let Some(material) = d.materials.keys().next().cloned() else {
+    let mut description = small("cornell.toml", (4, 3), 1, 1);
+    let Some(material) = description.materials.keys().next().cloned() else {
         panic!("a scene without materials")
     };
-    d.shapes.extend((0..count).map(|i| {
+    description.shapes.extend((0..count).map(|i| {
         let coordinate = |k: u32| f64::from(i.wrapping_mul(k) % 1009) / 1009.0;
         ShapeDescription::Sphere(SphereDescription {
             material: material.clone(),
@@ -38,16 +38,16 @@ fn spheres(count: u32) -> Description {
             radius: 0.003,
         })
     }));
-    d
+    description
 }
 
 /// Returns planes below the floor, which are not in the BVH.
 fn planes(count: u32) -> Description {
-    let mut d = small("cornell.toml", (4, 3), 1, 1);
-    let Some(material) = d.materials.keys().next().cloned() else {
+    let mut description = small("cornell.toml", (4, 3), 1, 1);
+    let Some(material) = description.materials.keys().next().cloned() else {
         panic!("a scene without materials")
     };
-    d.shapes.extend((0..count).map(|i| {
+    description.shapes.extend((0..count).map(|i| {
         let point = [0.0, 0.0, -1.0 - f64::from(i) * 1e-3];
         ShapeDescription::Plane(PlaneDescription::new(
             &material,
@@ -56,7 +56,7 @@ fn planes(count: u32) -> Description {
             [1.0, 0.0, 0.0],
         ))
     }));
-    d
+    description
 }
 
 fn try_render(packed: &Packed, mode: RenderMode, shaders: &Shaders) -> Result<Film, RenderError> {
@@ -77,7 +77,8 @@ fn try_render(packed: &Packed, mode: RenderMode, shaders: &Shaders) -> Result<Fi
     Ok(film)
 }
 
-/// Returns shaders that loop `rounds` times in the first dispatch and add the iterations to red.
+/// Returns shaders that loop `rounds` times in the first dispatch and add the number of iterations to the
+/// red channel.
 fn looping(rounds: u32) -> Shaders {
     assert_eq!(rounds % 4, 0);
     let (file, store) = ("kernels/render.wgsl", "    film[index] = sum;");
@@ -93,7 +94,7 @@ fn looping(rounds: u32) -> Shaders {
     edited_shaders(file, store, &looping)
 }
 
-/// Returns true if the red sums of `film` exceed those of `plain` by `rounds`: all rounds of the loop were executed.
+/// Returns true if the red sums of `film` exceed those of `plain` by `rounds`, so that no iteration is missing.
 fn has_rounds(film: &Film, plain: &Film, rounds: u32) -> bool {
     let matches = |(a, b): (&glam::Vec4, &glam::Vec4)| a.x == b.x + rounds as f32 && a.y == b.y;
     film.sums.iter().zip(&plain.sums).all(matches)
@@ -133,10 +134,10 @@ fn long_renders_are_complete() {
         ("mirrors and glass", small("mirror-glass.toml", (8, 6), 100, 64)),
         ("textures", small("textures.toml", (8, 6), 100, 64)),
         ("many spheres", {
-            let mut d = spheres(100);
-            d.render.pixel_samples = patterns::samples(Pattern::Grid, 256);
-            d.render.light_samples = patterns::samples(Pattern::Grid, 64);
-            d
+            let mut description = spheres(100);
+            description.render.pixel_samples = patterns::samples(Pattern::Grid, 256);
+            description.render.light_samples = patterns::samples(Pattern::Grid, 64);
+            description
         }),
         ("adaptive", adaptive),
     ] {
@@ -154,7 +155,7 @@ fn long_renders_are_complete() {
 }
 
 #[test]
-fn too_long_samples_are_errors_or_correct() {
+fn samples_with_too_many_iterations_are_errors_or_correct() {
     if adapter::device().is_none() {
         return;
     }

@@ -25,7 +25,7 @@ render = { integrator = 'path', pixel_samples = 2 }
 environment = { name = 'studio' }
 ";
 
-/// Returns all files below a folder.
+/// Returns all files below a folder with their contents.
 fn files_of(folder: &Path) -> MemoryFiles {
     let mut files = MemoryFiles::new();
     let mut folders = vec![PathBuf::new()];
@@ -42,7 +42,7 @@ fn files_of(folder: &Path) -> MemoryFiles {
     files
 }
 
-/// A folder with models of all formats that refer to other files.
+/// Returns a folder with a scene and models in all formats, some of which refer to other files.
 fn models() -> TestFolder {
     let folder = TestFolder::with_file(
         "s.toml",
@@ -59,7 +59,7 @@ fn models() -> TestFolder {
         "a.obj",
         "mtllib A.MTL\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nusemtl m\nf 1/1 2/2 3/3\n",
     );
-    // Names that differ in the case of letters, and a Windows path.
+    // References to these files differ in the case of letters, and one reference is a Windows path.
     folder.write("a.mtl", "newmtl m\nKd 1 1 1\nmap_Kd C:\\textures\\Color.PNG\n");
     let color = image::RgbImage::from_fn(2, 2, |x, y| image::Rgb([100, 50 * x as u8, 200 * y as u8]));
     color.save(folder.path("color.png")).unwrap();
@@ -83,8 +83,8 @@ fn models() -> TestFolder {
     folder
 }
 
-/// Loads a file from disk, from a folder as a source, and from memory, and asserts that all are equal. Returns the
-/// result.
+/// Loads a file from disk, from a folder as a source, and from memory, and asserts that the scenes or the
+/// errors are equal. Returns the result from memory.
 fn load_all(folder: &Path, name: &str, overrides: &Overrides) -> Result<Scene, String> {
     let path = folder.join(name);
     let bytes = std::fs::read(&path).unwrap();
@@ -102,9 +102,9 @@ fn load_all(folder: &Path, name: &str, overrides: &Overrides) -> Result<Scene, S
                 *file = relative.unwrap_or(file).to_owned();
             }
             scene.files.sort();
-            let libraries = |scene: &Scene| format!("{:?}", scene.notes);
+            let notes = |scene: &Scene| format!("{:?}", scene.notes);
             (
-                libraries(&scene),
+                notes(&scene),
                 scene.files,
                 scene.materials,
                 scene.material_names,
@@ -174,7 +174,7 @@ fn scenes_in_subfolders_find_their_files() {
     assert_eq!(names.len(), 3, "{names:?}");
 }
 
-/// Asserts that all errors and warnings equal those of files, too.
+/// `load_all` also asserts that errors from memory equal errors from disk.
 #[test]
 fn errors_have_file_line_and_rule() {
     let folder = models();
@@ -310,7 +310,7 @@ fn no_file_is_read_and_no_error_reveals_which_files_exist() {
         );
         assert!(requested.contains(&"Cargo.toml".to_owned()), "{requested:?}");
     }
-    // A model with references: all of them are requested from the source.
+    // All files that a model refers to are requested from the source.
     let denied = DenyAll::default();
     let options = LoadOptions::new().with_name("models/a").with_source(denied.clone());
     let scene = Scene::from_slice(&folder.read("a.obj"), SceneFormat::Mesh(MeshFormat::Obj), &options).unwrap();
@@ -365,7 +365,7 @@ radius = 1
     let scene = Scene::from_slice(text.as_bytes(), SceneFormat::Toml, &options).unwrap();
     assert_eq!((scene.width, scene.shapes.len(), scene.textures.len()), (8, 2, 2));
     assert_eq!(scene.files, [PathBuf::from("color.png")]);
-    // A description uses the files of a source, too.
+    // A description also uses the files of a source.
     let description = Description::parse(&text, "s.toml").unwrap();
     let mut assets = Assets::from_source(files_of(models().folder()));
     let error = description.validate_with(&assets).unwrap_err().to_string();
@@ -481,12 +481,12 @@ fn images_are_decoded_from_bytes() {
     }
 }
 
-/// Fails after some bytes, like a full disk.
-struct Full {
+/// A writer that fails after `left` bytes, like a full disk.
+struct FullDisk {
     left: usize,
 }
 
-impl Write for Full {
+impl Write for FullDisk {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         self.left = self.left.checked_sub(bytes.len()).ok_or(io::ErrorKind::StorageFull)?;
         Ok(bytes.len())
@@ -497,7 +497,7 @@ impl Write for Full {
     }
 }
 
-impl Seek for Full {
+impl Seek for FullDisk {
     fn seek(&mut self, _: SeekFrom) -> io::Result<u64> {
         Ok(0)
     }
@@ -542,7 +542,7 @@ fn images_written_to_memory_equal_files() {
                 );
             }
             for left in [0, 20, 60] {
-                let error = picture.write_to(Full { left }, format, options).unwrap_err();
+                let error = picture.write_to(FullDisk { left }, format, options).unwrap_err();
                 assert!(!error.to_string().is_empty());
             }
         }
@@ -555,7 +555,7 @@ fn images_written_to_memory_equal_files() {
 }
 
 #[test]
-fn sources_have_only_their_files() {
+fn asset_sources_contain_only_their_files() {
     let files = MemoryFiles::new()
         .with("./a/b.png", *b"x")
         .with("/c", *b"x")

@@ -48,14 +48,14 @@ fn every_mutation_is_applicable() {
     let (missing, count) = missing(&table.parse().unwrap(), read);
     assert!(
         missing.is_empty(),
-        "not in the source any more:\n{}",
+        "texts that a mutation replaces, but that are not in the source:\n{}",
         missing.join("\n")
     );
     assert!(count > 100, "{count}");
 }
 
 #[test]
-fn a_missing_text_is_found() {
+fn a_missing_text_is_detected() {
     let table = "[[a]]\nboth = ['x + y', 'x - y']\n[[a]]\nwgsl = ['p', 'q']\nrust = ['r', 's']"
         .parse()
         .unwrap();

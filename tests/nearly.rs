@@ -6,8 +6,8 @@ use std::fmt;
 use wgray_render::film::Film;
 use wgray_render::records::Packed;
 
-/// Maximum error of a pixel, relative to the largest channel of the pixel, because patterns subtract nearly equal
-/// integrals in dark channels.
+/// Maximum error of a pixel, relative to the largest channel of the pixel, because procedural patterns subtract nearly
+/// equal integrals in dark channels.
 const MAX_PIXEL_ERROR: f64 = 1e-4;
 /// Replaces `MAX_PIXEL_ERROR` for scenes with textures on devices other than software Vulkan, where a texture
 /// coordinate that differs by one ulp may select another texel.
@@ -24,7 +24,7 @@ const MAX_MEAN_ERROR: f64 = 1e-5;
 /// Difference of a GPU film from a CPU film, or the sum over several pairs of films.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct FilmDifference {
-    /// Non-finite pixels; must be 0.
+    /// Number of GPU pixels that are not finite; must be 0.
     non_finite: usize,
     /// Number of outliers.
     outliers: usize,
@@ -42,15 +42,15 @@ impl FilmDifference {
 
     /// Uses the tolerances for devices other than software Vulkan, which are larger for textures and small images.
     pub fn loose(packed: &Packed, gpu: &Film, cpu: &Film) -> FilmDifference {
-        let relative = if packed.textures.records.is_empty() {
+        let max_pixel_error = if packed.textures.records.is_empty() {
             MAX_PIXEL_ERROR
         } else {
             MAX_PIXEL_ERROR_TEXTURED
         };
-        FilmDifference::with_limits(relative, MIN_SIDE, gpu, cpu)
+        FilmDifference::with_limits(max_pixel_error, MIN_SIDE, gpu, cpu)
     }
 
-    fn with_limits(relative: f64, min_side: f64, gpu: &Film, cpu: &Film) -> FilmDifference {
+    fn with_limits(max_pixel_error: f64, min_side: f64, gpu: &Film, cpu: &Film) -> FilmDifference {
         let side = (cpu.sums.len() as f64).sqrt();
         let mut result = FilmDifference {
             max_outliers: MAX_OUTLIER_FRACTION * side * side.max(min_side),
@@ -58,10 +58,10 @@ impl FilmDifference {
         };
         for (gpu, cpu) in gpu.sums.iter().zip(&cpu.sums) {
             let [a, b] = [gpu, cpu].map(|v| v.truncate().as_dvec3() / f64::from(v.w));
-            let near = (a - b).abs().max_element() <= b.abs().max_element() * relative;
+            let is_near = (a - b).abs().max_element() <= b.abs().max_element() * max_pixel_error;
             result.non_finite += usize::from(!a.is_finite());
-            result.outliers += usize::from(!near);
-            if near || side >= min_side {
+            result.outliers += usize::from(!is_near);
+            if is_near || side >= min_side {
                 result.sums[0] += a.element_sum();
                 result.sums[1] += b.element_sum();
             }

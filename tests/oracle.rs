@@ -1,6 +1,7 @@
-//! Reference renderer in f64 from the scene description. The oracle shares no code and no formula with the twins, and
-//! therefore none of their errors: ellipsoids are quadrics, rectangles bounded planes, meshes triangle lists loaded
-//! here, and Phong is the formula of `docs/scene-format.md` with unit vectors.
+//! Reference renderer in f64, which reads the scene description. The oracle shares no code and no formula with the
+//! twins, so the twins and the oracle do not have the same errors: ellipsoids are quadrics, rectangles are bounded
+//! planes, meshes are triangle lists that the oracle loads itself, and Phong shading uses the formula of
+//! `docs/scene-format.md` with unit vectors.
 
 use std::collections::HashMap;
 
@@ -44,14 +45,14 @@ pub struct Oracle<'a> {
 }
 
 struct Surface {
-    form: Form,
+    geometry: Geometry,
     /// Index of the scene object, in the order shapes, instances, lights.
     object: usize,
     /// `None` for lights.
     material: Option<String>,
 }
 
-enum Form {
+enum Geometry {
     /// The points p with (p, 1)^T Q (p, 1) = 0.
     Quadric {
         q: DMat4,
@@ -110,24 +111,24 @@ impl<'a> Oracle<'a> {
     pub fn new(scene: &'a Description, flaw: Flaw) -> Oracle<'a> {
         let mut surfaces = Vec::new();
         for (object, description) in scene.shapes.iter().enumerate() {
-            let (material, forms) = forms(description, flaw);
-            let surface = |form| Surface {
-                form,
+            let (material, geometries) = geometries(description, flaw);
+            let surface = |geometry| Surface {
+                geometry,
                 object,
                 material: Some(material.clone()),
             };
-            surfaces.extend(forms.into_iter().map(surface));
+            surfaces.extend(geometries.into_iter().map(surface));
         }
         for (i, instance) in scene.instances.iter().enumerate() {
             surfaces.push(Surface {
-                form: mesh(instance, &scene.meshes[&instance.mesh], flaw),
+                geometry: mesh(instance, &scene.meshes[&instance.mesh], flaw),
                 object: scene.shapes.len() + i,
                 material: instance.material.clone(),
             });
         }
         for (i, light) in scene.lights.iter().enumerate() {
             if let LightDescription::Rectangle(light) = light {
-                let form = flat(
+                let geometry = flat(
                     light.center,
                     light.normal,
                     tangent(light.normal, light.tangent),
@@ -135,7 +136,7 @@ impl<'a> Oracle<'a> {
                     flaw,
                 );
                 surfaces.push(Surface {
-                    form,
+                    geometry,
                     object: scene.shapes.len() + scene.instances.len() + i,
                     material: None,
                 });
@@ -219,7 +220,7 @@ impl<'a> Oracle<'a> {
     fn nearest(&self, origin: DVec3, direction: DVec3) -> Option<Intersection> {
         let mut nearest: Option<(f64, usize, Option<&Facet>)> = None;
         for (i, surface) in self.surfaces.iter().enumerate() {
-            for (t, facet) in crossings(&surface.form, origin, direction) {
+            for (t, facet) in crossings(&surface.geometry, origin, direction) {
                 if t > 0.0 && nearest.is_none_or(|(nearer, ..)| t < nearer) {
                     nearest = Some((t, i, facet));
                 }
@@ -236,7 +237,7 @@ impl<'a> Oracle<'a> {
                 ..facet.intersection(point, self.flaw)
             });
         }
-        let (normal, uv) = normal_and_uv(&self.surfaces[i].form, point);
+        let (normal, uv) = normal_and_uv(&self.surfaces[i].geometry, point);
         Some(Intersection {
             t,
             object,
@@ -271,7 +272,7 @@ impl<'a> Oracle<'a> {
         } else {
             -intersection.shading_normal
         };
-        // Minimum offset of ray origins, relative to the largest coordinate; 1e-9 suffices in f64.
+        // The offset of ray origins is relative to the largest coordinate or the hit distance. In f64, 1e-9 suffices.
         let offset = normal * (render.shadow_epsilon.max(1e-9) * point.abs().max_element().max(intersection.t));
         let follow = |origin: DVec3, direction: DVec3| self.radiance((origin, direction), bounces + 1);
         match &self.scene.materials[material] {
@@ -282,7 +283,7 @@ impl<'a> Oracle<'a> {
             _ if bounces == render.max_depth => render.background,
             MaterialDescription::Mirror(mirror) => {
                 assert!(mirror.normal_map.is_none(), "the oracle does not support normal maps");
-                // A reflection below the surface uses the geometric normal.
+                // The geometric normal replaces a shading normal that faces away or mirrors the ray below the surface.
                 let mirrored = direction.reflect(shading_normal);
                 let is_usable = mirrored.dot(normal) > 0.0 && shading_normal.dot(direction) < 0.0;
                 let mirrored = if is_usable { mirrored } else { direction.reflect(normal) };
@@ -297,7 +298,7 @@ impl<'a> Oracle<'a> {
                     (glass.ior, 1.0)
                 };
                 let reflected = follow(point + offset, direction.reflect(normal));
-                // Snell's law in sines, in the plane of incidence
+                // Snell's law for the sines, in the plane of incidence
                 let tangential = direction - normal * direction.dot(normal);
                 let sine = tangential.length() * n1 / n2;
                 if sine >= 1.0 {
@@ -441,7 +442,7 @@ impl<'a> Oracle<'a> {
         };
         let occluders = self.surfaces.iter().filter(occludes);
         occluders
-            .flat_map(|surface| crossings(&surface.form, origin, direction))
+            .flat_map(|surface| crossings(&surface.geometry, origin, direction))
             .any(|(t, facet)| {
                 t > 0.0 && t < max_t && (excluded.is_none() || excluded != facet.map(|facet| facet.corners))
             })
@@ -471,10 +472,10 @@ fn sizes(size: [f64; 2], flaw: Flaw) -> [f64; 2] {
     }
 }
 
-fn flat(center: DVec3, normal: DVec3, tangent: DVec3, size: Option<[f64; 2]>, flaw: Flaw) -> Form {
+fn flat(center: DVec3, normal: DVec3, tangent: DVec3, size: Option<[f64; 2]>, flaw: Flaw) -> Geometry {
     let (tangent, bitangent) = frame(normal, tangent);
     let half = size.map(|size| DVec2::from_array(sizes(size, flaw)) / 2.0);
-    Form::Flat {
+    Geometry::Flat {
         center,
         tangent,
         bitangent,
@@ -489,9 +490,9 @@ fn tangent(normal: DVec3, explicit: Option<DVec3>) -> DVec3 {
     explicit.unwrap_or(if x_is_normal { DVec3::Y } else { DVec3::X })
 }
 
-fn disk(d: &DiskDescription) -> Form {
+fn disk(d: &DiskDescription) -> Geometry {
     let (tangent, bitangent) = frame(d.normal, tangent(d.normal, d.tangent));
-    Form::Flat {
+    Geometry::Flat {
         center: d.center,
         tangent,
         bitangent,
@@ -500,18 +501,18 @@ fn disk(d: &DiskDescription) -> Form {
     }
 }
 
-fn quadric(center: DVec3, axes: [DVec3; 3]) -> Form {
+fn quadric(center: DVec3, axes: [DVec3; 3]) -> Geometry {
     let [a, b, c] = axes;
     let from_local = DMat4::from_cols(a.extend(0.0), b.extend(0.0), c.extend(0.0), center.extend(1.0));
     let to_local = from_local.inverse();
     let sphere = DMat4::from_diagonal(DVec4::new(1.0, 1.0, 1.0, -1.0));
-    Form::Quadric {
+    Geometry::Quadric {
         q: to_local.transpose() * sphere * to_local,
         from_local,
     }
 }
 
-fn forms(shape: &ShapeDescription, flaw: Flaw) -> (String, Vec<Form>) {
+fn geometries(shape: &ShapeDescription, flaw: Flaw) -> (String, Vec<Geometry>) {
     match shape {
         ShapeDescription::Rectangle(r) => (
             r.material.clone(),
@@ -545,7 +546,7 @@ fn forms(shape: &ShapeDescription, flaw: Flaw) -> (String, Vec<Form>) {
                     tangent: Some(tangent),
                 })
             };
-            let side = Form::Side {
+            let side = Geometry::Side {
                 start: c.start,
                 axis,
                 radius: c.radius,
@@ -553,7 +554,7 @@ fn forms(shape: &ShapeDescription, flaw: Flaw) -> (String, Vec<Form>) {
             };
             (c.material.clone(), vec![side, cap(c.start, -axis), cap(c.end, axis)])
         }
-        ShapeDescription::Triangle(t) => (t.material.clone(), vec![Form::Triangle(t.vertices)]),
+        ShapeDescription::Triangle(t) => (t.material.clone(), vec![Geometry::Triangle(t.vertices)]),
         ShapeDescription::Tetrahedron(t) => {
             let [v0, mut v1, mut v2, v3] = t.vertices;
             // The face (v0, v2, v1) must face away from v3.
@@ -561,18 +562,18 @@ fn forms(shape: &ShapeDescription, flaw: Flaw) -> (String, Vec<Form>) {
                 (v1, v2) = (v2, v1);
             }
             let faces = [[v0, v2, v1], [v0, v1, v3], [v1, v2, v3], [v0, v3, v2]];
-            (t.material.clone(), faces.map(Form::Triangle).into())
+            (t.material.clone(), faces.map(Geometry::Triangle).into())
         }
         other => panic!("the oracle does not support the shape {other:?}"),
     }
 }
 
-fn mesh(i: &InstanceDescription, file: &MeshFileDescription, flaw: Flaw) -> Form {
+fn mesh(instance: &InstanceDescription, file: &MeshFileDescription, flaw: Flaw) -> Geometry {
     assert!(
-        i.matrix.is_none() && i.materials.is_empty() && file.up == Up::Z,
+        instance.matrix.is_none() && instance.materials.is_empty() && file.up == Up::Z,
         "the oracle supports only meshes with z up, without matrix and without materials of groups"
     );
-    let scale = match i.scale {
+    let scale = match instance.scale {
         None => DVec3::ONE,
         Some(Scale::All(s)) => DVec3::splat(s),
         Some(Scale::Each(s)) => s,
@@ -582,12 +583,12 @@ fn mesh(i: &InstanceDescription, file: &MeshFileDescription, flaw: Flaw) -> Form
         let (sine, cosine) = degrees.to_radians().sin_cos();
         v * cosine + axis.cross(v) * sine + axis * (axis.dot(v) * (1.0 - cosine))
     };
-    let rotated = |v: DVec3| match &i.rotate {
+    let rotated = |v: DVec3| match &instance.rotate {
         None => v,
         Some(Rotation::Angles(a)) => rotate(rotate(rotate(v, DVec3::X, a.x), DVec3::Y, a.y), DVec3::Z, a.z),
         Some(Rotation::About(about)) => rotate(v, about.axis.normalize(), about.degrees),
     };
-    let to_world = |p: DVec3| rotated(p * scale) + i.translate.unwrap_or_default();
+    let to_world = |p: DVec3| rotated(p * scale) + instance.translate.unwrap_or_default();
     let normal_to_world = |n: DVec3| match flaw {
         Flaw::StretchedNormals => rotated(n * scale).normalize(),
         _ => rotated(n / scale).normalize(),
@@ -610,18 +611,18 @@ fn mesh(i: &InstanceDescription, file: &MeshFileDescription, flaw: Flaw) -> Form
             let polygon: Vec<[usize; 3]> = words.into_iter().map(corner).collect();
             for i in 2..polygon.len() {
                 let corners = [polygon[0], polygon[i - 1], polygon[i]];
-                let [p, t, n] =
-                    [0, 1, 2].map(|part| corners.map(|corner| lists[["v", "vt", "vn"][part]][corner[part] - 1]));
-                let positions = p.map(to_world);
-                let mirrored = (scale.x * scale.y * scale.z).signum();
+                let [positions, uvs, normals] =
+                    [0, 1, 2].map(|list| corners.map(|corner| lists[["v", "vt", "vn"][list]][corner[list] - 1]));
+                let positions = positions.map(to_world);
+                let orientation = (scale.x * scale.y * scale.z).signum();
                 facets.push(Facet {
                     corners: positions,
-                    uvs: t.map(|uv| uv.truncate()),
-                    normals: (file.normals != Some(Normals::Flat)).then(|| n.map(normal_to_world)),
+                    uvs: uvs.map(|uv| uv.truncate()),
+                    normals: (file.normals != Some(Normals::Flat)).then(|| normals.map(normal_to_world)),
                     normal: (positions[1] - positions[0])
                         .cross(positions[2] - positions[1])
                         .normalize()
-                        * mirrored,
+                        * orientation,
                 });
             }
         } else if ["v", "vt", "vn"].contains(&tag) {
@@ -638,7 +639,7 @@ fn mesh(i: &InstanceDescription, file: &MeshFileDescription, flaw: Flaw) -> Form
         let low = points().fold(DVec3::INFINITY, DVec3::min);
         (low, points().fold(DVec3::NEG_INFINITY, DVec3::max), facets.to_vec())
     };
-    Form::Mesh(facets.chunks(32).map(with_bounds).collect())
+    Geometry::Mesh(facets.chunks(32).map(with_bounds).collect())
 }
 
 impl Facet {
@@ -681,22 +682,22 @@ fn hits_box(low: DVec3, high: DVec3, origin: DVec3, direction: DVec3) -> bool {
     let (a, b) = ((low - origin) / direction, (high - origin) / direction);
     let (near, far) = (a.min(b).max_element(), a.max(b).min_element());
     let margin = 1e-9 * (1.0 + near.abs());
-    // NaN, for a ray in a face, counts as a hit.
+    // A ray in the plane of a face gives NaN, which counts as a hit.
     !(near > far + margin || far < -margin)
 }
 
-/// Returns the distance of each crossing, with the triangle if the form is a mesh.
-fn crossings(form: &Form, origin: DVec3, direction: DVec3) -> Vec<(f64, Option<&Facet>)> {
-    if let Form::Mesh(parts) = form {
-        let parts = parts
+/// Returns the distance of each crossing, with the triangle if the geometry is a mesh.
+fn crossings(geometry: &Geometry, origin: DVec3, direction: DVec3) -> Vec<(f64, Option<&Facet>)> {
+    if let Geometry::Mesh(blocks) = geometry {
+        let blocks = blocks
             .iter()
             .filter(|(low, high, _)| hits_box(*low, *high, origin, direction));
-        let facets = parts.flat_map(|(.., facets)| facets);
+        let facets = blocks.flat_map(|(.., facets)| facets);
         let hits =
             facets.filter_map(|facet| triangle_crossing(&facet.corners, origin, direction).map(|t| (t, Some(facet))));
         return hits.collect();
     }
-    distances(form, origin, direction)
+    distances(geometry, origin, direction)
         .into_iter()
         .map(|t| (t, None))
         .collect()
@@ -715,10 +716,10 @@ fn triangle_crossing([v0, v1, v2]: &[DVec3; 3], origin: DVec3, direction: DVec3)
     inside.then(|| edge2.dot(q) / determinant)
 }
 
-fn distances(form: &Form, origin: DVec3, direction: DVec3) -> Vec<f64> {
-    match form {
-        Form::Mesh(_) => Vec::new(),
-        Form::Quadric { q, .. } => {
+fn distances(geometry: &Geometry, origin: DVec3, direction: DVec3) -> Vec<f64> {
+    match geometry {
+        Geometry::Mesh(_) => Vec::new(),
+        Geometry::Quadric { q, .. } => {
             let (o, d) = (origin.extend(1.0), direction.extend(0.0));
             let (a, b, c) = (d.dot(*q * d), 2.0 * d.dot(*q * o), o.dot(*q * o));
             let discriminant = b * b - 4.0 * a * c;
@@ -728,10 +729,10 @@ fn distances(form: &Form, origin: DVec3, direction: DVec3) -> Vec<f64> {
             let root = discriminant.sqrt();
             vec![(-b - root) / (2.0 * a), (-b + root) / (2.0 * a)]
         }
-        Form::Side {
+        Geometry::Side {
             start, axis, radius, ..
         } => {
-            // The quadratic equation of the distance from the axis.
+            // Quadratic equation for the points of the ray whose distance from the axis is the radius.
             let unit = axis.normalize();
             let perpendicular = |v: DVec3| v - unit * v.dot(unit);
             let (o, d) = (perpendicular(origin - *start), perpendicular(direction));
@@ -744,8 +745,8 @@ fn distances(form: &Form, origin: DVec3, direction: DVec3) -> Vec<f64> {
                 .filter(|t| (0.0..=axis.length()).contains(&axial(*t)))
                 .collect()
         }
-        Form::Triangle(corners) => triangle_crossing(corners, origin, direction).into_iter().collect(),
-        Form::Flat {
+        Geometry::Triangle(corners) => triangle_crossing(corners, origin, direction).into_iter().collect(),
+        Geometry::Flat {
             center,
             tangent,
             bitangent,
@@ -764,10 +765,10 @@ fn distances(form: &Form, origin: DVec3, direction: DVec3) -> Vec<f64> {
     }
 }
 
-fn normal_and_uv(form: &Form, point: DVec3) -> (DVec3, DVec2) {
-    match form {
-        Form::Mesh(_) => unreachable!("mesh triangles have their own function"),
-        Form::Quadric { q, from_local } => {
+fn normal_and_uv(geometry: &Geometry, point: DVec3) -> (DVec3, DVec2) {
+    match geometry {
+        Geometry::Mesh(_) => unreachable!("`Facet::intersection` returns the normal of a mesh triangle"),
+        Geometry::Quadric { q, from_local } => {
             let gradient = *q * point.extend(1.0);
             let local = from_local.inverse().transform_point3(point);
             let turn = std::f64::consts::TAU;
@@ -778,7 +779,7 @@ fn normal_and_uv(form: &Form, point: DVec3) -> (DVec3, DVec2) {
                 DVec2::new(longitude - longitude.floor(), latitude),
             )
         }
-        Form::Side {
+        Geometry::Side {
             start, axis, tangent, ..
         } => {
             let unit = axis.normalize();
@@ -787,7 +788,7 @@ fn normal_and_uv(form: &Form, point: DVec3) -> (DVec3, DVec2) {
             let longitude = normal.dot(unit.cross(*tangent)).atan2(normal.dot(*tangent)) / std::f64::consts::TAU;
             (normal, DVec2::new(longitude - longitude.floor(), along / axis.length()))
         }
-        Form::Triangle([v0, v1, v2]) => {
+        Geometry::Triangle([v0, v1, v2]) => {
             let normal = (*v1 - *v0).cross(*v2 - *v1);
             let area = |a: DVec3, b: DVec3, c: DVec3| (b - a).cross(c - b).dot(normal);
             let total_area = area(*v0, *v1, *v2);
@@ -796,7 +797,7 @@ fn normal_and_uv(form: &Form, point: DVec3) -> (DVec3, DVec2) {
                 DVec2::new(area(*v0, point, *v2), area(*v0, *v1, point)) / total_area,
             )
         }
-        Form::Flat {
+        Geometry::Flat {
             center,
             tangent,
             bitangent,

@@ -17,11 +17,11 @@ const HEIGHT: u32 = 64;
 fn spheres(directions: &[DVec3], radius: f64) -> Packed {
     let shapes: String = directions
         .iter()
-        .map(|d| {
-            let c = DVec3::new(1.0, 2.0, 3.0) + *d * 10.0;
+        .map(|direction| {
+            let center = DVec3::new(1.0, 2.0, 3.0) + *direction * 10.0;
             format!(
                 "[[shapes]]\ntype = 'sphere'\nmaterial = 'light'\ncenter = [{}, {}, {}]\nradius = {radius}\n",
-                c.x, c.y, c.z
+                center.x, center.y, center.z
             )
         })
         .collect();
@@ -71,7 +71,7 @@ fn directions_match_the_mapping() {
 
 #[test]
 fn spheres_appear_at_their_direction_with_their_solid_angle() {
-    // Center, seam, general position, pole, near the pole.
+    // Directions of the sphere: center, seam, general position, pole, near the pole.
     for (east, north) in [(0.0, 0.0), (180.0, 0.0), (77.0, -31.0), (0.0, 90.0), (33.0, -86.0)] {
         let sphere_direction = direction(east, north);
         let packed = spheres(&[sphere_direction], 3.0);
@@ -148,15 +148,15 @@ fn differentials_match_adjacent_rays() {
 fn a_crop_has_the_pixels_of_the_full_image() {
     let packed = spheres(&[direction(10.0, 20.0), direction(180.0, 0.0)], 3.0);
     let full = render(&packed, both()[0]);
-    let part = Region {
+    let region = Region {
         x0: 0,
         y0: 5,
         x1: 90,
         y1: 17,
     };
     for mode in both() {
-        let found = film(&mut *backend(&packed, mode), &packed, part, &WorkSplit::default());
-        assert_eq!(differing(&found, &crop(&full, part)), 0, "{mode:?}");
+        let found = film(&mut *backend(&packed, mode), &packed, region, &WorkSplit::default());
+        assert_eq!(differing(&found, &crop(&full, region)), 0, "{mode:?}");
     }
 }
 

@@ -16,13 +16,13 @@ use crate::{adapter, sources};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RenderMode {
     Cpu,
-    /// Exact SPIR-V, the scene as constants.
+    /// Exact SPIR-V with the scene as constants.
     Baked,
-    /// Exact SPIR-V, the scene in buffers.
+    /// Exact SPIR-V with the scene in buffers.
     Buffers,
     /// Like `Buffers`, with software quotients and square roots.
     Rounded,
-    /// Plain WGSL through wgpu, the scene in buffers.
+    /// Plain WGSL through wgpu, with the scene in buffers.
     Plain,
 }
 
@@ -33,7 +33,7 @@ pub fn both() -> Vec<RenderMode> {
     modes
 }
 
-/// Returns the bit-identical configurations.
+/// Returns the configurations that must be bit-identical.
 pub fn exact_modes() -> Vec<RenderMode> {
     let exact = adapter::device().is_some_and(adapter::bit_exact);
     if exact {
@@ -139,8 +139,8 @@ fn image_records(film: &Film) -> impl Iterator<Item = &Vec4> {
     [&film.sums, &film.moments].into_iter().chain(&film.layers).flatten()
 }
 
-pub fn crop(film: &Film, part: Region) -> Film {
-    film.clone().part(part)
+pub fn crop(film: &Film, region: Region) -> Film {
+    film.clone().part(region)
 }
 
 pub fn means(film: &Film) -> Vec<[f64; 3]> {

@@ -24,7 +24,7 @@ use wgray_render::records::{
 };
 
 pub trait ProbeWords: Sized {
-    /// Reads a value from the front of `words` and advances.
+    /// Reads a value from the front of `words`, and removes the words of the value from `words`.
     fn read(words: &mut &[u32]) -> Self;
     fn write(&self, words: &mut Vec<u32>);
 }

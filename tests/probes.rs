@@ -129,13 +129,13 @@ use crate::probe_words::{Argument, ProbeWords};
 use crate::random::Random;
 use crate::sources::{parse, shared_source};
 
-/// Environment variable with the name of the only function to compare.
+/// Environment variable that selects one function by name; without it, all functions are compared.
 const FUNCTION: &str = "WGRAY_TEST_FUNCTION";
 
 /// Number of calls of each function.
 const CALLS: usize = 8192;
 
-/// A twin with arguments and results as words.
+/// A twin whose arguments and results are read and written as words.
 pub struct Probe {
     pub name: &'static str,
     arguments: &'static [&'static str],
@@ -144,7 +144,7 @@ pub struct Probe {
 
 macro_rules! probes {
     ($($name:ident($($argument:ident: $ty:ty),* $(,)?) -> $result:ty;)*) => {
-        /// The twins. A test fails for a shared function without an entry.
+        /// The probed twins. A test fails if a shared function has no entry.
         pub const PROBES: &[Probe] = &[$(Probe {
             name: stringify!($name),
             arguments: &[$(stringify!($argument)),*],
@@ -594,7 +594,9 @@ fn compare(device: &Device, function: &Function) -> Result<usize, String> {
     let converts_arguments = !matches!(name, "jittered_sample" | "sample_square");
     let is_rounded_twice = known_difference.is_some_and(|known_difference| known_difference.reason == ROUNDED_TWICE);
     if is_rounded_twice && converts_arguments && !differ.iter().all(has_large) {
-        return Err(format!("{name}: calls without {ROUNDED_TWICE} differ"));
+        return Err(format!(
+            "{name}: results differ for calls without integers of 2^31 or more"
+        ));
     }
     judge(known_difference, name, differ.len() as f64 / CALLS as f64).map_err(|message| {
         let Some(&call) = differ.first() else { return message };
@@ -730,7 +732,7 @@ fn inputs_cover_both_outcomes_of_predicates() {
 }
 
 #[test]
-fn a_difference_of_one_ulp_is_found() {
+fn a_difference_of_one_ulp_is_detected() {
     let Some(device) = adapter::device() else { return };
     for (name, from, to) in [
         ("log2", "2.8853900817779268", "2.8853903"),
@@ -762,7 +764,7 @@ fn a_difference_of_one_ulp_is_found() {
     }
 }
 
-/// `max(NaN, 0)` is 0: NaN does not spread to the result.
+/// For example, `max(NaN, 0)` is 0.
 #[test]
 fn nan_does_not_propagate() {
     assert_eq!(max(f32::NAN, 0.0), 0.0);

@@ -43,7 +43,7 @@ position = [0.4, -0.3, 1.5]
 color = [1, 0.5, 2]
 "#;
 
-/// Returns the maximum error at the pixel centers, x to the right, y up.
+/// Returns the maximum error of all pixels. The arguments of `expected` are a pixel center: x to the right, y up.
 fn largest_error(film: &Film, expected: impl Fn(f64, f64) -> [f64; 3]) -> f64 {
     let mut largest = 0.0f64;
     for (i, found) in film.means().enumerate() {
@@ -68,8 +68,8 @@ fn point_light(x: f64, y: f64, power: i32) -> [f64; 3] {
 }
 
 #[test]
-fn a_point_light_over_a_plane() {
-    // Shading is evaluated at the origin of the shadow rays; the formula has no offset.
+fn a_point_light_over_a_plane_matches_the_closed_form() {
+    // Shading is evaluated at the origin of the shadow rays, and the formula has no offset, so the offset is set to 0.
     let down = DOWN.replace("[render]", "[render]\nshadow_epsilon = 0");
     let scene = parse(&format!("{down}{GROUND}{LIGHT}"));
     for film in films(&scene) {
@@ -81,7 +81,7 @@ fn a_point_light_over_a_plane() {
 }
 
 #[test]
-fn ambient_light_only() {
+fn ambient_light_is_multiplied_by_the_ambient_factor() {
     let scene = parse(&format!("{DOWN}{GROUND}"));
     for film in films(&scene) {
         let (expected, wrong) = ([0.1f32 * 0.5, 0.2 * 0.5, 0.3 * 1.0], [0.1f32, 0.2, 0.3]);
@@ -108,7 +108,7 @@ fn the_ground_occludes_light_from_below() {
     for (lit, unlit) in lit.iter().zip(&unlit) {
         assert!(
             unlit.means().all(|color| color == [0.1 * 0.5, 0.2 * 0.5, 0.3]),
-            "more than ambient light"
+            "light from below the ground is visible"
         );
         assert!(lit.means().all(|color| color[0] > 0.1));
     }
@@ -117,7 +117,7 @@ fn the_ground_occludes_light_from_below() {
 /// A sphere of radius 0.5 casts a shadow of radius 0.5. The camera is below the sphere, which would otherwise hide the
 /// shadow; rays start in the image plane, at height 0.25.
 #[test]
-fn a_sphere_under_directional_light_casts_a_disk() {
+fn a_sphere_under_directional_light_casts_a_disk_shaped_shadow() {
     let scene = DOWN.replace("position = [0, 0, 5]", "position = [0, 0, 0.25]");
     let sphere = "[[shapes]]\ntype = 'sphere'\nmaterial = 'ground'\ncenter = [0.2, 0.1, 1]\nradius = 0.5\n";
     let light = "[[lights]]\ntype = 'directional'\ndirection = [0, 0, -2]\ncolor = [1, 1, 1]\n";
@@ -135,8 +135,8 @@ fn a_sphere_under_directional_light_casts_a_disk() {
     }
 }
 
-/// Returns a large shape of each kind, at these heights. `all_dark_or_lit` adds a small shape above them, because the
-/// renderer culls shadow casters that have no other shape on one of their sides.
+/// Returns a large shape of each kind, at the given heights. `all_dark_or_lit` adds a small shape above the large
+/// shapes, because the renderer culls a shadow caster if all other shapes are on one side of the caster.
 fn covers(heights: [f64; 4]) -> [String; 4] {
     let [a, b, c, d] = heights;
     [
@@ -165,9 +165,9 @@ fn all_dark_or_lit(light: &str, covers: &str) -> (bool, bool) {
 const DARK: (bool, bool) = (true, false);
 const LIT: (bool, bool) = (false, true);
 
-/// Primitives of any two kinds occlude.
+/// Each primitive occludes alone, and together with a primitive of another kind.
 #[test]
-fn two_primitives_occlude() {
+fn primitives_occlude_alone_and_in_pairs() {
     let light = "[[lights]]\ntype = 'directional'\ndirection = [0, 0, -2]\ncolor = [1, 1, 1]\n";
     let kinds = covers([1.0, 1.5, 2.0, 3.0]);
     for (i, first) in kinds.iter().enumerate() {

@@ -1,5 +1,4 @@
-//! GPU and CPU images agree for all scenes, configurations, sizes, seeds and sample patterns, and for
-//! every split of the work.
+//! GPU and CPU images agree for all scenes, configurations, sizes, seeds and sample patterns, and for every work split.
 
 use std::ops::Range;
 
@@ -49,7 +48,7 @@ pub fn compare_hits(gpu: &[FirstHit], cpu: &[FirstHit]) -> Result<(), String> {
         return judge(entry, "first hits", fraction);
     }
     if fraction > MAX_OUTLIER_FRACTION {
-        Err(format!("{fraction} of the first hits differ"))
+        Err(format!("a fraction of {fraction} of the first hits differs"))
     } else {
         Ok(())
     }
@@ -62,21 +61,23 @@ fn configured(
     pattern: Pattern,
     counts: (u32, u32),
 ) -> Description {
-    let mut d = description.clone();
-    (d.image.width, d.image.height) = size;
-    d.render.seed = seed;
-    d.render.pixel_samples = patterns::samples(pattern, counts.0);
-    d.render.light_samples = patterns::samples(pattern, counts.1);
-    d
+    let mut description = description.clone();
+    (description.image.width, description.image.height) = size;
+    description.render.seed = seed;
+    description.render.pixel_samples = patterns::samples(pattern, counts.0);
+    description.render.light_samples = patterns::samples(pattern, counts.1);
+    description
 }
 
 /// Returns all scenes at reduced size.
 pub fn small_scenes() -> Vec<(String, Packed)> {
-    let small = |(name, mut d): (String, Description)| {
-        let scale = d.image.width.max(d.image.height).div_ceil(100);
-        (d.image.width, d.image.height) = (d.image.width / scale, d.image.height / scale);
-        d.render.pixel_samples = patterns::samples(d.render.pixel_samples.pattern(d.integrator()), 4);
-        (name, scenes::packed(&d))
+    let small = |(name, mut description): (String, Description)| {
+        let scale = description.image.width.max(description.image.height).div_ceil(100);
+        (description.image.width, description.image.height) =
+            (description.image.width / scale, description.image.height / scale);
+        description.render.pixel_samples =
+            patterns::samples(description.render.pixel_samples.pattern(description.integrator()), 4);
+        (name, scenes::packed(&description))
     };
     scenes::descriptions().into_iter().map(small).collect()
 }
@@ -85,9 +86,9 @@ pub fn small_scenes() -> Vec<(String, Packed)> {
 pub fn variations() -> Vec<(String, Packed)> {
     let (mut scenes, patterns) = (scenes::descriptions(), patterns::all());
     // Path-traced scenes are last, so that the other scenes keep their indices.
-    scenes.sort_by_key(|(_, d)| d.integrator() == Integrator::Path);
+    scenes.sort_by_key(|(_, description)| description.integrator() == Integrator::Path);
     let vary = |i: usize| {
-        let (name, d) = &scenes[i % scenes.len()];
+        let (name, description) = &scenes[i % scenes.len()];
         let (size, counts) = (
             [(33, 17), (64, 3), (1, 1), (8, 40)][i % 4],
             [(1, 1), (9, 4), (2, 36), (4, 100)][i % 4],
@@ -95,13 +96,16 @@ pub fn variations() -> Vec<(String, Packed)> {
         let seed = [0, 1, u32::MAX][i % 3];
         let (pattern_name, pattern) = &patterns[i % patterns.len()];
         let name = format!("{name}, {pattern_name}, seed {seed}, {size:?}, {counts:?} samples");
-        (name, scenes::packed(&configured(d, size, seed, *pattern, counts)))
+        (
+            name,
+            scenes::packed(&configured(description, size, seed, *pattern, counts)),
+        )
     };
     (0..scenes.len().max(patterns.len())).map(vary).collect()
 }
 
 #[test]
-fn pictures_of_all_scenes_are_the_same() {
+fn images_of_all_scenes_agree() {
     if adapter::device().is_none() {
         return;
     }
@@ -155,7 +159,7 @@ fn first_hits_of_all_scenes_agree() {
 
 /// One number in a shader differs by one ulp, or one pixel by one bit.
 #[test]
-fn a_different_image_is_found() {
+fn a_different_image_is_detected() {
     let Some(device) = adapter::device() else { return };
     let (_, packed) = small_scenes()
         .into_iter()
@@ -212,7 +216,7 @@ fn a_different_image_is_found() {
 }
 
 #[test]
-fn a_larger_image_agrees() {
+fn a_larger_image_agrees_on_gpu_and_cpu() {
     if adapter::device().is_none() {
         return;
     }
@@ -310,7 +314,7 @@ fn images_do_not_depend_on_the_work_split() {
 }
 
 #[test]
-fn a_crop_is_a_part_of_the_image() {
+fn a_crop_equals_the_region_of_the_full_image() {
     let packed = scenes::packed(&configured(
         &scenes::scene("ellipsoids.toml"),
         (67, 41),
@@ -321,15 +325,15 @@ fn a_crop_is_a_part_of_the_image() {
     let expected = reference(&packed);
     for mode in exact_modes() {
         let mut backend = backend(&packed, mode);
-        for part in [
+        for region in [
             tile(0, 0, 1, 1),
             tile(3, 7, 60, 29),
             tile(66, 0, 67, 41),
             tile(0, 40, 67, 41),
             tile(11, 5, 30, 37),
         ] {
-            let found = film(&mut *backend, &packed, part, &WorkSplit::default());
-            assert_eq!(differing(&found, &crop(&expected, part)), 0, "{mode:?}, {part:?}");
+            let found = film(&mut *backend, &packed, region, &WorkSplit::default());
+            assert_eq!(differing(&found, &crop(&expected, region)), 0, "{mode:?}, {region:?}");
         }
     }
     let moved = Film {

@@ -63,8 +63,8 @@ fn differing_pixels(a: &Film, b: &Film, tolerance: f32) -> Vec<usize> {
         .collect()
 }
 
-/// Returns the visibly different pixels, of 40,000. A shadow edge that moves across a light sample changes a value by
-/// 1/16 of the light.
+/// Returns the pixels that differ visibly, of 40,000 pixels. A shadow edge that moves across a light sample changes a
+/// pixel by 1/16 of the light.
 fn visibly_differing_pixels(offset: f64, shadow_epsilon: f64) -> Vec<usize> {
     let expected = reference(&packed(&cornell()));
     let mut description = transformed(&cornell(), 1.0, DVec3::splat(offset));
@@ -78,7 +78,7 @@ const ROUNDING: f64 = 56.0 / 16_777_216.0;
 
 /// Returns true if rounding may change a pixel: in f64, moving the camera or the light by `ROUNDING` moves an edge
 /// across the camera ray or a light sample.
-fn near_an_edge(description: &Description, pixel: usize) -> bool {
+fn is_near_edge(description: &Description, pixel: usize) -> bool {
     let value = |description: &Description| {
         let oracle = Oracle::new(description, Flaw::None);
         DVec3::from_array(oracle.pixel(pixel as u32))
@@ -123,11 +123,11 @@ fn scaling_changes_pixels_only_near_edges() {
     for scale in [0.001, 0.3, 7.7, 1000.0] {
         let found = reference(&packed(&transformed(&scene, scale, DVec3::ZERO)));
         for pixel in differing_pixels(&found, &expected, 1e-5) {
-            assert!(near_an_edge(&scene, pixel), "scaled by {scale}: pixel {pixel}");
+            assert!(is_near_edge(&scene, pixel), "scaled by {scale}: pixel {pixel}");
         }
     }
     let some_pixels = (0..40_000).step_by(41);
-    let near = some_pixels.filter(|pixel| near_an_edge(&scene, *pixel)).count();
+    let near = some_pixels.filter(|pixel| is_near_edge(&scene, *pixel)).count();
     assert_eq!(near, 0, "some of the sampled pixels are near edges");
 }
 
@@ -148,11 +148,19 @@ fn translation_does_not_change_the_image() {
 }
 
 #[test]
-fn too_large_an_offset_is_found() {
+fn too_large_a_shadow_epsilon_is_detected() {
     let changed = visibly_differing_pixels(0.0, 0.05);
-    assert!(changed.len() > 400, "lost contact shadows: {} pixels", changed.len());
+    assert!(
+        changed.len() > 400,
+        "pixels with lost contact shadows: {}",
+        changed.len()
+    );
     // A small offset also changes pixels far from edges.
     let (scene, moved) = (cornell(), visibly_differing_pixels(0.0, 1e-3));
-    let far_from_edges = moved.iter().filter(|pixel| !near_an_edge(&scene, **pixel)).count();
-    assert!(far_from_edges > 60, "{far_from_edges} of {} pixels", moved.len());
+    let far_from_edges = moved.iter().filter(|pixel| !is_near_edge(&scene, **pixel)).count();
+    assert!(
+        far_from_edges > 60,
+        "pixels far from edges: {far_from_edges} of {}",
+        moved.len()
+    );
 }

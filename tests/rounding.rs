@@ -23,8 +23,8 @@ fn nudged(x: f32) -> f32 {
 }
 ";
 
-/// Returns the software functions over imprecise device operations.
-fn over_imprecise_operations() -> String {
+/// Returns the software-rounding functions, based on imprecise device operations.
+fn software_rounding_of_imprecise_operations() -> String {
     let mut text = shaders().text(ROUNDING).to_string();
     for (from, to) in [
         (
@@ -43,7 +43,7 @@ fn over_imprecise_operations() -> String {
     text + NUDGED
 }
 
-/// Returns imprecise device operations instead of the functions.
+/// Returns functions of the same names that use imprecise device operations without software rounding.
 fn imprecise_operations() -> String {
     "fn quotient(a: f32, b: f32) -> f32 { return nudged(a / b); }
     fn quotient2(a: vec2f, b: vec2f) -> vec2f { return vec2f(quotient(a.x, b.x), quotient(a.y, b.y)); }
@@ -58,7 +58,7 @@ fn imprecise_operations() -> String {
         + NUDGED
 }
 
-/// Returns a number of any magnitude, or the end of a range.
+/// Returns a number of any magnitude, or a number at the end of a range.
 fn random_number(random: &Random) -> f32 {
     const EDGES: [u32; 12] = [
         0,
@@ -90,7 +90,7 @@ struct Case {
     name: &'static str,
     arguments: usize,
     exact: fn(&[f32]) -> f32,
-    /// Errors that must be detected.
+    /// Replacements in the source text that introduce an error, which the test must detect.
     mistakes: [(&'static str, &'static str); 2],
 }
 
@@ -102,7 +102,7 @@ const CASES: [Case; 2] = [
         mistakes: [
             ("rest > half", "rest >= half"),
             ("rest >= denominator", "rest > denominator"),
-        ], // the first mistake concerns ties
+        ], // the first replacement changes the rounding of ties
     },
     Case {
         name: "square_root",
@@ -149,7 +149,7 @@ fn quotients_and_square_roots_are_rounded_correctly_on_any_device() {
     for case in &CASES {
         for (device, text) in [
             ("this device", shaders().text(ROUNDING)),
-            ("an imprecise device", &over_imprecise_operations()),
+            ("an imprecise device", &software_rounding_of_imprecise_operations()),
         ] {
             let (count, first) = count_wrong(case, text);
             println!(
@@ -162,17 +162,17 @@ fn quotients_and_square_roots_are_rounded_correctly_on_any_device() {
         // Negative controls.
         assert!(
             count_wrong(case, &imprecise_operations()).0 > 100_000,
-            "{}: imprecise operations are not found",
+            "{}: imprecise operations are not detected",
             case.name
         );
         for (from, to) in case.mistakes {
-            let (count, _) = count_wrong(case, &edited(&over_imprecise_operations(), from, to));
+            let (count, _) = count_wrong(case, &edited(&software_rounding_of_imprecise_operations(), from, to));
             assert!(count > 0, "{}: '{to}'", case.name);
         }
     }
 }
 
-/// Returns imprecise operations for kernels that round in software.
+/// Returns shaders in which imprecise device operations replace the functions that round in software.
 pub fn imprecise_shaders() -> &'static Shaders {
     static SHADERS: OnceLock<Shaders> = OnceLock::new();
     SHADERS.get_or_init(|| shaders_with(ROUNDING, &imprecise_operations()))
@@ -187,7 +187,7 @@ const IMPRECISE: u32 = 2;
 /// over the device's operations; `CORRECTED`: software rounding over deliberately imprecise operations; `IMPRECISE`:
 /// only the imprecise operations. One kernel per scene covers all three.
 fn selectable_shaders() -> Shaders {
-    let mut text = over_imprecise_operations();
+    let mut text = software_rounding_of_imprecise_operations();
     for (from, to) in [
         (
             "i32(((bits * 0x9e3779b9u) >> 16u) % 7u) - 3;".to_owned(),
@@ -240,7 +240,7 @@ fn images_keep_their_guarantees_on_an_imprecise_device() {
             assert_eq!(rendered(seed).0, 0, "{name} on {device}");
         }
     }
-    // Images of the shaders without a selection are bit-identical, too.
+    // Images of the unmodified shaders are also bit-identical.
     let (name, packed) = small_scenes().swap_remove(0);
     let found = render_with(&packed, RenderMode::Rounded, sources::shaders());
     assert_eq!(differing(&found, &reference(&packed)), 0, "{name}");

@@ -24,7 +24,7 @@ fn schema() -> &'static Json {
 
 fn validator() -> &'static Validator {
     static VALIDATOR: OnceLock<Validator> = OnceLock::new();
-    VALIDATOR.get_or_init(|| jsonschema::draft202012::new(schema()).expect("a schema of the draft"))
+    VALIDATOR.get_or_init(|| jsonschema::draft202012::new(schema()).expect("a valid schema"))
 }
 
 fn matches_schema(scene: &Table) -> bool {
@@ -365,7 +365,8 @@ integrator = "path"
 "#,
 ];
 
-/// Messages of errors that the schema cannot express: relations of values, names, and file contents.
+/// Parts of error messages for rules that the schema cannot express: relations between values, names, and file
+/// contents.
 const BEYOND_SCHEMA: &[&str] = &[
     // Names and files.
     "there is no texture",
@@ -402,7 +403,7 @@ const BEYOND_SCHEMA: &[&str] = &[
     "must not emit light",
     "must be greater than the frame of the previous key",
     "camera.path: at frame",
-    // Relations of numbers. The schema covers lists of zeros and lengths.
+    // Relations between numbers.
     "must not be parallel",
     "must not lie",
     "must differ from the camera's position",
@@ -517,7 +518,7 @@ fn disagreement(scene: &Table, folder: &Path) -> Option<String> {
             let has_path = scene["camera"].get("path").is_some();
             (!has_path).then(|| format!("only the program rejects a camera without a path: {message}"))
         }
-        (true, Err(message)) if !BEYOND_SCHEMA.iter().any(|part| message.contains(part)) => {
+        (true, Err(message)) if !BEYOND_SCHEMA.iter().any(|phrase| message.contains(phrase)) => {
             Some(format!("only the program rejects: {message}"))
         }
         _ => None,
@@ -539,7 +540,7 @@ fn compare(scene: &Table, folder: &Path, step: usize) -> usize {
         .collect();
     assert!(
         disagreements.is_empty(),
-        "{} of {}: {disagreements:#?}",
+        "{} of {} changed scenes: {disagreements:#?}",
         disagreements.len(),
         scenes.len()
     );
@@ -634,7 +635,7 @@ fn schema_and_parser_agree_on_random_scenes_and_mutations() {
 }
 
 #[test]
-fn the_projects_scenes_are_valid() {
+fn scenes_of_the_project_match_the_schema() {
     let mut count = 0;
     for entry in std::fs::read_dir(project("scenes")).unwrap() {
         let path = entry.unwrap().path();
@@ -658,10 +659,10 @@ fn the_projects_scenes_are_valid() {
     }
 }
 
-/// Returns the schema's parts with their headings.
-fn parts() -> Vec<(String, &'static Json)> {
+/// Returns the schemas of the tables of a scene file, with the headings of the tables in the documentation.
+fn table_schemas() -> Vec<(String, &'static Json)> {
     let defs = schema()["$defs"].as_object().unwrap();
-    let typed_parts = defs.iter().map(|(name, part)| {
+    let typed_tables = defs.iter().map(|(name, table_schema)| {
         let (shape, tag) = name.split_once('-').unwrap();
         let header = match shape {
             "camera" => "[camera]",
@@ -670,7 +671,7 @@ fn parts() -> Vec<(String, &'static Json)> {
             "light" => "[[lights]]",
             _ => "[[shapes]]",
         };
-        (format!("### `{header}` of type `\"{tag}\"`"), part)
+        (format!("### `{header}` of type `\"{tag}\"`"), table_schema)
     });
     let top = &schema()["properties"];
     let plain = [
@@ -680,8 +681,8 @@ fn parts() -> Vec<(String, &'static Json)> {
         ("## `[meshes.NAME]`", &top["meshes"]["additionalProperties"]),
         ("## `[[instances]]`", &top["instances"]["items"]),
     ];
-    typed_parts
-        .chain(plain.map(|(heading, part)| (heading.to_owned(), part)))
+    typed_tables
+        .chain(plain.map(|(heading, table_schema)| (heading.to_owned(), table_schema)))
         .collect()
 }
 
@@ -702,9 +703,9 @@ fn rows(heading: &str) -> BTreeMap<&'static str, (String, String)> {
 #[test]
 fn the_page_has_the_same_keys_defaults_and_ranges() {
     let (mut defaults, mut ranges) = (0, 0);
-    for (heading, part) in parts() {
+    for (heading, table_schema) in table_schemas() {
         let rows = rows(&heading);
-        let keys = part["properties"].as_object().unwrap();
+        let keys = table_schema["properties"].as_object().unwrap();
         assert_eq!(
             rows.keys().copied().collect::<Vec<_>>(),
             keys.keys().map(String::as_str).collect::<Vec<_>>(),
@@ -714,7 +715,7 @@ fn the_page_has_the_same_keys_defaults_and_ranges() {
             let location = format!("{heading} {key}");
             let property = &keys[key];
             // Camera keys are required without a path.
-            let required = [&part["required"], &part["anyOf"][0]["required"]].into_iter();
+            let required = [&table_schema["required"], &table_schema["anyOf"][0]["required"]].into_iter();
             let is_required = required.flat_map(Json::as_array).flatten().any(|name| name == key);
             // `type` is always required.
             assert!(is_required == (default == "required") || key == "type", "{location}");
@@ -769,7 +770,7 @@ fn visit_keys(schema: &Json, path: &str, check: &mut impl FnMut(&str, &Json)) {
     match schema {
         Json::Object(all) => {
             for (key, property) in all.get("properties").and_then(Json::as_object).into_iter().flatten() {
-                // The `then` part of the condition describes these keys.
+                // The `then` branch of the condition describes these keys.
                 if !path.ends_with("/if") {
                     check(&format!("{path}.{key}"), property);
                 }
@@ -826,7 +827,7 @@ fn every_key_has_a_description_and_every_number_a_range() {
 }
 
 #[test]
-fn the_tests_cover_every_key() {
+fn the_scenes_cover_every_key() {
     let mut covered: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
     let mut record_keys = |name: String, table: &Value| {
         covered
@@ -873,9 +874,14 @@ fn the_tests_cover_every_key() {
         .as_object()
         .unwrap()
         .iter()
-        .map(|(name, part)| (name.clone(), part));
-    for (name, part) in defs.chain(plain).chain(list_items) {
-        let expected: BTreeSet<String> = part["properties"].as_object().unwrap().keys().cloned().collect();
+        .map(|(name, table_schema)| (name.clone(), table_schema));
+    for (name, table_schema) in defs.chain(plain).chain(list_items) {
+        let expected: BTreeSet<String> = table_schema["properties"]
+            .as_object()
+            .unwrap()
+            .keys()
+            .cloned()
+            .collect();
         assert_eq!(covered.get(&name), Some(&expected), "{name}");
     }
 }

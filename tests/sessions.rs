@@ -1,4 +1,4 @@
-//! Sessions: images, and packed scenes, have the bits of fresh ones after changes of camera and scene.
+//! Sessions: after changes of camera and scene, images and packed scenes equal those of a new session bit for bit.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -34,7 +34,7 @@ fn with_camera(scene: &Scene, camera: Camera) -> Scene {
     scene
 }
 
-/// Cameras with every projection, and far targets.
+/// Returns the cameras of the scenes, and the same cameras moved by 1000 units along x.
 fn cameras(descriptions: &[Description]) -> Vec<Camera> {
     let mut cameras: Vec<Camera> = descriptions.iter().map(|d| scene_of(d).camera).collect();
     for camera in cameras.clone() {
@@ -47,7 +47,7 @@ fn cameras(descriptions: &[Description]) -> Vec<Camera> {
 }
 
 #[test]
-fn edited_cameras_are_packed_like_fresh_ones() {
+fn scenes_with_edited_cameras_are_packed_like_new_scenes() {
     let descriptions = random_descriptions(24);
     let cameras = cameras(&descriptions);
     let (mut kept, mut moved) = (0, 0);
@@ -57,21 +57,21 @@ fn edited_cameras_are_packed_like_fresh_ones() {
         let mut packed = pack_with(&scene, &shading, texels);
         assert_eq!(packed, pack(&scene));
         for camera in &cameras {
-            let other = with_camera(&scene, *camera);
+            let edited = with_camera(&scene, *camera);
             if pack::origin(camera) == packed.origin {
                 kept += 1;
-                pack::set_camera(&mut packed, &other);
+                pack::set_camera(&mut packed, &edited);
             } else {
                 moved += 1;
-                packed = pack_with(&other, &shading, packed.textures.texels);
+                packed = pack_with(&edited, &shading, packed.textures.texels);
             }
-            assert_eq!(packed, pack(&other));
+            assert_eq!(packed, pack(&edited));
         }
     }
     assert!(kept > 100 && moved > 100, "{kept} origins kept, {moved} moved");
 }
 
-/// Returns the color and depth of all pixels.
+/// Returns the bits of the colors of all pixels.
 fn bits(picture: &Picture) -> Vec<u32> {
     let colors = picture.pixels().colors.into_iter().flatten();
     colors.map(f32::to_bits).collect()
@@ -83,7 +83,7 @@ fn check_session(device: &Device, scene_count: usize) {
     let scenes: Vec<Arc<Scene>> = descriptions.iter().map(|d| Arc::new(scene_of(d))).collect();
     let context = Context::new();
     let mut session = Session::new(&context, Arc::clone(&scenes[0]));
-    let mut former: Option<Vec<u32>> = None;
+    let mut previous: Option<Vec<u32>> = None;
     let mut changed = 0;
     for scene in &scenes {
         session.set_scene(Arc::clone(scene));
@@ -98,27 +98,27 @@ fn check_session(device: &Device, scene_count: usize) {
                 },
                 ..Options::default()
             };
-            let expected = wgray::render(&with_camera(scene, *camera), &options).expect("a fresh image");
-            // The second image needs no packing at all.
+            let expected = wgray::render(&with_camera(scene, *camera), &options).expect("an image without a session");
+            // The second image reuses the packed scene.
             for _ in 0..2 {
                 let image = session.render(&options).expect("an image");
                 assert_eq!(image, expected, "camera {i}");
             }
             let now = bits(&expected);
-            changed += usize::from(former.is_some_and(|former| former != now));
-            former = Some(now);
+            changed += usize::from(previous.is_some_and(|previous| previous != now));
+            previous = Some(now);
         }
     }
     assert!(changed > scene_count, "the images do not depend on the camera");
 }
 
 #[test]
-fn images_of_a_session_have_the_bits_of_fresh_images_on_the_cpu() {
+fn images_of_a_session_equal_images_without_a_session_on_the_cpu() {
     check_session(&Device::Cpu, 8);
 }
 
 #[test]
-fn images_of_a_session_have_the_bits_of_fresh_images_on_the_gpu() {
+fn images_of_a_session_equal_images_without_a_session_on_the_gpu() {
     if adapter::device().is_some() {
         check_session(&Device::Gpu, 2);
     }
@@ -140,7 +140,7 @@ fn sessions_of_a_context_work_at_the_same_time() {
         for scene in &scenes {
             let (context, options) = (&context, &options);
             threads.spawn(move || {
-                let expected = wgray::render(scene, options).expect("a fresh image");
+                let expected = wgray::render(scene, options).expect("an image without a session");
                 let mut session = Session::new(context, scene.clone());
                 for _ in 0..3 {
                     assert_eq!(session.render(options).expect("an image"), expected);
@@ -158,7 +158,7 @@ fn a_session_survives_invalid_options() {
         device: Device::Cpu,
         ..Options::default()
     };
-    let expected = wgray::render(&scene, &options).expect("a fresh image");
+    let expected = wgray::render(&scene, &options).expect("an image without a session");
     let mut session = Session::new(&Context::new(), scene);
     let invalid = [
         Options {
@@ -192,28 +192,28 @@ fn devices() -> Vec<Device> {
     devices
 }
 
-fn on(device: &Device) -> Options {
+fn options_for(device: &Device) -> Options {
     Options {
         device: device.clone(),
         ..Options::default()
     }
 }
 
-/// Cancels after different times, and continues.
+/// The render is cancelled after different times, and continued.
 #[test]
-fn steps_have_the_bits_of_a_render_in_spite_of_cancellations() {
+fn a_render_with_cancellations_equals_a_render_without() {
     for device in devices() {
         let count = if device == Device::Cpu { 6 } else { 2 };
         for description in random_descriptions(count) {
             let scene = Arc::new(scene_of(&description));
-            let options = on(&device);
+            let options = options_for(&device);
             let expected = wgray::render(&scene, &options).expect("an image");
             let mut session = Session::new(&Context::new(), Arc::clone(&scene));
             let mut render = session.start(&options, &CancelToken::new()).expect("a start");
             let black = render.snapshot();
             assert!(bits(&black).iter().all(|bits| *bits == 0), "the first image is black");
             assert_eq!((render.samples(), render.fraction()), (0, 0.0));
-            let (mut picture, mut former, mut pause) = (black, 0, 0);
+            let (mut picture, mut previous, mut pause) = (black, 0, 0);
             loop {
                 let cancel = CancelToken::new();
                 let status = std::thread::scope(|threads| {
@@ -223,8 +223,8 @@ fn steps_have_the_bits_of_a_render_in_spite_of_cancellations() {
                     });
                     render.run(&cancel).expect("a step")
                 });
-                assert!(render.samples() >= former && (0.0..=1.0).contains(&render.fraction()));
-                former = render.samples();
+                assert!(render.samples() >= previous && (0.0..=1.0).contains(&render.fraction()));
+                previous = render.samples();
                 render.snapshot_into(&mut picture);
                 assert!(is_same(&picture, &render.snapshot()));
                 if status == Status::Finished {
@@ -250,20 +250,20 @@ environment = { name = 'studio' }
 materials.a = { type = 'diffuse', color = [0.5, 0.5, 0.5] }
 shapes = [{ type = 'sphere', material = 'a', center = [0, 0, 0], radius = 1 }]";
     let scene = Arc::new(Scene::parse(text, "s.toml").expect("a scene"));
-    let never = CancelToken::new();
+    let no_cancel = CancelToken::new();
     for device in devices() {
-        let options = on(&device);
+        let options = options_for(&device);
         let image = |additions: &[(bool, u32)]| {
             let mut session = Session::new(&Context::new(), Arc::clone(&scene));
-            let mut render = session.start(&options, &never).expect("a start");
+            let mut render = session.start(&options, &no_cancel).expect("a start");
             for (runs_first, count) in additions {
                 if *runs_first {
-                    assert_eq!(render.run(&never).expect("samples"), Status::Finished);
+                    assert_eq!(render.run(&no_cancel).expect("samples"), Status::Finished);
                 }
                 render.add_samples(*count).expect("an addition");
             }
-            assert_eq!(render.run(&never).expect("samples"), Status::Finished);
-            assert_eq!(render.step(&never).expect("no samples"), Status::Finished);
+            assert_eq!(render.run(&no_cancel).expect("samples"), Status::Finished);
+            assert_eq!(render.step(&no_cancel).expect("no samples"), Status::Finished);
             (render.samples(), render.finish().pixels())
         };
         let expected = image(&[(false, 5)]);
@@ -272,7 +272,7 @@ shapes = [{ type = 'sphere', material = 'a', center = [0, 0, 0], radius = 1 }]";
         assert!(image(&[(true, 1), (false, 1), (true, 3)]) == expected);
         assert!(image(&[(true, 4)]).1 != expected.1);
         let mut session = Session::new(&Context::new(), Arc::clone(&scene));
-        let mut render = session.start(&options, &never).expect("a start");
+        let mut render = session.start(&options, &no_cancel).expect("a start");
         let error = render.add_samples(65_534).unwrap_err().to_string();
         assert_eq!(error, "samples: 65537 in total must be at most 65536");
         assert!(render.add_samples(u32::MAX).is_err());
@@ -280,7 +280,7 @@ shapes = [{ type = 'sphere', material = 'a', center = [0, 0, 0], radius = 1 }]";
     let adaptive = text.replace("pixel_samples = 3", "pixel_samples = 64, adaptive = { error = 0.01 }");
     let scene = Scene::parse(&adaptive, "s.toml").expect("a scene");
     let mut session = Session::new(&Context::new(), scene);
-    let mut render = session.start(&on(&Device::Cpu), &never).expect("a start");
+    let mut render = session.start(&options_for(&Device::Cpu), &no_cancel).expect("a start");
     assert!(render.add_samples(1).unwrap_err().to_string().contains("adaptive"));
 }
 
@@ -305,7 +305,7 @@ environment = { file = 'map' }";
         matches!(result, Err(Error::Render(wgray::error::RenderError::Cancelled)))
     };
     for device in devices() {
-        let options = on(&device);
+        let options = options_for(&device);
         let mut session = Session::new(&Context::new(), Arc::clone(&scene));
         let cancel = CancelToken::new();
         cancel.cancel();
@@ -322,26 +322,26 @@ environment = { file = 'map' }";
         });
         let delay = start.elapsed() - time_of_cancel;
         assert!(delay < Duration::from_millis(500), "cancelled after {delay:?}"); // usually 10 ms
-        // The preparation continues, and is used, or dropped when the scene changes.
-        let never = CancelToken::new();
+        // The cancelled preparation continues. A later render uses the result, or drops it if the scene has changed.
+        let no_cancel = CancelToken::new();
         let expected = wgray::render(&scene, &options).expect("an image");
-        let mut render = session.start(&options, &never).expect("a start");
-        assert_eq!(render.run(&never).expect("samples"), Status::Finished);
+        let mut render = session.start(&options, &no_cancel).expect("a start");
+        assert_eq!(render.run(&no_cancel).expect("samples"), Status::Finished);
         assert!(is_same(&render.finish(), &expected));
         let cancel = CancelToken::new();
-        let mut other = Session::new(&Context::new(), Arc::clone(&scene));
+        let mut second_session = Session::new(&Context::new(), Arc::clone(&scene));
         std::thread::scope(|threads| {
             threads.spawn(|| {
                 std::thread::sleep(Duration::from_millis(50));
                 cancel.cancel();
             });
-            assert!(cancelled(other.start(&options, &cancel)));
+            assert!(cancelled(second_session.start(&options, &cancel)));
         });
         let mut camera = scene.camera;
         camera.position.x += 1.0;
-        other.set_camera(camera).expect("a camera");
+        second_session.set_camera(camera).expect("a camera");
         let expected = wgray::render(&with_camera(&scene, camera), &options).expect("an image");
-        assert!(is_same(&other.render(&options).expect("an image"), &expected));
+        assert!(is_same(&second_session.render(&options).expect("an image"), &expected));
     }
 }
 
@@ -349,13 +349,13 @@ environment = { file = 'map' }";
 fn renders_start_on_threads_of_a_pool() {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a pool");
     let scene = Arc::new(scene_of(&random_descriptions(1)[0]));
-    let options = on(&Device::Cpu);
+    let options = options_for(&Device::Cpu);
     let expected = wgray::render(&scene, &options).expect("an image");
     let image = pool.install(|| {
         let mut session = Session::new(&Context::new(), Arc::clone(&scene));
-        let never = CancelToken::new();
-        let mut render = session.start(&options, &never).expect("a start");
-        render.run(&never).expect("samples");
+        let no_cancel = CancelToken::new();
+        let mut render = session.start(&options, &no_cancel).expect("a start");
+        render.run(&no_cancel).expect("samples");
         render.finish().pixels()
     });
     assert!(image == expected.pixels());
@@ -383,10 +383,10 @@ fn block_on<F: Future>(future: F) -> F::Output {
 }
 
 #[test]
-fn futures_have_the_same_image_and_can_be_cancelled_and_dropped() {
+fn futures_return_the_same_image_and_can_be_cancelled_and_dropped() {
     let scene = Arc::new(scene_of(&random_descriptions(1)[0]));
     for device in devices() {
-        let options = on(&device);
+        let options = options_for(&device);
         let expected = wgray::render(&scene, &options).expect("an image");
         let mut session = Session::new(&Context::new(), Arc::clone(&scene));
         let cancel = CancelToken::new();
@@ -450,14 +450,14 @@ impl<S: tracing::Subscriber> tracing_subscriber::Layer<S> for Recorder {
 #[test]
 fn spans_cover_the_phases_and_the_device_has_a_reason() {
     use tracing_subscriber::prelude::*;
-    // If there is only one subscriber, tracing asks the default one of the thread that first enters a span: in other
-    // tests, none.
+    // With only one subscriber, tracing uses the default subscriber of the thread that first enters a span. In other
+    // tests, this thread has no subscriber.
     let _second = tracing::Dispatch::new(tracing_subscriber::registry());
     for (device, reason) in devices().into_iter().zip(["requested", "requested"]) {
         let recorder = Recorder::default();
         let subscriber = tracing_subscriber::registry().with(recorder.clone());
         tracing::subscriber::with_default(subscriber, || {
-            // A mesh that no other test has in use.
+            // No other test uses this mesh.
             let folder = TestFolder::with_file("a.obj", "v 0 0 0\nv 1 0 0\nv 0 0 1\nf 1 2 3\n");
             let overrides = wgray::Overrides {
                 size: Some((4, 3)),
@@ -467,7 +467,9 @@ fn spans_cover_the_phases_and_the_device_has_a_reason() {
             let scene = Scene::load_with(folder.path("a.obj"), &overrides).expect("a scene");
             let mut session = Session::new(&Context::new(), scene);
             // Spans of other threads belong to the same subscriber.
-            let mut render = session.start(&on(&device), &CancelToken::new()).expect("a start");
+            let mut render = session
+                .start(&options_for(&device), &CancelToken::new())
+                .expect("a start");
             render.step(&CancelToken::new()).expect("a step");
         });
         let names = recorder.0.lock().expect("a list");

@@ -76,7 +76,7 @@ pub type Named = (String, String);
 pub struct Signature {
     pub name: String,
     /// Arguments or fields.
-    pub parts: Vec<Named>,
+    pub members: Vec<Named>,
     pub result: Option<String>,
 }
 
@@ -89,7 +89,7 @@ pub fn wgsl_functions(module: &Module, source: &Source, file: &str) -> Vec<Signa
             let argument = |a: &naga::FunctionArgument| (a.name.clone().unwrap_or_default(), type_name(module, a.ty));
             let signature = Signature {
                 name: function.name.clone().unwrap_or_default(),
-                parts: function.arguments.iter().map(argument).collect(),
+                members: function.arguments.iter().map(argument).collect(),
                 result: function.result.as_ref().map(|result| type_name(module, result.ty)),
             };
             functions.push((span, signature));
@@ -114,7 +114,7 @@ pub fn wgsl_records(module: &Module, source: &Source, file: &str) -> Vec<Signatu
                 span,
                 Signature {
                     name,
-                    parts: members.iter().map(field).collect(),
+                    members: members.iter().map(field).collect(),
                     result: None,
                 },
             ));
@@ -177,7 +177,7 @@ pub fn rust_functions(file: &syn::File) -> Vec<Signature> {
     let function = |item: &Item| match item {
         Item::Fn(function) => Some(Signature {
             name: function.sig.ident.to_string(),
-            parts: function.sig.inputs.iter().map(argument).collect(),
+            members: function.sig.inputs.iter().map(argument).collect(),
             result: match &function.sig.output {
                 ReturnType::Default => updated(function),
                 ReturnType::Type(_, ty) => Some(rust_type(ty)),
@@ -199,7 +199,7 @@ pub fn rust_records(file: &syn::File) -> Vec<Signature> {
     let record = |item: &Item| match item {
         Item::Struct(s) => Some(Signature {
             name: s.ident.to_string(),
-            parts: s.fields.iter().map(field).collect(),
+            members: s.fields.iter().map(field).collect(),
             result: None,
         }),
         _ => None,
@@ -239,7 +239,7 @@ fn rust_type(ty: &Type) -> String {
     }
 }
 
-/// Returns readable differences; empty if equal.
+/// Returns a message for each difference.
 pub fn differences(file: &str, wgsl: &[Signature], rust: &[Signature]) -> Vec<String> {
     let mut problems = Vec::new();
     for w in wgsl {
@@ -264,7 +264,7 @@ fn every_kernel_is_tested() {
         if file.starts_with("kernels/") {
             assert!(
                 KERNELS.iter().any(|kernel| kernel.file() == file),
-                "{file} is not a kernel"
+                "{file} is not in `KERNELS`"
             );
         }
     }

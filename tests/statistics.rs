@@ -1,5 +1,5 @@
 //! Random patterns are uniform, jointly and in projections, and have the same image mean as grids. The tests are
-//! deterministic, because the random numbers are fixed.
+//! deterministic, because the seeds are fixed.
 
 use glam::Vec2;
 use wgray::scene::Pattern;
@@ -20,10 +20,19 @@ fn positions(pattern: Pattern, count: u32, sets: u32) -> Vec<Vec<Vec2>> {
     let mut description = scenes::scene("cornell.toml");
     description.render.pixel_samples = patterns::samples(pattern, count);
     let packed: Packed = scenes::packed(&description);
-    let s = &packed.specialization;
+    let specialization = &packed.specialization;
     let keys = evaluate("sample_key", (0..sets).flat_map(|i| [i % 97, i / 97, 5, 0]).collect());
     let arguments = keys.chunks_exact(2).flat_map(|key| {
-        (0..packed.sampling.pixel_samples).flat_map(|index| [s.pixel_pattern, s.pixel_side, index, 0, key[0], key[1]])
+        (0..packed.sampling.pixel_samples).flat_map(|index| {
+            [
+                specialization.pixel_pattern,
+                specialization.pixel_side,
+                index,
+                0,
+                key[0],
+                key[1],
+            ]
+        })
     });
     let points = evaluate("sample_square", arguments.collect());
     let point = |words: &[u32]| Vec2::new(f32::from_bits(words[0]), f32::from_bits(words[1]));
@@ -84,7 +93,8 @@ fn chi_square(counts: &[u32]) -> f64 {
         .sum()
 }
 
-/// Returns the first projection in which the positions, assumed to be independent, are not uniform.
+/// Returns the first projection in which the positions are not uniform. The test assumes that the positions are
+/// independent.
 fn nonuniform_projection(positions: &[Vec2]) -> Option<String> {
     const CELLS: usize = 16;
     let cell = |x: f32| ((x * CELLS as f32) as usize).min(CELLS - 1);
@@ -175,18 +185,20 @@ fn all_patterns_are_centered() {
 }
 
 #[test]
-fn a_biased_pattern_is_found() {
+fn a_biased_pattern_is_detected() {
     let sets = positions(Pattern::Random, 16, 10_000);
     let unbiased: Vec<Vec2> = sets.into_iter().flatten().collect();
     assert_eq!(nonuniform_projection(&unbiased), None);
     type Change = fn(usize, Vec2) -> Vec2;
     let changes: [(&str, Change); 6] = [
-        ("a little to the left", |_, p| Vec2::new(p.x.powf(1.03), p.y)),
-        ("a little up", |_, p| Vec2::new(p.x, p.y * 0.99)),
-        ("both the same", |_, p| Vec2::splat(p.x)),
-        ("y follows x", |i, p| if i % 8 == 0 { Vec2::splat(p.x) } else { p }),
-        ("a number from -0.5 to 0.5", |_, p| (p - 0.5).abs()),
-        ("seven bits only", |_, p| (p * 128.0).floor() / 128.0),
+        ("slightly to the left", |_, p| Vec2::new(p.x.powf(1.03), p.y)),
+        ("slightly to the top", |_, p| Vec2::new(p.x, p.y * 0.99)),
+        ("y equals x", |_, p| Vec2::splat(p.x)),
+        ("y equals x for one position in eight", |i, p| {
+            if i % 8 == 0 { Vec2::splat(p.x) } else { p }
+        }),
+        ("distance from the center", |_, p| (p - 0.5).abs()),
+        ("only seven bits", |_, p| (p * 128.0).floor() / 128.0),
     ];
     for (name, change) in changes {
         let biased: Vec<Vec2> = unbiased.iter().enumerate().map(|(i, p)| change(i, *p)).collect();
@@ -196,12 +208,12 @@ fn a_biased_pattern_is_found() {
 
 /// Returns a scene with so few pixels that most of them contain edges.
 fn noisy(pattern: Pattern, seed: u32, counts: (u32, u32)) -> Packed {
-    let mut d = scenes::scene("cornell.toml");
-    (d.image.width, d.image.height) = (20, 20);
-    d.render.seed = seed;
-    d.render.pixel_samples = patterns::samples(pattern, counts.0);
-    d.render.light_samples = patterns::samples(pattern, counts.1);
-    scenes::packed(&d)
+    let mut description = scenes::scene("cornell.toml");
+    (description.image.width, description.image.height) = (20, 20);
+    description.render.seed = seed;
+    description.render.pixel_samples = patterns::samples(pattern, counts.0);
+    description.render.light_samples = patterns::samples(pattern, counts.1);
+    scenes::packed(&description)
 }
 
 /// Returns the deviation of each pixel from the reference, in standard errors over the seeds.
@@ -212,13 +224,13 @@ fn deviations(pictures: &[Vec<[f64; 3]>], expected_pixels: &[[f64; 3]]) -> Vec<f
         let mean = values.iter().sum::<f64>() / n;
         let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0);
         let expected: f64 = expected_pixels[i].iter().sum();
-        // The reference, a fine grid, has its own error.
+        // The relative error of the reference, a fine grid, is assumed to be 1e-3.
         (mean - expected) / ((variance / n).sqrt() + 1e-3 * expected)
     };
     (0..expected_pixels.len()).map(pixel).collect()
 }
 
-/// Checks that the mean and mean square of the deviations do not exceed the values of a standard normal distribution.
+/// Checks that the mean and mean square of the deviations are within the limits for a standard normal distribution.
 fn check_unbiased(deviations: &[f64]) -> Result<(), String> {
     let n = deviations.len() as f64;
     let mean = deviations.iter().sum::<f64>() / n;
@@ -226,7 +238,9 @@ fn check_unbiased(deviations: &[f64]) -> Result<(), String> {
     if mean.abs() * n.sqrt() < 4.0 && square < 1.3 {
         Ok(())
     } else {
-        Err(format!("mean {mean:.3}, mean square {square:.3}, of {n} pixels"))
+        Err(format!(
+            "mean deviation {mean:.3}, mean square {square:.3}, for {n} pixels"
+        ))
     }
 }
 
@@ -242,13 +256,13 @@ fn images_of_random_patterns_have_the_mean_of_grids() {
         let brighter: Vec<[f64; 3]> = expected_pixels.iter().map(|pixel| pixel.map(|v| v * 1.02)).collect();
         assert!(
             check_unbiased(&deviations(&pictures, &brighter)).is_err(),
-            "{name}: a bias is not found"
+            "{name}: a bias is not detected"
         );
         let mut shifted = expected_pixels.clone();
         shifted.rotate_right(1);
         assert!(
             check_unbiased(&deviations(&pictures, &shifted)).is_err(),
-            "{name}: a shift is not found"
+            "{name}: a shift is not detected"
         );
     }
 }

@@ -1,4 +1,4 @@
-//! The import graph of the modules of each package has no cycles. Cargo rejects cycles of packages.
+//! The import graph of the modules of each package has no cycles. Cargo itself rejects cycles of packages.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -30,7 +30,7 @@ fn module_imports_have_no_cycles() {
 }
 
 #[test]
-fn cycles_are_found() {
+fn cycles_are_detected() {
     let found = |texts: &[(&str, &str)]| {
         let file = |(name, text): &(&str, &str)| {
             let module = if *name == "lib" { Vec::new() } else { strings(&[name]) };
@@ -45,7 +45,7 @@ fn cycles_are_found() {
         found(&[("a", "use crate::b::B;"), ("b", "fn f() { super::a::g() }")]),
         cycle
     );
-    // Through names that the root exports.
+    // A cycle through names that the root module exports.
     let root = ("lib", "mod a; mod b; pub use b::B; pub use a::*;");
     assert_eq!(
         found(&[
@@ -55,7 +55,7 @@ fn cycles_are_found() {
         ]),
         cycle
     );
-    // In a macro, and through a third module.
+    // A cycle through a macro and a third module.
     let third = [
         ("a", "macro_rules! m { () => { crate::b::B } }"),
         ("b", "use crate::c;"),
@@ -208,8 +208,8 @@ impl Paths {
             "self" | "super" => self.module.clone(),
             _ => return,
         };
-        let ups = path.iter().take_while(|name| *name == "super").count();
-        base.truncate(base.len().saturating_sub(ups));
+        let super_count = path.iter().take_while(|name| *name == "super").count();
+        base.truncate(base.len().saturating_sub(super_count));
         let rest = path
             .iter()
             .skip_while(|name| matches!(name.as_str(), "crate" | "self" | "super"));

@@ -20,15 +20,15 @@ const SHADERS_WITHOUT_TWIN: &[(&str, &str)] = &[
         "rounding.wgsl",
         "quotients and square roots are correctly rounded in Rust",
     ),
-    ("texels.wgsl", "the CPU path has all texels in one list"),
-    ("film.wgsl", "the film of the CPU path has a list for each layer"),
+    ("texels.wgsl", "the CPU backend has all texels in one list"),
+    ("film.wgsl", "the film of the CPU backend has a list for each layer"),
     (
         "integrators/whole.wgsl",
-        "the CPU path renders complete samples in pixel.rs, without lockstep",
+        "the CPU backend renders complete samples in pixel.rs, without lockstep",
     ),
     (
         "bvh.wgsl",
-        "the CPU path has a different traversal (bvh.rs, traversal) with the same hits, see tests/meshes",
+        "the CPU backend has a different traversal (bvh.rs, traversal) with the same hits, see tests/meshes",
     ),
     (
         "buffers.wgsl",
@@ -54,7 +54,7 @@ const RUST_FILES_WITHOUT_SHADER: &[&str] = &[
     "wavefront",
 ];
 
-/// Functions and records that exist in only one language or differ: file, name, reason.
+/// Functions and records that exist in only one language, or differ between the languages: file, name, reason.
 const ONE_SIDED: &[(&str, &str, &str)] = &[
     (
         "linear_primitives.wgsl",
@@ -109,9 +109,13 @@ const ONE_SIDED: &[(&str, &str, &str)] = &[
     (
         "linear_primitives.wgsl",
         "occluded_by",
-        "Rust has a range of indices instead of two numbers",
+        "in Rust, a range of indices replaces two arguments",
     ),
-    ("geometry.wgsl", "instance_of", "only in Rust, for a record in a list"),
+    (
+        "geometry.wgsl",
+        "instance_of",
+        "only in Rust, where instances are records in a list",
+    ),
     (
         "geometry.wgsl",
         "group_word",
@@ -140,20 +144,23 @@ fn twin_differences(source: &Source, file: &str, twin: &syn::File) -> Vec<String
     // If a WGSL function takes `before` and returns the new value, its Rust twin may take `state: &mut T` instead. The
     // argument is renamed for the comparison.
     let in_place = |wgsl: &Signature, twin: &Signature| {
-        let has_result_type =
-            |s: &Signature, name: &str| s.parts.iter().any(|(n, ty)| n == name && Some(ty) == s.result.as_ref());
+        let has_result_type = |s: &Signature, name: &str| {
+            s.members
+                .iter()
+                .any(|(n, ty)| n == name && Some(ty) == s.result.as_ref())
+        };
         has_result_type(wgsl, "before") && has_result_type(twin, "state")
     };
     for twin in &mut twins {
         if functions.iter().any(|f| f.name == twin.name && in_place(f, twin)) {
-            let state = twin.parts.iter_mut().find(|(name, _)| name == "state");
+            let state = twin.members.iter_mut().find(|(name, _)| name == "state");
             state.expect("the argument just found").0 = "before".to_string();
         }
     }
     if !is_shared(file) {
         for twin in &mut twins {
-            if twin.parts.first().is_some_and(|(_, ty)| ty == "Packed") {
-                twin.parts.remove(0);
+            if twin.members.first().is_some_and(|(_, ty)| ty == "Packed") {
+                twin.members.remove(0);
             }
         }
     }
@@ -198,7 +205,7 @@ fn functions_and_records_match() {
 }
 
 #[test]
-fn a_changed_twin_is_found() {
+fn a_changed_twin_is_detected() {
     let shared = shared_source();
     let changed = |file: &str, from: &str, to: &str| {
         let text = std::fs::read_to_string(sources::path(&format!("crates/render/src/cpu/{file}"))).expect("a twin");
@@ -261,12 +268,13 @@ fn every_rust_file_has_a_shader() {
         let twin = built_in().any(|(file, _)| file == wgsl);
         assert!(
             twin || RUST_FILES_WITHOUT_SHADER.contains(&name.as_str()),
-            "crates/render/src/cpu/{name} is not the twin of a file"
+            "crates/render/src/cpu/{name} is not the twin of a shader"
         );
     }
 }
 
-/// Allowed SPIR-V instructions. On floats: arithmetic protected by `NoContraction`, comparisons, conversions, moves.
+/// Allowed SPIR-V instructions. For floats, only arithmetic protected by `NoContraction`, comparisons, conversions and
+/// moves are allowed.
 mod opcode {
     use std::ops::RangeInclusive;
 
@@ -341,7 +349,7 @@ fn violations(module: &[u32]) -> Vec<String> {
     problems
 }
 
-/// Returns true if only conversions to integers use a result.
+/// Returns true if only conversions to integers use `result`.
 fn is_only_converted_to_integer(module: &[u32], result: u32) -> bool {
     let defines = |op: u16, words: &[u32]| op == opcode::EXTENDED && words[2] == result;
     let functions = instructions(module).skip_while(|(op, _)| *op != opcode::FUNCTION);
@@ -386,7 +394,7 @@ fn kernels_have_only_exact_operations() {
 }
 
 #[test]
-fn an_inexact_operation_is_found() {
+fn an_inexact_operation_is_detected() {
     let (_, packed) = scenes::all().remove(0);
     let source = sources::shaders().compose(&RENDER, Integrator::Phong, None);
     let from = "    var sum = environment.ambient * material.ambient;\n";
@@ -413,8 +421,8 @@ fn an_inexact_operation_is_found() {
     }
     let module = spirv(&source, &RENDER, &packed, Rounding::Device);
     assert_eq!(violations(&module), Vec::<String>::new());
-    let decorations: Vec<usize> = positions(&module)
-        .filter(|at| module[*at] as u16 == opcode::DECORATE && module[at + 2] == opcode::NO_CONTRACTION)
+    let decorations: Vec<usize> = instruction_starts(&module)
+        .filter(|start| module[*start] as u16 == opcode::DECORATE && module[start + 2] == opcode::NO_CONTRACTION)
         .collect();
     assert!(decorations.len() > 100);
     let mut without = module.clone();
@@ -422,7 +430,7 @@ fn an_inexact_operation_is_found() {
     assert_eq!(violations(&without).len(), 1, "an undecorated operation was not found");
 }
 
-fn positions(module: &[u32]) -> impl Iterator<Item = usize> {
+fn instruction_starts(module: &[u32]) -> impl Iterator<Item = usize> {
     let mut position = 5; // after the header
     instructions(module).map(move |(_, words)| {
         let start = position;

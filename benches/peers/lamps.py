@@ -5,8 +5,8 @@ The columns are the time, the error, and the time to reach the error of one ligh
 
 Run it as `target/peers/venv/bin/python benches/peers/lamps.py --wgray target/release/wgray`.
 
-The error is that of `path_error.py`: the relative variance between images with different seeds, averaged over the pixels,
-and the root of this average. The time is the shortest render time reported by `--stats`, without compilation. A light is a rectangle
+The error is the relative error of `path_error.py`: the relative variance between images with different seeds is averaged
+over the pixels; the error is the square root of the average. The time is the minimum of the render times in `--stats`, which exclude compilation. A light is a rectangle
 that faces down, an emissive sphere or a point light. It is invisible to the camera, because the noise of a small
 visible light would dominate the error. A thousand lights are spread through the room, one per cell of a grid of 10 x 10
 x 10.
@@ -55,13 +55,14 @@ AREA = 0.25
 
 
 def positions(count):
-    """Returns the point below the middle of the ceiling for one light, else a random point in each cell of a grid."""
+    """Returns the positions of the lights: a point below the center of the ceiling for one light, otherwise a random point in
+    each cell of a grid."""
     if count == 1:
         return [(0, 0, 2.7)]
     side = round(count ** (1 / 3))
-    source = random.Random(7)
+    generator = random.Random(7)
     cells = [(i, j, k) for i in range(side) for j in range(side) for k in range(side)]
-    return [tuple(low + (high - low) * (index + 0.1 + 0.8 * source.random()) / side
+    return [tuple(low + (high - low) * (index + 0.1 + 0.8 * generator.random()) / side
                   for index, low, high in zip(cell, (-1.9, -3.9, 0.3), (1.9, 3.9, 2.9))) for cell in cells]
 
 
@@ -89,9 +90,9 @@ def dark_sphere(kind, position):
 def scene(kind, count, arguments):
     walls = "".join(f'[[shapes]]\ntype = "rectangle"\nmaterial = "{material}"\ncenter = {center}\nsize = {size}\nnormal = {normal}\n'
                     f"tangent = {tangent}\n" for material, center, size, normal, tangent in WALLS)
-    start = ROOM.format(size=arguments.size, depth=arguments.depth, spp=arguments.spp, radiance=RADIANCE)
+    head = ROOM.format(size=arguments.size, depth=arguments.depth, spp=arguments.spp, radiance=RADIANCE)
     spheres = "".join(dark_sphere(kind, position) for position in positions(1000)) if arguments.dark and count == 1 else ""
-    return start + walls + spheres + "".join(light(kind, count, position) for position in positions(count))
+    return head + walls + spheres + "".join(light(kind, count, position) for position in positions(count))
 
 
 def render(folder, text, seed, device, arguments):

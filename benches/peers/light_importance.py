@@ -20,13 +20,13 @@ POINTS = 2000
 DOWN = np.array([0, 0, -1.0])
 
 
-def points_on_walls(source):
+def points_on_walls(generator):
     """Returns uniformly distributed points on the walls of the room of `lamps.py`, and their normals."""
     size = np.array([4, 8, 3.0])
     areas = np.repeat([size[1] * size[2], size[0] * size[2], size[0] * size[1]], 2)
-    wall = source.choice(6, p=areas / areas.sum(), size=POINTS)
+    wall = generator.choice(6, p=areas / areas.sum(), size=POINTS)
     axis, side = wall // 2, wall % 2 - 0.5
-    points, normals = (source.random((POINTS, 3)) - 0.5) * size, np.zeros((POINTS, 3))
+    points, normals = (generator.random((POINTS, 3)) - 0.5) * size, np.zeros((POINTS, 3))
     rows = np.arange(POINTS)
     points[rows, axis] = side * size[axis]
     normals[rows, axis] = -2 * side
@@ -34,6 +34,7 @@ def points_on_walls(source):
 
 
 def split(positions, lights):
+    """Splits lights at the median of the longest side of their bounds."""
     selected = positions[lights]
     axis = np.argmax(selected.max(0) - selected.min(0))
     lights = lights[np.argsort(selected[:, axis], kind="stable")]
@@ -44,14 +45,14 @@ def tree(positions, lights, width):
     """Returns the index of a light, or a list of children: pairs of light indices and their subtree."""
     if len(lights) == 1:
         return lights[0]
-    parts = [lights]
-    while len(parts) < width:
-        cost = [len(part) * np.prod(np.ptp(positions[part], axis=0) + 0.01) ** (2 / 3) if len(part) > 1 else 0 for part in parts]
+    groups = [lights]
+    while len(groups) < width:
+        cost = [len(group) * np.prod(np.ptp(positions[group], axis=0) + 0.01) ** (2 / 3) if len(group) > 1 else 0 for group in groups]
         worst = int(np.argmax(cost))
         if cost[worst] == 0:
             break
-        parts[worst:worst + 1] = split(positions, parts[worst])
-    return [(part, tree(positions, part, width)) for part in parts]
+        groups[worst:worst + 1] = split(positions, groups[worst])
+    return [(group, tree(positions, group, width)) for group in groups]
 
 
 def heights(points, normals, center, flat):
@@ -81,6 +82,7 @@ def cosine_means(points, normals, center, radius, flat):
 
 
 def probabilities(positions, width, importance, points, normals, flat):
+    """Returns the probability with which the light tree selects each light, for each point."""
     out = np.zeros((len(points), len(positions)))
 
     def add_node(node, probability):
@@ -104,6 +106,7 @@ def probabilities(positions, width, importance, points, normals, flat):
 
 
 def variance(positions, width, importance, points, normals, flat):
+    """Returns a cell of the table."""
     to = positions[None] - points[:, None]
     squares = (to ** 2).sum(-1)
     cosines = np.maximum((to * normals[:, None]).sum(-1), 0) / np.sqrt(squares)
@@ -111,19 +114,19 @@ def variance(positions, width, importance, points, normals, flat):
     probability = probabilities(positions, width, importance, points, normals, flat)
     if ((light > 1e-12) & (probability == 0)).any():
         raise SystemExit("a light that contributes has probability 0")
-    second = np.where(light > 0, light ** 2 / np.maximum(probability, 1e-300), 0).sum(1)
+    second_moment = np.where(light > 0, light ** 2 / np.maximum(probability, 1e-300), 0).sum(1)
     mean = light.sum(1)
     lit = mean > 1e-3
-    relative = second[lit] / mean[lit] ** 2 - 1
+    relative = second_moment[lit] / mean[lit] ** 2 - 1
     return f"{relative.mean():.2f} ({np.median(relative):.2f})"
 
 
 def main():
     argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter).parse_args()
-    source = np.random.default_rng(1)
-    points, normals = points_on_walls(source)
+    generator = np.random.default_rng(1)
+    points, normals = points_on_walls(generator)
     grid = np.meshgrid(np.linspace(-1.9, 1.9, 25), np.linspace(-3.9, 3.9, 40), [2.7])
-    clumps = [(x, y, 1.5) + 0.05 * source.standard_normal((100, 3)) for x in (-1, 1) for y in (-3, -1.5, 0, 1.5, 3)]
+    clumps = [(x, y, 1.5) + 0.05 * generator.standard_normal((100, 3)) for x in (-1, 1) for y in (-3, -1.5, 0, 1.5, 3)]
     layouts = {"spread over the room": np.array(lamps.positions(1000)), "under the ceiling": np.stack(grid, -1).reshape(-1, 3),
               "in ten clumps": np.concatenate(clumps)}
     print("| a thousand lights | two children, bounds of cosines | four children, bounds of cosines | four children, means of cosines |")

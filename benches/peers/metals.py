@@ -4,7 +4,7 @@
     benches/peers/run --install-only                                    once
     target/peers/venv/bin/python benches/peers/metals.py
 
-Each spectrum is weighted by the colour matching functions of CIE 1931, converted to sRGB's primaries, and divided by the result of
+Each spectrum is weighted by the colour matching functions of CIE 1931, converted to sRGB's primaries, and divided by the result for
 a constant spectrum of 1. The last column is the reflectance at normal incidence.
 """
 import os
@@ -13,7 +13,7 @@ import sys
 
 sys.dont_write_bytecode = True
 import install
-os.environ |= install.Peers().mitsuba()[1]  # before the import
+os.environ |= install.Peers().mitsuba()[1]  # before the import, which loads LLVM
 
 import mitsuba as mi
 import numpy as np

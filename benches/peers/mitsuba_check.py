@@ -9,13 +9,13 @@ samples are random. Mitsuba therefore only traces the rays, from the pixel centr
 centres of the light's sample grid; Phong's formula is evaluated in numpy. The comparison with wgray's image at one
 sample per pixel:
 
-    coverage   the pixels with a hit are the same, except at silhouettes
+    coverage   the same pixels have a hit in both images, except at silhouettes
     depth      the distance along the ray agrees to a relative error of 1e-4, except at silhouettes, where the second difference of
                the depth exceeds 1 % of the smallest depth
     image      the means agree to 1 %, and 97 % of the pixels to 0.02 in every channel, in linear values
 
-As a control, the first scene is compared again with Mitsuba's camera moved by 0.01, which must fail. Exit status 1 if
-it does not, or if another scene fails. Ellipsoids are Mitsuba's shape `ellipsoids`.
+As a control, the first scene is compared again with Mitsuba's camera moved by 0.01; this comparison must fail. Exit
+status 1 if it passes, or if a scene fails. Ellipsoids are Mitsuba's shape `ellipsoids`.
 """
 import argparse
 import os

@@ -3,8 +3,8 @@
 Mitsuba's `roughconductor` and `roughdielectric` have the same microfacet distribution, sampling and Fresnel formulas,
 but the separable masking-shadowing function G = G1(wi) G1(wo) (Walter et al., "Microfacet Models for Refraction through
 Rough Surfaces", EGSR 2007). These BSDFs use the height-correlated function (Heitz, "Understanding the Masking-Shadowing
-Function in Microfacet-Based BRDFs", JCGT 3(2), 2014, equation 99) for reflection, and the separable one for refraction.
-Distribution, sampling, Fresnel formulas and the integrator are Mitsuba's. Call `register` after setting the variant.
+Function in Microfacet-Based BRDFs", JCGT 3(2), 2014, equation 99) for reflection, and the separable function for refraction.
+The distribution, sampling, Fresnel formulas and the integrator are Mitsuba's. Call `register` after setting the variant.
 """
 import drjit as dr
 import mitsuba as mi
@@ -97,7 +97,7 @@ def register():
             separable = self.distribution.smith_g1(si.wi, m) * self.distribution.smith_g1(wo, m)
             bend = (to_i + eta * to_o) ** 2
             mirrored = reflected * d * correlated_g2(self.distribution, si.wi, wo, m) / (4 * dr.abs(i))
-            # In radiance transport, the factor eta^2 of the BTDF cancels against 1/eta^2, so neither appears.
+            # In radiance transport, the factor eta^2 of the BTDF cancels against 1/eta^2, so the formula has neither factor.
             refracted = (1 - reflected) * d * separable * dr.abs(to_i * to_o / (i * bend))
             value = dr.select(mirrors, mi.Color3f(mirrored), self.color.eval(si, active) * refracted)
             visible = self.distribution.pdf(dr.mulsign(si.wi, i), m)

@@ -5,13 +5,13 @@
 
 Renders direct light only, with LIGHT_SAMPLES shadow rays per light and hit: as many rays as wgray's Phong integrator,
 with cheaper, diffuse shading. Mitsuba chooses a light at random for each of its `emitter_samples`, so it gets LIGHT_SAMPLES times the
-number of lights. `load_s` is the time to read the scene's files and to build Embree's BVHs, `first_s` that of the first
-render, including compilation, `warm_s` the median of WARM further renders. --warm 0 with -o times the whole process, as in
+number of lights. `load_s` is the time to read the scene's files and to build Embree's BVHs, `first_s` the time of the first
+render, including compilation, and `warm_s` the median of WARM further renders. --warm 0 with -o times the whole process, as in
 a user's script.
 
 With --integrator path it renders a scene of the path tracer: with `path`, or with `volpath` if glass absorbs. Mitsuba's
-depth is `max_depth` + 1, because Mitsuba also counts the segment from the camera. The BSDFs are Mitsuba's, except Phong's,
-which it lacks (mitsuba_phong.py). `emission` becomes an area light on the outer side of a closed shape, and two area lights
+depth is `max_depth` + 1, because Mitsuba also counts the segment from the camera. The BSDFs are Mitsuba's, except Phong's
+(mitsuba_phong.py), which Mitsuba lacks. `emission` becomes an area light on the outer side of a closed shape, and two area lights
 back to back for a rectangle, a disk and a triangle. Emissive meshes must be closed. --seed is the seed of the first image.
 
 Mitsuba's `sphere` supports neither unequal axes nor shear. --ellipsoids selects the replacement of ellipsoids:
@@ -39,14 +39,15 @@ import mitsuba_phong
 import scenes
 
 MAX_SPHERES = 1000
-# Distance of an emissive rectangle, disk or triangle from each of its two area lights: at 5e-4, nearby surfaces are
-# visibly brighter.
+# Distance of an emissive rectangle, disk or triangle from each of its two area lights. At a distance of 5e-4, nearby
+# surfaces would be visibly brighter.
 SIDE_OFFSET = 2e-5
 BLACK = {"type": "diffuse", "reflectance": {"type": "rgb", "value": [0, 0, 0]}}
 
 
 def color_texture(value):
-    """Returns a colour as a Mitsuba texture. Two squares cover a uv interval of 1 in Mitsuba, of 2 in wgray."""
+    """Returns a colour as a Mitsuba texture. Two squares of a checker cover a uv interval of 1 in Mitsuba, and of 2 in
+    wgray."""
     if isinstance(value, scenes.Checker):
         u, v = value.scale
         return {"type": "checkerboard", "color0": color_texture(value.even), "color1": color_texture(value.odd),
@@ -73,8 +74,8 @@ def bsdf(material, traced, exact):
             plugin |= {"type": "roughconductor", "distribution": "ggx"} | microfacets(*material.alpha)
     elif material.kind == "principled":
         # Only Mitsuba's metal (GGX with Schlick's formula) agrees with wgray's, at roughnesses with little masking and multiple
-        # scattering.
-        # Disney's diffuse term, specular lobe, glass, clearcoat and sheen differ from glTF's; their cost is comparable.
+        # scattering. The diffuse term, specular lobe, glass, clearcoat and sheen of Disney's model differ from glTF's, at a
+        # comparable cost.
         alpha_u, alpha_v = (float(alpha) for alpha in material.alpha)
         anisotropy = {"anisotropic": (1 - alpha_v / alpha_u) / 0.9} if alpha_u > alpha_v else {}
         plugin = {"type": "principled", "base_color": color_texture(material.color), "metallic": float(material.metallic),
@@ -104,8 +105,8 @@ def microfacets(alpha_u, alpha_v):
 def environment_emitter(T, environment):
     """Returns a constant or an image environment.
 
-    Mitsuba's rows of texels are at equal angles from pole to pole, wgray's at the centres of bands. With 2 n + 1 rows
-    Mitsuba's include wgray's n rows; the rows in between are means, as both renderers interpolate linearly.
+    Mitsuba's rows of texels are at equal angles from pole to pole, wgray's at the centres of bands. With 2 n + 1 rows,
+    Mitsuba's rows include wgray's n rows. The rows in between are means, because both renderers interpolate linearly.
     """
     if not isinstance(environment, scenes.EnvironmentMap):
         return {"type": "constant", "radiance": color_texture(environment)}
@@ -159,7 +160,7 @@ def round_mesh(T, s, path, rows=256):
 
 
 def both_sides(T, s, path):
-    """Returns the two one-sided shapes of an open emissive shape; exchanged edges flip the second one."""
+    """Returns the two one-sided shapes of an open emissive shape. Exchanged edges flip the normal of the second shape."""
     if any(isinstance(c, scenes.Checker) and c.scale[0] != c.scale[1] for c in (s.material.color, s.material.diffuse, s.material.emission)):
         raise ValueError("a checker on an emissive shape needs equal scales for u and v")
     if isinstance(s, scenes.Triangles):
@@ -208,14 +209,14 @@ def sensor(T, scene, width, height, spp):
     film = {"film": {"type": "hdrfilm", "width": width, "height": height, "rfilter": {"type": "box"}},
             "sampler": {"type": "independent", "sample_count": spp}}
     to_world = T().look_at(origin=scene.position, target=scene.look_at, up=scene.up)
-    if scene.height_seen is None and scene.lens:
+    if scene.view_height is None and scene.lens:
         diameter, distance = scene.lens
         return film | {"type": "thinlens", "fov": scene.fov, "fov_axis": "y", "to_world": to_world, "aperture_radius": diameter / 2,
                        "focus_distance": float(distance)}
-    if scene.height_seen is None:
+    if scene.view_height is None:
         return film | {"type": "perspective", "fov": scene.fov, "fov_axis": "y", "to_world": to_world}
-    # Mitsuba's orthographic camera sees -1 to 1 along x, and this range divided by the aspect ratio along y.
-    half = scene.height_seen / 2 * width / height
+    # The view of Mitsuba's orthographic camera is -1 to 1 along x, and this range divided by the aspect ratio along y.
+    half = scene.view_height / 2 * width / height
     return film | {"type": "orthographic", "near_clip": 1e-4, "to_world": to_world @ T().scale([half, half, 1])}
 
 

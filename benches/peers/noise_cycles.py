@@ -3,7 +3,7 @@
 
     benches/peers/noise_cycles.py MODEL [--size N] [--wgray FILE]
 
-The environment is a constant radiance of 0.5, so that the noise is that of pixel filters, textures, materials and occlusion. Prints
+The environment is a constant radiance of 0.5, so that only pixel filters, textures, materials and occlusion cause noise. Prints
 the noise in percent for 16 and 64 samples: the square root of the relMSE against the same renderer's image of 1,024 samples with
 another seed. wgray also renders without ray differentials (no mip levels) and with other pixel filters. Both renderers run on the CPU.
 """
@@ -18,7 +18,7 @@ import tempfile
 sys.dont_write_bytecode = True
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 SAMPLES = [16, 64]
-REFERENCE = 1024
+REFERENCE_SAMPLES = 1024
 WGRAY = {
     "wgray": [],
     "wgray, no ray differentials": ["render.ray_differentials=false"],
@@ -72,7 +72,7 @@ def main():
         renderers += [(name, render_with_cycles, pixel_filter) for name, pixel_filter in CYCLES.items()]
         for name, render, setting in renderers:
             reference, image = folder / "reference.exr", folder / "image.exr"
-            render(setting, REFERENCE, 99, reference)
+            render(setting, REFERENCE_SAMPLES, 99, reference)
             row = []
             for samples in SAMPLES:
                 render(setting, samples, 0, image)

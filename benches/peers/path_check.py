@@ -10,13 +10,13 @@
 The scenes are those of path_scenes.py and scenes/cornell-path.toml. Both renderers render each scene BATCHES times with
 different seeds, to estimate mean and variance of every pixel. Welch's t-test compares the means at three levels:
 pixels, blocks of 8 x 8 pixels and the whole image, per channel. p-values are corrected for the number of tests of a
-level (Šidák), and the bound of 1 % for the number of levels and scenes, so that a correct renderer fails for one seed in
+level (Šidák), and the bound of 1 % for the number of levels and scenes, so that a correct renderer fails with one seed in
 a hundred. The standard error is at least 1e-5 of the mean, for rounding errors where the images have no
 noise, and 1e-4 where an environment map is visible. Rough metal and glass are those of mitsuba_ggx.py. A scene also
 fails
 
     if more than twice as many pixels are rejected at 1 % as expected by chance
-    if the whole image would also pass when multiplied by --control (1.02): the test is too insensitive (black images)
+    if the whole image, multiplied by --control (1.02), would also pass: the test is too insensitive, as for a black image
     for the course scenes: if a block differs by more than 2 %, or the whole image by more than 0.5 %
 
 Exit status 1 if any scene fails. --save writes an image per scene: wgray's, Mitsuba's, and their difference, red where
@@ -45,7 +45,7 @@ import path_scenes
 import scenes
 
 LEVEL, BLOCK, ROUNDING = 0.01, 8, 1e-5
-MAP_ROUNDING = 1e-4  # for visible environment maps, because of the error of Mitsuba's interpolation between texels
+MAP_ROUNDING = 1e-4  # where an environment map is visible: the error of Mitsuba's interpolation between texels
 # Mitsuba selects lights uniformly, regardless of their power. With few samples the distribution of the means is so
 # skewed that t-tests reject too often.
 MORE_SAMPLES = {"many-lights": 8}
@@ -53,7 +53,7 @@ MORE_SAMPLES = {"many-lights": 8}
 
 @dataclasses.dataclass
 class Means:
-    """The means over the batches of each part of an image, and their squared standard errors."""
+    """The means over the batches of each pixel, block or image, and their squared standard errors."""
     mean: np.ndarray
     square: np.ndarray
     count: int
@@ -70,7 +70,7 @@ def blocks(batches):
 
 
 def welch(ours, theirs, rounding=ROUNDING):
-    """Returns t and the two-sided p-value of each part."""
+    """Returns t and the two-sided p-value of each pixel, block or image."""
     floor = (rounding * (abs(ours.mean) + abs(theirs.mean)) / 2) ** 2 + 1e-18
     a, b = ours.square, theirs.square
     degrees_of_freedom = (a + b) ** 2 / np.maximum(a ** 2 / (ours.count - 1) + b ** 2 / (theirs.count - 1), 1e-300)
@@ -138,8 +138,8 @@ def check(args, name, path, bound):
     failures, lowest = [], []
     rounding = MAP_ROUNDING if name.startswith("map") else ROUNDING
     levels = {"pixels": lambda x: x, "blocks": blocks, "whole": lambda x: x.mean((1, 2))}
-    for level, part in levels.items():
-        a, b = means(part(ours)), means(part(theirs))
+    for level, reduce in levels.items():
+        a, b = means(reduce(ours)), means(reduce(theirs))
         t, p = welch(a, b, rounding)
         lowest.append(sidak(p))
         if lowest[-1] < bound:
@@ -179,7 +179,7 @@ def main():
     parser.add_argument("--course-size", type=int, default=96)
     parser.add_argument("--course-spp", type=int, default=512)
     parser.add_argument("--course-batches", type=int, default=48)
-    parser.add_argument("--seed", type=int, default=1, help="first seed of wgray; Mitsuba's start at 1001")
+    parser.add_argument("--seed", type=int, default=1, help="first seed of wgray; Mitsuba's seeds start at 1001")
     parser.add_argument("--wrong", type=float, default=1, help="factor on wgray's images, which must be detected")
     parser.add_argument("--control", type=float, default=1.02, help="the factor that the test of each scene must detect")
     parser.add_argument("--own-facets", action="store_true",

@@ -1,7 +1,8 @@
 """Prints the errors of the EXR images in a folder as JSON: `relative`, `absolute`; null for fewer than two images.
 
 `absolute` is computed from the variance of each pixel, `relative` from the variance divided by the squared mean (plus
-1e-4, for dark pixels): summed over the channels, averaged over the pixels, and then the root. The images have the same expected
+1e-4, for dark pixels). Both are summed over the channels and averaged over the pixels; the error is the square root of
+the average. The images have the same expected
 value and independent noise, so the variance of a pixel over the images is the mean squared error of one image. The
 absolute error is dominated by the pixels at the edges of visible lights, so the relative error is compared.
 """

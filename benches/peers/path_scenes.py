@@ -63,29 +63,29 @@ WALL = rectangle("floor", [0, 1.5, 1], [5, 2], [0, -1, 0], [1, 0, 0])
 
 
 def ball(keys, more="", **render):
-    """A ball of a material on a floor, under an area light and a constant environment."""
+    """Returns a scene with a ball of a material on a floor, under an area light and a constant environment."""
     return (head(**render) + ENVIRONMENT + FLOOR + material("ball", keys) + area_light()
             + shape("sphere", "ball", center=[0, 0, 0.55], radius=0.5) + more)
 
 
 def emitter(*shapes, emission='emission = [4, 3, 2]', more=""):
-    """A two-sided emissive shape between a floor and a wall, the only emitter."""
+    """Returns a scene whose only emitter is a two-sided emissive shape between a floor and a wall."""
     lit = material("lit", 'type = "diffuse"\ncolor = [0.3, 0.4, 0.5]\n' + emission)
     return head() + more + FLOOR + WALL + lit + material("red", 'type = "diffuse"\ncolor = [0.7, 0.2, 0.1]') + "".join(shapes) + shape(
         "sphere", "red", center=[-0.7, -0.4, 0.25], radius=0.25)
 
 
 def many_lights(count=64):
-    source = random.Random(count)
+    generator = random.Random(count)
     text = head("position = [0, -5, 3]\nlook_at = [0, 0, 0.3]\nfov = 40") + FLOOR + WALL + material("ball", 'type = "phong"\nambient = [0, 0, 0]\ndiffuse = [0.4, 0.3, 0.3]\n'
                                                                                         "specular = [0.3, 0.3, 0.3]\nshininess = 20")
     for i in range(count):
-        power = 10 ** source.uniform(-1, 1.5)
-        position = [source.uniform(-2, 2), source.uniform(-2, 1.4), source.uniform(0.6, 2.5)]
-        color = [power * source.uniform(0.2, 1) for _ in range(3)]
+        power = 10 ** generator.uniform(-1, 1.5)
+        position = [generator.uniform(-2, 2), generator.uniform(-2, 1.4), generator.uniform(0.6, 2.5)]
+        color = [power * generator.uniform(0.2, 1) for _ in range(3)]
         if i % 8:
-            side = source.uniform(0.05, 0.2)
-            text += area_light(position, [side, side / 2], [source.uniform(-1, 1), source.uniform(-1, 1), -1], color)
+            side = generator.uniform(0.05, 0.2)
+            text += area_light(position, [side, side / 2], [generator.uniform(-1, 1), generator.uniform(-1, 1), -1], color)
         else:
             text += table("lights", "point", position=position, color=[c / 20 for c in color])
     text += table("lights", "directional", direction=[0.5, 0.6, -1], color=[0.6, 0.5, 0.4])
@@ -95,7 +95,7 @@ def many_lights(count=64):
 
 
 def room(depth, rr=5):
-    """A closed room of high albedo, with long paths."""
+    """Returns a closed room of high albedo, in which paths are long."""
     text = head("position = [0, -0.9, 1]\nlook_at = [0, 1, 1.2]\nfov = 100", depth, rr) + material("white", 'type = "diffuse"\ncolor = [0.9, 0.85, 0.8]')
     for center, normal, tangent in (([0, 0, 0], [0, 0, 1], [1, 0, 0]), ([0, 0, 2], [0, 0, -1], [1, 0, 0]), ([0, 1, 1], [0, -1, 0], [1, 0, 0]),
                                     ([0, -1, 1], [0, 1, 0], [1, 0, 0]), ([-1, 0, 1], [1, 0, 0], [0, 1, 0]), ([1, 0, 1], [-1, 0, 0], [0, 1, 0])):
@@ -111,7 +111,7 @@ SHAPES = (shape("disk", "ball", center=[-0.8, 0.2, 0.5], radius=0.4, normal=[0.4
 MESH = shape("mesh", "ball", file="meshes/blob.obj", normals="flat", scale=0.5, rotate=[20, 0, 30], translate=[0, 0, 0.6])
 CHECKER = '\n[textures.checker]\ntype = "checker"\neven = [0.8, 0.7, 0.2]\nodd = [0.1, 0.2, 0.6]\nscale = [{0}, {0}]\n'
 
-# Materials that Mitsuba supports too, without energy compensation, which Mitsuba lacks.
+# Materials that Mitsuba also supports. They have no energy compensation, which Mitsuba lacks.
 GOLD = "eta = [0.143, 0.375, 1.442]\nk = [3.983, 2.386, 1.603]"
 SKY = '\n[environment]\nfile = "maps/lobes.hdr"\n'
 
@@ -175,9 +175,9 @@ SCENES = {
     "dielectric-rough-color": ball(rough("dielectric", 0.4, "ior = 1.33\ncolor = [0.9, 0.6, 0.3]")),
     "dielectric-rough-air": ball(rough("dielectric", 0.4, "ior = 0.7")),
     "dielectric-thin": ball('type = "dielectric"\nior = 1.5\nthin = true'),
-    # Mitsuba's `principled` metal agrees for alpha near 0.01: at 0.04 its masking-shadowing function differs at the
-    # ball's edge, and it replaces 0 by 0.001. For a dielectric without reflection, other Mitsuba BSDFs match the
-    # remaining lobes.
+    # Mitsuba's `principled` metal agrees for alpha near 0.01: at an alpha of 0.04 its masking-shadowing function differs at
+    # the ball's edge, and Mitsuba replaces an alpha of 0 by 0.001. For a dielectric without reflection, other Mitsuba BSDFs
+    # match the remaining lobes.
     "principled-metal": ball('type = "principled"\nroughness = 0.1\nbase_color = [0.9, 0.7, 0.4]'),
     "principled-brushed": ball('type = "principled"\nroughness = 0.1\nanisotropy = 0.15\nbase_color = [0.9, 0.7, 0.4]'),
     "principled-ground": ball(f'{NO_SPECULAR}\nbase_color = [0.8, 0.5, 0.2]'),
@@ -254,7 +254,7 @@ COURSE_SCENES = {
 
 
 def write_map(path, width=256):
-    """Writes a pale sky with a bright, warm lobe and a cold one as an uncompressed Radiance file."""
+    """Writes a pale sky with a bright warm lobe and a dim cold lobe as an uncompressed Radiance file."""
     height = width // 2
     lobes = [((0.5, -0.7, 0.5), 30, (12, 10, 7)), ((-0.8, 0.1, 0.3), 8, (0.5, 0.9, 1.6))]
     lobes = [([x / math.hypot(*axis) for x in axis], sharpness, color) for axis, sharpness, color in lobes]

@@ -32,10 +32,10 @@ import povray_scenes
 import scenes
 
 MISS, LIGHT = -1, -2
-CLASSES = {  # a pixel belongs to the first class that applies; colours of difference.png
+CLASSES = {  # the colour in difference-*.png, and the meaning; a pixel belongs to the first class that applies
     "light": ((255, 220, 0), "the light, which is invisible to POV-Ray's camera"),
     "edge": ((255, 0, 0), "within a pixel of another primitive"),
-    "shadow": ((0, 120, 255), "penumbra: some light samples are occluded, here or a pixel away, and some are not"),
+    "shadow": ((0, 120, 255), "penumbra: some light samples of the pixel or a neighbour are occluded, others are not"),
     "other": ((255, 0, 255), "none of these"),
 }
 

@@ -49,7 +49,7 @@ def shape(s, ambient):
 
 
 def mesh(s, pov_texture):
-    """Returns a `mesh2` of flat triangles, as wgray renders a file without normals."""
+    """Returns a `mesh2` of flat-shaded triangles, because wgray renders a file without normals with flat shading."""
     vertices, triangles = read_ply(s.file)
     rows = ", ".join(f"<{x:.9g},{y:.9g},{z:.9g}>" for x, y, z in vertices)
     faces = ", ".join(f"<{a},{b},{c}>" for a, b, c in triangles)

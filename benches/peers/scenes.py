@@ -1,7 +1,7 @@
 """Reads wgray's scene files for other renderers.
 
-`load` supports the keys of docs/scene-format.md that the benchmark scenes use and rejects all others: scenes
-for the Phong integrator, with constant colours and rectangle lights, or, with `integrator="path"`, for the path tracer.
+`load` supports the keys of docs/scene-format.md that the benchmark scenes use, and rejects all other keys. The scenes
+are for the Phong integrator, with constant colours and rectangle lights, or, with `integrator="path"`, for the path tracer.
 """
 import json
 import math
@@ -32,9 +32,9 @@ def unit(a):
 
 @dataclass
 class Material:
-    """A material. Colours are lists of three numbers or a Checker.
+    """A material. Each colour is a list of three numbers or a Checker.
 
-    `kind` is the type of the format, except that "mirror" is "conductor" and "glass" is "dielectric".
+    `kind` is the material type of the scene format, except that "mirror" is "conductor" and "glass" is "dielectric".
     """
     kind: str = "phong"
     ambient: list | None = None
@@ -61,7 +61,7 @@ class Checker:
 
 @dataclass
 class Quad:
-    """A rectangle, `center + s u + t v` with s and t in [-1, 1]; `color`: the colour of a light, otherwise None."""
+    """A rectangle, `center + s u + t v` with s and t in [-1, 1]. `color` is the colour of a light, otherwise None."""
     center: list
     u: list
     v: list
@@ -95,7 +95,8 @@ class SpotLight:
 
 @dataclass
 class EnvironmentMap:
-    """An equirectangular environment map: the centre is +x, the upper edge +z; rotated about z by degrees."""
+    """An equirectangular environment map, with +x at the centre and +z at the upper edge. `rotate` is the rotation about z in
+    degrees."""
     file: str
     scale: float
     rotate: float
@@ -133,7 +134,7 @@ class Plane:
 
 @dataclass
 class Mesh:
-    """The triangles of a file, with an affine 3 x 4 transform. `normals`: "smooth", "flat", "file", None."""
+    """The triangles of a file, with an affine 3 x 4 transform. `normals` is "smooth", "flat", "file" or None."""
     file: str
     normals: str | None
     to_world: list
@@ -152,7 +153,7 @@ class Scene:
     shapes: list = field(default_factory=list)
     lights: list = field(default_factory=list)
     integrator: str = "phong"
-    height_seen: float | None = None  # for an orthographic camera
+    view_height: float | None = None  # of an orthographic camera
     environment: list | EnvironmentMap | None = None
     lens: tuple | None = None  # diameter and focus distance
     max_depth: int = 8
@@ -167,7 +168,7 @@ def quad(row, **attributes):
 
 
 def product(a, b):
-    """Returns the affine transform that applies b, then a; all are three rows of four numbers."""
+    """Returns the affine transform that applies b, then a. Each transform is three rows of four numbers."""
     rows = [*b, [0, 0, 0, 1]]
     return [[sum(row[k] * rows[k][j] for k in range(4)) for j in range(4)] for row in a]
 
@@ -188,7 +189,7 @@ UP = {"x": [[0, 1, 0, 0], [0, 0, 1, 0], [1, 0, 0, 0]],
 
 
 def to_world(row, up):
-    """Returns the transform of a mesh: up axis, then scale, rotation, translation, or the matrix instead of these three."""
+    """Returns the transform of a mesh: first the up axis, then the matrix, or scale, rotation and translation."""
     if "matrix" in row:
         return product(row["matrix"][:3], UP[up])
     x, y, z = row["scale"] if isinstance(row.get("scale"), list) else [row.get("scale", 1)] * 3
@@ -199,8 +200,8 @@ def to_world(row, up):
     else:
         for axis, degrees in zip(([1, 0, 0], [0, 1, 0], [0, 0, 1]), rotate):
             transform = product(rotation(axis, degrees), transform)
-    moved = [[*line[:3], offset] for line, offset in zip(transform, row.get("translate", [0, 0, 0]))]
-    return product(moved, UP[up])
+    translated = [[*line[:3], offset] for line, offset in zip(transform, row.get("translate", [0, 0, 0]))]
+    return product(translated, UP[up])
 
 
 def color(path, row, key, textures, default=None):
@@ -238,7 +239,8 @@ def material(path, row, textures, traced):
         result.coat = (row.get("clearcoat", 0), row.get("clearcoat_roughness", 0))
         return result
     if rough:
-        # The formula of glTF: mix(alpha, 1, anisotropy^2) along the tangent. Rotation by 90 degrees exchanges the two.
+        # glTF's formula for the roughness along the tangent: mix(alpha, 1, anisotropy^2). A rotation by 90 degrees exchanges
+        # the two roughnesses.
         alpha = row.get("roughness", 0) ** 2
         tangent_alpha = alpha + (1 - alpha) * row.get("anisotropy", 0) ** 2 if alpha else 0
         angle = row.get("anisotropy_rotation", 0)
@@ -276,6 +278,7 @@ def without_specular(path, row, result):
 
 
 def load(path, integrator="phong"):
+    """Returns the Scene of a file. Raises ValueError for keys that the other renderers do not support."""
     traced = integrator == "path"
     if traced and str(path).endswith(".json"):
         return read_course_scene(path)
@@ -293,7 +296,7 @@ def load(path, integrator="phong"):
         raise ValueError(f"{path}: other renderers support only a black background")
     scene = Scene(text["image"]["width"], text["image"]["height"], camera["position"], camera["look_at"],
                   camera.get("up", [0, 0, 1]), camera.get("fov"), render.get("ambient", [0, 0, 0]), integrator=integrator,
-                  height_seen=camera["height"] if orthographic else None, environment=environment(path, text.get("environment", {})),
+                  view_height=camera["height"] if orthographic else None, environment=environment(path, text.get("environment", {})),
                   lens=(camera["aperture"], camera.get("focus_distance", math.dist(camera["position"], camera["look_at"])))
                   if camera.get("aperture") else None, max_depth=render.get("max_depth", 8), rr_depth=render.get("rr_depth", 5),
                   spp=render.get("pixel_samples", {}).get("count", 16))
@@ -364,7 +367,8 @@ def shape(path, row, material):
 
 
 def read_course_scene(path):
-    """Reads a JSON scene in the format of a university course. Its axes are not converted (y is up); the image is the same."""
+    """Reads a JSON scene in the format of a university course. The axes are not converted (y is up), which does not affect
+    the image."""
     with open(path, encoding="utf-8") as file:
         text = json.load(file)
     camera, light = text["cam_config"], text["light_config"]

@@ -5,7 +5,7 @@
 
 The first run installs PyPI's bpy, for Blender's OpenColorIO configuration, and opencolorio, OpenEXR, numpy and pypng
 into target/peers. wgray renders a card of N colours, from 2^-12 to 2^7, including greys, as a linear EXR and, with
-every view transform and two exposures, as 16-bit PNGs. The EXR's values are transformed for each PNG in two ways:
+every view transform and two exposures, as 16-bit PNGs. For each PNG, the values of the EXR are transformed in two ways:
 
     formula   in numpy, by the published formula: the PNG must agree to 2e-5 everywhere, 1.3 steps of 16 bits
     Blender   by OpenColorIO with Blender's tables, which interpolate between at most 57 points per axis: the mean
@@ -42,7 +42,7 @@ CARD_WIDTH = 512
 
 
 def card(count):
-    """Returns linear colours as an image: greys, the corners of the RGB cube, random colours."""
+    """Returns an image of linear colours: greys, corners of the RGB cube, and random colours."""
     random = np.random.default_rng(1)
     stops = random.uniform(-12, 7, (count, 1))
     colors = random.uniform(0, 1, (count, 3)) ** random.choice([1, 4], (count, 1)) * 2.0**stops
@@ -66,13 +66,13 @@ shapes = [{{ type = "rectangle", material = "card", center = [0, 0, 0], size = [
 
 
 def srgb(light):
-    """IEC 61966-2-1."""
+    """The transfer function of sRGB, by IEC 61966-2-1."""
     light = np.clip(light, 0, 1)
     return np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
 
 
 def neutral(light):
-    """Khronos PBR Neutral, as specified."""
+    """The formula of Khronos PBR Neutral."""
     minimum = light.min(1, keepdims=True)
     light = light - np.where(minimum < 0.08, minimum - 6.25 * minimum**2, 0.04)
     peak = light.max(1, keepdims=True)
@@ -93,18 +93,19 @@ def hsv(color):
 
 
 def rgb(hue, saturation, value):
-    def part(n):
+    def channel(n):
         k = (n + hue * 6) % 6
         return value * (1 - saturation * np.clip(np.minimum(k, 4 - k), 0, 1))
 
-    return np.stack([part(5), part(3), part(1)], 1)
+    return np.stack([channel(5), channel(3), channel(1)], 1)
 
 
 def agx(light):
-    """AgX as in AgX_LUT_Gen for Blender (AgXBaseRec2020.py), clipped to Rec. 709. The matrices follow from primaries and white."""
+    """AgX as in AgX_LUT_Gen for Blender (AgXBaseRec2020.py), clipped to Rec. 709. The matrices are derived from the primaries and the
+    white point."""
     to_rec2020 = np.array([[0.627403914, 0.329283038, 0.043313048], [0.069097292, 0.919540405, 0.011362303], [0.016391439, 0.088013308, 0.895595253]])
-    inset = primaries_moved([2.13976149, -1.22827335, -3.05174246], [0.32965205, 0.28051336, 0.12475368])
-    outset = np.linalg.inv(primaries_moved([0, 0, 0], [0.32317438, 0.28325605, 0.0374326]))
+    inset = moved_primaries([2.13976149, -1.22827335, -3.05174246], [0.32965205, 0.28051336, 0.12475368])
+    outset = np.linalg.inv(moved_primaries([0, 0, 0], [0.32317438, 0.28325605, 0.0374326]))
     light = light @ to_rec2020.T @ inset.T
     original_hue = hsv(light)[0]
     with np.errstate(divide="ignore"):
@@ -121,9 +122,10 @@ def agx(light):
     return rgb(hue % 1, saturation, value) @ outset.T @ np.linalg.inv(to_rec2020).T
 
 
-def primaries_moved(degrees, fractions):
-    """Returns the matrix to Rec. 2020 from its primaries, each rotated about the white point along the edges of the triangle by
-    an angle, and moved towards the white point by a fraction (working_space.py of AgX_LUT_Gen)."""
+def moved_primaries(degrees, fractions):
+    """Returns the matrix to Rec. 2020 from moved primaries. Each primary of Rec. 2020 is rotated about the white point by an
+    angle, along the edges of the triangle of primaries, and moved towards the white point by a fraction (working_space.py
+    of AgX_LUT_Gen)."""
     white, corners = np.array([0.3127, 0.3290]), np.array([[0.708, 0.292], [0.170, 0.797], [0.131, 0.046]])
     moved = []
     for corner, degree, fraction in zip(corners, degrees, fractions):
@@ -134,7 +136,7 @@ def primaries_moved(degrees, fractions):
 
 
 def to_edge(corners, direction):
-    """Returns the vector in a direction from the origin to the edge of the triangle around it."""
+    """Returns the vector in a direction from the origin to the edge of the triangle, which contains the origin."""
     distances = []
     for a, b in zip(corners, np.roll(corners, -1, axis=0)):
         distance, edge_position = np.linalg.solve(np.array([direction, a - b]).T, a)

@@ -1,4 +1,4 @@
-"""The workloads that `run` times."""
+"""The workloads of the script `run`."""
 import dataclasses
 
 import generate
@@ -77,7 +77,7 @@ PATH = {
     "path-rock70k": path("paths around a rock of 69,312 triangles", "path-rock70k", 400),
     "path-cold": path("paths in the assignment scene, whole process, caches empty", CORNELL_PATH, 400, "cold"),
 }
-MATERIALS = {name: dataclasses.replace(workload, renderers=NO_POVRAY) for name, workload in {  # not supported by cycles_scenes.py
+MATERIALS = {name: dataclasses.replace(workload, renderers=NO_POVRAY) for name, workload in {  # cycles_scenes.py does not support these scenes
     "spheres": path("a rough metal and a rough glass sphere under a map", "path-spheres", 400),
     "lamps1": path("a room with one area light", "path-lamps1", 400),
     "lamps1000": path("a room with 1,000 area lights", "path-lamps1000", 400),

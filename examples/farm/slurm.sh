@@ -8,7 +8,7 @@
 #SBATCH --requeue
 #SBATCH --open-mode=append
 
-# Settings. Paths are relative to the folder of this file, which all machines must see under the same name.
+# Settings. Paths are relative to the folder of this file, which must have the same path on all machines.
 job=scene.farm   # folder for parts, checkpoints and logs
 tiles=16         # parts per image
 frames=          # frame numbers, such as "$(seq 1 48)"; empty for a single image

@@ -29,9 +29,9 @@ from collections import defaultdict
 import tree_sitter
 import tree_sitter_rust
 
-from project import AGREEMENT, ANSWERS, REST, ROOT, WITHOUT_GPU, WORK, Tests, cargo, copy
+from project import AGREEMENT, KNOWN_RESULTS, REST, ROOT, WITHOUT_GPU, WORK, Tests, cargo, copy
 
-PROBES, PICTURES = AGREEMENT[:1], AGREEMENT[1:]
+PROBES, IMAGES = AGREEMENT[:1], AGREEMENT[1:]
 # Minimum fraction of the mutations that the tests must detect.
 MIN_DETECTED = 0.95
 REASONS = ROOT / "scripts/mutation/survivors.toml"
@@ -57,7 +57,7 @@ class Mutation:
         # A key that does not depend on other lines: the function, the text of the line and the column in this text.
         self.key = f"{self.function}: {self.line} | {self.change} @{start['column'] - (len(line) - len(line.lstrip()))}"
 
-    def when(self, mutated, original):
+    def switch(self, mutated, original):
         """Returns a switch between the mutated and the original expression, with markers that locate compile errors."""
         return f"if crate::mutant({self.number}) {{ /*<{self.number}*/ {mutated} /*{self.number}>*/ }} else {{ {original} }}"
 
@@ -104,7 +104,7 @@ class Writer:
             if found:
                 operator, operand = node.children
                 original = f"{operator.text.decode()} a_"
-                return f"({{ let a_ = {self.write(operand)}; {found[0].when('a_', original)} }})"
+                return f"({{ let a_ = {self.write(operand)}; {found[0].switch('a_', original)} }})"
         if node.type == "match_arm":
             found = self.mutations("MatchArm", node.start_byte)
             if found:
@@ -116,7 +116,7 @@ class Writer:
             if found:
                 base = next(n for n in node.parent.children if n.type == "base_field_initializer").text.decode().lstrip(".")
                 name, value = field("field").text.decode(), self.write(field("value"))
-                return f"{name}: " + found[0].when(f"({base}).{name}", value)
+                return f"{name}: " + found[0].switch(f"({base}).{name}", value)
         if node.type == "block" and node.parent.type == "function_item":
             inner = [child for child in node.children if child.is_named]
             found = self.mutations("FnValue", inner[0].start_byte) if inner else []
@@ -136,7 +136,7 @@ class Writer:
             parts, a, b = f"let (a_, b_) = ({left}, {right});", "a_", "b_"
         text = f"{a} {operator} {b}"
         for m in found:
-            text = m.when(f"{a} {m.replacement} {b}", text)
+            text = m.switch(f"{a} {m.replacement} {b}", text)
         return f"({{ {parts} {text} }})"
 
 
@@ -146,10 +146,10 @@ def write_mutations(mutations, folder):
     missed = []
     for file in {m.file for m in mutations}:
         source = (ROOT / file).read_bytes()
-        of_file = [m for m in mutations if m.file == file]
-        writer = Writer(source, of_file)
+        in_file = [m for m in mutations if m.file == file]
+        writer = Writer(source, in_file)
         (folder / file).write_text(writer.write(parser.parse(source).root_node))
-        missed += [m for m in of_file if m.number not in writer.written]
+        missed += [m for m in in_file if m.number not in writer.written]
     if missed:
         raise SystemExit("cannot locate these mutations:\n" + "\n".join(m.name for m in missed))
 
@@ -211,7 +211,7 @@ def main():
             test = tests.first_failing(PROBES, WGRAY_TEST_FUNCTION=m.function, **mutant)
             if test:
                 return test
-        return tests.first_failing(ANSWERS, **WITHOUT_GPU, **mutant) or tests.first_failing(PICTURES + REST, **mutant)
+        return tests.first_failing(KNOWN_RESULTS, **WITHOUT_GPU, **mutant) or tests.first_failing(IMAGES + REST, **mutant)
 
     begin = time.monotonic()
     survivors, detected_by = [], defaultdict(int)

@@ -13,7 +13,7 @@ TARGET = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target")).resolve()
 WORK = TARGET / "mutants"
 
 SWITCH = """
-/// Returns whether the mutation with this number is active.
+/// Returns true if the mutation with this number is active.
 #[doc(hidden)]
 pub fn mutant(number: u32) -> bool {
     static ACTIVE: std::sync::LazyLock<u32> =
@@ -29,7 +29,7 @@ AGREEMENT = [
     ["main", "random_scenes::random_scenes_are_the_same"],
 ]
 # Tests against known results, on the CPU only. The comparisons of GPU and CPU extend these tests to the GPU.
-ANSWERS = [
+KNOWN_RESULTS = [
     ["lib", "cpu::"],
     ["main", "textures::", "against_oracle::", "radiance::", "culling::", "--skip", "is_found", "--skip", "textures::agreement"],
     ["main", "bounds::", "analytic::", "statistics::", "robust::", "--skip", "is_found"],
@@ -80,16 +80,16 @@ def build(folder):
 
 
 class Tests:
-    """The tests of a copy."""
+    """The test binaries of a copy, and the time of each stage without a mutation."""
 
     def __init__(self, folder):
         self.folder, self.binaries, self.seconds = folder, build(folder), {}
-        for name, stages, environment in [("agreement", AGREEMENT, {}), ("answers", ANSWERS, WITHOUT_GPU), ("the rest", REST, {})]:
+        for name, stages, environment in [("agreement", AGREEMENT, {}), ("known results", KNOWN_RESULTS, WITHOUT_GPU), ("rest", REST, {})]:
             for stage in stages:
                 begin = time.monotonic()
                 failed = self.first_failing([stage], **environment)
                 if failed:
-                    raise SystemExit(f"without a mutation, the tests of {name} fail: {failed}")
+                    raise SystemExit(f"without a mutation, a test of the group '{name}' fails: {failed}")
                 self.seconds[str(stage)] = time.monotonic() - begin
 
     def first_failing(self, stages, **environment):

@@ -2,9 +2,9 @@
 """Applies the mutations of twins.toml, one at a time, and checks that the tests detect them.
 
 The comparisons of GPU and CPU must detect a mutation of only the shader, and a mutation of only the Rust twin. They must
-not detect a mutation of both, or else the two mutations are not the same. The tests against known results must detect
-the mutation of both. All mutations of twins are compiled into one binary, in which an environment variable selects one
-mutation; mutated shaders are read from a folder. Thus only the mutated kernels are compiled again.
+not detect a mutation of both twins; otherwise the two mutations are not equivalent. The tests against known results must
+detect the mutation of both twins. All mutations of twins are compiled into one binary, in which an environment variable selects one
+mutation; mutated shaders are read from a folder. Only the mutated kernels are therefore compiled again.
 
     scripts/mutation/twins.py                     all mutations (ten minutes on two cores)
     scripts/mutation/twins.py --only ray,shadow   the mutations of some files
@@ -21,7 +21,7 @@ import shutil
 import sys
 import tomllib
 
-from project import AGREEMENT, ANSWERS, LOOP, ROOT, WITHOUT_GPU, WORK, Tests, copy
+from project import AGREEMENT, KNOWN_RESULTS, LOOP, ROOT, WITHOUT_GPU, WORK, Tests, copy
 
 
 class Mutation:
@@ -57,18 +57,18 @@ def make_twins(all_mutations, folder):
     for file in sorted({m.file for m in all_mutations}):
         path = folder / f"crates/render/src/cpu/{file}.rs"
         text = path.read_text()
-        of_file = [m for m in all_mutations if m.file == file]
-        spans = sorted(((locate(text, m.rust[0], path), m) for m in of_file), key=lambda s: s[0], reverse=True)
-        for ((start, end), m), (later, _) in zip(spans, [((len(text), 0), None)] + spans):
-            assert end <= later[0], f"{path}: two mutations overlap at '{m.rust[0]}'"
+        in_file = [m for m in all_mutations if m.file == file]
+        spans = sorted(((locate(text, m.rust[0], path), m) for m in in_file), key=lambda s: s[0], reverse=True)
+        for ((start, end), m), (next_span, _) in zip(spans, [((len(text), 0), None)] + spans):
+            assert end <= next_span[0], f"{path}: two mutations overlap at '{m.rust[0]}'"
             original = text[start:end]
             text = f"{text[:start]}(if crate::mutant({m.number}) {{ {m.rust[1]} }} else {{ {original} }}){text[end:]}"
         path.write_text(text)
 
 
 def run_tests(tests, m):
-    """Returns the first tests that detect a mutation: in WGSL only; in Rust only; comparing WGSL with Rust, in both; and
-    against known results, in both."""
+    """Returns four results, each the first test that detects the mutation, or None. The comparisons of GPU and CPU run with
+    the mutation in WGSL only, in Rust only, and in both; the tests against known results run with the mutation in both."""
     shaders = WORK / f"shaders-{m.number}"
     shutil.rmtree(shaders, ignore_errors=True)
     shutil.copytree(tests.folder / "shaders", shaders)
@@ -81,7 +81,7 @@ def run_tests(tests, m):
         tests.first_failing(AGREEMENT, **wgsl),
         tests.first_failing(AGREEMENT, **rust),
         tests.first_failing(AGREEMENT[:1], **wgsl, **rust),
-        tests.first_failing(ANSWERS, **WITHOUT_GPU, **rust),
+        tests.first_failing(KNOWN_RESULTS, **WITHOUT_GPU, **rust),
     )
     shutil.rmtree(shaders)
     return found
@@ -105,10 +105,10 @@ def main():
     chosen = [m for m in all_mutations if not arguments.only or m.file in arguments.only.split(",")]
     survivors = {"in one language": [], "in both languages": []}
     with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
-        for m, (by_wgsl, by_rust, differ, by_both) in zip(chosen, pool.map(lambda m: run_tests(tests, m), chosen)):
+        for m, (by_wgsl, by_rust, twin_difference, by_both) in zip(chosen, pool.map(lambda m: run_tests(tests, m), chosen)):
             print(f"{m}\n    detected in WGSL by {by_wgsl}; in Rust by {by_rust}; in both by {by_both}", flush=True)
-            if differ and differ != LOOP:
-                raise SystemExit(f"{m}\n  the mutations in WGSL and in Rust are not the same: {differ}")
+            if twin_difference and twin_difference != LOOP:
+                raise SystemExit(f"{m}\n  the mutations in WGSL and in Rust are not equivalent: {twin_difference}")
             if not (by_wgsl and by_rust):
                 survivors["in one language"].append(m)
             if not by_both:

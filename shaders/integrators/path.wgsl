@@ -15,7 +15,7 @@ struct PathState {
     layers: Layers,        // if enabled
     albedo_recorded: bool,
     prev_position: vec3f,  // where the ray was scattered, for a light tree
-    prev_normal: vec3f,    // normal there, for light tree and environment map; 0 if light may arrive from both sides
+    prev_normal: vec3f,    // normal at `prev_position`; 0 if light may arrive from both sides
     skipped_distance: f32, // from the last bounce, past skipped surfaces, to the ray's origin
     skips: u32,            // number of surfaces skipped because of their alpha
 }

@@ -1,7 +1,8 @@
 // The integrator `phong`: direct light by Phong's model on surfaces seen directly, in mirrors or through glass.
 
-// Returns the radiance along a camera ray. Paths branch at glass, traced depth first, with at most MAX_SPLIT_DEPTH
-// pending. A path that hits a mirror or glass after BOUNCES bounces returns the background.
+// Returns the radiance along a camera ray. A path branches at glass. Branches are traced depth first; at most
+// MAX_SPLIT_DEPTH branches are pending. A path that hits a mirror or glass after BOUNCES bounces returns the
+// background.
 fn radiance(ray: Ray, differential: Differential, pixel: vec2u, sample: u32) -> vec3f {
     var path = Path(ray, differential, vec3f(1.0), 0u, 0u, NO_PRIMITIVE, NO_PRIMITIVE);
     if CAMERA_INVISIBLE != 0u {

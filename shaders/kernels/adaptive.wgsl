@@ -1,7 +1,7 @@
 // Adaptive rendering: like `render.wgsl`, but takes more than the pilot samples only where the pilot statistics of
-// neighboring pixels require more. Two further parts of the film hold moments and pilot statistics. A dispatch renders
-// either pilot samples or later samples, which require all pilot samples of the film. A pixel's own samples do not
-// affect the pixel's sample count: with such a stopping rule, the mean is biased.
+// neighboring pixels require more. Two further lists of the film contain moments and pilot statistics. A dispatch
+// renders either pilot samples or later samples, which require all pilot samples of the film. A pixel's own samples do
+// not affect the pixel's sample count: with such a stopping rule, the mean is biased.
 
 @compute @workgroup_size(8, 8)
 fn adaptive(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_index) local: u32) {

@@ -125,16 +125,16 @@ fn image(scene: &Scene, packed: &Packed) -> String {
     )
 }
 
-/// Describes the shapes: the number of shapes, and the number and memory use of mesh instances.
+/// Describes the shapes: their number, the number of mesh instances, and the number and memory use of meshes.
 fn shapes(scene: &Scene, packed: &Packed) -> String {
-    let all = count(scene.shapes.len(), "shape");
+    let shapes = count(scene.shapes.len(), "shape");
     if packed.bvh.instances.is_empty() {
-        return all;
+        return shapes;
     }
     let triangles: usize = packed.bvh.meshes.iter().map(|mesh| mesh.triangles.len()).sum();
     let bytes: u64 = packed.bvh.meshes.iter().map(|mesh| mesh.bytes()).sum();
     format!(
-        "{all}, including {} of {} ({}, {:.1} MiB)",
+        "{shapes}, including {} of {} ({}, {:.1} MiB)",
         count(packed.bvh.instances.len(), "instance"),
         count(packed.bvh.meshes.len(), "mesh"),
         count(triangles, "triangle"),

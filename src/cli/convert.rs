@@ -51,7 +51,7 @@ pub struct Args {
     options: SceneOptions,
 }
 
-/// Validates the scene first, so that the file can be rendered.
+/// Writes the scene as TOML. The scene is validated first, so that the written file can be rendered.
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let is_toml = |path: &Path| path.extension().is_some_and(|end| end.eq_ignore_ascii_case("toml"));
     if !is_toml(&args.output) {

@@ -1,4 +1,4 @@
-//! `wgray dev`: renders a scene again whenever it or its shaders are saved, and shows it on a web page.
+//! `wgray dev`: renders a scene again whenever the scene or a shader is saved, and shows the image on a web page.
 
 use std::io::{self, IsTerminal, Write};
 use std::path::{Path, PathBuf};
@@ -100,7 +100,8 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if args.no_page && args.out.is_none() {
         return Err(Usage("--no-page requires --out FILE.png".to_string()).into());
     }
-    // Kept alive until the session has read the scene, so that the meshes are read only once.
+    // The cache of meshes keeps a mesh only while a scene uses the mesh. This scene is dropped after the session has
+    // read the scene, so that meshes are read only once.
     let scene = args
         .out
         .as_ref()
@@ -114,7 +115,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     };
     let editor = editor(&args.editor)?;
     let terminal = Terminal::new();
-    let watching = format!("Watching {}", watched_paths(&sources));
+    let watch_message = format!("Watching {}", watched_paths(&sources));
     let session = Session::start(Settings {
         sources,
         device,
@@ -129,7 +130,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         error => anyhow::Error::from(error),
     })?;
     drop(scene);
-    terminal.line("", &watching);
+    terminal.line("", &watch_message);
     let Some(listener) = listener else {
         Terminal::new().line("", &format!("Writing {}", args.out.unwrap_or_default().display()));
         loop {
@@ -183,26 +184,26 @@ fn editor(template: &str) -> anyhow::Result<Option<String>> {
     if template == "off" {
         return Ok(None);
     }
-    let refuse = |rule: &str| Err(Usage(format!("--editor: {template}: {rule}")).into());
+    let usage_error = |rule: &str| Err(Usage(format!("--editor: {template}: {rule}")).into());
     let (scheme, rest) = template.split_once(':').unwrap_or(("", template));
     let has_valid_chars = scheme.chars().all(|c| c.is_ascii_alphanumeric() || "+-.".contains(c));
     if !scheme.starts_with(|c: char| c.is_ascii_alphabetic()) || !has_valid_chars {
-        return refuse("must start with the URL scheme of an editor, such as vscode:, or be off");
+        return usage_error("must start with the URL scheme of an editor, such as vscode:, or be off");
     }
     if NON_EDITOR_SCHEMES
         .iter()
         .any(|reserved| scheme.eq_ignore_ascii_case(reserved))
     {
-        return refuse(&format!("{scheme}: is not the URL scheme of an editor"));
+        return usage_error(&format!("{scheme}: is not the URL scheme of an editor"));
     }
     if rest.contains(|c: char| c.is_whitespace() || c.is_control()) {
-        return refuse("must not contain white space");
+        return usage_error("must not contain white space");
     }
     let without_placeholders = ["{file}", "{line}", "{column}"]
         .iter()
         .fold(rest.to_string(), |rest, placeholder| rest.replace(placeholder, ""));
     if without_placeholders.contains(['{', '}']) || !rest.contains("{file}") {
-        return refuse("must contain {file}, may contain {line} and {column}, and must not contain other braces");
+        return usage_error("must contain {file}, may contain {line} and {column}, and must not contain other braces");
     }
     Ok(Some(template.to_string()))
 }
@@ -383,7 +384,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn links_open_editors_and_nothing_else() {
+    fn editor_links_need_an_editor_scheme_and_a_file_placeholder() {
         for valid in [
             "vscode://file/{file}:{line}:{column}",
             "vscode-insiders://file/{file}:{line}",

@@ -81,7 +81,11 @@ fn names(controls: FloatControls) -> String {
         (signed_zeros, "signed zeros"),
         (denormals, "denormals"),
     ];
-    let names: Vec<&str> = all.iter().filter(|(has, _)| *has).map(|(_, name)| *name).collect();
+    let names: Vec<&str> = all
+        .iter()
+        .filter(|(is_set, _)| *is_set)
+        .map(|(_, name)| *name)
+        .collect();
     if names.is_empty() {
         "none".to_owned()
     } else {

@@ -6,7 +6,7 @@ use clap::builder::StyledStr;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use wgray_image::sanitize::escape_control;
 
-/// Options of other renderers and their equivalents.
+/// Options of other renderers, and the equivalent options of wgray.
 const OPTIONS: [(&str, &str); 21] = [
     ("--width", "--size WIDTHxHEIGHT"),
     ("--height", "--size WIDTHxHEIGHT"),

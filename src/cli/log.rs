@@ -139,7 +139,7 @@ pub fn install_panic_hook() {
     }
 }
 
-/// Prints the events of this program, and the warnings of libraries.
+/// Prints the `tracing` events of this program, and the warnings and errors of libraries.
 pub fn print_events() {
     use tracing_subscriber::filter::{LevelFilter, Targets};
     use tracing_subscriber::prelude::*;
@@ -162,7 +162,7 @@ pub fn print_events() {
         .init();
 }
 
-/// Writes events as JSON.
+/// Prints `tracing` events as JSON messages, with the fields of their spans.
 struct JsonLayer;
 
 impl<S: Subscriber + for<'a> LookupSpan<'a>> Layer<S> for JsonLayer {
@@ -175,14 +175,14 @@ impl<S: Subscriber + for<'a> LookupSpan<'a>> Layer<S> for JsonLayer {
     }
 
     fn on_event(&self, event: &Event<'_>, context: Context<'_, S>) {
-        let mut all = Fields::default();
+        let mut fields = Fields::default();
         for span in context.event_scope(event).into_iter().flatten() {
-            if let Some(fields) = span.extensions().get::<Fields>() {
-                all.0.extend(fields.0.clone());
+            if let Some(span_fields) = span.extensions().get::<Fields>() {
+                fields.0.extend(span_fields.0.clone());
             }
         }
-        event.record(&mut all);
-        let message = match all.0.remove("message") {
+        event.record(&mut fields);
+        let message = match fields.0.remove("message") {
             Some(Value::String(message)) => message,
             _ => String::new(),
         };
@@ -192,7 +192,7 @@ impl<S: Subscriber + for<'a> LookupSpan<'a>> Layer<S> for JsonLayer {
             tracing::Level::INFO => Level::Info,
             _ => Level::Debug,
         };
-        print_with(level, &message, all.0);
+        print_with(level, &message, fields.0);
     }
 }
 

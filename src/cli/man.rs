@@ -67,8 +67,8 @@ fn name_of(command: &Command) -> &str {
 fn page(command: &Command, program: &Command) -> io::Result<Vec<u8>> {
     let name = name_of(command);
     let man = Man::new(command.clone());
-    // Built here, because `clap_mangen` shifts the other fields if there is no date; reproducible builds need pages
-    // without a date.
+    // The title line is written here, because reproducible builds need pages without a date, and `clap_mangen` shifts
+    // the other fields if the date is missing.
     let (title, version) = (name.to_uppercase(), env!("CARGO_PKG_VERSION"));
     let mut text = format!(".TH {title} 1 \"\" \"wgray {version}\" \"User Commands\"\n").into_bytes();
     man.render_name_section(&mut text)?;

@@ -31,7 +31,7 @@ pub struct Args {
     frame: Option<u32>,
 
     #[command(flatten)]
-    pictures: PictureOptions,
+    picture_options: PictureOptions,
 
     /// Suppress all output except errors
     #[arg(short, long)]
@@ -41,30 +41,34 @@ pub struct Args {
 /// Joins the parts into the image and its layers, byte-identical to the files of a single render.
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let frame = Frame::single(args.frame);
-    let output_names = args.pictures.output.iter().map(|output| frame.name("--output", output));
-    let pictures = PictureOptions {
+    let output_names = args
+        .picture_options
+        .output
+        .iter()
+        .map(|output| frame.name("--output", output));
+    let picture_options = PictureOptions {
         output: output_names.collect::<Result<_, _>>()?,
-        ..args.pictures.clone()
+        ..args.picture_options.clone()
     };
     let files = files(&args.parts)?;
     let parts = Parts::open(
         &files,
-        args.pictures.view_transform.is_some() && args.pictures.exposure.is_some(),
+        args.picture_options.view_transform.is_some() && args.picture_options.exposure.is_some(),
     )?;
-    let [first, ..] = pictures.output.as_slice() else {
+    let [first, ..] = picture_options.output.as_slice() else {
         return Err(Usage("--output: is required: -o NAME.exr".to_owned()).into());
     };
     let mut layout = parts.layout();
-    layout.view = args.pictures.view(layout.view);
-    let outputs = Outputs::find(&pictures, first, (&layout.aovs, LayerPolicy::Available), None)?;
+    layout.view = args.picture_options.view(layout.view);
+    let outputs = Outputs::find(&picture_options, first, (&layout.aovs, LayerPolicy::Available), None)?;
     outputs.check(&files, None)?;
     outputs.check_size(layout.region)?;
     let open_outputs = outputs.open().map_err(RenderError::Output)?;
     let stop = signal::install_handlers().context("signal handler")?;
-    let Files::Pictures(targets) = open_outputs.files else {
+    let Files::Images(targets) = open_outputs.files else {
         return Ok(ExitCode::SUCCESS); // unreachable: merge does not write parts
     };
-    let options = args.pictures.save_options(parts.metadata());
+    let options = args.picture_options.save_options(parts.metadata());
     let written = image::save(targets, &layout, &options, &mut |sink| {
         parts.read(&mut |band| match stop.signal() {
             None => sink(band),
@@ -76,7 +80,8 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         (Err(error), _) => Err(error.into()),
         (Ok(saved), _) => {
             if !args.quiet {
-                args.pictures.warn(&saved, &mut |line| log::print(Level::Warning, line));
+                args.picture_options
+                    .warn(&saved, &mut |line| log::print(Level::Warning, line));
             }
             Ok(ExitCode::SUCCESS)
         }

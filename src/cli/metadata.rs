@@ -9,7 +9,7 @@ use crate::scene::Scene;
 use wgray_render::job::hash_of_scene;
 use wgray_render::records::Packed;
 
-/// Marks an incomplete image: `32 of 64 samples`.
+/// Name of the metadata that marks an incomplete image, with a value such as `32 of 64 samples`.
 const PARTIAL: &str = "partial";
 
 /// Returns true if an image file is complete and contains all samples.
@@ -17,7 +17,8 @@ pub fn is_finished(path: &Path) -> bool {
     is_complete(path) && read_metadata(path).is_none_or(|metadata| metadata.get(PARTIAL).is_none())
 }
 
-/// Returns the (maximum) samples per pixel of an image file; `None` if wgray did not write it.
+/// Returns the samples per pixel of an image file, the maximum if sampling is adaptive; `None` if wgray did not write
+/// the file.
 pub fn samples_of(path: &Path) -> Option<u32> {
     let metadata = read_metadata(path)?;
     let text = match (metadata.get(PARTIAL), metadata.get("adaptive")) {

@@ -164,9 +164,9 @@ pub fn main() -> ExitCode {
 
 /// Parses the command line. `--help` lists all options, `-h` only options without `hide_short_help`.
 fn parse() -> Result<Cli, clap::Error> {
-    let shows_all = std::env::args_os().any(|word| word == "--help")
+    let lists_all_options = std::env::args_os().any(|word| word == "--help")
         || std::env::args_os().nth(1).is_some_and(|word| word == "help");
-    let mut command = match shows_all {
+    let mut command = match lists_all_options {
         true => with_all_options(Cli::command()),
         false => Cli::command(),
     };
@@ -210,14 +210,14 @@ fn prepare_environment(threads: Option<u16>) {
         set("LP_NUM_THREADS", threads.to_string().as_ref());
     }
     if cfg!(target_os = "linux") && std::env::var_os("XDG_RUNTIME_DIR").is_none() {
-        // Mesa warns if this variable is unset, although only windows use it.
+        // Mesa warns if this variable is unset, although only programs with windows need it.
         set("XDG_RUNTIME_DIR", std::env::temp_dir().as_os_str());
     }
 }
 
 /// Starts the global thread pool. Returns an error if threads cannot be started; otherwise rayon would panic later.
 fn start_threads(threads: Option<u16>) -> anyhow::Result<()> {
-    let count = threads.map_or(0, usize::from); // 0: all
+    let count = threads.map_or(0, usize::from); // 0: rayon's default
     let pool = rayon::ThreadPoolBuilder::new().num_threads(count);
     Ok(pool.build_global().map_err(NoThreads)?)
 }
@@ -227,7 +227,7 @@ fn load(path: &Path, overrides: &Overrides) -> anyhow::Result<Scene> {
     Scene::load_with(path, overrides).map_err(|error| cli_error(error.into()))
 }
 
-/// Formats a warning about a scene with its location, in the same form as errors: the file, and the line if known.
+/// Formats a warning about a scene like an error: with the file, and with the line if the line is known.
 fn located(path: &Path, note: &Note) -> String {
     match (&note.file, note.line) {
         (None, Some(line)) => format!("{}:{line}: {}", path.display(), note.message),
@@ -267,7 +267,7 @@ fn option_error(problem: &Problem) -> Usage {
     Usage(format!("--{name}{sub_key}: {}{hint}", problem.message))
 }
 
-/// Returns the messages of an error and its sources. A source whose text the previous message contains is omitted.
+/// Returns the messages of an error and its sources. A source is omitted if the message already ends with its text.
 fn chain_message(error: &anyhow::Error) -> String {
     let mut message = error.to_string();
     for source in error.chain().skip(1).map(ToString::to_string) {
@@ -285,9 +285,9 @@ fn report(error: &anyhow::Error, code: u8) {
         let (errors, more) = error.each();
         for error in errors {
             let mut facts = facts_of([("exit_code", code.clone())]);
-            let place = error.place();
-            let numbers = [("line", place.line), ("column", place.column)];
-            let texts = [("file", place.file), ("key", place.key)];
+            let location = error.place();
+            let numbers = [("line", location.line), ("column", location.column)];
+            let texts = [("file", location.file), ("key", location.key)];
             let texts = texts.map(|(name, text)| (name, text.map(Value::from)));
             let numbers = numbers.map(|(name, number)| (name, number.map(Value::from)));
             let fields = numbers.into_iter().chain(texts);
@@ -299,8 +299,8 @@ fn report(error: &anyhow::Error, code: u8) {
         }
         return;
     }
-    let shader = shader_errors(error);
-    if shader.is_empty() {
+    let shader_errors = shader_errors(error);
+    if shader_errors.is_empty() {
         let hint = match error.downcast_ref() {
             Some(RenderError::OutOfMemory { .. }) => " (--crop, --size, --device cpu)",
             _ => "",
@@ -308,12 +308,14 @@ fn report(error: &anyhow::Error, code: u8) {
         let facts = facts_of([("exit_code", code.clone())]);
         log::print_with(Level::Error, &(chain_message(error) + hint), facts);
     }
-    for error in shader {
+    for error in shader_errors {
         let mut facts = facts_of([("exit_code", code.clone())]);
-        let mut place = error.place.rsplitn(3, ':');
-        if let (Some(Ok(column)), Some(Ok(line)), Some(file)) =
-            (place.next().map(str::parse), place.next().map(str::parse), place.next())
-        {
+        let mut location = error.place.rsplitn(3, ':');
+        if let (Some(Ok(column)), Some(Ok(line)), Some(file)) = (
+            location.next().map(str::parse),
+            location.next().map(str::parse),
+            location.next(),
+        ) {
             let (line, column): (u64, u64) = (line, column);
             facts.extend(facts_of([
                 ("file", file.into()),

@@ -1,5 +1,5 @@
-//! The destinations of a render, checked before it begins: none may be an input or occur twice, and a default name must
-//! not replace another program's file.
+//! The destinations of a render. They are checked before the render begins: a destination must not be an input or occur
+//! twice, and a default name must not replace another program's file.
 
 use std::io::{self, IsTerminal as _};
 use std::path::{Path, PathBuf};
@@ -13,19 +13,19 @@ use super::metadata::is_finished;
 use super::picture_options::PictureOptions;
 
 pub struct Outputs {
-    pictures: Vec<Picture>,
-    /// A part of an image, instead of images.
+    images: Vec<ImageOutput>,
+    /// The part of an image that is written instead of images.
     part: Option<Output>,
     stats: Option<Output>,
 }
 
-struct Picture {
+struct ImageOutput {
     format: Format,
     /// The image, then the AOVs in separate files; each with the option that requests the file.
     files: Vec<(String, Output)>,
 }
 
-impl Picture {
+impl ImageOutput {
     fn is_rewritable(&self) -> bool {
         self.files.iter().all(|(_, output)| output.is_file())
     }
@@ -37,7 +37,7 @@ pub struct OpenOutputs {
 }
 
 pub enum Files {
-    Pictures(Vec<Target>),
+    Images(Vec<Target>),
     Part(Pending),
 }
 
@@ -45,7 +45,7 @@ impl Files {
     /// Returns the name of the first file, for messages.
     pub fn name(&self) -> Option<&str> {
         match self {
-            Files::Pictures(targets) => targets
+            Files::Images(targets) => targets
                 .iter()
                 .flat_map(|target| &target.files)
                 .next()
@@ -79,36 +79,36 @@ impl Outputs {
             [] => vec![default],
             paths => paths.iter().map(PathBuf::as_path).collect(),
         };
-        let mut found = Vec::new();
+        let mut destinations = Vec::new();
         for path in paths {
-            let picture = output(path)?;
+            let destination = output(path)?;
             if path.as_os_str() == "-" && io::stdout().is_terminal() {
                 let message = "--output: -: standard output is a terminal; redirect it with > FILE or | COMMAND";
                 return Err(Usage(message.to_owned()).into());
             }
-            forbid_ending("--output", path, &picture, "toml", "scenes")?;
-            found.push((path, picture));
+            forbid_ending("--output", path, &destination, "toml", "scenes")?;
+            destinations.push((path, destination));
         }
-        let formats = formats(&found, options.format)?;
+        let formats = formats(&destinations, options.format)?;
         options.check(&formats)?;
         if let LayerPolicy::Requested = layer_policy {
-            check_layers(aovs, &found, &formats)?;
+            check_layers(aovs, &destinations, &formats)?;
         }
-        let mut pictures = Vec::new();
-        for ((path, picture), format) in found.into_iter().zip(formats) {
-            let separate_aovs = match picture.is_file() {
+        let mut images = Vec::new();
+        for ((path, destination), format) in destinations.into_iter().zip(formats) {
+            let separate_aovs = match destination.is_file() {
                 true => aovs,
                 false => &[],
             };
-            let mut files = vec![("--output".to_owned(), picture)];
+            let mut files = vec![("--output".to_owned(), destination)];
             let aov_files = image::files(path, format, separate_aovs).into_iter().skip(1);
             for (aov, path) in separate_aovs.iter().zip(aov_files) {
                 files.push((format!("--aov {}", aov.name()), output(&path)?));
             }
-            pictures.push(Picture { format, files });
+            images.push(ImageOutput { format, files });
         }
         let outputs = Outputs {
-            pictures,
+            images,
             part: None,
             stats: stats.map(find_stats).transpose()?,
         };
@@ -120,7 +120,7 @@ impl Outputs {
 
     /// Rejects existing files that wgray did not write.
     fn protect_foreign_files(&self) -> Result<(), Usage> {
-        let mut files = self.pictures.iter().flat_map(|picture| &picture.files);
+        let mut files = self.images.iter().flat_map(|image| &image.files);
         let is_foreign = |(_, output): &&(String, Output)| {
             let path = output.path().filter(|path| path.exists());
             path.is_some_and(|path| image::read_metadata(path).is_none())
@@ -134,6 +134,7 @@ impl Outputs {
         }
     }
 
+    /// Checks the destinations of a part.
     pub fn find_part(options: &PictureOptions, stats: Option<&Path>) -> anyhow::Result<Outputs> {
         let is_part = |path: &Path| path.extension().is_some_and(|end| end.eq_ignore_ascii_case(PART));
         let path = match options.output.as_slice() {
@@ -148,7 +149,7 @@ impl Outputs {
         }
         options.check(&[])?;
         Ok(Outputs {
-            pictures: Vec::new(),
+            images: Vec::new(),
             part: Some(output(path)?),
             stats: stats.map(find_stats).transpose()?,
         })
@@ -157,9 +158,9 @@ impl Outputs {
     /// Rejects images too large for their format.
     pub fn check_size(&self, region: Region) -> Result<(), Usage> {
         let mut named = self
-            .pictures
+            .images
             .iter()
-            .filter_map(|picture| Some((picture.format, picture.files.first()?)));
+            .filter_map(|image| Some((image.format, image.files.first()?)));
         named.try_for_each(|(format, (option, output))| {
             let rule = format.check_size(region.width(), region.height());
             rule.map_err(|rule| Usage(format!("{option}: {}: {rule}", output.name())))
@@ -175,14 +176,14 @@ impl Outputs {
             .iter()
             .map(|output| ("--checkpoint", output, "choose another name"));
         let stats = self.stats.iter().map(|stats| ("--stats", stats, "choose another name"));
-        let pictures =
-            (self.pictures.iter().flat_map(|picture| &picture.files)).map(|(option, output)| match option.as_str() {
+        let images =
+            (self.images.iter().flat_map(|image| &image.files)).map(|(option, output)| match option.as_str() {
                 "--output" => ("--output", output, "choose another name"),
                 option => (option, output, "choose another name with --output"),
             });
         let part = self.part.iter().map(|part| ("--output", part, "choose another name"));
         let mut checked: Vec<(&str, &Output)> = Vec::new();
-        for (option, output, remedy) in part.chain(pictures).chain(stats).chain(checkpoint) {
+        for (option, output, remedy) in part.chain(images).chain(stats).chain(checkpoint) {
             protect_inputs(option, output, inputs, remedy)?;
             if let Some((other, _)) = checked.iter().find(|(_, other)| other.is_same(output)) {
                 let name = output.name();
@@ -201,25 +202,25 @@ impl Outputs {
     /// is ignored.
     pub fn exist(&self) -> bool {
         let exists = |output: &Output| output.path().is_some_and(Path::is_file);
-        let mut pictures = self.pictures.iter().flat_map(|picture| &picture.files);
+        let mut images = self.images.iter().flat_map(|image| &image.files);
         let stats = self.stats.iter().filter(|stats| stats.is_file());
         self.part.iter().chain(stats).all(exists)
-            && pictures.all(|(_, output)| exists(output) && output.path().is_some_and(is_finished))
+            && images.all(|(_, output)| exists(output) && output.path().is_some_and(is_finished))
     }
 
     /// Returns the images that previews can rewrite because they are files: the format, the image and its layers.
     pub fn rewritable(&self) -> io::Result<Vec<(Format, Vec<Output>)>> {
-        let pictures = self.pictures.iter().filter(|picture| picture.is_rewritable());
-        let reopened = |Picture { format, files }: &Picture| {
+        let images = self.images.iter().filter(|image| image.is_rewritable());
+        let reopened = |ImageOutput { format, files }: &ImageOutput| {
             let files = files.iter().map(|(_, output)| output.again());
             Ok((*format, files.collect::<io::Result<_>>()?))
         };
-        pictures.map(reopened).collect()
+        images.map(reopened).collect()
     }
 
     /// Rejects `--preview` if no image is written to a regular file.
     pub fn check_preview(&self) -> Result<(), Usage> {
-        match self.pictures.iter().any(Picture::is_rewritable) {
+        match self.images.iter().any(ImageOutput::is_rewritable) {
             true => Ok(()),
             false => Err(Usage(
                 "--preview: needs an output that is a file, such as -o NAME.png".to_owned(),
@@ -227,45 +228,47 @@ impl Outputs {
         }
     }
 
+    /// Returns the path of the part, if the output is a part.
     pub fn part(&self) -> Option<&Path> {
         self.part.as_ref()?.path()
     }
 
     /// Returns the files, each with its option and its name for messages.
     pub fn files(&self) -> impl Iterator<Item = (&str, &str, &Path)> {
-        let pictures = self.pictures.iter().flat_map(|picture| &picture.files);
-        let pictures = pictures.map(|(option, output)| (option.as_str(), output));
+        let images = self.images.iter().flat_map(|image| &image.files);
+        let images = images.map(|(option, output)| (option.as_str(), output));
         let part = self.part.iter().map(|part| ("--output", part));
         let stats = self.stats.iter().map(|stats| ("--stats", stats));
-        let all = pictures.chain(part).chain(stats);
+        let all = images.chain(part).chain(stats);
         all.filter_map(|(option, output)| Some((option, output.name(), output.path()?)))
     }
 
+    /// Returns the name of the first output whose format has no alpha.
     pub fn without_alpha(&self) -> Option<&str> {
-        let is_opaque = |picture: &&Picture| picture.format == Format::Jpeg;
-        let (_, output) = self.pictures.iter().find(is_opaque)?.files.first()?;
+        let is_opaque = |image: &&ImageOutput| image.format == Format::Jpeg;
+        let (_, output) = self.images.iter().find(is_opaque)?.files.first()?;
         Some(output.name())
     }
 
     /// Returns the names of the images or of the part, for messages.
-    pub fn images(&self) -> Vec<String> {
-        let pictures = self.pictures.iter().flat_map(|picture| &picture.files);
-        let outputs = pictures.map(|(_, output)| output).chain(&self.part);
+    pub fn image_names(&self) -> Vec<String> {
+        let images = self.images.iter().flat_map(|image| &image.files);
+        let outputs = images.map(|(_, output)| output).chain(&self.part);
         outputs.map(|output| output.name().to_owned()).collect()
     }
 
     /// Opens all destinations. Opening a pipe blocks until it has a reader, so signals must still end the program
     /// immediately.
     pub fn open(mut self) -> io::Result<OpenOutputs> {
-        let pictures = self.pictures.iter_mut().flat_map(|picture| &mut picture.files);
-        for output in pictures
+        let images = self.images.iter_mut().flat_map(|image| &mut image.files);
+        for output in images
             .map(|(_, output)| output)
             .chain(&mut self.part)
             .chain(&mut self.stats)
         {
             output.connect()?;
         }
-        let target = |Picture { format, files }| {
+        let target = |ImageOutput { format, files }| {
             let files = files.into_iter().map(|(_, output)| Pending::start(output));
             let files = files.collect::<io::Result<_>>()?;
             Ok(Target { format, files })
@@ -273,7 +276,7 @@ impl Outputs {
         Ok(OpenOutputs {
             files: match self.part {
                 Some(part) => Files::Part(Pending::start(part)?),
-                None => Files::Pictures(self.pictures.into_iter().map(target).collect::<io::Result<_>>()?),
+                None => Files::Images(self.images.into_iter().map(target).collect::<io::Result<_>>()?),
             },
             stats: self.stats.map(Pending::start).transpose()?,
         })
@@ -282,7 +285,7 @@ impl Outputs {
 
 fn find_stats(path: &Path) -> anyhow::Result<Output> {
     let stats = output(path)?;
-    forbid_pictures("--stats", path, &stats)?;
+    forbid_known_extensions("--stats", path, &stats)?;
     Ok(stats)
 }
 
@@ -292,18 +295,18 @@ fn find_checkpoint(path: &Path) -> anyhow::Result<Output> {
         let name = checkpoint.name();
         return Err(Usage(format!("--checkpoint: {name}: must be a regular file")).into());
     }
-    forbid_pictures("--checkpoint", path, &checkpoint)?;
+    forbid_known_extensions("--checkpoint", path, &checkpoint)?;
     Ok(checkpoint)
 }
 
-/// Rejects names of scenes, parts, models and images, which are probably unintended.
-fn forbid_pictures(option: &str, path: &Path, output: &Output) -> Result<(), Usage> {
+/// Rejects names with the extension of a scene, part, model or image: the user probably confused two options.
+fn forbid_known_extensions(option: &str, path: &Path, output: &Output) -> Result<(), Usage> {
     forbid_ending(option, path, output, "toml", "scenes")?;
     forbid_ending(option, path, output, PART, "parts of images")?;
-    let mut models = ["gltf", "glb"].into_iter();
-    models.try_for_each(|ending| forbid_ending(option, path, output, ending, "models"))?;
-    let mut pictures = ["png", "exr", "jpg", "jpeg", "webp"].into_iter();
-    pictures.try_for_each(|ending| forbid_ending(option, path, output, ending, "images"))
+    let mut model_extensions = ["gltf", "glb"].into_iter();
+    model_extensions.try_for_each(|ending| forbid_ending(option, path, output, ending, "models"))?;
+    let mut image_extensions = ["png", "exr", "jpg", "jpeg", "webp"].into_iter();
+    image_extensions.try_for_each(|ending| forbid_ending(option, path, output, ending, "images"))
 }
 
 pub fn protect_inputs(option: &str, output: &Output, inputs: &[PathBuf], remedy: &str) -> Result<(), Usage> {
@@ -326,22 +329,26 @@ fn output(path: &Path) -> Result<Output, RenderError> {
     }
 }
 
-/// Returns the formats, determined by extension, else by --format. Streams default to PNG.
-fn formats(pictures: &[(&Path, Output)], option: Option<Format>) -> Result<Vec<Format>, Usage> {
-    let named: Vec<Option<Format>> = pictures.iter().map(|(path, _)| Format::of(path)).collect();
-    if let (Some(option), false) = (option, named.contains(&None)) {
+/// Returns the format of each output: that of its extension, else that of --format. Streams default to PNG.
+fn formats(destinations: &[(&Path, Output)], option: Option<Format>) -> Result<Vec<Format>, Usage> {
+    let by_extension: Vec<Option<Format>> = destinations.iter().map(|(path, _)| Format::of(path)).collect();
+    if let (Some(option), false) = (option, by_extension.contains(&None)) {
         // All outputs have known extensions, which --format must not contradict.
-        let other = pictures.iter().zip(&named).find(|(_, named)| **named != Some(option));
-        if let Some(((path, _), _)) = other {
+        let contradiction = destinations
+            .iter()
+            .zip(&by_extension)
+            .find(|(_, format)| **format != Some(option));
+        if let Some(((path, _), _)) = contradiction {
             let (name, ending) = (path.display(), path.extension().unwrap_or_default().display());
             return Err(Usage(format!(
                 "--format: contradicts --output {name}, which ends in .{ending}"
             )));
         }
     }
-    let format = |((path, picture), named): (&(&Path, Output), Option<Format>)| match named.or(option) {
+    let format = |((path, destination), by_extension): (&(&Path, Output), Option<Format>)| match by_extension.or(option)
+    {
         Some(format) => Ok(format),
-        None if !picture.is_file() => Ok(Format::Png),
+        None if !destination.is_file() => Ok(Format::Png),
         None if path.extension().is_some_and(|end| end.eq_ignore_ascii_case(PART)) => Err(Usage(format!(
             "--output: {}: names a part; use --tile i/n to render part i of n",
             path.display()
@@ -351,12 +358,12 @@ fn formats(pictures: &[(&Path, Output)], option: Option<Format>) -> Result<Vec<F
             path.display()
         ))),
     };
-    pictures.iter().zip(named).map(format).collect()
+    destinations.iter().zip(by_extension).map(format).collect()
 }
 
 /// Rejects layers that no output supports.
-fn check_layers(aovs: &[Aov], pictures: &[(&Path, Output)], formats: &[Format]) -> Result<(), Usage> {
-    let mut layers = pictures
+fn check_layers(aovs: &[Aov], destinations: &[(&Path, Output)], formats: &[Format]) -> Result<(), Usage> {
+    let mut layers = destinations
         .iter()
         .zip(formats)
         .map(|((_, output), format)| match format.layers() {
@@ -367,7 +374,11 @@ fn check_layers(aovs: &[Aov], pictures: &[(&Path, Output)], formats: &[Format]) 
         return Ok(());
     };
     let aov = aov.name();
-    let message = match pictures.iter().zip(formats).find(|(_, format)| **format == Format::Png) {
+    let message = match destinations
+        .iter()
+        .zip(formats)
+        .find(|(_, format)| **format == Format::Png)
+    {
         Some(((_, output), _)) => format!(
             "--aov {aov}: needs a file beside {}, which is a stream; use -o NAME.png, or --format exr for a layer",
             output.name()

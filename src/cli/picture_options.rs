@@ -74,7 +74,7 @@ impl PictureOptions {
     pub fn warn(&self, saved: &SaveReport, log: &mut dyn FnMut(&str)) {
         for (name, count) in &saved.too_large {
             log(&format!(
-                "{name}: values beyond 65504, the maximum of 16 bits, were written as infinity (number of these values: \
+                "{name}: values beyond 65504, the maximum of a 16-bit float, were written as infinity (number of these values: \
                  {count}); use --exr-type float"
             ));
         }
@@ -92,21 +92,23 @@ impl PictureOptions {
             ("--exr-compression", self.exr_compression.is_some(), &[Exr]),
             ("--quality", self.quality.is_some(), &[Jpeg]),
         ];
-        let unused = |(_, is_set, users): &(&str, bool, &[Format])| {
-            *is_set && !users.iter().any(|format| formats.contains(format))
+        let unused = |(_, is_set, supporting_formats): &(&str, bool, &[Format])| {
+            *is_set && !supporting_formats.iter().any(|format| formats.contains(format))
         };
         match options.into_iter().find(unused) {
             None => Ok(()),
-            Some((option, _, users)) => {
-                let users: Vec<String> = users.iter().map(|format| format.name().to_uppercase()).collect();
-                let users = users.join(", ");
-                Err(Usage(format!("{option}: only applies to {users} outputs")))
+            Some((option, _, supporting_formats)) => {
+                let names: Vec<String> = (supporting_formats.iter())
+                    .map(|format| format.name().to_uppercase())
+                    .collect();
+                let names = names.join(", ");
+                Err(Usage(format!("{option}: only applies to {names} outputs")))
             }
         }
     }
 }
 
-/// Returns a parser of these names.
+/// Returns a parser that maps the name of each value to the value.
 pub fn name_parser<T: Clone + Send + Sync + 'static, const N: usize>(
     all: [T; N],
     name: fn(T) -> &'static str,

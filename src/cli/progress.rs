@@ -11,7 +11,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use super::facts_of;
 use super::log::{self, Level};
 
-/// Form of the progress display.
+/// The display of progress: a bar, lines or none.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Mode {
     // A bar on a terminal; otherwise a line every ten seconds. JSON messages use the intervals of Plain.
@@ -35,12 +35,12 @@ const STEPS: f64 = 1000.0;
 /// The progress of one render. Dropping it removes the bar.
 pub struct Progress {
     display: Display,
-    /// Label printed before each line, with a colon; empty when rendering a single image.
+    /// Label printed before each line, with a colon; empty if a single image is rendered.
     label: String,
     /// The frame number.
     frame: Option<u32>,
     start: Instant,
-    /// The initial fraction; above 0 if the render was resumed from a checkpoint.
+    /// The fraction at the first update; above 0 if the render was resumed from a checkpoint.
     first_fraction: Option<f64>,
     /// The tenths (or hundredths) that were completed when the last line was printed, and the time of this line.
     printed: (u32, Instant),
@@ -81,7 +81,7 @@ impl Progress {
         let first_fraction = *self.first_fraction.get_or_insert(fraction);
         let remaining = remaining(elapsed, first_fraction, fraction);
         match &mut self.display {
-            // With several frames, short frames have a bar too.
+            // With several frames, the bar appears at once, so that short frames have a bar too.
             Display::Bar(bar) if elapsed > BAR_DELAY || !self.label.is_empty() => {
                 let bar = bar.get_or_insert_with(|| new_bar(elapsed, &self.label));
                 bar.set_position((fraction * STEPS) as u64);
@@ -119,7 +119,7 @@ impl Progress {
         );
         let mut facts = facts_of([
             ("fraction", fraction.into()),
-            ("share", fraction.into()), // the former name, until 0.3
+            ("share", fraction.into()), // the former name, kept until version 0.3
             ("seconds", seconds.into()),
         ]);
         facts.extend(self.frame.map(|frame| ("frame".to_owned(), frame.into())));
@@ -160,21 +160,21 @@ pub fn with_spinner<T>(mode: Mode, name: &'static str, work: impl FnOnce() -> T)
     if mode != Mode::Auto || log::is_json() || !std::io::stderr().is_terminal() {
         return work();
     }
-    let (done, ended) = mpsc::channel::<()>();
-    let watch = thread::Builder::new().spawn(move || {
-        if ended.recv_timeout(BAR_DELAY) == Err(RecvTimeoutError::Timeout) {
+    let (work_guard, work_end) = mpsc::channel::<()>();
+    let spinner = thread::Builder::new().spawn(move || {
+        if work_end.recv_timeout(BAR_DELAY) == Err(RecvTimeoutError::Timeout) {
             let bar = ProgressBar::new_spinner().with_elapsed(BAR_DELAY);
             bar.set_style(spinner_style());
             bar.set_message(name);
             bar.enable_steady_tick(Duration::from_millis(100));
-            let _ = ended.recv(); // until the work has ended
+            let _ = work_end.recv(); // returns when `work_guard` is dropped
             bar.finish_and_clear();
         }
     });
     let result = work();
-    drop(done);
-    if let Ok(watch) = watch {
-        let _ = watch.join();
+    drop(work_guard);
+    if let Ok(spinner) = spinner {
+        let _ = spinner.join();
     }
     result
 }
@@ -199,7 +199,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn estimates_begin_when_they_are_meaningful() {
+    fn estimates_need_elapsed_time_and_progress() {
         let estimate = |seconds, first, fraction| {
             remaining(Duration::from_secs(seconds), first, fraction).map(|time| time.as_secs_f64().round())
         };
@@ -212,7 +212,7 @@ mod tests {
     }
 
     #[test]
-    fn durations_have_two_units() {
+    fn durations_have_at_most_two_units() {
         for (seconds, text) in [(0.2, "1 s"), (59.0, "59 s"), (60.0, "1 m 0 s"), (7325.0, "2 h 2 m")] {
             assert_eq!(format_duration(Duration::from_secs_f64(seconds)), text);
         }

@@ -24,24 +24,23 @@ pub struct Stats {
     pub pixel_samples: u32,
     /// Minimum samples per pixel.
     pub min_samples: u32,
-    /// The former name of `min_samples`, until 0.3.
+    /// The former name of `min_samples`, kept until version 0.3.
     #[serde(rename = "least_samples")]
     pub former_min_samples: u32,
     /// True if a signal ended a render with `--preview`.
     pub partial: bool,
     /// Light samples per hit, summed over all lights.
     pub light_samples: u64,
-    /// Seconds until the device is ready, counted from the start of the process, or from the start of the frame for
-    /// later frames.
+    /// Seconds until the device is ready, counted from the start of the process, or from the end of the previous frame.
     pub setup_s: f64,
     pub render_s: f64,
     /// Seconds until the image is written, counted like `setup_s`.
     pub total_s: f64,
     /// Camera rays of the image.
     pub camera_rays: u64,
-    /// Fraction of the samples that were rendered, not read from a checkpoint.
+    /// Fraction of the samples that this run rendered; the other samples come from a checkpoint.
     pub fraction_rendered: f64,
-    /// The former name of `fraction_rendered`, until 0.3.
+    /// The former name of `fraction_rendered`, kept until version 0.3.
     #[serde(rename = "share_rendered")]
     pub former_fraction_rendered: f64,
     /// Always `None`: kernels do not count shadow rays.

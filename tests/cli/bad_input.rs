@@ -12,11 +12,11 @@ fn assert_failed(folder: &TestFolder, result: &RunResult, code: i32, message: &s
         "'{message}' is not in: {}",
         result.stderr
     );
-    assert!(folder.files().is_empty(), "files left: {:?}", folder.files());
+    assert!(folder.files().is_empty(), "these files remain: {:?}", folder.files());
 }
 
 #[test]
-fn wrong_command_lines_exit_with_2() {
+fn invalid_command_lines_exit_with_2() {
     let folder = TestFolder::new();
     let cases: [(&[&str], &str); 37] = [
         (&["--size", "64"], "--size"),
@@ -98,9 +98,9 @@ fn a_crop_is_checked_against_the_size_option() {
     folder.run_quietly(&["render", "small.toml", "--size", "20x20", "--crop", "0,0,11,7"]);
 }
 
-/// A selection of rules; the tests next to the parser cover every rule of scene files.
+/// Covers a selection of rules; the tests of the parser cover every rule of scene files.
 #[test]
-fn bad_scenes_exit_with_3_and_name_file_line_key_value_and_rule() {
+fn invalid_scenes_exit_with_3_and_name_file_line_key_value_and_rule() {
     let cases = [
         (
             "radius = 0.8",
@@ -160,7 +160,7 @@ fn bad_scenes_exit_with_3_and_name_file_line_key_value_and_rule() {
     }
 }
 
-/// An error that is caused by the option is reported at the line of the file.
+/// An error that the option causes is reported with the line of the scene file.
 #[test]
 fn an_integrator_option_validates_the_scene() {
     let folder = TestFolder::new();

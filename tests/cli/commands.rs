@@ -1,4 +1,4 @@
-//! Commands other than `render`, and the help.
+//! `wgray devices` and `wgray check`, the help, and the scenes in the documentation.
 
 use super::{NO_DRIVER, TestFolder, project_scene};
 
@@ -39,8 +39,8 @@ fn valid_scenes_pass_the_check_without_a_device() {
 #[test]
 fn a_check_warns_about_scenes_that_render_black() {
     let folder = TestFolder::new();
-    let (head, lit) = super::SCENE.split_once("[[lights]]").unwrap();
-    let (_, shapes) = lit.split_once("[[shapes]]").unwrap();
+    let (head, rest) = super::SCENE.split_once("[[lights]]").unwrap();
+    let (_, shapes) = rest.split_once("[[shapes]]").unwrap();
     let dark = format!("{head}[[shapes]]{shapes}").replace("[0.1, 0.1, 0.1]", "[0, 0, 0]");
     folder.write("dark.toml", &dark.replace("[0.2, 0.3, 2]", "[0, 0, 0]"));
     let result = folder.run(&["check", "dark.toml"]);
@@ -58,12 +58,12 @@ fn the_view_check_finds_a_mesh_away_from_the_origin() {
     let (start, rest) = super::SCENE.split_once("[[shapes]]").unwrap();
     let mesh = "[[shapes]]\ntype = 'mesh'\nmaterial = 'gray'\nfile = 'far.obj'\n";
     assert!(rest.contains("sphere"));
-    let near = format!("{start}{mesh}");
-    let far = near.replace(
+    let camera_at_origin = format!("{start}{mesh}");
+    let camera_at_mesh = camera_at_origin.replace(
         "position = [0, -5, 1], look_at = [0, 0, 1]",
         "position = [100.3, -5, 1], look_at = [100.3, 0, 1]",
     );
-    for (scene, is_in_view) in [(far, true), (near, false)] {
+    for (scene, is_in_view) in [(camera_at_mesh, true), (camera_at_origin, false)] {
         folder.write("far.toml", &scene);
         let result = folder.run(&["check", "far.toml"]);
         assert_eq!(result.code, 0, "{}", result.stderr);

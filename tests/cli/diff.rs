@@ -7,8 +7,8 @@ use exr::prelude::{Encoding, Image};
 
 use super::{RunResult, TestFolder};
 
-/// Writes an 8-bit PNG; the number of values determines the color type.
-fn png(folder: &TestFolder, name: &str, (width, height): (u32, u32), values: &[u8]) {
+/// Writes an 8-bit PNG; the number of values per pixel determines the color type.
+fn write_8_bit_png(folder: &TestFolder, name: &str, (width, height): (u32, u32), values: &[u8]) {
     let color = match values.len() / (width * height) as usize {
         1 => png::ColorType::Grayscale,
         2 => png::ColorType::GrayscaleAlpha,
@@ -36,11 +36,11 @@ fn write_png(
     encoder.write_header().unwrap().write_image_data(values).unwrap();
 }
 
-fn exr(folder: &TestFolder, name: &str, size: (usize, usize), channels: Vec<(&str, FlatSamples)>) {
-    exr_parts(folder, name, size, vec![("part", channels)], Encoding::FAST_LOSSLESS);
+fn write_exr(folder: &TestFolder, name: &str, size: (usize, usize), channels: Vec<(&str, FlatSamples)>) {
+    write_exr_parts(folder, name, size, vec![("part", channels)], Encoding::FAST_LOSSLESS);
 }
 
-fn exr_parts(
+fn write_exr_parts(
     folder: &TestFolder,
     name: &str,
     size: (usize, usize),
@@ -75,8 +75,8 @@ fn write_two_pngs(folder: &TestFolder) -> (Vec<u8>, Vec<u8>) {
     let a: Vec<u8> = (0..24).map(|i| i * 9).collect();
     let mut b = a.clone();
     b[16] += 10; // pixel (1, 1), green
-    png(folder, "a.png", (4, 2), &a);
-    png(folder, "b.png", (4, 2), &b);
+    write_8_bit_png(folder, "a.png", (4, 2), &a);
+    write_8_bit_png(folder, "b.png", (4, 2), &b);
     (a, b)
 }
 
@@ -100,7 +100,7 @@ fn json(result: &RunResult) -> serde_json::Value {
 fn identical_files_pass_and_a_single_differing_bit_fails() {
     let folder = TestFolder::new();
     let (a, _) = write_two_pngs(&folder);
-    png(&folder, "copy.png", (4, 2), &a);
+    write_8_bit_png(&folder, "copy.png", (4, 2), &a);
     for name in ["a.png", "copy.png"] {
         let result = folder.run(&["diff", "a.png", name]);
         assert_output(&result, 0, "color R G B: identical\nidentical\n");
@@ -113,7 +113,7 @@ fn identical_files_pass_and_a_single_differing_bit_fails() {
         5,
         "  largest    0.0392157 in G at (1, 1): 0.564706 instead of 0.603922\n",
     );
-    // one of the 24 values differs by 10 / 255: sqrt((10 / 255)² / 24)
+    // One of the 24 values differs by 10 / 255, so the RMSE is sqrt((10 / 255)² / 24).
     assert_output(&result, 5, "  rmse       0.00800487\n");
     assert_eq!((result.stderr.as_str(), folder.files().len()), ("", 3));
 }
@@ -198,10 +198,10 @@ fn limits_decide_the_exit_code() {
 }
 
 #[test]
-fn wrong_command_lines_exit_with_2() {
+fn invalid_command_lines_exit_with_2() {
     let folder = TestFolder::new();
     write_two_pngs(&folder);
-    exr(&folder, "depth.exr", (2, 1), vec![("depth.Z", floats(&[1.0, 2.0]))]);
+    write_exr(&folder, "depth.exr", (2, 1), vec![("depth.Z", floats(&[1.0, 2.0]))]);
     let metrics = "different, largest, share, rmse, rel_mse, psnr, ssim, flip";
     let cases: [(&[&str], &str); 17] = [
         (&["a.png"], "<B>"),
@@ -270,10 +270,10 @@ fn files_that_are_not_images_exit_with_1() {
     let mut flipped = complete.clone();
     flipped[50] ^= 1;
     fs::write(folder.path("flipped.png"), flipped).unwrap();
-    exr(&folder, "whole.exr", (4, 2), gray(&[0.5; 8]));
+    write_exr(&folder, "whole.exr", (4, 2), gray(&[0.5; 8]));
     let complete = folder.read("whole.exr");
     fs::write(folder.path("short.exr"), &complete[..complete.len() - 40]).unwrap();
-    exr(&folder, "depth.exr", (4, 2), vec![("depth.Z", floats(&[1.0; 8]))]);
+    write_exr(&folder, "depth.exr", (4, 2), vec![("depth.Z", floats(&[1.0; 8]))]);
     fs::create_dir(folder.path("folder")).unwrap();
     for (name, message) in [
         ("absent.png", "cannot be read: "),
@@ -293,13 +293,13 @@ fn files_that_are_not_images_exit_with_1() {
             assert_eq!(result.stdout, "", "{name}");
         }
     }
-    // the cause is printed only once
+    // The cause is printed only once.
     for arguments in [["diff", "absent.png", "a.png"], ["diff", "a.png", "absent.png"]] {
         let message = "error: absent.png: cannot be read: No such file or directory (os error 2)\n";
         assert_eq!(folder.run(&arguments).stderr, message);
     }
-    // the format comes from the content, not from the extension
-    png(&folder, "a.exr", (4, 2), &a);
+    // The content determines the format, not the extension.
+    write_8_bit_png(&folder, "a.exr", (4, 2), &a);
     assert_output(&folder.run(&["diff", "a.exr", "a.png"]), 0, "identical\n");
 }
 
@@ -307,12 +307,12 @@ fn files_that_are_not_images_exit_with_1() {
 fn different_sizes_and_positions_differ() {
     let folder = TestFolder::new();
     write_two_pngs(&folder);
-    png(&folder, "wide.png", (8, 1), &[0; 24]);
+    write_8_bit_png(&folder, "wide.png", (8, 1), &[0; 24]);
     let result = folder.run(&["diff", "a.png", "wide.png", "--fail", "rmse=1", "--out", "out.png"]);
     assert_output(&result, 5, "fails: A has 4 x 2 pixels, B 8 x 1\n");
     assert_output(&result, 5, "note: out.png: not written");
     assert!(!folder.path("out.png").exists());
-    // two crops of one image, equal in size
+    // Two crops of the same size are at different positions in the image.
     for (name, crop) in [("left.exr", "0,0,2,2"), ("right.exr", "2,0,4,2")] {
         folder.run_quietly(&["render", "small.toml", "--device", "cpu", "-o", name, "--crop", crop]);
     }
@@ -329,9 +329,9 @@ fn missing_channels_differ_unless_excluded() {
     let folder = TestFolder::new();
     let colors = || gray(&[0.25, 0.5]);
     let depth = |z: f32| vec![("depth.Z", floats(&[1.0, z]))];
-    exr(&folder, "both.exr", (2, 1), [colors(), depth(2.0)].concat());
-    exr(&folder, "deeper.exr", (2, 1), [colors(), depth(2.5)].concat());
-    exr(&folder, "colors.exr", (2, 1), colors());
+    write_exr(&folder, "both.exr", (2, 1), [colors(), depth(2.0)].concat());
+    write_exr(&folder, "deeper.exr", (2, 1), [colors(), depth(2.5)].concat());
+    write_exr(&folder, "colors.exr", (2, 1), colors());
     let missing = folder.run(&["diff", "both.exr", "colors.exr", "--fail", "rmse=9"]);
     assert_output(&missing, 5, "fails: B lacks depth.Z, which A has\n");
     assert_output(
@@ -344,7 +344,7 @@ fn missing_channels_differ_unless_excluded() {
         0,
         "identical\n",
     );
-    // differing layers are listed, and identical ones are reported as such
+    // Layers that differ are listed with metrics; identical layers are reported as identical.
     let result = folder.run(&["diff", "both.exr", "deeper.exr"]);
     assert_output(&result, 5, "color R G B: identical\ndepth depth.Z\n");
     assert_output(&result, 5, "  largest    0.5 in depth.Z at (1, 0): 2 instead of 2.5\n");
@@ -373,25 +373,25 @@ fn non_finite_values_are_counted_and_fail() {
         channels[0].1 = floats(values);
         channels
     };
-    exr(&folder, "odd.exr", (4, 1), red(&[0.5, nan, inf, -inf]));
-    exr(&folder, "even.exr", (4, 1), red(&[0.5; 4]));
+    write_exr(&folder, "non-finite.exr", (4, 1), red(&[0.5, nan, inf, -inf]));
+    write_exr(&folder, "finite.exr", (4, 1), red(&[0.5; 4]));
     let text = "color: 1 NaN and 2 infinite values in A, 1 and 2 in B, the first at (1, 0)";
-    // identical files fail, too, regardless of the limits
-    let diff_with_itself = ["diff", "odd.exr", "odd.exr"];
+    // Files with non-finite values fail even if they are identical, regardless of the limits.
+    let diff_with_itself = ["diff", "non-finite.exr", "non-finite.exr"];
     assert_output(&folder.run(&diff_with_itself), 5, text);
     assert_output(
         &folder.run(&[&diff_with_itself[..], &["--fail", "rmse=9"]].concat()),
         5,
         text,
     );
-    let result = folder.run(&["diff", "odd.exr", "even.exr", "--json", "--fail", "share=1"]);
+    let result = folder.run(&["diff", "non-finite.exr", "finite.exr", "--json", "--fail", "share=1"]);
     assert_eq!(result.code, 5);
     let layer = &json(&result)["layers"][0];
     assert_eq!(
         layer["not_finite"],
         serde_json::json!({"nan_a": 1, "nan_b": 0, "infinite_a": 2, "infinite_b": 0, "first": {"x": 1, "y": 0}})
     );
-    // pixels with non-finite values count as different, and as 0 in the other metrics
+    // Pixels with non-finite values count as different; in the other metrics, their difference is 0.
     assert_eq!((&layer["different"], &layer["share"]), (&3.into(), &0.75.into()));
     for metric in ["largest", "rmse", "rel_mse", "flip"] {
         assert_eq!(layer[metric], 0.0, "{metric}");
@@ -401,8 +401,8 @@ fn non_finite_values_are_counted_and_fail() {
 #[test]
 fn signed_zeros_differ_by_zero() {
     let folder = TestFolder::new();
-    exr(&folder, "plus.exr", (1, 1), gray(&[0.0]));
-    exr(&folder, "minus.exr", (1, 1), gray(&[-0.0]));
+    write_exr(&folder, "plus.exr", (1, 1), gray(&[0.0]));
+    write_exr(&folder, "minus.exr", (1, 1), gray(&[-0.0]));
     let result = folder.run(&["diff", "plus.exr", "minus.exr"]);
     assert_output(&result, 5, "fails: color: 1 pixel differs\n");
     assert_output(&result, 5, "  largest    0\n");
@@ -414,17 +414,17 @@ fn signed_zeros_differ_by_zero() {
 }
 
 #[test]
-fn the_share_counts_differences_above_the_threshold() {
+fn the_share_counts_pixels_above_the_threshold() {
     let folder = TestFolder::new();
     let (a, mut b) = write_two_pngs(&folder);
     b[0] += 1;
-    png(&folder, "b.png", (4, 2), &b);
-    png(&folder, "a.png", (4, 2), &a);
+    write_8_bit_png(&folder, "b.png", (4, 2), &b);
+    write_8_bit_png(&folder, "a.png", (4, 2), &a);
     let share = |threshold: &str| {
         let result = folder.run(&["diff", "a.png", "b.png", "--json", "--threshold", threshold]);
         json(&result)["layers"][0]["share"].as_f64().unwrap()
     };
-    // 1 / 255 is 0.0039, 10 / 255 is 0.0392
+    // The differences are 1 / 255 = 0.0039 and 10 / 255 = 0.0392.
     assert_eq!((share("0"), share("0.01"), share("0.04")), (0.25, 0.125, 0.0));
     let result = folder.run(&["diff", "a.png", "b.png", "--threshold", "0.01", "--fail", "share=0.1"]);
     assert_output(&result, 5, "fails: color: share over 0.01 0.125 is above 0.1\n");
@@ -469,8 +469,8 @@ fn encodings_of_equal_values_are_equal() {
     let colors = [
         10, 20, 30, 200, 100, 0, 10, 20, 30, 10, 20, 30, 200, 100, 0, 200, 100, 0, 10, 20, 30, 10, 20, 30,
     ];
-    png(&folder, "rgb.png", (4, 2), &colors);
-    // palette indices 0 1 0 0 / 1 1 0 0
+    write_8_bit_png(&folder, "rgb.png", (4, 2), &colors);
+    // The palette indices are 0 1 0 0 in the first row and 1 1 0 0 in the second.
     write_png(
         &folder,
         "palette.png",
@@ -482,7 +482,7 @@ fn encodings_of_equal_values_are_equal() {
     let deep: Vec<u8> = colors.iter().flat_map(|value| [*value, *value]).collect();
     write_png(&folder, "deep.png", (4, 2), ColorType::Rgb, BitDepth::Sixteen, &deep);
     let opaque: Vec<u8> = colors.chunks(3).flat_map(|pixel| [pixel, &[255]].concat()).collect();
-    png(&folder, "opaque.png", (4, 2), &opaque);
+    write_8_bit_png(&folder, "opaque.png", (4, 2), &opaque);
     for name in ["palette.png", "deep.png", "opaque.png"] {
         assert_output(&folder.run(&["diff", name, "rgb.png"]), 0, "identical\n");
         assert_output(&folder.run(&["diff", "rgb.png", name]), 0, "identical\n");
@@ -495,44 +495,44 @@ fn encodings_of_equal_values_are_equal() {
         5,
         "1 of 8 pixels, the first at (0, 0)\n",
     );
-    let mut glass = opaque;
-    glass[7] = 254;
-    png(&folder, "glass.png", (4, 2), &glass);
+    let mut translucent = opaque;
+    translucent[7] = 254;
+    write_8_bit_png(&folder, "translucent.png", (4, 2), &translucent);
     assert_output(
-        &folder.run(&["diff", "glass.png", "rgb.png"]),
+        &folder.run(&["diff", "translucent.png", "rgb.png"]),
         5,
         " in A at (1, 0): 0.996078 instead of 1\n",
     );
-    png(&folder, "gray.png", (2, 1), &[7, 9]);
-    png(&folder, "grays.png", (2, 1), &[7, 7, 7, 9, 9, 9]);
+    write_8_bit_png(&folder, "gray.png", (2, 1), &[7, 9]);
+    write_8_bit_png(&folder, "grays.png", (2, 1), &[7, 7, 7, 9, 9, 9]);
     assert_output(&folder.run(&["diff", "gray.png", "grays.png"]), 0, "identical\n");
-    // EXR: half and float, compressed and not, tiles and scan lines, integers
+    // EXR files with half and float channels: uncompressed and compressed, in scan lines and in tiles.
     let values = [0.5_f32, 1.0, 1.5, 65504.0];
     let halves = FlatSamples::F16(values.map(f16::from_f32).to_vec());
     let half = ["R", "G", "B"].map(|name| (name, halves.clone())).to_vec();
-    exr(&folder, "float.exr", (4, 1), gray(&values));
+    write_exr(&folder, "float.exr", (4, 1), gray(&values));
     let encodings = [
         Encoding::UNCOMPRESSED,
         Encoding::SMALL_LOSSLESS,
         Encoding::SMALL_FAST_LOSSLESS,
     ];
     for encoding in encodings {
-        exr_parts(&folder, "half.exr", (4, 1), vec![("", half.clone())], encoding);
+        write_exr_parts(&folder, "half.exr", (4, 1), vec![("", half.clone())], encoding);
         assert_output(&folder.run(&["diff", "half.exr", "float.exr"]), 0, "identical\n");
     }
     let mut changed = values;
     changed[2] = 1.5_f32.next_up();
-    exr(&folder, "other.exr", (4, 1), gray(&changed));
+    write_exr(&folder, "other.exr", (4, 1), gray(&changed));
     assert_output(
         &folder.run(&["diff", "half.exr", "other.exr"]),
         5,
         "1 of 4 pixels, the first at (2, 0)\n",
     );
-    let numbers = |last: u32| vec![("primitive.ID", FlatSamples::U32(vec![0, last]))];
-    exr(&folder, "id.exr", (2, 1), numbers(u32::MAX));
-    exr(&folder, "next.exr", (2, 1), numbers(u32::MAX - 1));
+    let ids = |last: u32| vec![("primitive.ID", FlatSamples::U32(vec![0, last]))];
+    write_exr(&folder, "id.exr", (2, 1), ids(u32::MAX));
+    write_exr(&folder, "next.exr", (2, 1), ids(u32::MAX - 1));
     assert_output(&folder.run(&["diff", "id.exr", "id.exr"]), 0, "identical\n");
-    // The values are equal after conversion to f32.
+    // IDs are compared as integers: as f32, these two would be equal.
     assert_output(
         &folder.run(&["diff", "id.exr", "next.exr"]),
         5,
@@ -549,7 +549,7 @@ fn jpegs_and_interlaced_pngs_are_read() {
     };
     jpeg("a.jpg", 90);
     jpeg("b.jpg", 99);
-    png(
+    write_8_bit_png(
         &folder,
         "decoded.png",
         (16, 8),
@@ -557,26 +557,26 @@ fn jpegs_and_interlaced_pngs_are_read() {
     );
     assert_output(&folder.run(&["diff", "a.jpg", "decoded.png"]), 0, "identical\n");
     assert_output(&folder.run(&["diff", "a.jpg", "b.jpg"]), 5, "128 of 128 pixels");
-    // two pixels in a row: in pass 1 and in pass 6 of 7, each row with filter 0
+    // An interlaced PNG of two pixels: the first belongs to pass 1, the second to pass 6. Both rows have filter type 0.
     let chunk = |kind: &[u8; 4], data: &[u8]| {
         let body = [kind.as_slice(), data].concat();
         let length = (data.len() as u32).to_be_bytes();
         [length.as_slice(), &body, &crc32fast::hash(&body).to_be_bytes()].concat()
     };
     let data = [0, 10, 20, 30, 0, 40, 50, 60_u8];
-    let sums = data.iter().fold((1_u32, 0_u32), |(a, b), byte| {
+    let adler_sums = data.iter().fold((1_u32, 0_u32), |(a, b), byte| {
         (a + u32::from(*byte), b + a + u32::from(*byte))
     });
-    let adler = (sums.1 << 16 | sums.0).to_be_bytes();
-    let packed = [&[0x78, 1, 1, 8, 0, 0xf7, 0xff], data.as_slice(), &adler].concat();
+    let adler = (adler_sums.1 << 16 | adler_sums.0).to_be_bytes();
+    let zlib_stream = [&[0x78, 1, 1, 8, 0, 0xf7, 0xff], data.as_slice(), &adler].concat();
     let file = [
         b"\x89PNG\r\n\x1a\n".to_vec(),
         chunk(b"IHDR", &[0, 0, 0, 2, 0, 0, 0, 1, 8, 2, 0, 0, 1]),
-        chunk(b"IDAT", &packed),
+        chunk(b"IDAT", &zlib_stream),
         chunk(b"IEND", &[]),
     ];
     fs::write(folder.path("interlaced.png"), file.concat()).unwrap();
-    png(&folder, "plain.png", (2, 1), &[10, 20, 30, 40, 50, 60]);
+    write_8_bit_png(&folder, "plain.png", (2, 1), &[10, 20, 30, 40, 50, 60]);
     assert_output(&folder.run(&["diff", "interlaced.png", "plain.png"]), 0, "identical\n");
 }
 
@@ -584,8 +584,8 @@ fn jpegs_and_interlaced_pngs_are_read() {
 fn parts_of_an_exr_are_layers() {
     let folder = TestFolder::new();
     let parts = |x: f32| vec![("beauty", gray(&[0.5])), ("normal", vec![("X", floats(&[x]))])];
-    exr_parts(&folder, "a.exr", (1, 1), parts(0.0), Encoding::FAST_LOSSLESS);
-    exr_parts(&folder, "b.exr", (1, 1), parts(1.0), Encoding::FAST_LOSSLESS);
+    write_exr_parts(&folder, "a.exr", (1, 1), parts(0.0), Encoding::FAST_LOSSLESS);
+    write_exr_parts(&folder, "b.exr", (1, 1), parts(1.0), Encoding::FAST_LOSSLESS);
     let result = folder.run(&["diff", "a.exr", "b.exr"]);
     assert_output(&result, 5, "beauty.R");
     assert_output(&result, 5, "fails: normal: 1 pixel differs\n");
@@ -593,7 +593,7 @@ fn parts_of_an_exr_are_layers() {
 }
 
 #[test]
-fn an_exr_is_compared_with_a_png_as_it_would_be_written() {
+fn an_exr_is_converted_to_a_png_before_it_is_compared_with_a_png() {
     let folder = TestFolder::new();
     for name in ["out.png", "out.exr"] {
         folder.run_quietly(&["render", "small.toml", "--device", "cpu", "-o", name]);
@@ -638,7 +638,7 @@ fn standard_input_and_pipes_are_read() {
         1,
         "error: standard input: is not an image",
     );
-    // a full standard output is an error, a closed pipe is not
+    // A full standard output is an error.
     assert_output(
         &folder.shell("sh", "\"$0\" diff a.png a.png > /dev/full"),
         8,
@@ -647,35 +647,35 @@ fn standard_input_and_pipes_are_read() {
 }
 
 #[test]
-fn the_difference_image_shows_the_location() {
+fn the_difference_image_marks_the_location() {
     let folder = TestFolder::new();
-    // one bit of one pixel in half a million
+    // One bit of one of 500,000 pixels differs.
     let (width, height) = (1000, 500);
     let mut values = vec![60; width * height * 3];
-    png(&folder, "a.png", (width as u32, height as u32), &values);
+    write_8_bit_png(&folder, "a.png", (width as u32, height as u32), &values);
     values[3 * (123 * width + 456)] ^= 1;
-    png(&folder, "b.png", (width as u32, height as u32), &values);
+    write_8_bit_png(&folder, "b.png", (width as u32, height as u32), &values);
     let result = folder.run(&["diff", "a.png", "b.png", "--out", "out.png"]);
     assert_output(&result, 5, "the first at (456, 123)\n");
     let (out_width, _, bytes) = super::read_png(&folder.path("out.png"));
-    let line: Vec<(usize, usize)> = (bytes.chunks(3).enumerate())
+    let marker: Vec<(usize, usize)> = (bytes.chunks(3).enumerate())
         .filter(|(_, pixel)| pixel == &[0, 220, 220])
         .map(|(i, _)| (i % out_width as usize, i / out_width as usize))
         .collect();
     let center = |coordinate: fn(&(usize, usize)) -> usize| {
-        let values = || line.iter().map(coordinate);
+        let values = || marker.iter().map(coordinate);
         let (low, high) = (values().min().unwrap(), values().max().unwrap());
         assert!(high - low < 40, "{low} {high}");
         (low + high) / 2
     };
-    // the map is to the right of both images, below a label of 20 rows and a gap of 8
-    let middle = (center(|pixel| pixel.0), center(|pixel| pixel.1));
+    // The difference map is to the right of both images. Margins and gaps are 8 pixels wide, and labels have 20 rows.
+    let marker_center = (center(|pixel| pixel.0), center(|pixel| pixel.1));
     let expected = (8 + 2 * (width + 8) + 456, 8 + 20 + 123);
     assert!(
-        middle.0.abs_diff(expected.0) < 20 && middle.1.abs_diff(expected.1) < 20,
-        "{middle:?} {expected:?}"
+        marker_center.0.abs_diff(expected.0) < 20 && marker_center.1.abs_diff(expected.1) < 20,
+        "{marker_center:?} {expected:?}"
     );
-    // identical images have no marker
+    // The difference image of identical images has no marker.
     assert_output(
         &folder.run(&["diff", "a.png", "a.png", "--out", "out.png"]),
         0,
@@ -719,18 +719,18 @@ fn all_metrics_exist_for_extreme_sizes() {
     let folder = TestFolder::new();
     for (width, height) in [(1, 1), (65536, 1), (1, 65536), (10, 11), (11, 10)] {
         let count = (width * height * 3) as usize;
-        png(&folder, "a.png", (width, height), &vec![50; count]);
-        png(&folder, "b.png", (width, height), &vec![80; count]);
+        write_8_bit_png(&folder, "a.png", (width, height), &vec![50; count]);
+        write_8_bit_png(&folder, "b.png", (width, height), &vec![80; count]);
         let result = folder.run(&["diff", "a.png", "b.png", "--json", "--out", "out.png"]);
         assert_eq!(result.code, 5, "{width} x {height}: {}", result.stderr);
         let layer = &json(&result)["layers"][0];
-        let figure = |name: &str| layer[name].as_f64().unwrap();
-        assert!((figure("rmse") - 30.0 / 255.0).abs() < 1e-12);
+        let metric = |name: &str| layer[name].as_f64().unwrap();
+        assert!((metric("rmse") - 30.0 / 255.0).abs() < 1e-12);
         // SSIM of two constant images: (2 a b + C1) / (a² + b² + C1)
         let (a, b) = (50.0 / 255.0, 80.0 / 255.0);
         let expected = (2.0 * a * b + 1e-4) / (a * a + b * b + 1e-4);
-        assert!((figure("ssim") - expected).abs() < 1e-9, "{width} x {height}");
-        assert!(figure("flip") > 0.05 && figure("flip") < 0.5, "{}", figure("flip"));
+        assert!((metric("ssim") - expected).abs() < 1e-9, "{width} x {height}");
+        assert!(metric("flip") > 0.05 && metric("flip") < 0.5, "{}", metric("flip"));
         image::open(folder.path("out.png")).unwrap();
     }
 }

@@ -5,7 +5,7 @@
 use std::fs;
 use std::os::unix::fs::PermissionsExt as _;
 
-use super::{RunResult, TestFolder, program, project};
+use super::{RunResult, TestFolder, program, project_path};
 
 /// A file name with special characters of shells, YAML and Open Job Description.
 const SPECIAL_NAME: &str = "it's $HOME \"{{a}}\" #1 é.toml";
@@ -13,7 +13,7 @@ const QUOTED_SPECIAL_NAME: &str = "'it'\\''s $HOME \"{{a}}\" #1 é.toml'";
 const OPTIONS: &str = "--size 20x12 --spp 4 -D 'materials.gray.color=[0.1, 0.5, 0.3]' --aov normal --device cpu";
 
 fn template(name: &str) -> String {
-    fs::read_to_string(project("examples/farm").join(name)).expect("a template")
+    fs::read_to_string(project_path("examples/farm").join(name)).expect("a template")
 }
 
 fn write_slurm(folder: &TestFolder, variables: &str, scene: &str, options: &str, output: &str) {
@@ -31,9 +31,9 @@ fn write_slurm(folder: &TestFolder, variables: &str, scene: &str, options: &str,
 }
 
 /// Runs a shell script in a folder that does not contain the scene.
-fn run(words: &[&str], variables: &[(&str, &str)]) -> RunResult {
+fn run(arguments: &[&str], variables: &[(&str, &str)]) -> RunResult {
     let mut command = assert_cmd::Command::new("sh");
-    command.current_dir("/").args(words).envs(variables.iter().copied());
+    command.current_dir("/").args(arguments).envs(variables.iter().copied());
     let output = command
         .timeout(std::time::Duration::from_secs(60))
         .output()
@@ -46,6 +46,7 @@ fn run(words: &[&str], variables: &[(&str, &str)]) -> RunResult {
     )
 }
 
+/// Runs the task with the number `first` + `index` of the Slurm script.
 fn task(folder: &TestFolder, kind: &str, first: &str, index: &str) -> RunResult {
     let script = folder.path("slurm.sh").display().to_string();
     let folder_path = folder.folder().display().to_string();
@@ -106,7 +107,7 @@ fn tasks_of_slurm_render_the_image() {
 #[test]
 fn tasks_of_slurm_render_frames() {
     let folder = TestFolder::new();
-    fs::copy(project("scenes/turntable.toml"), folder.path("turn.toml")).expect("a copy");
+    fs::copy(project_path("scenes/turntable.toml"), folder.path("turn.toml")).expect("a copy");
     let options = "--size 8x6 --spp 1 --device cpu";
     assert_eq!(
         folder
@@ -205,11 +206,11 @@ fn signaled_tasks_of_slurm_are_requeued() {
                 .args([*signal, child.id().to_string().as_str()])
                 .status();
             assert!(status.expect("kill").success());
-            // bash postpones a signal that arrives while it handles another one.
+            // bash postpones a signal that arrives while it handles another signal.
             std::thread::sleep(std::time::Duration::from_millis(300));
         }
         assert_eq!(
-            child.wait().expect("an end").code(),
+            child.wait().expect("an exit status").code(),
             Some(code),
             "{signals:?} {restarts}"
         );
@@ -220,7 +221,7 @@ fn signaled_tasks_of_slurm_are_requeued() {
 }
 
 #[test]
-fn slurm_arrays_have_the_maximum_size_of_the_cluster() {
+fn slurm_arrays_do_not_exceed_the_maximum_size_of_the_cluster() {
     let folder = TestFolder::new();
     write_slurm(
         &folder,
@@ -292,6 +293,7 @@ fn slurm_arrays_have_the_maximum_size_of_the_cluster() {
     }
 }
 
+/// Returns the scripts in an Open Job Description template.
 fn scripts(template: &str) -> Vec<String> {
     let script = |text: &str| -> String {
         let indent = " ".repeat(12);

@@ -66,7 +66,7 @@ mod unix {
         assert_eq!(mode("stats.json"), mode("small.toml"));
     }
 
-    /// Simulates a full disk by a limit on file sizes.
+    /// A limit on file sizes simulates a full disk.
     #[test]
     fn an_incomplete_file_is_removed() {
         let folder = TestFolder::new();
@@ -92,13 +92,13 @@ mod unix {
     }
 
     /// Starts a render that takes minutes, and waits for its temporary file.
-    fn long_render(folder: &TestFolder, shell: &str, options: &[&str]) -> Child {
+    fn long_render(folder: &TestFolder, shell_prefix: &str, options: &[&str]) -> Child {
         let before = temporary_files(folder);
         let child = Command::new("sh")
             .current_dir(folder.path("."))
             .args([
                 "-c",
-                &format!("{shell} exec \"$0\" render small.toml -o out.exr --size 2000x2000 \"$@\""),
+                &format!("{shell_prefix} exec \"$0\" render small.toml -o out.exr --size 2000x2000 \"$@\""),
             ])
             .arg(program())
             .args(options)
@@ -126,11 +126,11 @@ mod unix {
     }
 
     fn send(signal: &str, child: &Child) {
-        let sent = Command::new("kill")
+        let status = Command::new("kill")
             .args([signal, &child.id().to_string()])
             .status()
             .unwrap();
-        assert!(sent.success());
+        assert!(status.success());
     }
 
     #[test]
@@ -145,7 +145,8 @@ mod unix {
             let folder = TestFolder::new();
             folder.write("out.exr", "old");
             let mut child = long_render(&folder, "", &["--spp", "400", "--device", device]);
-            std::thread::sleep(Duration::from_millis(100)); // the signal handler is installed after the file is created
+            // The temporary file appears before the signal handlers are installed.
+            std::thread::sleep(Duration::from_millis(100));
             send(signal, &child);
             assert_eq!(child.wait().unwrap().code(), Some(code), "{signal}");
             assert_eq!(folder.files(), ["out.exr"]);
@@ -171,21 +172,21 @@ mod unix {
     }
 
     #[test]
-    fn temporary_files_of_killed_renders_are_removed_by_the_next() {
+    fn temporary_files_of_killed_renders_are_removed_by_the_next_render() {
         let folder = TestFolder::new();
         let mut killed = long_render(&folder, "", &["--spp", "400", "--device", "cpu"]);
         send("-KILL", &killed);
         killed.wait().unwrap();
         let [leftover] = temporary_files(&folder).try_into().unwrap();
-        let process = format!(".wgray-{}@", killed.id());
+        let process_prefix = format!(".wgray-{}@", killed.id());
         assert!(
-            leftover.starts_with(&process) && leftover.ends_with("-out.exr"),
+            leftover.starts_with(&process_prefix) && leftover.ends_with("-out.exr"),
             "{leftover}"
         );
         // Folders and temporary files of another output, another machine or a running process are kept.
         let other_machine = leftover.replace('@', "@not-");
         let other_output = leftover.replace("-out.exr", "-about.exr");
-        let kept_folder = leftover.replace(&process, ".wgray-1@");
+        let kept_folder = leftover.replace(&process_prefix, ".wgray-1@");
         for name in [&other_machine, &other_output] {
             folder.write(name, "");
         }
@@ -197,7 +198,7 @@ mod unix {
             .unwrap();
         assert!(
             !folder.path(&leftover).exists(),
-            "the next render did not remove the file"
+            "the next render did not remove the temporary file"
         );
         folder.run_quietly(&["render", "small.toml", "-o", "out.exr", "--device", "cpu"]);
         let mut expected = [other_machine, other_output, kept_folder, running_file];

@@ -1,4 +1,4 @@
-//! `--frames`, `--skip-existing` and `--define`: the rendered frames and their file names.
+//! `--frames`, `--skip-existing` and `--define`.
 
 use std::fs;
 use std::time::{Duration, SystemTime};
@@ -14,7 +14,8 @@ fn write_moving_scene(folder: &TestFolder, interpolation: &str) {
     folder.write("moving.toml", &SCENE.replace("fov = 40 }", &path));
 }
 
-/// Returns the width and color bits of an EXR; the metadata may depend on the source file.
+/// Returns the width and the color bits of an EXR. Tests compare these bits instead of files, because the metadata may
+/// depend on the scene file.
 fn bits(folder: &TestFolder, name: &str) -> (u32, Vec<u32>) {
     let picture = image::open(folder.path(name)).unwrap_or_else(|error| panic!("{name}: {error}"));
     let picture = picture.into_rgb32f();
@@ -68,7 +69,7 @@ fn a_frame_equals_a_still_image_of_its_camera() {
             );
         }
         assert_ne!(bits(&folder, "out.001.exr"), bits(&folder, "out.009.exr"));
-        // A frame halfway between two keys is the same on its own and among other frames in any order.
+        // A frame halfway between two keys does not depend on the other frames of the render or their order.
         folder.write("still.toml", &SCENE.replace("[0, -5, 1]", "[-1, -5, 1]"));
         render_quietly(&folder, &["still.toml", "-o", "still.exr"]);
         render_quietly(&folder, &["moving.toml", "--frames", "3", "-o", "alone.exr"]);
@@ -76,14 +77,14 @@ fn a_frame_equals_a_still_image_of_its_camera() {
         for name in ["alone.exr", "3.exr"] {
             assert_eq!(bits(&folder, name), bits(&folder, "still.exr"), "{name}");
         }
-        // Without `--frames`, the camera's `position` applies, which equals the key of frame 5.
+        // Without `--frames`, the `position` of the camera applies. It equals the key of frame 5.
         render_quietly(&folder, &["moving.toml", "-o", "static.exr"]);
         assert_eq!(bits(&folder, "static.exr"), bits(&folder, "out.005.exr"));
     }
 }
 
 #[test]
-fn frames_are_bit_identical_on_every_device() {
+fn frames_have_the_same_bits_on_the_default_device_and_the_cpu() {
     let folder = TestFolder::new();
     write_moving_scene(&folder, "smooth");
     folder.run(&["render", "moving.toml", "--frames", "2-4", "-o", "any.#.exr"]);
@@ -140,7 +141,7 @@ fn file_names_get_frame_numbers_and_folder_names_do_not() {
     for name in ["m#.0003.png", "m#.12345.png", "m#.png"] {
         assert!(files.contains(&name.to_owned()), "{files:?}");
     }
-    // A single frame needs no number; without `--frames` a # is literal.
+    // A single frame needs no number; without `--frames`, a # is literal.
     render_quietly(&folder, &["m#.toml", "--frames", "4", "-o", "one.png"]);
     render_quietly(&folder, &["m#.toml", "-o", "#.##.png"]);
     assert!(folder.files().contains(&"#.##.png".to_owned()));
@@ -201,7 +202,7 @@ fn ambiguous_frame_names_are_rejected() {
 }
 
 #[test]
-fn ten_thousand_frames_are_planned_fast() {
+fn ten_thousand_frames_of_which_most_exist_take_less_than_a_minute() {
     let folder = TestFolder::new();
     write_moving_scene(&folder, "smooth");
     let options = [
@@ -279,8 +280,8 @@ fn existing_frames_are_skipped_on_request() {
     // A frame is complete only if all of its files exist.
     fs::remove_file(folder.path("2.normal.png")).unwrap();
     assert_skipped("note: skipped 2 of 3: the output files exist\n");
-    let renewed: Vec<_> = all.into_iter().filter(|name| !is_old(name)).collect();
-    assert_eq!(renewed, ["2.png", "2.normal.png"]);
+    let rerendered: Vec<_> = all.into_iter().filter(|name| !is_old(name)).collect();
+    assert_eq!(rerendered, ["2.png", "2.normal.png"]);
     // A statistics file counts as an output file; statistics on standard output do not.
     let with_stats = [&["render"], &arguments[..], &CPU, &["--stats", "#.json"]].concat();
     assert_eq!(folder.run(&with_stats).stderr, "");
@@ -333,7 +334,7 @@ fn invalid_cameras_are_rejected_before_the_first_frame() {
 fn a_failed_frame_ends_the_run_and_finished_frames_remain() {
     let folder = TestFolder::new();
     write_moving_scene(&folder, "linear");
-    // /dev/full passes the check at the start, as it is not a regular file; writing the second frame fails.
+    // The check before the render accepts /dev/full, which is not a regular file; writing the second frame then fails.
     #[cfg(target_os = "linux")]
     {
         std::os::unix::fs::symlink("/dev/full", folder.path("s.2.json")).unwrap();
@@ -381,7 +382,7 @@ fn progress_and_notes_name_the_frame() {
 
 #[cfg(unix)]
 #[test]
-fn a_signal_ends_all_frames() {
+fn a_signal_ends_the_render_of_all_frames() {
     let folder = TestFolder::new();
     write_moving_scene(&folder, "linear");
     let mut child = std::process::Command::new(super::program())
@@ -416,12 +417,12 @@ fn a_signal_ends_all_frames() {
     assert!(files.len() > 3 && files.len() < 1000, "{}", files.len());
     assert!(
         files.iter().all(|name| !name.starts_with('.')),
-        "files left behind: {files:?}"
+        "temporary files remain: {files:?}"
     );
 }
 
 #[test]
-fn a_define_equals_an_edited_scene() {
+fn a_define_has_the_effect_of_an_edit_of_the_scene() {
     let folder = TestFolder::new();
     for (name, defines, edits) in [
         (
@@ -506,7 +507,7 @@ fn invalid_defines_are_rejected() {
         "bad.toml:22: shapes[0].radius: -1 must",
     );
     render_quietly(&folder, &["bad.toml", "-o", "x.png", "-D", "shapes[0].radius=1"]);
-    // An invalid value for a model file without a scene also names the option.
+    // A message about a model file also names the option.
     folder.write("tri.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
     for (define, message) in [
         (
@@ -574,18 +575,18 @@ fn truncated_images_and_parts_are_rendered_again() {
     for name in ["a.png", "a.exr", "a.jpg", "a.webp", "a.part"] {
         let tile: &[&str] = if name == "a.part" { &["--tile", "1/2"] } else { &[] };
         let arguments = [&["render", "small.toml", "-o", name, "--skip-existing"], tile, &CPU].concat();
-        let skips = || {
+        let is_skipped = || {
             let result = folder.run(&arguments);
             assert_eq!(result.code, 0, "{name}: {}", result.stderr);
             result.stderr.contains("skipped 1 of 1")
         };
-        assert!(!skips(), "{name}");
+        assert!(!is_skipped(), "{name}");
         let complete = folder.read(name);
         for length in [0, 10, complete.len() / 2, complete.len() - 1] {
             fs::write(folder.path(name), &complete[..length]).unwrap();
-            assert!(!skips(), "{name} of {length} bytes");
+            assert!(!is_skipped(), "{name} of {length} bytes");
             assert_eq!(folder.read(name), complete, "{name} of {length} bytes");
         }
-        assert!(skips(), "{name} is complete");
+        assert!(is_skipped(), "the complete {name} is rendered again");
     }
 }

@@ -14,7 +14,7 @@ fn folder_with_model(model: &Model) -> TestFolder {
     folder
 }
 
-fn with_cameras() -> Model {
+fn model_with_cameras() -> Model {
     Model {
         cameras: true,
         ..Model::default()
@@ -100,8 +100,8 @@ fn a_model_renders_without_a_scene() {
 }
 
 #[test]
-fn options_select_parts_by_name_or_index() {
-    let folder = folder_with_model(&with_cameras());
+fn options_select_parts_of_the_file_by_name_or_index() {
+    let folder = folder_with_model(&model_with_cameras());
     let default_image = bits(&folder, &["box.glb"]);
     let mut images_so_far = vec![default_image.clone()];
     let assert_new_image = |options: &[&[&str]], images_so_far: &mut Vec<Vec<u32>>| {
@@ -161,7 +161,7 @@ fn options_select_parts_by_name_or_index() {
 
 #[test]
 fn unknown_gltf_selections_list_the_available_ones() {
-    let folder = folder_with_model(&with_cameras());
+    let folder = folder_with_model(&model_with_cameras());
     for (option, value, message) in [
         (
             "--camera",
@@ -261,7 +261,7 @@ fn unknown_gltf_selections_list_the_available_ones() {
 
 #[test]
 fn frames_select_times_of_the_animation() {
-    let folder = folder_with_model(&with_cameras());
+    let folder = folder_with_model(&model_with_cameras());
     render_quietly(&folder, &["box.glb", "--frames", "0-12:6", "-o", "f.##.exr"]);
     render_quietly(&folder, &["box.glb", "--frames", "5", "--fps", "10", "-o", "fps.exr"]);
     for (frame, time) in [
@@ -293,7 +293,7 @@ fn frames_select_times_of_the_animation() {
     assert_eq!(result.code, 0);
     assert!(result.stderr.contains("all frames are equal"), "{}", result.stderr);
     assert_eq!(pixels(&folder, "named.exr"), render_at_time(&folder, "0.25"));
-    // A generated camera does not move: a rising part does not change the framing.
+    // The automatic camera does not move: the part of the model that rises does not change the framing.
     Model::default().write_glb(folder.folder(), "box.glb");
     render_quietly(&folder, &["box.glb", "--frames", "0-18:6", "-o", "s##.exr"]);
     render_quietly(&folder, &["box.glb", "--frames", "18", "-o", "alone.exr"]);
@@ -309,7 +309,7 @@ fn render_at_time(folder: &TestFolder, time: &str) -> Vec<u32> {
 
 #[test]
 fn a_converted_scene_has_the_same_bits() {
-    let folder = folder_with_model(&with_cameras());
+    let folder = folder_with_model(&model_with_cameras());
     fs::create_dir_all(folder.path("scenes/models")).unwrap();
     fs::copy(folder.path("box.glb"), folder.path("scenes/models/a box.glb")).unwrap();
     let model = "scenes/models/a box.glb";
@@ -348,7 +348,7 @@ fn a_converted_scene_has_the_same_bits() {
         assert_eq!(pixels(&folder, "bits.exr"), expected, "{options:?}");
         assert!(
             !earlier_images.contains(&expected),
-            "{options:?}: the comparison cannot fail"
+            "{options:?}: the options have no effect"
         );
         earlier_images.push(expected);
         let text = String::from_utf8(folder.read("scenes/box.toml")).unwrap();
@@ -420,7 +420,7 @@ fn a_conversion_keeps_its_input_and_uses_relative_paths() {
 
 #[test]
 fn info_lists_the_names_that_options_accept() {
-    let folder = folder_with_model(&with_cameras());
+    let folder = folder_with_model(&model_with_cameras());
     let result = folder.run(&["info", "box.glb", "--device", "cpu"]);
     assert_eq!((result.code, result.stderr.as_str()), (0, ""));
     for row in [

@@ -5,8 +5,9 @@ use std::fs;
 use std::process::Command;
 
 use super::{RunResult, program};
-use crate::sources::path as project;
+use crate::sources::path as project_path;
 
+/// A copy of `examples/golden`.
 struct Example {
     folder: tempfile::TempDir,
 }
@@ -14,13 +15,13 @@ struct Example {
 impl Example {
     fn new() -> Example {
         let folder = tempfile::tempdir().unwrap();
-        let source = project("examples/golden");
+        let source = project_path("examples/golden");
         fs::copy(source.join("check"), folder.path().join("check")).unwrap();
-        for part in ["scenes", "golden"] {
-            fs::create_dir(folder.path().join(part)).unwrap();
-            for entry in fs::read_dir(source.join(part)).unwrap() {
+        for subfolder in ["scenes", "golden"] {
+            fs::create_dir(folder.path().join(subfolder)).unwrap();
+            for entry in fs::read_dir(source.join(subfolder)).unwrap() {
                 let entry = entry.unwrap();
-                fs::copy(entry.path(), folder.path().join(part).join(entry.file_name())).unwrap();
+                fs::copy(entry.path(), folder.path().join(subfolder).join(entry.file_name())).unwrap();
             }
         }
         Example { folder }
@@ -50,7 +51,7 @@ impl Example {
 }
 
 fn page() -> String {
-    fs::read_to_string(project("docs/golden-pictures.md")).unwrap()
+    fs::read_to_string(project_path("docs/golden-pictures.md")).unwrap()
 }
 
 #[test]
@@ -74,12 +75,12 @@ fn a_changed_scene_fails_until_updated() {
     assert!(result.stdout.contains(report), "{}is not\n{report}", result.stdout);
     assert!(
         result.stdout.contains("out/balls.png against golden/balls.png"),
-        "an image is not checked"
+        "the second image is not checked"
     );
     let found = image::open(example.folder.path().join("out/ball.diff.png")).unwrap();
     assert_eq!(
         found,
-        image::open(project("docs/golden-pictures/ball.diff.png")).unwrap()
+        image::open(project_path("docs/golden-pictures/ball.diff.png")).unwrap()
     );
 
     let unchanged = fs::read(example.folder.path().join("golden/balls.png")).unwrap();
@@ -106,13 +107,13 @@ fn a_scene_without_a_golden_image_fails() {
     );
     assert_eq!(example.check(&["update"]).stdout, "golden/new.exr is new\n");
     assert_eq!(example.check(&[]).code, 0);
-    // a scene that cannot be rendered keeps its own exit code
+    // If a scene cannot be rendered, the script exits with the exit code of the render.
     fs::write(scenes.join("new.toml"), "image = 3").unwrap();
     assert_eq!(example.check(&[]).code, 3);
 }
 
 #[test]
-fn the_page_names_existing_files() {
+fn the_page_and_the_help_list_the_metrics_options_and_exit_codes() {
     let (page, help) = (page(), super::TestFolder::new().run(&["diff", "--help"]).stdout);
     let help = help.split_whitespace().collect::<Vec<_>>().join(" "); // help lines wrap at the terminal width
     for metric in [

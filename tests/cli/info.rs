@@ -1,4 +1,4 @@
-//! `wgray info`.
+//! `wgray info`: counts, memory, the selected device and errors.
 
 use serde_json::Value;
 
@@ -81,7 +81,7 @@ fn info_counts_shapes_memory_and_samples() {
             .zip(memory["film"].as_u64())
             .map(|(scene, film)| scene + film)
     );
-    // Four triangles, five rectangles, an ellipsoid and a light.
+    // The primitives of this scene are four triangles, five rectangles, an ellipsoid and an area light.
     let cornell_info = info(&folder, &[&project_scene("cornell.toml"), "--device", "cpu"]);
     let shapes = &cornell_info["shapes"];
     assert_eq!(

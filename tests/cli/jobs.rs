@@ -1,4 +1,4 @@
-//! Interrupted and resumed renders, and images in parts, tested through the program with signals and damaged files.
+//! Checkpoints, parts and time limits, tested by running, signaling and killing the program.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -31,13 +31,14 @@ fn start(folder: &TestFolder, arguments: &[&str]) -> Child {
     Command::new(program())
         .current_dir(folder.path("."))
         .args(LONG)
-        .args(["--reproducible", "--threads", "1"]) // takes a while on any machine
+        .args(["--reproducible", "--threads", "1"]) // so that the render takes seconds on any machine
         .args(arguments)
         .stderr(Stdio::piped())
         .spawn()
         .expect("the program")
 }
 
+/// Waits until the file has more than `bytes` bytes.
 fn wait_for(folder: &TestFolder, file: &str, bytes: u64) {
     let start = Instant::now();
     while fs::metadata(folder.path(file)).map_or(0, |data| data.len()) <= bytes {
@@ -46,7 +47,7 @@ fn wait_for(folder: &TestFolder, file: &str, bytes: u64) {
     }
 }
 
-/// Waits for 0.15 s of CPU time, after which the signal handlers are installed even on a busy machine.
+/// Waits until the child has used 0.15 s of CPU time. By then, its signal handlers are installed.
 fn wait_for_cpu_time(child: &Child) {
     let ticks = || {
         let stat = fs::read_to_string(format!("/proc/{}/stat", child.id())).ok()?;
@@ -71,7 +72,7 @@ fn wait_for_end(child: Child) -> RunResult {
     )
 }
 
-/// Resumes from the checkpoint.
+/// Resumes the render from the checkpoint `c`.
 fn resume_render(folder: &TestFolder, device: &str) -> RunResult {
     let mut arguments = LONG.to_vec();
     arguments.extend(["--reproducible", "--checkpoint", "c", "--resume", "--device", device]);
@@ -101,7 +102,7 @@ fn a_killed_render_resumes() {
         let before = fs::metadata(folder.path("c")).map_or(0, |data| data.len());
         wait_for(&folder, "c", before + 50_000);
         std::thread::sleep(Duration::from_millis(7 * round));
-        child.kill().expect("killed"); // SIGKILL
+        child.kill().expect("the process is killed"); // SIGKILL
         child.wait().expect("an exit status");
     }
     let result = resume_render(&folder, "cpu");
@@ -116,7 +117,7 @@ fn a_killed_render_resumes() {
 
 #[cfg(unix)]
 #[test]
-fn signals_end_a_render_with_a_checkpoint_and_a_code() {
+fn signals_end_a_render_with_a_checkpoint_and_an_exit_code() {
     crate::cli::restore_signal_defaults();
     let folder = TestFolder::new();
     let expected = render_expected(&folder);
@@ -135,7 +136,8 @@ fn signals_end_a_render_with_a_checkpoint_and_a_code() {
         ("-INT", 130, requeue, message_for("Ctrl+C (SIGINT)")), // Ctrl+C does not requeue the render
     ] {
         if !extra.is_empty() && folder.path("c").exists() {
-            fs::remove_file(folder.path("c")).expect("a checkpoint"); // so that samples remain
+            // The next render must have samples left to render.
+            fs::remove_file(folder.path("c")).expect("a checkpoint");
         }
         // With an interval of 1 h, only the signal causes a checkpoint.
         let child = start(
@@ -163,8 +165,8 @@ fn signals_end_a_render_with_a_checkpoint_and_a_code() {
             std::thread::sleep(Duration::from_millis(2));
         }
         wait_for_cpu_time(&child);
-        let sent = Command::new("kill").args([signal, &child.id().to_string()]).status();
-        assert!(sent.expect("kill").success());
+        let status = Command::new("kill").args([signal, &child.id().to_string()]).status();
+        assert!(status.expect("kill").success());
         let result = wait_for_end(child);
         assert_eq!((result.code, result.stderr), (code, message), "{signal} {extra:?}");
         assert!(
@@ -179,7 +181,7 @@ fn signals_end_a_render_with_a_checkpoint_and_a_code() {
 }
 
 #[test]
-fn a_second_writer_waits_and_resumes() {
+fn a_second_render_waits_for_the_checkpoint_and_resumes() {
     let folder = TestFolder::new();
     let expected = render_expected(&folder);
     let options = [
@@ -198,7 +200,7 @@ fn a_second_writer_waits_and_resumes() {
     assert!(!folder.path("second.exr").exists());
     #[cfg(target_os = "linux")]
     check_sigterm_while_waiting(&folder, &options);
-    first.kill().expect("killed");
+    first.kill().expect("the process is killed");
     first.wait().expect("an exit status");
     let result = wait_for_end(second);
     assert_eq!(result.code, 0, "{}", result.stderr);
@@ -239,7 +241,8 @@ fn check_sigterm_while_waiting(folder: &TestFolder, options: &[&str]) {
     assert_eq!(wait_for_end(child).code, 75);
 }
 
-/// Rejects checkpoints that exist, checkpoints of renders with other options, and files that are not checkpoints.
+/// Without `--resume`, an existing checkpoint is rejected. With `--resume`, checkpoints of renders with other options
+/// and files that are not checkpoints are rejected.
 #[test]
 fn checkpoints_of_other_jobs_are_rejected() {
     let folder = TestFolder::new();
@@ -288,14 +291,14 @@ fn checkpoints_of_other_jobs_are_rejected() {
     ] {
         fs::write(folder.path("c"), &bytes).expect("a file");
         assert_rejected(&resume, rule);
-        assert_eq!(folder.read("c"), bytes, "a rejected file was changed");
+        assert_eq!(folder.read("c"), bytes, "the rejected file was changed");
     }
     fs::remove_file(folder.path("c")).expect("a file");
     assert_eq!(run(&resume).code, 0, "a missing checkpoint is not created");
     assert_eq!(
         folder.read("c"),
         checkpoint,
-        "the checkpoint differs from that of the same job"
+        "the checkpoint differs from the first checkpoint of this job"
     );
     for (name, rule) in [
         ("small.toml", ".toml files are scenes"),
@@ -325,7 +328,7 @@ fn checkpoints_of_other_jobs_are_rejected() {
 }
 
 #[test]
-fn a_folder_has_a_checkpoint_for_each_job() {
+fn a_checkpoint_folder_contains_a_file_for_each_job() {
     let folder = TestFolder::new();
     fs::create_dir(folder.path("kept")).expect("a folder");
     let run = |extra: &[&str]| {
@@ -382,7 +385,7 @@ fn a_folder_has_a_checkpoint_for_each_job() {
     );
 }
 
-/// The file has the header of this job and the pieces of another job.
+/// The file consists of the header of this job and the pieces of another job.
 #[test]
 fn pieces_of_another_job_are_rejected() {
     let folder = TestFolder::new();
@@ -395,8 +398,8 @@ fn pieces_of_another_job_are_rejected() {
     render(&["--checkpoint", "b", "--seed", "1", "-o", "b.exr"]);
     let [a, b] = ["a", "b"].map(|name| folder.read(name));
     assert_eq!(a.len(), b.len(), "the headers have different lengths");
-    let pieces = (10 * 6) * 16 + 14 * 4 + 32 + 32;
-    let start = a.len() - pieces;
+    let piece_bytes = (10 * 6) * 16 + 14 * 4 + 32 + 32;
+    let start = a.len() - piece_bytes;
     fs::write(folder.path("c"), [&a[..start], &b[start..]].concat()).expect("a file");
     let stderr = render(&["--checkpoint", "c", "--resume", "-o", "c.exr"]);
     assert!(stderr.contains("is damaged"), "{stderr}");
@@ -476,13 +479,13 @@ fn a_damaged_checkpoint_is_used_up_to_the_damage() {
     assert!(folder.read("out.exr") == expected);
 }
 
-/// Writing the image fails; once space is available, the render resumes from the checkpoint.
+/// Writing the image fails; after space becomes available, the render resumes from the checkpoint.
 #[cfg(unix)]
 #[test]
 fn the_checkpoint_is_kept_when_the_disk_is_full() {
     let folder = TestFolder::new();
     let expected = render_expected(&folder);
-    // A file size limit of 250 KiB; the checkpoint needs 400 KiB.
+    // The limit on file sizes is 250 KiB; a complete checkpoint needs 400 KiB.
     let line = "trap '' XFSZ; ulimit -f 500; exec \"$0\" render small.toml --size 160x160 --spp 300 --aov normal \
                 --reproducible --checkpoint c --checkpoint-interval 0.02 -o out.exr --exr-compression none --device cpu";
     let result = folder.shell("sh", line);
@@ -492,7 +495,7 @@ fn the_checkpoint_is_kept_when_the_disk_is_full() {
         "{}",
         result.stderr
     );
-    assert_eq!(folder.files(), ["c", "whole.exr"], "an incomplete file is left");
+    assert_eq!(folder.files(), ["c", "whole.exr"], "an incomplete file remains");
     let checkpoint_len = fs::metadata(folder.path("c")).expect("the checkpoint").len();
     assert!(checkpoint_len > 50_000, "{checkpoint_len}");
     let result = resume_render(&folder, "cpu");
@@ -503,7 +506,7 @@ fn the_checkpoint_is_kept_when_the_disk_is_full() {
 /// Mounts file systems in a separate mount namespace. Skipped where such namespaces are not permitted.
 #[cfg(target_os = "linux")]
 #[test]
-fn full_and_read_only_file_systems() {
+fn full_and_read_only_file_systems_are_reported() {
     let folder = TestFolder::new();
     fs::create_dir(folder.path("disk")).expect("a folder");
     let mounted = folder.shell("sh", "unshare -rm mount -t tmpfs -o size=64k none disk");
@@ -552,7 +555,7 @@ fn full_and_read_only_file_systems() {
         );
         assert!(
             start_time.elapsed() < Duration::from_secs(20),
-            "not reported before the render"
+            "the error is not reported before the render"
         );
     }
 }
@@ -606,7 +609,7 @@ fn parts_merge_to_the_same_image() {
     );
     render(&["--tile", "2/3", "-o", "other.part"]);
     assert_rejected(&[&shuffled[..], &["other.part"]].concat(), "other.part: overlaps");
-    // Parts of different divisions of the image are accepted if they cover it without overlaps.
+    // A single part that covers the full image is accepted.
     render(&["--tile", "1/1", "-o", "all.part"]);
     assert_eq!(merge(&["all.part"]).code, 0);
     for suffix in ["png", "exr", "normal.png", "depth.png", "instance.png"] {
@@ -690,12 +693,12 @@ fn parts_merge_to_the_same_image() {
 #[test]
 fn a_part_resumes_from_its_own_checkpoint() {
     let folder = TestFolder::new();
-    let part = |extra: &[&str]| {
+    let render_part = |extra: &[&str]| {
         let base = ["render", "small.toml", "--device", "cpu", "--tile", "2/3"];
         folder.run(&[&base[..], extra].concat())
     };
-    assert_eq!(part(&["-o", "a.part", "--checkpoint", "c"]).code, 0);
-    assert_eq!(part(&["-o", "b.part", "--checkpoint", "c", "--resume"]).code, 0);
+    assert_eq!(render_part(&["-o", "a.part", "--checkpoint", "c"]).code, 0);
+    assert_eq!(render_part(&["-o", "b.part", "--checkpoint", "c", "--resume"]).code, 0);
     assert!(folder.read("a.part") == folder.read("b.part"));
     let result = folder.run(&[
         "render",
@@ -761,12 +764,12 @@ fn a_time_limit_ends_with_a_complete_image() {
         assert!(
             result
                 .stderr
-                .contains("--time-limit: the first samples must cover the pixel, which those of --pixel-pattern"),
+                .contains("--time-limit: the first samples must cover the pixel, but those of --pixel-pattern"),
             "{}",
             result.stderr
         );
     }
-    // A limit that is not reached has no effect. A stopped render resumes and gives the same image.
+    // A time limit that is not reached has no effect. After a time limit was reached, the render can be resumed.
     let arguments = [
         "render",
         "small.toml",

@@ -11,7 +11,7 @@ use serde_json::Value;
 use super::program;
 use super::{NO_DRIVER, RunResult, SCENE, TestFolder};
 
-/// Parses standard error and checks the common keys.
+/// Parses standard error and checks that each line has the keys of all messages.
 fn lines(result: &RunResult) -> Vec<Value> {
     let lines = result.stderr.lines().map(|line| {
         let value: Value = serde_json::from_str(line).unwrap_or_else(|error| panic!("{error}: {line}"));
@@ -72,8 +72,8 @@ fn a_render_logs_progress_and_statistics() {
         .find(|line| line["message"] == "scene read")
         .expect("an event");
     assert!(scene_read["seconds"].as_f64() > Some(0.0), "{scene_read}");
-    let done = |line: &&Value| line["message"] == "render done";
-    assert_eq!(lines.iter().filter(done).count(), 1, "{lines:?}");
+    let is_done = |line: &&Value| line["message"] == "render done";
+    assert_eq!(lines.iter().filter(is_done).count(), 1, "{lines:?}");
     let (code, lines) = log(&folder, &["render", "small.toml", "-o", "a.png", "--quiet"]);
     assert_eq!((code, lines.len()), (0, 0));
     let (_, lines) = log(&folder, &["render", "small.toml", "-o", "#.png", "--frames", "1-2"]);
@@ -87,7 +87,7 @@ fn a_render_logs_progress_and_statistics() {
 }
 
 #[test]
-fn each_error_of_a_scene_is_a_message() {
+fn each_error_of_a_scene_is_a_separate_message() {
     let folder = TestFolder::new();
     let invalid_scene = SCENE
         .replace("radius = 0.8", "radius = -1")
@@ -188,7 +188,7 @@ fn errors_have_location_and_exit_code() {
     }
     let (code, lines) = log(&folder, &["check", "value.toml", "syntax.toml", "small.toml"]);
     assert_eq!((code, lines.len()), (3, 2));
-    // Control characters in a name do not break the line.
+    // Control characters in a file name are escaped, so the message remains one line.
     let escaped = single_error(&["render", "a\n\"b\".toml"]);
     assert_eq!(escaped["file"], "a\n\"b\".toml");
 }
@@ -236,7 +236,7 @@ fn a_signal_is_an_error_with_its_exit_code() {
     let mut stderr_lines = BufReader::new(child.stderr.take().expect("a pipe"))
         .lines()
         .map_while(Result::ok);
-    // The signal handlers are installed before the message `ready`.
+    // The program installs its signal handlers before it prints the message `ready`.
     assert!(stderr_lines.any(|line| line.contains("\"ready\"")));
     // SAFETY: the process is a child that has not been waited for, so that its id is still valid.
     unsafe { libc::kill(child.id() as i32, libc::SIGTERM) };

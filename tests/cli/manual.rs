@@ -33,7 +33,7 @@ fn every_command_has_a_page() {
     assert_eq!(found, expected);
     for name in found {
         let page = std::fs::read_to_string(pages.join(&name)).unwrap();
-        for part in [
+        for text in [
             ".TH WGRAY",
             ".SH NAME",
             ".SH SYNOPSIS",
@@ -41,7 +41,7 @@ fn every_command_has_a_page() {
             ".SH EXAMPLES",
             ".SH \"SEE ALSO\"",
         ] {
-            assert!(page.contains(part), "{name}: {part}");
+            assert!(page.contains(text), "{name}: {text}");
         }
         let command = name.strip_prefix("wgray-").and_then(|name| name.strip_suffix(".1"));
         let arguments: Vec<&str> = std::iter::once("man").chain(command).collect();
@@ -63,14 +63,14 @@ fn every_command_has_a_page() {
         assert_no_groff_warnings(&pages.join(&name));
     }
     let render = folder.run(&["man", "render"]).stdout;
-    for part in [
+    for text in [
         ".SH ENVIRONMENT",
         "VK_DRIVER_FILES",
         ".SH FILES",
         "checkpoint\\-interval",
         "128 + n",
     ] {
-        assert!(render.contains(part), "{part}");
+        assert!(render.contains(text), "{text}");
     }
     std::fs::write(pages.join("wgray.1"), "old").unwrap();
     folder.run_quietly(&["man", "-o", "pages/man1"]);
@@ -113,10 +113,10 @@ fn assert_no_groff_warnings(page: &std::path::Path) {
     }
 }
 
-/// The documentation and the help list the same exit codes; manual pages repeat the help.
+/// The documentation and the help list the same exit codes; the manual pages contain the text of the help.
 #[test]
 fn exit_codes_are_documented() {
-    let page = std::fs::read_to_string(super::project("docs/command-line.md")).unwrap();
+    let page = std::fs::read_to_string(super::project_path("docs/command-line.md")).unwrap();
     let (_, table) = page.split_once("| exit code | meaning |").expect("the table");
     let rows = table
         .lines()
@@ -187,7 +187,7 @@ fn bash_completes_commands_options_names_and_files() {
     assert_eq!(
         completions(&folder, &["wgray", "render", "a.toml", "--spp", "sm"]),
         ["compopt -o nospace", "sm"],
-        "files are offered"
+        "file names are offered for --spp"
     );
     let files = |option: &str| {
         let mut files = completions(&folder, &["wgray", "render", "a.toml", option, "sma"]);

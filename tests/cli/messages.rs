@@ -1,4 +1,4 @@
-//! Text messages: a closed or full stream does not fail a render, and each message names a remedy.
+//! Text messages: renders succeed although standard error is closed or full, and each message names a remedy.
 
 use super::{RunResult, SCENE, TestFolder};
 
@@ -61,7 +61,7 @@ mod unix {
 
     /// A full disk is an error; a closed pipe is not.
     #[test]
-    fn incomplete_output_changes_the_exit_code() {
+    fn output_to_a_full_disk_exits_with_8_and_a_closed_pipe_is_ignored() {
         let folder = TestFolder::new();
         for command in ["devices", "check small.toml", "--help", "render --help", "--version"] {
             let result = sh(&folder, &format!("$0 {command} > /dev/full"));
@@ -91,7 +91,7 @@ mod unix {
         );
         assert_eq!(
             result.code, 3,
-            "the check stopped at the closed pipe: {}",
+            "the check stopped because the pipe is closed: {}",
             result.stderr
         );
     }
@@ -236,7 +236,7 @@ fn messages_of_long_keys_and_values_are_short() {
 }
 
 #[test]
-fn wrong_arguments_name_a_remedy() {
+fn messages_about_wrong_arguments_name_a_remedy() {
     let folder = TestFolder::new();
     let grid = SCENE.replacen("pixel_samples = { pattern = \"random\", count = 3 }\n", "", 1);
     folder.write("grid.toml", &grid);

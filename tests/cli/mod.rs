@@ -28,7 +28,7 @@ mod summary;
 
 use std::path::Path;
 
-use crate::sources::path as project;
+use crate::sources::path as project_path;
 use crate::test_folder::TestFolder;
 
 /// Restores the default actions of signals for child processes: shells ignore SIGINT for background jobs, `nohup`
@@ -47,7 +47,7 @@ struct RunResult {
     stdout: String,
     /// Standard error without the lines of `summary`.
     stderr: String,
-    /// Lines like `box.png: 1024 x 1024, 64 spp, 12.3 s`, and progress lines of slow machines.
+    /// Summary lines, such as `box.png: 1024 x 1024, 64 spp, 12.3 s`, and progress lines, which slow machines print.
     summary: Vec<String>,
 }
 
@@ -88,7 +88,7 @@ fn is_summary(line: &str) -> bool {
     }
 }
 
-/// A scene of 10 x 6 pixels, each with different random sample positions.
+/// A scene of 10 x 6 pixels with different random samples in each pixel.
 const SCENE: &str = r#"image = { width = 10, height = 6 }
 camera = { position = [0, -5, 1], look_at = [0, 0, 1], fov = 40 }
 [render]
@@ -124,7 +124,7 @@ impl TestFolder {
         TestFolder::with_file("small.toml", SCENE)
     }
 
-    /// Returns the names of all files, hidden ones included, except `small.toml`.
+    /// Returns the names of all files, including hidden files, except `small.toml`.
     fn files(&self) -> Vec<String> {
         self.files_except(|name| name == "small.toml")
     }
@@ -178,6 +178,7 @@ fn program() -> &'static Path {
     Path::new(env!("CARGO_BIN_EXE_wgray"))
 }
 
+/// Environment variables with which the Vulkan loader finds no driver.
 const NO_DRIVER: [(&str, &str); 2] = [
     ("VK_DRIVER_FILES", "/nonexistent.json"),
     ("VK_ICD_FILENAMES", "/nonexistent.json"),
@@ -187,11 +188,11 @@ const NO_DRIVER: [(&str, &str); 2] = [
 fn read_png(path: &Path) -> (u32, u32, Vec<u8>) {
     let picture = image::open(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
     let image::DynamicImage::ImageRgb8(picture) = picture else {
-        panic!("{}: not 8-bit RGB", path.display());
+        panic!("{} is not an 8-bit RGB image", path.display());
     };
     (picture.width(), picture.height(), picture.into_raw())
 }
 
 fn project_scene(name: &str) -> String {
-    project("scenes").join(name).display().to_string()
+    project_path("scenes").join(name).display().to_string()
 }

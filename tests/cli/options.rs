@@ -1,4 +1,4 @@
-//! The effect of each option of `render`.
+//! Effects of the options of `wgray render`.
 
 use wgray::image::read_exr;
 
@@ -29,7 +29,7 @@ fn options_override_the_values_of_the_scene() {
 }
 
 #[test]
-fn the_option_sets_the_maximum_depth() {
+fn the_max_depth_option_overrides_the_scene() {
     let folder = TestFolder::new();
     // With a depth of 1, light does not leave the glass.
     let ball = SCENE.replacen("material = \"gray\"", "material = \"glass\"", 1);
@@ -46,7 +46,7 @@ fn the_option_sets_the_maximum_depth() {
     assert_ne!(folder.read("option.exr"), folder.read("plain.exr"));
 }
 
-/// The option and the key give the same warning about ignored keys.
+/// The option and the key cause the same warnings about keys without effect.
 #[test]
 fn the_integrator_option_overrides_the_scene() {
     let folder = TestFolder::new();
@@ -127,9 +127,9 @@ fn devices_are_selected_by_kind_and_by_part_of_a_name() {
     }
 }
 
-/// Software Vulkan rounds quotients and square roots correctly, so the option has no effect.
+/// Software Vulkan and the CPU round quotients and square roots correctly, so `--exact-rounding` has no effect.
 #[test]
-fn rounding_in_software_gives_the_same_image() {
+fn exact_rounding_does_not_change_images_of_software_vulkan_and_the_cpu() {
     let folder = TestFolder::new();
     for device in ["auto", "cpu"] {
         let arguments = ["render", "small.toml", "--device", device, "-o"];

@@ -1,10 +1,10 @@
-//! Failing memory allocations of the program.
+//! Failing memory allocations: the program ends with an error message and exit code 7.
 
 use std::fmt::Write as _;
 
 use super::TestFolder;
 
-/// Writes a scene with a mesh of several hundred megabytes.
+/// Writes a scene with a mesh of 180,000 triangles.
 fn write_large_scene(folder: &TestFolder) {
     const SIDE: usize = 300;
     let mut mesh = String::new();
@@ -29,7 +29,7 @@ fn write_large_scene(folder: &TestFolder) {
     );
 }
 
-/// Whichever allocation fails first, the program prints one line and leaves no file.
+/// Whichever allocation fails first, the program prints one line and leaves no image.
 #[test]
 fn failed_allocations_end_a_render_with_code_7() {
     let folder = TestFolder::new();
@@ -42,7 +42,7 @@ fn failed_allocations_end_a_render_with_code_7() {
         let result = folder.shell("sh", &line);
         let is_not_loaded = failed == 0 && [127, 139, -1].contains(&result.code);
         if is_not_loaded {
-            continue; // the limit does not even permit the program to be loaded
+            continue; // the program cannot be loaded within the limit
         }
         match result.code {
             0 => {
@@ -66,7 +66,7 @@ fn failed_allocations_end_a_render_with_code_7() {
     assert!(failed > 2 && succeeded > 3, "{failed} failed, {succeeded} succeeded");
 }
 
-/// The limits do not leave enough memory for all threads.
+/// Some limits are too low even for the threads of the program, so other exit codes occur, too.
 #[test]
 fn failed_allocations_end_other_commands_with_code_7() {
     let folder = TestFolder::new();
@@ -86,7 +86,7 @@ fn failed_allocations_end_other_commands_with_code_7() {
     assert!(failed > 2, "{failed}");
 }
 
-/// An image that exceeds the memory is reported as an error, not as a failed allocation.
+/// The program compares the size of an image with the available memory, so no allocation fails.
 #[test]
 fn images_that_exceed_the_memory_are_errors() {
     let folder = TestFolder::new();

@@ -20,7 +20,7 @@ fn the_default_output_has_the_scenes_name() {
 }
 
 #[test]
-fn a_png_has_display_values_of_the_means() {
+fn a_png_contains_the_display_values_of_the_means() {
     let folder = TestFolder::new();
     folder.run_quietly(&["render", "small.toml"]);
     let expected: Vec<u8> = reference(&parse(SCENE))
@@ -32,7 +32,7 @@ fn a_png_has_display_values_of_the_means() {
 }
 
 #[test]
-fn an_exr_has_the_linear_means() {
+fn an_exr_contains_the_linear_means() {
     let folder = TestFolder::new();
     for device in ["gpu", "cpu"] {
         folder.run_quietly(&["render", "small.toml", "-o", "out.EXR", "--device", device]);
@@ -102,7 +102,7 @@ fn aovs_are_layers_of_an_exr() {
         let found: Vec<u32> = match &channel.sample_data {
             exr::prelude::FlatSamples::F32(values) => values.iter().map(|value| value.to_bits()).collect(),
             exr::prelude::FlatSamples::U32(values) => values.clone(),
-            exr::prelude::FlatSamples::F16(_) => panic!("half precision"),
+            exr::prelude::FlatSamples::F16(_) => panic!("an unexpected channel of half floats"),
         };
         let name = channel.name.to_string();
         let expected: Vec<u32> = (hits.iter().zip(&means))
@@ -124,7 +124,7 @@ fn aovs_are_layers_of_an_exr() {
 }
 
 #[test]
-fn adaptive_sampling_and_its_layers_equal_the_library() {
+fn adaptive_sampling_and_its_layers_give_the_values_of_the_library() {
     let folder = TestFolder::new();
     let options = ["--pixel-pattern", "sobol", "--spp", "8", "--adaptive", "0.02"];
     let files = [
@@ -191,9 +191,9 @@ fn adaptive_sampling_and_its_layers_equal_the_library() {
     );
     let (_, _, bytes) = read_png(&folder.path("out.sample_count.png"));
     for (pixel, count) in bytes.chunks(3).zip(&counts) {
-        let grey = (255.0 * f64::from(*count).ln() / 128f64.ln()).round() as i32;
+        let gray = (255.0 * f64::from(*count).ln() / 128f64.ln()).round() as i32;
         assert!(
-            pixel.iter().all(|value| (i32::from(*value) - grey).abs() <= 1),
+            pixel.iter().all(|value| (i32::from(*value) - gray).abs() <= 1),
             "{pixel:?} for {count}"
         );
     }
@@ -239,11 +239,13 @@ fn path_layers_equal_the_layers_of_the_film() {
             let mut earlier_channels = Vec::new();
             for channel in channels {
                 let exr::prelude::FlatSamples::F32(found) = &channel.sample_data else {
-                    panic!("{}: no floats", channel.name);
+                    panic!("{}: the values are not floats", channel.name);
                 };
                 let name = channel.name.to_string();
-                let (layer, part) = name.split_once('.').unwrap_or(("", &name));
-                let channel_index = ["R", "G", "B", "X", "Y", "Z"].iter().position(|name| *name == part);
+                let (layer, component) = name.split_once('.').unwrap_or(("", &name));
+                let channel_index = ["R", "G", "B", "X", "Y", "Z"]
+                    .iter()
+                    .position(|name| *name == component);
                 let layer_index = NAMES.iter().position(|name| *name == layer);
                 let expected: Vec<f32> = (0..film.sums.len())
                     .map(|pixel| match (name.as_str(), layer_index, channel_index) {
@@ -259,7 +261,7 @@ fn path_layers_equal_the_layers_of_the_film() {
                 assert_eq!(found.to_vec(), expected, "{name}, {device}");
                 assert!(
                     !earlier_channels.contains(&expected),
-                    "{name} equals another channel, so the comparison cannot fail"
+                    "{name} equals another channel, so the test cannot detect that they are swapped"
                 );
                 earlier_channels.push(expected);
             }
@@ -297,11 +299,11 @@ fn path_layers_are_files_beside_a_png() {
     ]);
     let film = reference(&parse(&text));
     let layers = ["emission", "direct", "indirect", "albedo"];
-    for (list, name) in film.layers.iter().zip(layers) {
-        let expected: Vec<u8> = list
+    for (layer, name) in film.layers.iter().zip(layers) {
+        let expected: Vec<u8> = layer
             .iter()
             .zip(&film.sums)
-            .flat_map(|(light, sum)| [0, 1, 2].map(|i| encode(light[i] / sum.w)))
+            .flat_map(|(layer_sum, sum)| [0, 1, 2].map(|k| encode(layer_sum[k] / sum.w)))
             .collect();
         assert_eq!(
             read_png(&folder.path(&format!("out.{name}.png"))),
@@ -313,17 +315,17 @@ fn path_layers_are_files_beside_a_png() {
     let (_, _, normals) = read_png(&folder.path("out.shading_normal.png"));
     for (i, found) in normals.chunks(3).enumerate() {
         let (normal, alpha) = (film.layers[4][i] / film.sums[i].w, film.alpha(i));
-        for (part, found) in found.iter().enumerate() {
-            let expected = (normal[part] * 0.5 + alpha * 0.5) * 255.0;
+        for (k, found) in found.iter().enumerate() {
+            let expected = (normal[k] * 0.5 + alpha * 0.5) * 255.0;
             assert!(
                 (f32::from(*found) - expected).abs() <= 0.51,
-                "pixel {i}: {found} for {expected}"
+                "pixel {i}: {found}, not {expected}"
             );
         }
     }
     let picture = image::open(folder.path("out.png")).unwrap();
     let image::DynamicImage::ImageRgba8(picture) = picture else {
-        panic!("no alpha");
+        panic!("the PNG has no alpha channel");
     };
     let (mut transparent, mut partial, mut opaque) = (0, 0, 0);
     for (i, (pixel, sum)) in picture.pixels().zip(&film.sums).enumerate() {
@@ -375,7 +377,7 @@ fn aovs_are_files_beside_a_png() {
         let offset = 3 * (10 * y + x);
         [bytes[offset], bytes[offset + 1], bytes[offset + 2]]
     };
-    // the sphere in the middle, the floor below, the background above
+    // The sphere is in the middle of the image, the floor below it, and the background above it.
     let [sphere, ground, sky] = [(5, 3), (0, 5), (0, 0)].map(|(x, y)| pixel("a.b.normal.png", x, y));
     assert!(sphere[1] < 20 && sphere[0] > 128, "{sphere:?}");
     assert_eq!((ground, sky), ([128, 128, 255], [0, 0, 0]));
@@ -383,13 +385,13 @@ fn aovs_are_files_beside_a_png() {
     assert_eq!(
         (near, background),
         ([128; 3], [0; 3]),
-        "the sphere in the center is not at half brightness"
+        "the sphere is not displayed at half brightness, or the background is not black"
     );
     assert!(far[0] < near[0] && far[0] > 0, "{far:?}");
     assert_ne!(
         pixel("a.b.primitive.png", 5, 3),
         pixel("a.b.primitive.png", 0, 5),
-        "two shapes have one color"
+        "two shapes have the same color"
     );
     assert_eq!(
         pixel("a.b.primitive.png", 0, 5),
@@ -459,7 +461,7 @@ fn stats_have_the_documented_fields() {
     }
 }
 
-/// If the driver truncates loops and one sample exceeds the limit, the CPU renders the image and a warning is printed.
+/// If the driver truncates loops and a single sample needs longer loops, the CPU renders the image with a warning.
 #[test]
 fn a_sample_too_long_for_the_driver_is_rendered_on_the_cpu() {
     if crate::adapter::device().is_none() {

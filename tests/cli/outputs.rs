@@ -23,7 +23,8 @@ fn write_textured_scene(folder: &TestFolder) {
     folder.write("tiles.toml", &scene);
 }
 
-/// Writes a scene with a mesh whose .mtl file has two used materials, one textured, and an unused one.
+/// Writes a scene with a mesh whose .mtl file defines three materials. The mesh uses the first two, of which the second
+/// is textured.
 fn write_scene_with_materials(folder: &TestFolder) {
     for name in ["wood.png", "spare.png"] {
         image::RgbImage::new(2, 2).save(folder.path(name)).unwrap();
@@ -277,7 +278,7 @@ mod unix {
         );
     }
 
-    /// Standard output receives the same bytes as a file.
+    /// Standard output receives the bytes that a file would contain.
     #[test]
     fn standard_output_receives_an_image_or_statistics() {
         let folder = TestFolder::new();
@@ -372,7 +373,7 @@ mod unix {
     }
 
     #[test]
-    fn devices_are_written_through() {
+    fn devices_are_written_directly() {
         let folder = TestFolder::new();
         run_line_quietly(
             &folder,
@@ -431,14 +432,14 @@ mod unix {
     fn a_link_stays_and_its_target_is_replaced() {
         let folder = TestFolder::new();
         fs::create_dir(folder.path("inner")).unwrap();
-        folder.write("inner/there.png", "old");
-        std::os::unix::fs::symlink("inner/there.png", folder.path("there.png")).unwrap();
+        folder.write("inner/old.png", "old");
+        std::os::unix::fs::symlink("inner/old.png", folder.path("old.png")).unwrap();
         std::os::unix::fs::symlink("inner/new.png", folder.path("new.png")).unwrap();
         std::os::unix::fs::symlink("new.png", folder.path("twice.png")).unwrap();
         std::os::unix::fs::symlink("ring.png", folder.path("ring.png")).unwrap();
-        folder.run_quietly(&["render", "small.toml", "-o", "there.png", "--device", "cpu"]);
+        folder.run_quietly(&["render", "small.toml", "-o", "old.png", "--device", "cpu"]);
         folder.run_quietly(&["render", "small.toml", "-o", "twice.png", "--device", "cpu"]);
-        for name in ["there.png", "new.png", "twice.png"] {
+        for name in ["old.png", "new.png", "twice.png"] {
             assert!(fs::symlink_metadata(folder.path(name)).unwrap().is_symlink());
             assert!(folder.read(name).starts_with(b"\x89PNG"), "{name}");
         }
@@ -451,7 +452,7 @@ mod unix {
         );
     }
 
-    /// The mode bits decide, because root can write to any file.
+    /// The program checks the mode bits, because root can write to any file.
     #[test]
     fn a_read_only_file_is_not_replaced_and_other_files_keep_their_mode() {
         let folder = TestFolder::new();
@@ -494,11 +495,11 @@ mod unix {
             child.try_wait().unwrap().is_none(),
             "the render does not wait for a reader"
         );
-        let sent = Command::new("kill")
+        let status = Command::new("kill")
             .args(["-INT", &child.id().to_string()])
             .status()
             .unwrap();
-        assert!(sent.success());
+        assert!(status.success());
         assert!(!child.wait().unwrap().success());
         assert_eq!(folder.files(), ["p.png"]);
     }

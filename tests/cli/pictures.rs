@@ -25,8 +25,8 @@ fn texts(path: &Path) -> BTreeMap<String, String> {
     texts.map(|chunk| (chunk.keyword.clone(), chunk.text.clone())).collect()
 }
 
-/// Returns the sample bits of each channel of an EXR; half floats as 16 bits.
-fn samples(path: &Path) -> BTreeMap<String, Vec<u32>> {
+/// Returns the bits of the values of each channel of an EXR; half floats have 16 bits.
+fn channel_bits(path: &Path) -> BTreeMap<String, Vec<u32>> {
     let image = exr::prelude::read_first_flat_layer_from_file(path).unwrap();
     let bits = |samples: &FlatSamples| match samples {
         FlatSamples::F32(values) => values.iter().map(|value| value.to_bits()).collect(),
@@ -128,7 +128,7 @@ fn a_failed_output_leaves_no_incomplete_files() {
         "{}",
         result.stderr
     );
-    // Outputs are renamed one after the other: complete files from before the failure may exist, later files must not.
+    // Outputs are renamed one after the other: outputs before the failed output may exist, later outputs must not.
     assert!(!folder.files().contains(&"b.png".to_owned()), "{:?}", folder.files());
     assert!(
         folder.files().iter().all(|name| !name.starts_with('.')),
@@ -138,7 +138,7 @@ fn a_failed_output_leaves_no_incomplete_files() {
 }
 
 #[test]
-fn pngs_have_8_or_16_bits_and_name_their_curve() {
+fn pngs_have_8_or_16_bits_and_declare_their_transfer_function() {
     let folder = TestFolder::new();
     render(&folder, &["-o", "a.exr"]);
     let linear = read_exr(&folder.path("a.exr")).unwrap().colors;
@@ -147,7 +147,7 @@ fn pngs_have_8_or_16_bits_and_name_their_curve() {
             transform,
             exposure: -0.5,
         };
-        let (name, shown) = (
+        let (name, displayed) = (
             transform.name(),
             linear.iter().flat_map(|color| settings.display(*color)),
         );
@@ -157,12 +157,12 @@ fn pngs_have_8_or_16_bits_and_name_their_curve() {
             &folder,
             &[&["-o", "b.png", "--bit-depth", "16", "--aov", "normal"], &options[..]].concat(),
         );
-        let expected: Vec<u8> = shown.clone().map(to_8_bits).collect();
+        let expected: Vec<u8> = displayed.clone().map(to_8_bits).collect();
         assert_eq!(read_png(&folder.path("a.png")).2, expected, "{name}");
         let image::DynamicImage::ImageRgb16(deep) = image::open(folder.path("b.png")).unwrap() else {
-            panic!("not 16 bits");
+            panic!("the PNG does not have 16 bits per channel");
         };
-        let expected: Vec<u16> = shown.map(to_16_bits).collect();
+        let expected: Vec<u16> = displayed.map(to_16_bits).collect();
         assert_eq!(deep.into_raw(), expected, "{name}");
         assert!(
             expected.iter().any(|value| value % 257 != 0),
@@ -186,27 +186,33 @@ fn options_override_the_view_of_the_scene() {
         "shown.toml",
         &SCENE.replacen("height = 6", &format!("height = 6, {keys}"), 1),
     );
-    let shown = |options: &[&str]| {
+    let render_with_keys = |options: &[&str]| {
         folder.run_quietly(&[&["render", "shown.toml", "--device", "cpu", "-o", "s.png"], options].concat());
         read_png(&folder.path("s.png"))
     };
-    let plain = |options: &[&str]| {
+    let render_without_keys = |options: &[&str]| {
         render(&folder, &[&["-o", "p.png"], options].concat());
         read_png(&folder.path("p.png"))
     };
-    let with_scene_view = shown(&[]);
+    let with_scene_view = render_with_keys(&[]);
     assert_eq!(
         with_scene_view,
-        plain(&["--view-transform", "khronos-pbr-neutral", "--exposure", "1.5"])
+        render_without_keys(&["--view-transform", "khronos-pbr-neutral", "--exposure", "1.5"])
     );
-    assert_ne!(with_scene_view, plain(&["--view-transform", "khronos-pbr-neutral"]));
-    assert_ne!(with_scene_view, plain(&["--exposure", "1.5"]));
-    assert_eq!(shown(&["--view-transform", "gamma22", "--exposure", "0"]), plain(&[]));
+    assert_ne!(
+        with_scene_view,
+        render_without_keys(&["--view-transform", "khronos-pbr-neutral"])
+    );
+    assert_ne!(with_scene_view, render_without_keys(&["--exposure", "1.5"]));
     assert_eq!(
-        shown(&["--exposure", "-2"]),
-        plain(&["--view-transform", "khronos-pbr-neutral", "--exposure", "-2"])
+        render_with_keys(&["--view-transform", "gamma22", "--exposure", "0"]),
+        render_without_keys(&[])
     );
-    // An EXR is linear, whatever the view settings. The library writes the same images.
+    assert_eq!(
+        render_with_keys(&["--exposure", "-2"]),
+        render_without_keys(&["--view-transform", "khronos-pbr-neutral", "--exposure", "-2"])
+    );
+    // An EXR is linear and does not depend on the view settings. The library gives the same images as the program.
     folder.run_quietly(&["render", "shown.toml", "--device", "cpu", "-o", "s.exr"]);
     render(&folder, &["-o", "p.exr"]);
     assert_eq!(folder.read("s.exr"), folder.read("p.exr"));
@@ -243,7 +249,7 @@ fn exr_compression_is_lossless() {
     let folder = TestFolder::new();
     let aovs = ["--aov", "depth,primitive", "--size", "75x70"];
     render(&folder, &[&["-o", "zip.exr"], &aovs[..]].concat());
-    let floats = samples(&folder.path("zip.exr"));
+    let floats = channel_bits(&folder.path("zip.exr"));
     let halves: BTreeMap<String, Vec<u32>> = (floats.iter())
         .map(|(name, bits)| match name.as_str() {
             "primitive.ID" => (name.clone(), bits.clone()),
@@ -255,21 +261,24 @@ fn exr_compression_is_lossless() {
         .collect();
     let mut sizes = BTreeMap::new();
     for method in ["none", "rle", "zips", "zip", "piz"] {
-        for (numbers, expected) in [("float", &floats), ("half", &halves)] {
-            let options = ["--exr-compression", method, "--exr-type", numbers];
+        for (value_type, expected) in [("float", &floats), ("half", &halves)] {
+            let options = ["--exr-compression", method, "--exr-type", value_type];
             render(&folder, &[&["-o", "a.exr"], &aovs[..], &options].concat());
-            assert!(samples(&folder.path("a.exr")) == *expected, "{method} {numbers}");
-            sizes.insert((method, numbers), folder.read("a.exr").len());
-            // A crop that starts and ends inside a compression block.
+            assert!(
+                channel_bits(&folder.path("a.exr")) == *expected,
+                "{method} {value_type}"
+            );
+            sizes.insert((method, value_type), folder.read("a.exr").len());
+            // The crop starts and ends inside a compression block.
             render(
                 &folder,
                 &[&["-o", "c.exr", "--crop", "3,5,70,62"], &aovs[..], &options].concat(),
             );
-            let part = samples(&folder.path("c.exr"));
-            for (name, whole) in expected {
-                let rows = whole.chunks(75).skip(5).take(57);
-                let cut: Vec<u32> = rows.flat_map(|row| row[3..70].to_vec()).collect();
-                assert!(part[name] == cut, "{method} {numbers}: {name}");
+            let crop = channel_bits(&folder.path("c.exr"));
+            for (name, full) in expected {
+                let rows = full.chunks(75).skip(5).take(57);
+                let expected_crop: Vec<u32> = rows.flat_map(|row| row[3..70].to_vec()).collect();
+                assert!(crop[name] == expected_crop, "{method} {value_type}: {name}");
             }
         }
     }
@@ -299,14 +308,14 @@ fn half_float_overflows_are_counted() {
         "half",
     ]);
     assert_eq!(result.code, 0, "{}", result.stderr);
-    let found = samples(&folder.path("h.exr"));
+    let found = channel_bits(&folder.path("h.exr"));
     let infinite = |name: &str| found[name].iter().filter(|bits| **bits == 0x7c00).count();
     let infinite_blue = infinite("B");
     assert!(infinite_blue > 5, "{infinite_blue}");
-    // Values up to 65520, halfway to the next step, round to 65504.
+    // Values below 65520 round to 65504, the largest finite half float.
     assert_eq!((infinite("R"), infinite("G")), (0, 0));
     let warning = format!(
-        "warning: h.exr: values beyond 65504, the maximum of 16 bits, were written as infinity (number of these values: \
+        "warning: h.exr: values beyond 65504, the maximum of a 16-bit float, were written as infinity (number of these values: \
          {infinite_blue}); use --exr-type float\n"
     );
     assert_eq!(result.stderr, warning);
@@ -335,7 +344,7 @@ fn jpeg_and_webp_match_the_png() {
     render(&folder, &[&["-o", "b.jpg", "--quality", "20"], &size[..]].concat());
     let (_, _, exact) = read_png(&folder.path("a.png"));
     let image::DynamicImage::ImageRgb8(webp) = image::open(folder.path("a.webp")).unwrap() else {
-        panic!("no RGB");
+        panic!("the WebP image is not RGB");
     };
     assert_eq!(webp.into_raw(), exact, "WebP is not lossless");
     let error = |name: &str| {
@@ -353,7 +362,7 @@ fn jpeg_and_webp_match_the_png() {
 }
 
 #[test]
-fn alpha_is_in_a_webp_and_black_in_a_jpeg() {
+fn a_webp_has_alpha_and_a_jpeg_is_composited_over_black() {
     let folder = TestFolder::new();
     folder.write("small.toml", &path_scene());
     render(
@@ -373,10 +382,10 @@ fn alpha_is_in_a_webp_and_black_in_a_jpeg() {
         ],
     );
     let image::DynamicImage::ImageRgba8(png) = image::open(folder.path("a.png")).unwrap() else {
-        panic!("no alpha in a PNG");
+        panic!("the PNG has no alpha channel");
     };
     let image::DynamicImage::ImageRgba8(webp) = image::open(folder.path("a.webp")).unwrap() else {
-        panic!("no alpha in a WebP");
+        panic!("the WebP image has no alpha channel");
     };
     let transparent = png.pixels().filter(|pixel| pixel.0[3] == 0).count();
     let partial = png.pixels().filter(|pixel| !matches!(pixel.0[3], 0 | 255)).count();
@@ -394,7 +403,7 @@ fn alpha_is_in_a_webp_and_black_in_a_jpeg() {
     }
 }
 
-/// Albedo is only sRGB-encoded, and other layers are not transformed.
+/// The albedo layer is only sRGB-encoded, and the normal layer is not transformed.
 #[test]
 fn radiance_layers_use_the_view_of_the_image() {
     let folder = TestFolder::new();
@@ -409,16 +418,16 @@ fn radiance_layers_use_the_view_of_the_image() {
         "normal,albedo,direct,indirect,emission",
     ];
     render(&folder, &[&["-o", "a.png", "-o", "a.exr"], &options[..]].concat());
-    let numbers = samples(&folder.path("a.exr"));
+    let channels = channel_bits(&folder.path("a.exr"));
     let settings = ViewSettings {
         transform: ViewTransform::Agx,
         exposure: 2.0,
     };
     let mut differing = 0;
     for name in names {
-        let (_, _, shown) = read_png(&folder.path(&format!("a.{name}.png")));
-        for (i, found) in shown.chunks(3).enumerate() {
-            let color = ["R", "G", "B"].map(|part| f32::from_bits(numbers[&format!("{name}.{part}")][i]));
+        let (_, _, layer) = read_png(&folder.path(&format!("a.{name}.png")));
+        for (i, found) in layer.chunks(3).enumerate() {
+            let color = ["R", "G", "B"].map(|part| f32::from_bits(channels[&format!("{name}.{part}")][i]));
             let light = settings.rgb8(color);
             let reflectance = settings.display_reflectance(color).map(to_8_bits);
             differing += usize::from(light != reflectance);
@@ -431,9 +440,9 @@ fn radiance_layers_use_the_view_of_the_image() {
     assert_eq!(read_png(&folder.path("b.normal.png")).2, normals);
     render(&folder, &["-o", "c.png", "--bit-depth", "16"]);
     let image::DynamicImage::ImageRgba16(deep) = image::open(folder.path("c.png")).unwrap() else {
-        panic!("not 16 bits with alpha");
+        panic!("the PNG does not have 16 bits per channel and alpha");
     };
-    for (pixel, alpha) in deep.pixels().zip(&numbers["A"]) {
+    for (pixel, alpha) in deep.pixels().zip(&channels["A"]) {
         assert_eq!(pixel.0[3], to_16_bits(f64::from(f32::from_bits(*alpha))));
     }
 }
@@ -478,13 +487,13 @@ fn images_have_metadata() {
     let other_texts = texts(&folder.path("b.png"));
     assert_ne!(other_texts["scene_hash"], png["scene_hash"]);
     assert_eq!(other_texts["shader_hash"], png["shader_hash"]);
-    let shown = |name: &str| {
+    let exif_texts = |name: &str| {
         let data = exif::Reader::new()
             .read_from_container(&mut std::io::Cursor::new(folder.read(name)))
             .unwrap();
         let text = |tag| match &data.get_field(tag, exif::In::PRIMARY).unwrap().value {
             exif::Value::Ascii(texts) => String::from_utf8(texts[0].clone()).unwrap(),
-            _ => panic!("no text"),
+            _ => panic!("the Exif value is not text"),
         };
         (text(exif::Tag::Software), text(exif::Tag::ImageDescription))
     };
@@ -492,8 +501,8 @@ fn images_have_metadata() {
     let attributes = &meta.headers[0].own_attributes;
     let text = |text: &Option<exr::meta::attribute::Text>| text.as_ref().unwrap().to_string();
     for (name, (software, lines)) in [
-        ("a.jpg", shown("a.jpg")),
-        ("a.webp", shown("a.webp")),
+        ("a.jpg", exif_texts("a.jpg")),
+        ("a.webp", exif_texts("a.webp")),
         ("a.exr", (text(&attributes.software_name), text(&attributes.comments))),
     ] {
         assert_eq!(software, png["Software"], "{name}");
@@ -506,7 +515,7 @@ fn images_have_metadata() {
 }
 
 #[test]
-fn reproducible_images_do_not_depend_on_the_machine() {
+fn reproducible_images_do_not_depend_on_the_device() {
     let folder = TestFolder::new();
     let mut files: Vec<(String, Vec<u8>)> = Vec::new();
     const NAMES: [&str; 5] = ["a.png", "a.normal.png", "a.exr", "a.webp", "a.jpg"];
@@ -616,7 +625,7 @@ fn options_without_an_applicable_output_are_rejected() {
         ],
     );
     assert_eq!(folder.files(), ["a.jpg", "b"]);
-    assert!(samples(&folder.path("b")).contains_key("R"));
+    assert!(channel_bits(&folder.path("b")).contains_key("R"));
 }
 
 /// The error is reported before the render, which would take long.
@@ -642,7 +651,7 @@ fn images_too_large_for_a_format_are_rejected() {
             message,
         );
     }
-    // A crop within the limits, and the maximum sizes.
+    // A crop within the limits and images of the maximum sizes are accepted.
     let crop = [
         "--size",
         "65536x60000",

@@ -1,4 +1,4 @@
-//! `--preview`: intermediate images during a render, and renders that are ended by a signal.
+//! `--preview`: intermediate images during a render, and their replacement when a signal ends the render.
 
 use std::fs;
 use std::path::Path;
@@ -25,11 +25,11 @@ fn start(folder: &TestFolder, arguments: &[&str]) -> Child {
     start_in_shell(folder, "", arguments)
 }
 
-fn start_in_shell(folder: &TestFolder, line: &str, arguments: &[&str]) -> Child {
+fn start_in_shell(folder: &TestFolder, shell_prefix: &str, arguments: &[&str]) -> Child {
     restore_signal_defaults();
     Command::new("sh")
         .current_dir(folder.path("."))
-        .args(["-c", &format!("{line} exec \"$0\" \"$@\"")])
+        .args(["-c", &format!("{shell_prefix} exec \"$0\" \"$@\"")])
         .arg(program())
         .args(LONG)
         .arg("--preview")
@@ -52,8 +52,8 @@ fn wait_for(folder: &TestFolder, file: &str) {
 }
 
 fn send(signal: &str, child: &Child) {
-    let sent = Command::new("kill").args([signal, &child.id().to_string()]).status();
-    assert!(sent.expect("kill").success());
+    let status = Command::new("kill").args([signal, &child.id().to_string()]).status();
+    assert!(status.expect("kill").success());
 }
 
 fn wait_for_end(child: Child) -> RunResult {
@@ -62,7 +62,7 @@ fn wait_for_end(child: Child) -> RunResult {
     RunResult::new(output.status.code(), String::new(), &stderr, &[])
 }
 
-/// Returns the actual and the requested number of samples of a file that is marked as partial.
+/// Returns the actual and the requested number of samples if the file is marked as partial.
 fn partial(path: &Path) -> Option<(u32, u32)> {
     let metadata = read_metadata(path).expect("metadata");
     let text = metadata.get("partial")?.strip_suffix(" samples").expect("samples");
@@ -153,14 +153,18 @@ fn a_signal_leaves_the_last_complete_pass() {
         let child = start(&folder, &[&outputs[..], &extra].concat());
         files.iter().for_each(|file| wait_for(&folder, file));
         fs::copy(folder.path("out.exr"), folder.path("first.exr")).expect("a copy");
-        let (first, requested) = partial(&folder.path("first.exr")).expect("a mark");
+        let (first, requested) = partial(&folder.path("first.exr")).expect("a partial file");
         assert!(first.is_power_of_two() && requested == 65536, "{first} of {requested}");
         std::thread::sleep(Duration::from_millis(500));
-        let sent = Instant::now();
+        let signal_time = Instant::now();
         send(signal, &child);
         let result = wait_for_end(child);
-        assert!(sent.elapsed() < Duration::from_secs(10), "{:?}", sent.elapsed()); // 2 s on an idle machine
-        let (samples, _) = partial(&folder.path("out.exr")).expect("a mark");
+        assert!(
+            signal_time.elapsed() < Duration::from_secs(10),
+            "{:?}",
+            signal_time.elapsed()
+        ); // takes 2 s on an idle machine
+        let (samples, _) = partial(&folder.path("out.exr")).expect("a partial file");
         let message = format!(
             "note: interrupted: the image has {samples} of 65536 samples per pixel\nerror: interrupted by {name}\n"
         );
@@ -235,7 +239,7 @@ fn files_with_more_samples_are_not_replaced() {
     wait_for(&folder, "new.exr");
     send("-INT", &child);
     let result = wait_for_end(child);
-    let (samples, _) = partial(&folder.path("new.exr")).expect("a mark");
+    let (samples, _) = partial(&folder.path("new.exr")).expect("a partial file");
     assert!(has_pixels_of(&folder, "new.exr", samples, &[]));
     let fewer_samples = "has 60000 samples per pixel; a preview with fewer samples does not replace it";
     let foreign = "was not written by wgray; a preview does not replace it, but the complete image will";
@@ -271,7 +275,7 @@ fn files_with_more_samples_are_not_replaced() {
     );
     assert!(result.summary.is_empty() && !folder.path("stats.json").exists());
     assert_eq!(files.map(|file| folder.read(file)), before);
-    // A preview replaces a file with the same number of samples.
+    // The complete image replaces all files, even files with more samples.
     let result = render(&[&outputs[..], &["--preview", "--spp", "2"]].concat());
     assert_eq!(result.code, 0, "{}", result.stderr);
     assert!(files.iter().all(|file| partial(&folder.path(file)).is_none()));
@@ -354,7 +358,7 @@ fn a_signal_writes_the_samples_to_the_checkpoint() {
     let result = wait_for_end(child);
     let message = "note: progress is saved in c; --resume continues\nerror: interrupted by Ctrl+C (SIGINT)\n";
     assert_eq!((result.code, result.stderr.as_str()), (130, message));
-    let (samples, requested) = partial(&folder.path("out.exr")).expect("a mark");
+    let (samples, requested) = partial(&folder.path("out.exr")).expect("a partial file");
     assert!(
         samples.is_power_of_two() && requested == 2000,
         "{samples} of {requested}"
@@ -364,17 +368,17 @@ fn a_signal_writes_the_samples_to_the_checkpoint() {
 }
 
 #[test]
-fn previews_need_passes_and_a_file() {
+fn previews_need_a_pattern_with_passes_and_a_file() {
     let folder = TestFolder::new();
     for (options, rule) in [
         (&["--tile", "1/2", "-o", "x.part"][..], "cannot be used with '--tile"),
         (
             &["--pixel-pattern", "grid", "--spp", "4"],
-            "--preview: the first samples must cover the pixel, which those of --pixel-pattern grid do not; use sobol",
+            "--preview: the first samples must cover the pixel, but those of --pixel-pattern grid do not; use sobol",
         ),
         (
             &["--pixel-pattern", "jittered", "--spp", "4"],
-            "--preview: the first samples must cover the pixel, which those of --pixel-pattern jittered",
+            "--preview: the first samples must cover the pixel, but those of --pixel-pattern jittered",
         ),
         (
             &["-o", "-"],
@@ -387,7 +391,7 @@ fn previews_need_passes_and_a_file() {
         assert!(result.stderr.contains(rule), "{}", result.stderr);
         assert!(folder.files().is_empty(), "{:?}", folder.files());
     }
-    // A stream only receives the complete image.
+    // A stream receives only the complete image.
     let line = "\"$0\" render small.toml --preview --device cpu -q -o - -o a.png > b.png";
     let result = folder.shell("sh", line);
     assert_eq!((result.code, result.stderr.as_str()), (0, ""));
@@ -429,7 +433,7 @@ fn on_a_full_disk_previews_are_not_written_and_the_older_file_remains() {
         assert_eq!(result.code, 8, "{}", result.stderr);
         assert!(result.stderr.starts_with(&warning), "{}", result.stderr);
         assert!(result.stderr.contains("error: "), "{}", result.stderr);
-        // A signal that ends the render has the same effect.
+        // If a signal ends the render, the preview is not written, either.
         let child = start_in_shell(&folder, limit, &["-o", output, "--device", "cpu"]);
         wait_until("a temporary file", || {
             folder.files().iter().any(|name| name.starts_with(".wgray-"))

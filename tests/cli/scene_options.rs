@@ -1,4 +1,4 @@
-//! `--environment`, `--background` and `--turntable`, which override parts of a scene.
+//! `--environment`, `--background` and `--turntable`, which override values of a scene.
 
 use std::fs;
 
@@ -137,7 +137,7 @@ fn invalid_environment_options_are_rejected() {
         ),
         (
             ["small.toml", "--background", "none"],
-            "--background: none needs integrator = \"path\"",
+            "--background: transparency needs integrator = \"path\"",
         ),
         (
             ["ball.toml", "--background", "blue"],
@@ -196,8 +196,8 @@ fn a_turntable_is_one_full_turn() {
     let names = ["t.01.exr", "t.02.exr", "t.03.exr", "t.04.exr"];
     let found = folder.files_except(|name| !name.starts_with("t."));
     assert_eq!(found, names);
-    // The first frame equals the still image. As seen from the look-at point, the camera is towards +x after a quarter
-    // turn and towards +y after half a turn.
+    // The first frame equals the still image. The camera is at +x of the look-at point after a quarter turn and at +y
+    // after half a turn.
     assert_eq!(folder.read("t.01.exr"), folder.read("still.exr"));
     assert_eq!(folder.read("t.03.exr"), folder.read("alone.exr"));
     let max_difference = |position: &str, name: &str| {
@@ -218,7 +218,7 @@ fn a_turntable_is_one_full_turn() {
     assert!(max_difference("[-3.5, 0.5, 1]", "t.04.exr") < 1e-3);
     assert!(
         max_difference("[-3.5, 0.5, 1]", "t.02.exr") > 0.1,
-        "a different camera gives the same image"
+        "the image does not depend on the camera"
     );
     let result = folder.run(&["render", "ball.toml", "--turntable", "4", "-o", "t.exr"]);
     assert_eq!(result.code, 2);

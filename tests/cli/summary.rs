@@ -2,7 +2,7 @@
 
 use super::{SCENE, TestFolder, is_summary};
 
-/// Removes the time, which differs between runs.
+/// Removes the time of the render, which differs between runs.
 fn without_time(line: &str) -> String {
     let (rest, _) = line.rsplit_once(", ").unwrap_or((line, ""));
     rest.to_owned()
@@ -48,7 +48,7 @@ fn a_render_ends_with_a_summary_line() {
         stream.summary
     );
     assert!(folder.read("piped.png").starts_with(b"\x89PNG"));
-    // "render done" replaces the summary line.
+    // In a JSON log, "render done" replaces the summary line.
     let json = folder.run(&[
         "render",
         "small.toml",
@@ -66,7 +66,7 @@ fn a_render_ends_with_a_summary_line() {
 }
 
 #[test]
-fn the_device_is_explained_with_verbose_only() {
+fn the_choice_of_the_device_is_explained_only_with_verbose() {
     let folder = TestFolder::new();
     let sphere = SCENE.split("[[shapes]]").nth(1).expect("a sphere");
     let many = (0..70).map(|_| format!("[[shapes]]{sphere}")).collect::<String>();
@@ -79,7 +79,7 @@ fn the_device_is_explained_with_verbose_only() {
 }
 
 #[test]
-fn a_default_name_replaces_images_of_this_program_only() {
+fn a_default_name_replaces_only_images_of_this_program() {
     let folder = TestFolder::new();
     let options = ["render", "small.toml", "--device", "cpu", "--spp", "1"];
     let assert_rejected = |arguments: &[&str], name: &str| {

@@ -1,4 +1,4 @@
-//! Invalid pixels are counted, and marked in the displayed image only.
+//! Invalid pixels are counted. Marks for them appear in the displayed image, but not in the output file.
 
 use std::sync::Arc;
 
@@ -34,17 +34,17 @@ fn invalid_pixels_of_a_shader_are_counted_and_marked() {
         if pixel.y == 20u { sum.z = -1.0; }
         film[index] = sum;",
     );
-    let frame = session.wait("the faults", frame_with_faults);
+    let frame = session.wait("the counts of invalid pixels", frame_with_faults);
     let positions = &frame.header.faults[0].1.places;
     assert!(
         positions.contains(&[0, 3]) && positions.contains(&[20, 20]),
         "{positions:?}"
     );
-    let shown = |frame: &Frame| [(0, 3), (1, 3), (2, 3), (30, 20)].map(|(x, y)| pixel(&frame.pictures[0], x, y));
+    let displayed = |frame: &Frame| [(0, 3), (1, 3), (2, 3), (30, 20)].map(|(x, y)| pixel(&frame.pictures[0], x, y));
     let (magenta, cyan, green) = ([255, 0, 255], [0, 255, 255], [0, 255, 0]);
-    assert_eq!(shown(&frame), [magenta, cyan, cyan, green]);
+    assert_eq!(displayed(&frame), [magenta, cyan, cyan, green]);
     // The output file equals the image that `render` writes, without marks.
-    session.wait("the file", |_| {
+    session.wait("the output file", |_| {
         let picture = image::open(&out).ok()?.into_rgb8();
         (picture.get_pixel(1, 3).0 == [0, 255, 0]).then_some(())
     });

@@ -1,5 +1,5 @@
-//! The views of film layers show the same values as the layers of `wgray render --aov` with the same samples. A view is
-//! rejected if the scene does not have its layer.
+//! The views of film layers show the values of the layers that `wgray render --aov` computes from the same samples. A
+//! view is rejected if the scene does not have its layer.
 
 use std::sync::Arc;
 
@@ -58,14 +58,14 @@ fn layers_equal_the_layers_of_render_and_sum_to_the_image() {
         let layered = files.packed().with_layers();
         let expected = |layer| files.render_values(&layered, &|film: &Film, i| film.layer(layer, i));
         let mut earlier_layers = vec![colors.colors.clone()];
-        let mut compiled = None;
+        let mut layer_compile_seconds = None;
         for (view, layer) in LAYERS {
             session.inner.send(Command::View(view));
             let (found, frame) = wait_layer(&session, view);
             assert_eq!(found.values.colors, expected(layer), "{view:?}");
             assert!(
                 !earlier_layers.contains(&found.values.colors),
-                "{view:?} equals another layer, so the comparison cannot fail"
+                "{view:?} equals another layer, so the test cannot detect that they are swapped"
             );
             assert!(found.values.colors.iter().any(|value| *value != [0.0; 3]), "{view:?}");
             let values = frame.pixel(20, 15).unwrap();
@@ -74,24 +74,25 @@ fn layers_equal_the_layers_of_render_and_sum_to_the_image() {
             assert_eq!(
                 frame.header.histogram.is_some(),
                 found.is_light(),
-                "{view:?}: layers of light, and no others, have a histogram"
+                "{view:?}: only layers of light have a histogram"
             );
             earlier_layers.push(found.values.colors);
             // One kernel computes all layers.
             let compile_seconds = session.state().compile_seconds;
             assert_ne!(
                 compile_seconds, color_compile_seconds,
-                "{view:?} used the kernel of the color"
+                "{view:?} used the kernel of the color view"
             );
             assert_eq!(
-                *compiled.get_or_insert(compile_seconds),
+                *layer_compile_seconds.get_or_insert(compile_seconds),
                 compile_seconds,
                 "{view:?} needed another kernel"
             );
         }
+        // `earlier_layers` starts with the color and the albedo.
         for (i, color) in colors.colors.iter().enumerate() {
             let [direct, indirect, emission] = [2, 3, 4].map(|layer: usize| earlier_layers[layer][i]);
-            let sum = [0, 1, 2].map(|c| direct[c] + indirect[c] + emission[c]);
+            let sum = [0, 1, 2].map(|k| direct[k] + indirect[k] + emission[k]);
             assert!(is_close(*color, sum), "pixel {i}: {color:?} {sum:?}");
         }
         // The kernel and the image of the color view are still cached.
@@ -100,7 +101,7 @@ fn layers_equal_the_layers_of_render_and_sum_to_the_image() {
             let frame = session.frame()?;
             matches!(&frame.content, Content::Color(pixels) if frame.header.done && *pixels == colors).then_some(())
         });
-        assert_eq!(session.state().compile_seconds, compiled.unwrap());
+        assert_eq!(session.state().compile_seconds, layer_compile_seconds.unwrap());
         session.inner.send(Command::View(View::Variance));
         if scene == path_scene() {
             let notice = session.wait("a notice", |session| session.state().notice.clone());
@@ -117,7 +118,7 @@ fn layers_equal_the_layers_of_render_and_sum_to_the_image() {
             assert!(frame.header.legend.is_some() && frame.header.histogram.is_none());
             assert_eq!(
                 session.state().compile_seconds,
-                compiled.unwrap(),
+                layer_compile_seconds.unwrap(),
                 "the variance needed another compilation"
             );
         }
@@ -138,14 +139,17 @@ fn the_kernels_of_color_and_layers_are_cached() {
             (frame.header.done && frame.header.view == view).then_some(frame)
         })
     };
-    let first = session.state().compile_seconds;
+    let color_compile_seconds = session.state().compile_seconds;
     show(View::Direct);
-    let compiled = session.state().compile_seconds;
-    assert_ne!(compiled, first, "layers use the kernel of the color");
+    let layer_compile_seconds = session.state().compile_seconds;
+    assert_ne!(
+        layer_compile_seconds, color_compile_seconds,
+        "layers use the kernel of the color view"
+    );
     let color = show(View::Color);
     assert!(matches!(&color.content, Content::Color(pixels) if *pixels == colors));
     show(View::Albedo);
-    assert_eq!(session.state().compile_seconds, compiled);
+    assert_eq!(session.state().compile_seconds, layer_compile_seconds);
 }
 
 #[test]
@@ -165,7 +169,7 @@ fn missing_layers_are_rejected_until_an_edit_adds_them() {
         notice.text
     );
     assert_eq!(session.state().view, View::Color);
-    // In this scene the shading normals equal the normals of the first hits.
+    // In this scene, the shading normals equal the normals of the first hits.
     session.inner.send(Command::View(View::ShadingNormal));
     session.wait("the normals", |session| {
         let frame = session.frame()?;
@@ -178,7 +182,7 @@ fn missing_layers_are_rejected_until_an_edit_adds_them() {
     session.inner.send(Command::View(View::Direct));
     let (before, _) = wait_layer(&session, View::Direct);
     // The layer follows edits of the scene and of shaders.
-    let compiled = session.state().compile_seconds;
+    let compile_seconds = session.state().compile_seconds;
     files.edit("scene.toml", "color = [0.8, 0.1, 0.1]", "color = [0.1, 0.8, 0.1]");
     let expected = || {
         files.render_values(&files.packed().with_layers(), &|film: &Film, i| {
@@ -194,7 +198,7 @@ fn missing_layers_are_rejected_until_an_edit_adds_them() {
     session.wait("the edited scene", |session| shows(session, &green));
     assert_eq!(
         session.state().compile_seconds,
-        compiled,
+        compile_seconds,
         "a changed color was compiled into the kernel"
     );
     files.edit(KERNEL, RADIANCE, "path_value(simple)");
@@ -202,7 +206,7 @@ fn missing_layers_are_rejected_until_an_edit_adds_them() {
     assert!(shows(&session, &green).is_some(), "the last image was discarded");
     files.write_shaders();
     session.wait_for_no_problem();
-    // The direct integrator has no such layer.
+    // With the direct integrator, these layers do not exist.
     files.write("scene.toml", SCENE);
     session.wait_for_rendered_image(&files);
     assert_eq!(session.state().view, View::Color);

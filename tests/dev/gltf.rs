@@ -1,4 +1,4 @@
-//! glTF files in the development mode are shown, and reloaded whenever they are saved.
+//! The development mode shows glTF files and reloads them when they are saved.
 
 use std::fs;
 use std::io::Write as _;
@@ -36,7 +36,7 @@ fn start(folder: &Path, name: &str) -> TestSession {
     TestSession::start(sources, None)
 }
 
-/// Waits for an image in which the strongest channel at the center, where the large box is, is the channel of `color`.
+/// Waits for an image in which the large box, at the center, has the dominant channel of `color`.
 fn wait_for(session: &TestSession, color: [f64; 3]) {
     let expected = color.map(|value| value > 0.5);
     session.wait("the image of the file", |session| {
@@ -73,7 +73,7 @@ fn saving_a_model_updates_the_image() {
     wait_for(&session, RED);
 }
 
-/// Incomplete pieces cause no error; the state reports that files are being read.
+/// While a file grows byte by byte, no error is reported; the state reports that files are being read.
 #[test]
 fn incomplete_files_of_an_exporter_cause_no_error() {
     let folder = TempDir::new().unwrap();
@@ -82,16 +82,16 @@ fn incomplete_files_of_an_exporter_cause_no_error() {
     let session = start(folder.path(), "box.glb");
     wait_for(&session, RED);
     let complete = model(GREEN).glb();
-    // On a busy machine the writer may pause until the file seems complete.
+    // On a busy machine, the writer may pause for so long that the incomplete file is read.
     let shows_no_error = (0..20).any(|_| {
-        let [start, mut written] = [Instant::now(); 2];
+        let [start, mut last_write] = [Instant::now(); 2];
         let (mut was_read, mut has_paused) = (false, false);
         fs::write(&path, "").unwrap();
         let mut file = fs::OpenOptions::new().append(true).open(&path).unwrap();
         for byte in complete.chunks(1) {
             file.write_all(byte).unwrap();
-            has_paused |= written.elapsed() > Duration::from_millis(80);
-            written = Instant::now();
+            has_paused |= last_write.elapsed() > Duration::from_millis(80);
+            last_write = Instant::now();
             let state = session.state();
             was_read |= state.reading;
             if has_paused {

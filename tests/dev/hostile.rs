@@ -25,7 +25,7 @@ fn invalid_messages_are_rejected_and_the_file_is_unchanged() {
     let path_rule = "must be a path, such as shapes[2].radius";
     let not_understood = "not understood: ";
     let mut messages = vec![
-        // values of other types, and values that are not numbers
+        // Values of other types, values out of range, and text that is not JSON.
         (radius("{}"), number_rule),
         (radius("{\"a\":1}"), number_rule),
         (radius("[0.5]"), number_rule),
@@ -69,7 +69,7 @@ fn invalid_messages_are_rejected_and_the_file_is_unchanged() {
             "must be one of the allowed names",
         ),
         (set("materials.red.type", &json!("glass")), not_editable),
-        // paths outside of the scene, and paths without a value
+        // Paths to keys that do not exist, invalid paths, and messages of the wrong structure.
         (set("shapes[0].radius.x", &json!(1)), not_editable),
         (set("shapes[18446744073709551616].radius", &json!(1)), "must"),
         (set("shapes[-1].radius", &json!(1)), "must"),
@@ -113,13 +113,13 @@ fn invalid_messages_are_rejected_and_the_file_is_unchanged() {
         ("\u{0}".to_owned(), not_understood),
         ("[".repeat(4000), not_understood),
     ];
-    // An absent key is checked in the same way.
+    // Values of keys that the scene file does not contain are checked, too.
     messages.push((set("render.shadow_epsilon", &json!("0.01")), number_rule));
     let mut failures = Vec::new();
     for (message, expected) in messages {
         let reason = viewer.send_rejected(&message);
-        let is_plain = reason.chars().count() < 400 && !reason.chars().any(char::is_control);
-        if !reason.contains(expected) || !is_plain || files.read("scene.toml") != SCENE {
+        let is_short_and_printable = reason.chars().count() < 400 && !reason.chars().any(char::is_control);
+        if !reason.contains(expected) || !is_short_and_printable || files.read("scene.toml") != SCENE {
             failures.push((message.chars().take(100).collect::<String>(), reason));
         }
     }

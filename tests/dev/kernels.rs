@@ -1,4 +1,4 @@
-//! Unused kernels are checked, too, and kernels whose loops a driver truncates are reported.
+//! Kernels that no view uses at the moment are checked, too. Kernels whose loops a driver truncates are reported.
 
 use wgray_dev::{Command, Move, View};
 
@@ -62,12 +62,12 @@ fn errors_in_unused_kernels_are_reported_at_once() {
     session.wait_for_rendered_image(&files);
 }
 
-/// Adds a loop of a million iterations without effect that no compiler can remove.
-fn long_loop(files: &Files, file: &str, before: &str) {
-    let rounds = "var rounds = 0u;
+/// Inserts a loop of a million iterations before `next_code`. The loop has no effect, but no compiler can remove it.
+fn insert_long_loop(files: &Files, file: &str, next_code: &str) {
+    let loop_code = "var rounds = 0u;
     for (var i = 0u; i < 1000000u + 0u * params.origin.x; i++) { rounds += (rounds ^ i) & params.loop_probe.y; }
     if rounds == 0xffffffffu { return; }\n    ";
-    files.edit(file, before, &format!("{rounds}{before}"));
+    files.edit(file, next_code, &format!("{loop_code}{next_code}"));
 }
 
 #[test]
@@ -81,19 +81,19 @@ fn a_truncated_loop_is_reported_or_the_image_is_complete() {
     let initial = session.colors();
     let expected = files.rendered_image();
     assert_eq!(initial, expected);
-    long_loop(&files, KERNEL, "var sum = film[index];");
+    insert_long_loop(&files, KERNEL, "var sum = film[index];");
     files.edit(KERNEL, RADIANCE, &format!("({RADIANCE} * vec4f(vec3f(0.5), 1.0))"));
-    let halved = |session: &TestSession| {
+    let is_halved = |session: &TestSession| {
         let colors = session.colors().colors;
         let pairs = colors.iter().flatten().zip(initial.colors.iter().flatten());
         pairs.into_iter().all(|(new, old)| *new == old * 0.5)
     };
     let is_truncated = session.wait("a problem or the complete image", |session| {
-        let message = problems(session)
+        let has_message = problems(session)
             .iter()
             .any(|message| message.contains("ends long loops early"));
-        let is_complete = session.frame().is_some_and(|frame| frame.header.done) && halved(session);
-        (message || is_complete).then_some(message)
+        let is_complete = session.frame().is_some_and(|frame| frame.header.done) && is_halved(session);
+        (has_message || is_complete).then_some(has_message)
     });
     if is_truncated {
         assert_eq!(session.state().problems[0].kind, "shader");
@@ -111,15 +111,15 @@ fn a_truncated_loop_is_reported_or_the_image_is_complete() {
     session.wait_for_rendered_image(&files);
 
     // The loop is in the kernel of another view, and only that view reports the error.
-    long_loop(&files, FIRST_HITS, "let pixel = params.origin");
+    insert_long_loop(&files, FIRST_HITS, "let pixel = params.origin");
     session.wait_for_no_problem();
     session.inner.send(Command::View(View::Normal));
     session.wait("a problem or the normals", |session| {
-        let message = problems(session)
+        let has_message = problems(session)
             .iter()
             .any(|message| message.contains("ends long loops early"));
         let frame = session.frame()?;
-        (message || frame.header.view == View::Normal && frame.header.done).then_some(())
+        (has_message || frame.header.view == View::Normal && frame.header.done).then_some(())
     });
     session.inner.send(Command::View(View::Color));
     session.wait_for_rendered_image(&files);

@@ -6,9 +6,9 @@ use super::running::{Files, SCENE};
 
 #[test]
 fn an_image_too_large_to_display_is_rendered_smaller() {
-    let cheap = SCENE.replace("count = 4 }", "count = 1 }");
+    let scene = SCENE.replace("count = 4 }", "count = 1 }");
     for (size, max_side) in [((3000, 3000), 3000), ((65_536, 1), 16_384), ((1, 65_536), 16_384)] {
-        let files = Files::new(&cheap);
+        let files = Files::new(&scene);
         let mut sources = files.sources();
         sources.overrides.size = Some(size);
         let session = super::running::TestSession::start(sources, None);
@@ -24,10 +24,10 @@ fn an_image_too_large_to_display_is_rendered_smaller() {
         assert!(frame.pixel(size.0 - 1, size.1 - 1).is_some() && frame.pixel(size.0, 0).is_none());
         let colors = session.colors();
         assert_eq!([colors.width, colors.height], header.finest);
-        // The result equals a render at the smaller size.
+        // The image equals a render at the smaller size.
         if size == (3000, 3000) {
             let [width, height] = header.finest;
-            let smaller = cheap.replace("width = 40", &format!("width = {width}"));
+            let smaller = scene.replace("width = 40", &format!("width = {width}"));
             let expected = Files::new(&smaller.replace("height = 30", &format!("height = {height}"))).rendered_image();
             assert!(colors == expected, "{width} x {height}");
         }

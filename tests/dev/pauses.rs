@@ -30,27 +30,27 @@ fn rendering_pauses_without_viewers() {
     session.wait("a first image", |session| session.frame());
     let second_viewer = session.inner.viewers().enter();
     drop(viewer);
-    let last = session.frame().unwrap();
+    let last_frame = session.frame().unwrap();
     session.wait("more samples for the second viewer", |session| {
-        (!Arc::ptr_eq(&session.frame()?, &last)).then_some(())
+        (!Arc::ptr_eq(&session.frame()?, &last_frame)).then_some(())
     });
     drop(second_viewer);
     std::thread::sleep(IDLE_TIME);
-    let last = session.frame().unwrap();
-    assert!(!last.header.done, "the image is already complete");
+    let last_frame = session.frame().unwrap();
+    assert!(!last_frame.header.done, "the image is already complete");
     std::thread::sleep(Duration::from_secs(1));
     assert!(
-        Arc::ptr_eq(&session.frame().unwrap(), &last),
+        Arc::ptr_eq(&session.frame().unwrap(), &last_frame),
         "rendering continued without viewers"
     );
     let _viewer = session.inner.viewers().enter();
     session.wait("more samples", |session| {
-        (!Arc::ptr_eq(&session.frame()?, &last)).then_some(())
+        (!Arc::ptr_eq(&session.frame()?, &last_frame)).then_some(())
     });
 }
 
 #[test]
-fn the_time_to_an_image_contains_the_time_to_compile() {
+fn the_time_to_an_image_includes_the_time_to_compile() {
     let files = Files::new(SCENE);
     let (sender, reports) = std::sync::mpsc::channel();
     let settings = Settings {
@@ -64,14 +64,14 @@ fn the_time_to_an_image_contains_the_time_to_compile() {
     let session = TestSession {
         inner: Session::start(settings).unwrap(),
     };
-    // A viewer that connects after the compilation did not wait for the compilation.
+    // The viewer connects after the compilation, so its time to the first image does not include the compilation.
     session.wait("a kernel", |session| session.state().compile_seconds);
     std::thread::sleep(IDLE_TIME);
     let _viewer = session.inner.viewers().enter();
     session.wait_for_rendered_image(&files);
     files.tint(0.5);
     session.wait_for_rendered_image(&files);
-    // A preview size that the viewer chooses is not reported as too large to display.
+    // A reduced size that the viewer requests is not reported as an image too large to display.
     session.inner.send(Command::Preview(Preview::try_from(2).unwrap()));
     session.wait("a preview", |session| {
         (session.frame()?.header.finest == [20, 15]).then_some(())

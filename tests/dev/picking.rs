@@ -1,4 +1,4 @@
-//! Picking of objects in placed meshes, in meshes with their own materials, and in glTF files.
+//! Picking of mesh instances, of meshes with their own materials, and of objects in glTF files.
 
 use std::fs;
 
@@ -9,7 +9,7 @@ use wgray_dev::{Command, Object, SceneView, Set, Sources};
 use super::running::{Files, TestSession};
 use crate::model::Model;
 
-/// The camera is at -y; the image covers about x = -2 to 2.
+/// The start of a scene. The camera is at -y, and the image covers about x = -2 to 2.
 const START: &str = "\
 image = { width = 40, height = 30 }
 camera = { position = [0, -4, 0], look_at = [0, 0, 0], fov = 40 }
@@ -21,7 +21,7 @@ const RIGHT: [u32; 2] = [30, 15];
 
 const TILE: &str = "v -0.4 0 -0.4\nv 0.4 0 -0.4\nv 0.4 0 0.4\nv -0.4 0 0.4\nf 1 2 3 4\n";
 
-/// A mesh with materials for the left and the right part.
+/// An OBJ file of two quads with different materials: bark on the left, leaf on the right.
 const PAIR: &str = "\
 mtllib pair.mtl
 v -1.4 0 -0.4
@@ -78,7 +78,7 @@ materials.green = {{ type = 'phong', color = [0.1, 0.8, 0.1] }}
 [meshes.tile]
 file = 'tile.obj'
 
-# the left one
+# the left instance
 [[instances]]
 mesh = 'tile'
 material = 'red'
@@ -91,7 +91,7 @@ material = 'green'
 center = [0, 0, 0]
 radius = 0.3
 
-# the right one
+# the right instance
 [[instances]]
 mesh = 'tile'
 material = 'green'
@@ -104,11 +104,16 @@ translate = [1, 0, 0]
     session.wait_for_rendered_image(&files);
     let scene = wait_for_view(&session);
     for (pixel, name, comment, expected) in [
-        (LEFT, "instances[0]", "# the left one", ["materials.red", "meshes.tile"]),
+        (
+            LEFT,
+            "instances[0]",
+            "# the left instance",
+            ["materials.red", "meshes.tile"],
+        ),
         (
             RIGHT,
             "instances[1]",
-            "# the right one",
+            "# the right instance",
             ["materials.green", "meshes.tile"],
         ),
     ] {
@@ -123,8 +128,8 @@ translate = [1, 0, 0]
     assert_eq!(scene.at([0, 0]).name, "render");
     let mesh = scene.object("meshes.tile", None);
     let file = mesh.groups[0].fields.iter().find(|field| field.name == "file").unwrap();
-    assert!(file.fixed.is_some(), "a viewer may replace the list of read files");
-    // The instance is moved away from the clicked pixel and picked at its new position.
+    assert!(file.fixed.is_some(), "a viewer can change which file is read");
+    // The instance moves away from the pixel and is picked at its new position.
     assert_eq!(set(&session, "instances[1].translate", json!([1, 0, 0.9])), None);
     assert_eq!(
         files.read("scene.toml"),
@@ -185,7 +190,7 @@ materials = {{ leaf = 'leaf' }}
         (groups(&crown), &crown.note),
         (vec!["shapes[0]", "materials.leaf"], &None)
     );
-    // A mesh part only takes materials of the scene; values of other files cannot be set.
+    // Only materials of the scene can be assigned to a mesh; values in other files cannot be set.
     for (path, value, expected) in [
         (
             "shapes[0].materials.leaf",
@@ -226,10 +231,10 @@ fn picking_a_gltf_file_reports_that_it_is_read_only() {
     let session = TestSession::start(sources, None);
     session.wait_for_complete_image(0);
     let scene = wait_for_view(&session);
-    let clicked = scene.at([12, 11]);
-    assert_eq!((clicked.name.as_str(), clicked.groups.len()), ("shapes[0]", 0));
+    let object = scene.at([12, 11]);
+    assert_eq!((object.name.as_str(), object.groups.len()), ("shapes[0]", 0));
     let message = "glTF files are read-only here; run `wgray convert` for an editable scene";
-    assert_eq!(clicked.gone.as_deref(), Some(message));
+    assert_eq!(object.gone.as_deref(), Some(message));
     for (name, _) in scene.objects("").objects {
         assert_eq!(scene.object(&name, None).gone.as_deref(), Some(message), "{name}");
     }
@@ -268,14 +273,14 @@ translate = [1, 0, -0.2]
     session.wait_for_rendered_image(&files);
     let scene = wait_for_view(&session);
     assert_eq!(scene.at(LEFT).name, "shapes[0]");
-    let clicked = scene.at(RIGHT);
+    let object = scene.at(RIGHT);
     assert_eq!(
-        (clicked.name.as_str(), groups(&clicked)),
+        (object.name.as_str(), groups(&object)),
         ("shapes[1]", vec!["shapes[1]"])
     );
-    assert_eq!(clicked.groups[0].line, line_number(&text, "# the model"));
+    assert_eq!(object.groups[0].line, line_number(&text, "# the model"));
     assert_eq!(
-        clicked.note.as_deref(),
+        object.note.as_deref(),
         Some("The object is part of a glTF file, which is read-only here. Run `wgray convert` for an editable scene.")
     );
     assert_eq!(set(&session, "shapes[1].translate", json!([1, 0, 0.7])), None);

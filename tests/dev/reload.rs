@@ -1,4 +1,4 @@
-//! Files that are saved, invalid, renamed, linked or deleted: the image always shows their latest valid state.
+//! Files are saved, damaged, renamed, linked or deleted: the image always shows their latest valid state.
 
 use std::fs;
 use std::time::{Duration, Instant};
@@ -39,12 +39,12 @@ fn a_partly_written_scene_is_not_an_error() {
     let session = files.start();
     session.wait_for_rendered_image(&files);
     let incomplete = &SCENE[..SCENE.find("radius").unwrap() + 3];
-    // On a busy machine a save may take too long, but not each of ten saves.
-    let is_silent = (0..10).any(|i| {
+    // On a busy machine, a single save may take too long, but not each of ten saves.
+    let is_not_reported = (0..10).any(|i| {
         let start = Instant::now();
         files.write("scene.toml", incomplete);
-        let mut was_silent = true;
-        let mut check = || was_silent &= session.state().problems.is_empty();
+        let mut has_no_problem = true;
+        let mut check = || has_no_problem &= session.state().problems.is_empty();
         while start.elapsed() < Duration::from_millis(50) {
             check();
             std::thread::sleep(Duration::from_millis(1));
@@ -57,9 +57,9 @@ fn a_partly_written_scene_is_not_an_error() {
             check();
             std::thread::sleep(Duration::from_millis(1));
         }
-        was_silent
+        has_no_problem
     });
-    assert!(is_silent);
+    assert!(is_not_reported);
     session.wait_for_rendered_image(&files);
     files.write("scene.toml", incomplete); // a file that remains incomplete is an error
     session.wait_for_problem();
@@ -70,11 +70,15 @@ fn a_saved_scene_is_compiled_only_if_it_needs_another_kernel() {
     let files = Files::new(SCENE);
     let session = files.start();
     session.wait_for_rendered_image(&files);
-    let (before, compiled) = (session.colors(), session.state().compile_seconds);
+    let (before, compile_seconds) = (session.colors(), session.state().compile_seconds);
     files.edit("scene.toml", "0.8, 0.1, 0.1", "0.1, 0.8, 0.1");
     session.wait_for_rendered_image(&files);
     assert_ne!(session.colors(), before);
-    assert_eq!(session.state().compile_seconds, compiled, "a kernel was compiled");
+    assert_eq!(
+        session.state().compile_seconds,
+        compile_seconds,
+        "a kernel was compiled"
+    );
     let before = session.colors();
     let new_shape = |shape: &str| format!("[[shapes]]\nmaterial = 'red'\n{shape}\n\n[[shapes]]");
     let sphere = new_shape("type = 'sphere'\ncenter = [1, 0, 1]\nradius = 0.3");
@@ -83,7 +87,7 @@ fn a_saved_scene_is_compiled_only_if_it_needs_another_kernel() {
     assert_ne!(session.colors(), before);
     assert_eq!(
         session.state().compile_seconds,
-        compiled,
+        compile_seconds,
         "a second sphere needed a compilation"
     );
     let triangle = new_shape("type = 'triangle'\nvertices = [[1, 0, 1], [1, 0, 2], [1, 1, 1]]");
@@ -91,8 +95,8 @@ fn a_saved_scene_is_compiled_only_if_it_needs_another_kernel() {
     session.wait_for_rendered_image(&files);
     assert_ne!(
         session.state().compile_seconds,
-        compiled,
-        "no other kernel was compiled"
+        compile_seconds,
+        "no kernel was compiled"
     );
     files.edit("scene.toml", "width = 40", "width = 33");
     session.wait_for_rendered_image(&files);
@@ -113,10 +117,10 @@ fn a_view_transform_is_applied_without_rendering_again() {
         exposure: 1.0,
     };
     let expected: Vec<u8> = linear.colors.iter().flat_map(|color| settings.rgb8(*color)).collect();
-    let page = image::load_from_memory(&frame.pictures[0]).unwrap().into_rgb8();
-    assert_eq!(*page.as_raw(), expected);
+    let displayed = image::load_from_memory(&frame.pictures[0]).unwrap().into_rgb8();
+    assert_eq!(*displayed.as_raw(), expected);
     assert_eq!(session.colors(), linear);
-    session.wait("the file", |_| {
+    session.wait("the output file", |_| {
         let picture = image::open(&out).ok()?.into_rgb8();
         (*picture.as_raw() == expected).then_some(())
     });
@@ -157,14 +161,14 @@ fn an_invalid_shader_is_reported_and_the_image_stays() {
     assert!(excerpt.contains("= sun;") && excerpt.contains("^^^"), "{excerpt}");
     std::thread::sleep(IDLE_TIME);
     assert_eq!((session.colors(), session.revision()), (valid_colors, revision));
-    // Changes that do not need the invalid shader take effect.
+    // Changes that need no new kernel take effect.
     session.inner.send(Command::Move(Move::Orbit(0.3, 0.0)));
     session.wait_for_complete_image(revision);
     session.inner.send(Command::ResetCamera);
     files.edit("scene.toml", "0.8, 0.1, 0.1", "0.1, 0.8, 0.1");
-    let scene_changed = Files::new(&files.read("scene.toml")).rendered_image();
+    let changed_image = Files::new(&files.read("scene.toml")).rendered_image();
     session.wait("the changed scene with the last valid shaders", |session| {
-        (session.colors() == scene_changed).then_some(())
+        (session.colors() == changed_image).then_some(())
     });
     // Changes that need another kernel take effect, too.
     files.edit(
@@ -172,9 +176,9 @@ fn an_invalid_shader_is_reported_and_the_image_stays() {
         "radius = 0.5",
         "radius = 0.5\n\n[[shapes]]\ntype = 'sphere'\nmaterial = 'red'\ncenter = [1, 0, 1]\nradius = 0.3",
     );
-    let scene_changed = Files::new(&files.read("scene.toml")).rendered_image();
+    let changed_image = Files::new(&files.read("scene.toml")).rendered_image();
     session.wait("a new kernel from the last valid shaders", |session| {
-        (session.colors() == scene_changed).then_some(())
+        (session.colors() == changed_image).then_some(())
     });
     assert_eq!(session.wait_for_problem().kind, "shader");
     files.tint(0.5);
@@ -378,36 +382,36 @@ fn a_pipe_or_a_device_instead_of_the_scene_is_reported() {
 }
 
 #[test]
-fn a_finished_kernel_is_shown_while_a_newer_save_waits_for_the_compiler() {
+fn the_image_of_a_finished_kernel_is_shown_while_a_newer_save_waits_for_the_compiler() {
     let files = Files::new(SCENE);
     let session = files.start();
     session.wait_for_rendered_image(&files);
-    let compile = Duration::from_secs_f64(session.state().compile_seconds.unwrap());
+    let compile_time = Duration::from_secs_f64(session.state().compile_seconds.unwrap());
     let revision = session.revision();
     let start = Instant::now();
     let mut saves = 0;
     while session.revision() == revision {
         assert!(
-            start.elapsed() < 10 * compile,
+            start.elapsed() < 10 * compile_time,
             "{saves} saves in {:?}, no image",
             start.elapsed()
         );
         saves += 1;
         files.tint(1.0 / f64::from(saves + 1));
-        std::thread::sleep((compile / 3).max(Duration::from_millis(60)));
+        std::thread::sleep((compile_time / 3).max(Duration::from_millis(60)));
     }
     assert!(saves > 1);
     session.wait_for_rendered_image(&files);
 }
 
 #[test]
-fn a_comment_in_a_shader_is_not_compiled_and_later_errors_have_the_correct_line() {
+fn a_new_comment_in_a_shader_causes_no_compilation_and_later_errors_have_the_correct_line() {
     let files = Files::new(SCENE);
     let session = files.start();
     session.wait_for_rendered_image(&files);
     let (revision, before) = (session.revision(), session.state());
     files.write(KERNEL, &format!("// one\n// two\n{}", files.read(KERNEL)));
-    session.wait("the save", |session| {
+    session.wait("the saved comment", |session| {
         (session.state().scenes > before.scenes).then_some(())
     });
     std::thread::sleep(IDLE_TIME);
@@ -431,7 +435,7 @@ fn a_comment_in_a_shader_is_not_compiled_and_later_errors_have_the_correct_line(
 }
 
 #[test]
-fn reading_a_changed_scene_is_reported_until_it_is_read() {
+fn the_state_reports_a_changed_scene_until_it_is_read() {
     let files = Files::new(SCENE);
     let session = files.start();
     session.wait_for_rendered_image(&files);

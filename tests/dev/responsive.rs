@@ -1,4 +1,4 @@
-//! Saves and moves do not wait for an image that takes minutes.
+//! Saved files and camera moves do not wait for an image that takes minutes.
 
 use std::time::{Duration, Instant};
 
@@ -42,7 +42,7 @@ fn a_save_or_a_move_does_not_wait_for_the_image() {
         });
         max_time = max_time.max(start.elapsed());
     }
-    // The complete image takes minutes; the target is 0.3 s on an idle machine.
+    // The complete image takes minutes; the target for the next image is 0.3 s on an idle machine.
     assert!(max_time < Duration::from_secs(5), "{max_time:?}");
     assert!(!session.frame().unwrap().header.done);
 }

@@ -18,9 +18,9 @@ use wgray_render::job::{self, WorkSplit};
 use wgray_render::pack::pack;
 use wgray_render::records::Packed;
 
-/// Timeout of all waits, even on a busy machine.
+/// Timeout of all waits, long enough for a busy machine.
 pub const TIMEOUT: Duration = Duration::from_secs(40);
-/// Time after which a session without events is idle.
+/// Time after which a session has handled all events and is idle.
 pub const IDLE_TIME: Duration = Duration::from_millis(400);
 
 pub const SCENE: &str = "# a small scene
@@ -65,9 +65,9 @@ normal = [0, 0, 1]
 tangent = [1, 0, 0]
 ";
 
-/// A shader on which every pixel of the image depends.
+/// The kernel that computes the color of every pixel.
 pub const KERNEL: &str = "shaders/kernels/render.wgsl";
-/// The expression that the kernel sums.
+/// The expression in the kernel whose values are summed.
 pub const RADIANCE: &str = "path_value(path)";
 
 /// A temporary folder with a scene and shaders.
@@ -106,7 +106,7 @@ impl Files {
         fs::write(self.path(name), text).unwrap();
     }
 
-    /// Saves a file by renaming another one, as most editors do.
+    /// Saves a file as most editors do: writes a new file and renames it.
     pub fn save_by_rename(&self, name: &str, text: &str) {
         self.write("new~", text);
         fs::rename(self.path("new~"), self.path(name)).unwrap();
@@ -118,7 +118,7 @@ impl Files {
         self.write(name, &text.replacen(old, new, 1));
     }
 
-    /// Saves a kernel that scales the image.
+    /// Saves a kernel that multiplies the colors of the image by `factor`.
     pub fn tint(&self, factor: f64) {
         let kernel = Shaders::built_in().text("kernels/render.wgsl").to_string();
         assert!(kernel.contains(RADIANCE));
@@ -197,7 +197,7 @@ impl TestSession {
         let settings = Settings {
             sources,
             device: AdapterChoice::Auto,
-            only_for_viewers: out.is_some(), // must have no effect with an output file
+            only_for_viewers: out.is_some(), // has no effect if there is an output file
             out,
             editor: None,
             report: Box::new(|_| ()),
@@ -227,17 +227,17 @@ impl TestSession {
         panic!(
             "{event}: not within {TIMEOUT:?}; state: {:?}, frame: {:?}",
             self.state(),
-            self.frame().map(|f| f.header.clone())
+            self.frame().map(|frame| frame.header.clone())
         );
     }
 
-    /// Waits for a complete image that is newer than a revision.
+    /// Waits for a complete image that is newer than `revision`.
     #[track_caller]
-    pub fn wait_for_complete_image(&self, after: u64) -> Arc<Frame> {
+    pub fn wait_for_complete_image(&self, revision: u64) -> Arc<Frame> {
         self.wait("a finished image", |session| {
             session
                 .frame()
-                .filter(|frame| frame.header.done && frame.header.revision > after)
+                .filter(|frame| frame.header.done && frame.header.revision > revision)
         })
     }
 

@@ -1,4 +1,4 @@
-//! The server only answers requests of its own pages.
+//! The server answers only requests from its own page.
 
 use std::io::{Read as _, Write as _};
 use std::net::{SocketAddr, TcpStream};
@@ -15,9 +15,9 @@ fn send_request(address: SocketAddr, request: &str) -> (String, String) {
     let mut response = String::new();
     let mut buffer = [0; 4096];
     while !is_complete(&response) {
-        let n = stream.read(&mut buffer).unwrap();
-        assert_ne!(n, 0, "the response is incomplete: {response}");
-        response.push_str(&String::from_utf8_lossy(&buffer[..n]));
+        let length = stream.read(&mut buffer).unwrap();
+        assert_ne!(length, 0, "the response is incomplete: {response}");
+        response.push_str(&String::from_utf8_lossy(&buffer[..length]));
     }
     (response.lines().next().unwrap_or_default().to_string(), response)
 }
@@ -44,7 +44,7 @@ fn upgrade(host: &str, origin: &str) -> String {
 }
 
 #[test]
-fn the_server_answers_its_own_pages_only() {
+fn the_server_answers_only_requests_from_its_own_page() {
     let files = Files::new(SCENE);
     let session = files.start();
     session.wait_for_rendered_image(&files);
@@ -127,7 +127,7 @@ fn the_server_answers_its_own_pages_only() {
 
     // The number of viewers is limited; a viewer that disconnects makes room for another viewer.
     let request = upgrade(&own_host, &format!("Origin: http://{own_host}\r\n"));
-    let mut open = Vec::new();
+    let mut connections = Vec::new();
     let status = loop {
         let mut stream = TcpStream::connect(address).unwrap();
         stream.set_read_timeout(Some(TIMEOUT)).unwrap();
@@ -137,26 +137,26 @@ fn the_server_answers_its_own_pages_only() {
         if head != *b"HTTP/1.1 101" {
             break head;
         }
-        open.push(stream);
-        assert!(open.len() <= 16, "the number of viewers is not limited");
+        connections.push(stream);
+        assert!(connections.len() <= 16, "the number of viewers is not limited");
     };
     assert_eq!(status, *b"HTTP/1.1 503");
-    assert!(open.len() >= 15, "{}", open.len());
+    assert!(connections.len() >= 15, "{}", connections.len());
     // Viewers that read no messages do not block the session.
     for _ in 0..20 {
         let revision = session.revision();
         session.inner.send(Command::Move(Move::Orbit(0.1, 0.0)));
         session.wait_for_complete_image(revision);
     }
-    // A text of 5,000 bytes, masked with zeros, is too large and ends the connection.
-    let mut large = vec![0x81, 0x80 | 126, 0x13, 0x88, 0, 0, 0, 0];
-    large.resize(8 + 5000, b' ');
-    let mut stream = open.pop().unwrap();
-    stream.write_all(&large).unwrap();
+    // A text message of 5,000 bytes, masked with zeros, exceeds the limit and ends the connection.
+    let mut large_message = vec![0x81, 0x80 | 126, 0x13, 0x88, 0, 0, 0, 0];
+    large_message.resize(8 + 5000, b' ');
+    let mut stream = connections.pop().unwrap();
+    stream.write_all(&large_message).unwrap();
     let mut rest = Vec::new();
     let end = stream.read_to_end(&mut rest);
     assert!(end.is_ok() || end.is_err_and(|error| error.kind() == std::io::ErrorKind::ConnectionReset));
-    drop(open);
+    drop(connections);
     session.wait("a free slot", |_| {
         (send_request(address, &request).0 == "HTTP/1.1 101 Switching Protocols").then_some(())
     });
@@ -169,10 +169,10 @@ fn images_are_not_sent_to_foreign_origins_and_are_only_accepted_from_the_page() 
     session.wait_for_rendered_image(&files);
     let (session, address) = serve(session);
     let own_host = address.to_string();
-    for (path, kind) in [("/picture.png", "image/png"), ("/picture.exr", "image/x-exr")] {
+    for (path, mime_type) in [("/picture.png", "image/png"), ("/picture.exr", "image/x-exr")] {
         let (status, text) = send_request(address, &get(path, &own_host, ""));
         assert_eq!(status, "HTTP/1.1 200 OK", "{path}");
-        assert!(text.contains(kind) && text.contains("same-origin"), "{path}");
+        assert!(text.contains(mime_type) && text.contains("same-origin"), "{path}");
         let foreign = get(path, &own_host, "Origin: http://evil.example\r\n");
         assert_eq!(send_request(address, &foreign).0, "HTTP/1.1 403 Forbidden");
     }
@@ -196,7 +196,7 @@ fn images_are_not_sent_to_foreign_origins_and_are_only_accepted_from_the_page() 
 }
 
 #[test]
-fn incomplete_requests_time_out_and_do_not_block_others() {
+fn incomplete_requests_time_out_and_do_not_block_other_requests() {
     let files = Files::new(SCENE);
     let (_, address) = serve(files.start());
     let incomplete = [
@@ -204,7 +204,7 @@ fn incomplete_requests_time_out_and_do_not_block_others() {
         "GET / HTTP/1.1\r\nHost: ",
         &format!("POST / HTTP/1.1\r\nHost: {address}\r\nContent-Length: 9\r\n\r\nx"),
     ];
-    let open: Vec<TcpStream> = (0..200)
+    let connections: Vec<TcpStream> = (0..200)
         .map(|i| {
             let mut stream = TcpStream::connect(address).unwrap();
             stream.set_read_timeout(Some(TIMEOUT)).unwrap();
@@ -218,7 +218,7 @@ fn incomplete_requests_time_out_and_do_not_block_others() {
         "HTTP/1.1 200 OK"
     );
     assert!(start.elapsed() < Duration::from_secs(3), "{:?}", start.elapsed());
-    for mut stream in open {
+    for mut stream in connections {
         let end = stream.read_to_end(&mut Vec::new());
         assert!(end.is_ok() || end.is_err_and(|error| error.kind() == std::io::ErrorKind::ConnectionReset));
     }

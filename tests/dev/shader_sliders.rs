@@ -61,7 +61,7 @@ fn a_slider_equals_an_edit_without_a_compilation() {
     );
     let session = files.start();
     session.wait_for_rendered_image(&files);
-    let compiled = session.state().compile_seconds;
+    let compile_seconds = session.state().compile_seconds;
     let expected = SliderState {
         slider: Slider {
             file: FILE.to_string(),
@@ -76,8 +76,8 @@ fn a_slider_equals_an_edit_without_a_compilation() {
         value: Value::Number(0.5),
     };
     assert_eq!(slider(&session, "tint"), expected);
-    let first = session.colors();
-    let mut last = first.clone();
+    let initial_image = session.colors();
+    let mut previous_image = initial_image.clone();
     let mut edits = Vec::new();
     for (name, value, edit) in [
         ("tint", Value::Number(0.35), ("tint: f32 = 0.5", "tint: f32 = 0.35")),
@@ -87,20 +87,24 @@ fn a_slider_equals_an_edit_without_a_compilation() {
         ("hue", Value::Number(0.1), ("hue = 0.75", "hue = 0.1")),
     ] {
         edits.push(edit);
-        let edited = render_with_edits(&files, &edits);
-        assert_ne!(edited, last, "{name} has no effect");
+        let expected_image = render_with_edits(&files, &edits);
+        assert_ne!(expected_image, previous_image, "{name} has no effect");
         move_slider(&session, name, value);
-        wait_for(&session, &edited);
+        wait_for(&session, &expected_image);
         assert_eq!(slider(&session, name).value, value, "{name}");
-        last = edited;
+        previous_image = expected_image;
     }
-    assert_eq!(session.state().compile_seconds, compiled, "a kernel was compiled");
+    assert_eq!(
+        session.state().compile_seconds,
+        compile_seconds,
+        "a kernel was compiled"
+    );
     session
         .inner
         .send(Command::ResetSlider(FILE.to_string(), "hue".to_string()));
     wait_for(&session, &render_with_edits(&files, &edits[..4]));
     session.inner.send(Command::ResetSliders);
-    wait_for(&session, &first);
+    wait_for(&session, &initial_image);
 
     // Range and line of a slider follow the file without a compilation.
     files.edit(
@@ -108,11 +112,11 @@ fn a_slider_equals_an_edit_without_a_compilation() {
         "override tint: f32 = 0.5; // 0..1",
         "\noverride tint: f32 = 0.5; // 0..2",
     );
-    session.wait("the range", |session| {
+    session.wait("the new range", |session| {
         (slider(session, "tint").slider.max == 2.0).then_some(())
     });
     assert_eq!(slider(&session, "tint").slider.line, expected.slider.line + 1);
-    assert_eq!(session.state().compile_seconds, compiled);
+    assert_eq!(session.state().compile_seconds, compile_seconds);
     // An edited value in the file replaces the value of its slider; other sliders keep their values through a
     // compilation.
     move_slider(&session, "tint", Value::Number(0.9));
@@ -162,13 +166,13 @@ fn sliders_remain_while_a_shader_has_errors() {
     declare_overrides(&files, "override c: f32 = 0.5;", "min(1.0 / c, 1.0)");
     let session = files.start();
     session.wait_for_rendered_image(&files);
-    let (text, picture) = (files.read(KERNEL), session.colors());
+    let (text, initial_image) = (files.read(KERNEL), session.colors());
     move_slider(&session, "c", Value::Number(0.0));
-    wait_for(&session, &picture); // 1 / 0 is infinite, and the minimum is 1
+    wait_for(&session, &initial_image); // 1 / 0 is infinite, and the minimum of infinity and 1 is 1
     files.write(KERNEL, &text.replace("min(1.0 / c, 1.0)", "min(1.0 / d, 1.0)"));
     session.wait_for_problem();
     move_slider(&session, "c", Value::Number(1.0));
-    session.wait("the value", |session| {
+    session.wait("the moved slider", |session| {
         (slider(session, "c").value == Value::Number(1.0)).then_some(())
     });
     files.write(KERNEL, &text);

@@ -24,7 +24,7 @@ fn noisy_scene() -> String {
 }
 
 #[test]
-fn two_frames_at_most_are_in_flight_and_the_next_one_is_the_newest() {
+fn at_most_two_frames_are_in_flight_and_the_next_frame_is_the_newest() {
     let files = Files::new(SCENE);
     let session = files.start();
     session.wait_for_rendered_image(&files);
@@ -37,9 +37,9 @@ fn two_frames_at_most_are_in_flight_and_the_next_one_is_the_newest() {
         session.inner.send(Command::Move(Move::Orbit(0.1, 0.0)));
         session.wait_for_complete_image(revision);
     }
-    // Without acknowledgements, the viewer receives two frames and every state.
-    let newest = session.state().frame;
-    while reported_frame < newest {
+    // A viewer that acknowledges no frames receives two frames and every state.
+    let newest_frame = session.state().frame;
+    while reported_frame < newest_frame {
         match viewer.receive().unwrap() {
             Received::Frame(header, _) => frames.push(header),
             Received::Text(message) => reported_frame = message["state"]["frame"].as_u64().unwrap_or(reported_frame),
@@ -102,10 +102,10 @@ fn a_slow_connection_does_not_delay_camera_moves() {
             Received::Text(_) => {}
         }
     }
-    let frames = Duration::from_secs_f64(2.0 * max_size as f64 / RATE);
-    assert!(max_size > 4_000, "frames are too small to take time: {max_size}");
+    let two_frames = Duration::from_secs_f64(2.0 * max_size as f64 / RATE);
+    assert!(max_size > 4_000, "frames are too small for a slow transfer: {max_size}");
     assert!(
-        start.elapsed() < frames + Duration::from_secs(1),
+        start.elapsed() < two_frames + Duration::from_secs(1),
         "{:?}",
         start.elapsed()
     );

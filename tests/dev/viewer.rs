@@ -11,7 +11,7 @@ use super::running::TIMEOUT;
 /// A connection of a viewer.
 pub struct Viewer {
     stream: TcpStream,
-    /// Maximum rate in bytes per second.
+    /// Maximum rate of received bytes per second.
     rate: Option<f64>,
 }
 
@@ -78,22 +78,22 @@ impl Viewer {
         self.stream.set_read_timeout(Some(timeout)).unwrap();
     }
 
-    /// Returns the next message; `None` at the end of the connection or after the timeout.
+    /// Returns the next message, or `None` at the end of the connection or after the timeout.
     pub fn receive(&mut self) -> Option<Received> {
         loop {
-            let [kind, short] = self.read::<2>()?;
-            let length = match short {
+            let [opcode, short_length] = self.read::<2>()?;
+            let length = match short_length {
                 126 => u64::from(u16::from_be_bytes(self.read()?)),
                 127 => u64::from_be_bytes(self.read()?),
-                short => u64::from(short),
+                length => u64::from(length),
             };
             let mut body = vec![0; length as usize];
             self.fill(&mut body)?;
-            match kind & 0xf {
+            match opcode & 0xf {
                 1 => return Some(Received::Text(serde_json::from_slice(&body).unwrap())),
                 2 => {
-                    let length = u32::from_le_bytes(body[..4].try_into().unwrap()) as usize;
-                    let header = serde_json::from_slice(&body[4..4 + length]).unwrap();
+                    let header_length = u32::from_le_bytes(body[..4].try_into().unwrap()) as usize;
+                    let header = serde_json::from_slice(&body[4..4 + header_length]).unwrap();
                     return Some(Received::Frame(header, body.len()));
                 }
                 8 => return None,
@@ -102,7 +102,7 @@ impl Viewer {
         }
     }
 
-    /// Returns the next text message; `None` as for [`Viewer::receive`].
+    /// Returns the next text message, or `None` in the cases of [`Viewer::receive`].
     pub fn receive_text(&mut self) -> Option<Value> {
         loop {
             if let Received::Text(message) = self.receive()? {
@@ -121,16 +121,16 @@ impl Viewer {
         let Some(rate) = self.rate else {
             return self.stream.read_exact(bytes).ok();
         };
-        for part in bytes.chunks_mut(4096) {
+        for chunk in bytes.chunks_mut(4096) {
             let start = Instant::now();
-            self.stream.read_exact(part).ok()?;
-            let time = Duration::from_secs_f64(part.len() as f64 / rate);
-            std::thread::sleep(time.saturating_sub(start.elapsed()));
+            self.stream.read_exact(chunk).ok()?;
+            let min_time = Duration::from_secs_f64(chunk.len() as f64 / rate);
+            std::thread::sleep(min_time.saturating_sub(start.elapsed()));
         }
         Some(())
     }
 
-    /// Sends a message that must be rejected; returns the reason, from the answer or the following state.
+    /// Sends a message that must be rejected. Returns the reason, which is in the answer or in a later state.
     #[track_caller]
     pub fn send_rejected(&mut self, text: &str) -> String {
         self.send_text(text.as_bytes()).unwrap();

@@ -10,7 +10,7 @@ use wgray_render::cpu::Cpu;
 use super::running::{Files, IDLE_TIME, KERNEL, RADIANCE, SCENE, TestSession};
 
 #[test]
-fn the_camera_moves_and_is_saved_without_a_flicker() {
+fn the_camera_moves_and_is_saved_without_another_render() {
     let files = Files::new(SCENE);
     let session = files.start();
     session.wait_for_rendered_image(&files);
@@ -32,11 +32,11 @@ fn the_camera_moves_and_is_saved_without_a_flicker() {
     let state = session.state();
     assert!(state.camera_moved);
     // A scene file with the text of the moved camera gives the displayed image.
-    let from_text = {
+    let files_of_moved_camera = {
         let (start, end) = (SCENE.find("[camera]").unwrap(), SCENE.find("[render]").unwrap());
         Files::new(&format!("{}{}\n{}", &SCENE[..start], state.camera, &SCENE[end..]))
     };
-    assert_eq!(session.colors(), from_text.rendered_image());
+    assert_eq!(session.colors(), files_of_moved_camera.rendered_image());
     let (shown, revision) = (session.colors(), session.revision());
     session.inner.send(Command::SaveCamera);
     session.wait("the saved camera", |session| {
@@ -56,7 +56,7 @@ fn the_camera_moves_and_is_saved_without_a_flicker() {
     assert!(!notice.bad && notice.text.contains("scene.toml"), "{}", notice.text);
     std::thread::sleep(IDLE_TIME);
     assert_eq!(session.revision(), revision, "the image was rendered again");
-    // Undoing restores the text of the file, but not the camera of the view.
+    // Undo restores the text of the file, but not the camera of the displayed image.
     assert_eq!(session.state().undo.as_deref(), Some("camera"));
     session.inner.send(Command::UndoWrite);
     session.wait("the original file", |session| {
@@ -74,7 +74,7 @@ fn the_camera_moves_and_is_saved_without_a_flicker() {
 }
 
 #[test]
-fn an_edit_of_the_file_changes_only_the_edited_keys_of_a_moved_camera() {
+fn a_moved_camera_stays_until_its_position_in_the_file_is_edited() {
     let files = Files::new(SCENE);
     let session = files.start();
     session.wait_for_rendered_image(&files);
@@ -83,14 +83,14 @@ fn an_edit_of_the_file_changes_only_the_edited_keys_of_a_moved_camera() {
     session.wait_for_complete_image(before);
     let moved = session.state().camera.clone();
     files.edit("scene.toml", "fov = 40", "fov = 44");
-    let wide = moved.replace("fov = 40", "fov = 44");
-    session.wait("the moved camera with another field", |session| {
-        (session.state().camera == wide).then_some(())
+    let expected_camera = moved.replace("fov = 40", "fov = 44");
+    session.wait("the moved camera with the edited field of view", |session| {
+        (session.state().camera == expected_camera).then_some(())
     });
     assert!(session.state().camera_moved);
     files.edit("scene.toml", "position = [0, -4, 1]", "position = [0, -5, 1]");
     session.wait_for_rendered_image(&files);
-    assert!(!session.state().camera_moved, "the camera is still moved");
+    assert!(!session.state().camera_moved, "the camera still counts as moved");
 }
 
 #[test]
@@ -118,7 +118,7 @@ fn the_views_show_the_first_hits() {
         );
     }
     session.inner.send(Command::View(View::Samples));
-    let frame = session.wait("the counts", |session| {
+    let frame = session.wait("the sample counts", |session| {
         session.frame().filter(|frame| frame.header.view == View::Samples)
     });
     assert!(matches!(&frame.content, Content::Samples(counts, 4) if counts.iter().all(|count| *count == 4)));
@@ -128,7 +128,7 @@ fn the_views_show_the_first_hits() {
 
 #[test]
 fn another_view_shows_the_samples_of_a_paused_render() {
-    // The image takes minutes, but soon has a sample of each pixel.
+    // The complete image takes minutes, but each pixel soon has a sample.
     let slow = SCENE
         .replace("width = 40", "width = 120")
         .replace("height = 30", "height = 90");
@@ -143,7 +143,7 @@ fn another_view_shows_the_samples_of_a_paused_render() {
         (state.paused && !state.busy).then_some(())
     });
     session.inner.send(Command::View(View::Samples));
-    let frame = session.wait("the counts", |session| {
+    let frame = session.wait("the sample counts", |session| {
         session.frame().filter(|frame| frame.header.view == View::Samples)
     });
     assert!(frame.header.samples > 0 && !frame.header.done);
@@ -181,7 +181,7 @@ fn the_cpu_agrees_until_a_shader_is_changed() {
 }
 
 #[test]
-fn the_output_file_is_the_finished_image() {
+fn the_output_file_contains_the_finished_image() {
     let files = Files::new(SCENE);
     let out = files.path("pictures.png");
     let session = TestSession::start(files.sources(), Some(out.clone()));
@@ -194,7 +194,7 @@ fn the_output_file_is_the_finished_image() {
             .iter()
             .flat_map(|color| color.map(wgray::image::encode))
             .collect();
-        session.wait("the file", |_| {
+        session.wait("the output file", |_| {
             let picture = image::open(&out).ok()?.into_rgb8();
             (picture.dimensions() == (40, 30) && *picture.as_raw() == expected).then_some(())
         });

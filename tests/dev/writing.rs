@@ -45,17 +45,17 @@ fn a_new_value_is_written_and_shown() {
     session.wait_for_rendered_image(&files);
     assert_ne!(session.colors(), before);
     assert_eq!(session.state().undo.as_deref(), Some("materials.red.color"));
-    // Absent keys are added and removed. A value equal to the value in the file is not written.
+    // A value that equals the value in the file is not written. Keys can be added and removed.
     set(&session, "shapes[0].radius", json!(0.5), None);
     assert_eq!(session.state().undo.as_deref(), Some("materials.red.color"));
     set(&session, "render.seed", json!(3), None);
     assert!(files.read("scene.toml").contains("count = 4 }\nseed = 3\n\n[materials"));
     set(&session, "render.seed", Value::Null, None);
     assert!(!files.read("scene.toml").contains("seed"));
-    // An enumeration value that needs another kernel.
+    // This pattern needs another kernel.
     set(&session, "render.pixel_samples.pattern", json!("random"), None);
     session.wait_for_rendered_image(&files);
-    // Only edits of the file trigger the watcher.
+    // The file watcher reports edits of other programs, but not what the session writes.
     let scenes = session.state().scenes;
     std::thread::sleep(IDLE_TIME);
     assert_eq!(session.state().scenes, scenes);
@@ -98,7 +98,7 @@ fn setting_a_list_element_keeps_the_other_elements() {
     let center = |numbers: &str| original.replace("[0,  0, # here\n 0.5]", numbers);
     assert_eq!(files.read("scene.toml"), center("[0.25,  0, # here\n 1]"));
     session.wait_for_rendered_image(&files);
-    // Other elements of an absent list get their defaults.
+    // If the file does not contain the list, its other elements get their defaults.
     set(&session, "camera.up[0]", json!(0.5), None);
     assert!(files.read("scene.toml").contains("fov = 40\nup = [0.5, 0, 1]\n"));
     let text = files.read("scene.toml");
@@ -140,14 +140,14 @@ fn written_values_are_undone_and_redone() {
         set(&session, path, value, None);
         texts.push(files.read("scene.toml"));
     }
-    // A drag of a slider is one undo step.
+    // All values of one gesture, such as a drag, are one undo step.
     for i in 1..=20 {
         set(&session, "materials.red.shininess", json!(16 + i), Some(7));
     }
     assert_eq!(session.state().undo.as_deref(), Some("materials.red.shininess"));
     let last = files.read("scene.toml");
     assert!(last.contains("shininess = 36\r\n"), "{last}");
-    // Undoing a saved camera keeps the view.
+    // Undo of a saved camera does not move the camera of the displayed image.
     execute(&session, Command::Move(Move::Orbit(0.3, 0.1)));
     execute(&session, Command::SaveCamera);
     assert_eq!(session.state().undo.as_deref(), Some("camera"));
@@ -210,12 +210,12 @@ fn invalid_values_are_rejected_and_the_file_is_unchanged() {
         assert_eq!(files.read("scene.toml"), SCENE, "{path}");
     }
     assert_eq!(session.state().undo, None);
-    // A file with a syntax error must be fixed by hand.
+    // Values cannot be written into a file with a syntax error.
     files.edit("scene.toml", "radius = 0.5", "radius = ");
-    let broken = files.read("scene.toml");
+    let invalid_text = files.read("scene.toml");
     set(&session, "camera.fov", json!(50), None);
     assert!(rejection(&session).starts_with("fix the file first: "));
-    assert_eq!(files.read("scene.toml"), broken);
+    assert_eq!(files.read("scene.toml"), invalid_text);
     files.write("scene.toml", SCENE);
     set(&session, "camera.fov", json!(50), None);
     assert_eq!(files.read("scene.toml"), SCENE.replace("fov = 40", "fov = 50"));
@@ -235,7 +235,9 @@ fn changes_of_another_program_are_not_undone() {
         session.state().undo.is_none().then_some(())
     });
     assert_eq!(files.read("scene.toml"), edited);
-    session.wait("the change", |session| session.state().undo_blocked.clone());
+    session.wait("the change of the other program", |session| {
+        session.state().undo_blocked.clone()
+    });
     execute(&session, Command::UndoWrite);
     let message = rejection(&session);
     assert!(message.contains("changed by another program"), "{message}");

@@ -1,4 +1,4 @@
-//! The fault-injecting Vulkan driver: builds it and runs the program on it.
+//! Builds the fault-injecting Vulkan driver and runs the program on it.
 
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
@@ -7,10 +7,10 @@ use std::time::Duration;
 use std::{env, fs};
 
 use crate::cli::without_summary;
-use crate::sources::path as project;
+use crate::sources::path as project_path;
 use crate::test_folder::TestFolder;
 
-/// A scene of 40 x 30 pixels, each with different random sample positions.
+/// A scene of 40 x 30 pixels with different random samples in each pixel.
 pub const SCENE: &str = r#"image = { width = 40, height = 30 }
 camera = { position = [0, -5, 1], look_at = [0, 0, 1], fov = 40 }
 [render]
@@ -48,7 +48,8 @@ pub struct Driver {
     lavapipe: PathBuf,
 }
 
-/// Builds the driver. If lavapipe is missing, returns `None` if `WGRAY_TEST_WITHOUT_GPU` is 1, and panics otherwise.
+/// Builds the driver on the first call. If lavapipe is missing, returns `None` if `WGRAY_TEST_WITHOUT_GPU` is 1, and
+/// panics otherwise.
 pub fn driver() -> Option<&'static Driver> {
     static DRIVER: OnceLock<Option<Driver>> = OnceLock::new();
     DRIVER.get_or_init(prepare).as_ref()
@@ -59,30 +60,30 @@ fn prepare() -> Option<Driver> {
         let is_optional = env::var_os("WGRAY_TEST_WITHOUT_GPU").is_some_and(|value| value == "1");
         assert!(
             is_optional,
-            "no manifest of lavapipe for the fault tests; on Debian, 'apt-get install mesa-vulkan-drivers'"
+            "the fault tests need lavapipe, whose manifest is missing; on Debian, run 'apt-get install mesa-vulkan-drivers'"
         );
         return None;
     };
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("faults");
     fs::create_dir_all(&folder).expect("a folder below target/");
-    // Files are renamed when complete, because tests run concurrently.
+    // Tests run concurrently, so each file is written to a temporary folder and moved when it is complete.
     let [library, manifest] = ["libfaults.so", "faults.json"].map(|name| folder.join(name));
     let temp_folder = tempfile::tempdir_in(&folder).expect("a temporary folder");
-    let built = temp_folder.path().join("libfaults.so");
+    let new_library = temp_folder.path().join("libfaults.so");
     let rustc = Command::new(env::var_os("RUSTC").unwrap_or("rustc".into()))
         .args(["--crate-type", "cdylib", "--edition", "2024", "-O", "-o"])
-        .args([&built, &project("tests/faults/icd.rs")])
+        .args([&new_library, &project_path("tests/faults/icd.rs")])
         .output()
         .expect("rustc runs");
     assert!(rustc.status.success(), "{}", String::from_utf8_lossy(&rustc.stderr));
-    fs::rename(&built, &library).expect("the renamed library");
+    fs::rename(&new_library, &library).expect("the renamed library");
     let json = serde_json::json!({
         "file_format_version": "1.0.0",
         "ICD": { "library_path": library, "api_version": api_version },
     });
-    let built = temp_folder.path().join("faults.json");
-    fs::write(&built, json.to_string()).expect("a manifest");
-    fs::rename(&built, &manifest).expect("the renamed manifest");
+    let new_manifest = temp_folder.path().join("faults.json");
+    fs::write(&new_manifest, json.to_string()).expect("a manifest");
+    fs::rename(&new_manifest, &manifest).expect("the renamed manifest");
     Some(Driver {
         manifest,
         library,
@@ -90,7 +91,7 @@ fn prepare() -> Option<Driver> {
     })
 }
 
-/// Returns lavapipe's library and Vulkan version.
+/// Returns the path of lavapipe's library and its Vulkan version, if lavapipe is installed.
 fn lavapipe() -> Option<(PathBuf, String)> {
     let mut manifests = Vec::new();
     for variable in ["VK_DRIVER_FILES", "VK_ICD_FILENAMES"] {
@@ -118,11 +119,12 @@ fn lavapipe() -> Option<(PathBuf, String)> {
 pub struct RunResult {
     pub code: i32,
     pub stderr: String,
+    /// Lines of the driver's log.
     pub log: Vec<String>,
     pub picture: Option<Picture>,
 }
 
-/// Channel names and the bits of the values.
+/// Channels of an image: the name and the bits of each value.
 pub type Picture = Vec<(String, Vec<u32>)>;
 
 impl RunResult {
@@ -131,7 +133,7 @@ impl RunResult {
         self.log.iter().filter(|line| line.starts_with(prefix)).count()
     }
 
-    pub fn lines(&self) -> Vec<&str> {
+    pub fn stderr_lines(&self) -> Vec<&str> {
         self.stderr.lines().collect()
     }
 }
@@ -141,7 +143,7 @@ impl TestFolder {
         TestFolder::with_file("scene.toml", scene)
     }
 
-    /// Returns a command that runs the program on the driver with these faults.
+    /// Returns a command that renders on the driver with these faults; `arguments` follow the scene and the output.
     pub fn command_on(&self, driver: &Driver, arguments: &[&str], faults: &[(&str, &str)]) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_wgray"));
         command
@@ -153,7 +155,7 @@ impl TestFolder {
         command
     }
 
-    /// Runs the program, which must leave no files except an image.
+    /// Runs the program and checks that no temporary files remain.
     pub fn run_on(&self, driver: &Driver, arguments: &[&str], faults: &[(&str, &str)]) -> RunResult {
         let out = self.path("out.exr");
         for name in ["out.exr", "log"] {
@@ -166,7 +168,7 @@ impl TestFolder {
             .expect("the program runs");
         let is_expected = |name: &str| ["scene.toml", "log", "out.exr"].contains(&name) || name.ends_with(".png");
         let unexpected = self.files_except(is_expected);
-        assert_eq!(unexpected, [""; 0], "temporary files are left");
+        assert_eq!(unexpected, [""; 0], "temporary files remain");
         let stderr = without_summary(&String::from_utf8(output.stderr).expect("UTF-8"));
         assert!(
             !stderr.contains("panicked") && !stderr.contains("backtrace"),
@@ -212,7 +214,7 @@ fn read(path: &Path) -> Picture {
     let bits = |samples: &exr::prelude::FlatSamples| match samples {
         exr::prelude::FlatSamples::F32(values) => values.iter().map(|value| value.to_bits()).collect(),
         exr::prelude::FlatSamples::U32(values) => values.clone(),
-        exr::prelude::FlatSamples::F16(_) => panic!("half precision"),
+        exr::prelude::FlatSamples::F16(_) => panic!("an unexpected channel of half floats"),
     };
     let channels = image.layer_data.channel_data.list.iter();
     channels

@@ -5,18 +5,18 @@
 //!
 //! | variable | meaning |
 //! | --- | --- |
-//! | `FAULTS_DRIVER` | the library of the driver to forward to |
-//! | `FAULTS_ITSELF` | this library, which stays loaded to keep its counters |
-//! | `FAULTS_LOG` | a file to which a line per event is appended |
-//! | `FAULTS_LOSE` | comma-separated submits that lose the device, or `every:N` for the N-th submit of each device |
-//! | `FAULTS_LOSE_IN` | function that returns the loss first: `submit`, `status` (fence or semaphore query), `wait` |
+//! | `FAULTS_DRIVER` | path of the library of the driver to forward to |
+//! | `FAULTS_ITSELF` | path of this library, which stays loaded to keep its counters |
+//! | `FAULTS_LOG` | path of a file to which a line per event is appended |
+//! | `FAULTS_LOSE` | numbers of submits that lose the device, such as `2,7`; `every:N`: the N-th submit of each device |
+//! | `FAULTS_LOSE_IN` | function that first returns `VK_ERROR_DEVICE_LOST`: `submit`, `status` (fence, semaphore), `wait` |
 //! | `FAULTS_REFUSE` | number of device creations that fail after each loss |
 //! | `FAULTS_REFUSE_FIRST` | number of device creations that fail at the start |
 //! | `FAULTS_REFUSE_WITH` | error code of these failures, by default `VK_ERROR_INITIALIZATION_FAILED` |
-//! | `FAULTS_IDLE` | return code of waiting for an idle queue of a lost device, by default `VK_ERROR_DEVICE_LOST` |
-//! | `FAULTS_LARGEST` | maximum size in bytes of an allocation; larger ones fail |
-//! | `FAULTS_NO_MEMORY_FROM` | this allocation and all later ones fail |
-//! | `FAULTS_NO_MEMORY_IN` | the submit that fails for lack of memory |
+//! | `FAULTS_IDLE` | return code of the wait-idle functions of a lost device, by default `VK_ERROR_DEVICE_LOST` |
+//! | `FAULTS_LARGEST` | maximum size in bytes of an allocation; larger allocations fail |
+//! | `FAULTS_NO_MEMORY_FROM` | number of the first allocation that fails; all later allocations fail, too |
+//! | `FAULTS_NO_MEMORY_IN` | number of a submit that fails because memory is exhausted |
 //! | `FAULTS_SLEEP` | `N:MS`: the N-th submit first sleeps for MS milliseconds |
 
 use std::ffi::{CStr, CString, c_char, c_int, c_void};
@@ -46,11 +46,11 @@ const RTLD_NODELETE: c_int = 0x1000;
 static SUBMITS: AtomicU64 = AtomicU64::new(0);
 static SUBMITS_OF_DEVICE: AtomicU64 = AtomicU64::new(0);
 static ALLOCATIONS: AtomicU64 = AtomicU64::new(0);
-/// A function has returned the loss; all later calls return the loss, too.
+/// True after a function has returned `VK_ERROR_DEVICE_LOST`; all later calls return it, too.
 static LOST: AtomicBool = AtomicBool::new(false);
-/// The device is lost, but the function of `FAULTS_LOSE_IN` has not been called.
+/// True from the submit that loses the device until the function in `FAULTS_LOSE_IN` returns the loss.
 static LOSS_PENDING: AtomicBool = AtomicBool::new(false);
-/// Number of device creations still to fail.
+/// Number of device creations that will fail; negative before the first device creation.
 static TO_REFUSE: AtomicI64 = AtomicI64::new(-1);
 
 fn variable<T: FromStr>(name: &str) -> Option<T> {
@@ -96,18 +96,19 @@ pub unsafe extern "system" fn vk_icdGetInstanceProcAddr(instance: Handle, name: 
     unsafe { replaced(name, real(instance, name)) }
 }
 
-/// Replacements of driver functions: names, static for the driver's function, replacement and its type.
+/// Declares replacements of driver functions. Each line lists the names of the function, the static that stores the
+/// driver's function, the replacement and its type.
 macro_rules! replacements {
-    ($($name:literal $($other:literal)* => $original:ident, $function:ident: fn($($ty:ty),*) -> $result:ty;)*) => {
+    ($($name:literal $($alias:literal)* => $original:ident, $function:ident: fn($($ty:ty),*) -> $result:ty;)*) => {
         $(static $original: AtomicPtr<c_void> = AtomicPtr::new(null_mut());)*
 
-        /// Returns the replacement of a function, or the function itself.
+        /// Returns the replacement of the function `name`, or `real` if the function has no replacement.
         unsafe fn replaced(name: *const c_char, real: Function) -> Function {
             if real.is_null() {
                 return real;
             }
             match unsafe { CStr::from_ptr(name) }.to_bytes() {
-                $($name $(| $other)* => {
+                $($name $(| $alias)* => {
                     $original.store(real, SeqCst);
                     let function: unsafe extern "system" fn($($ty),*) -> $result = $function;
                     function as Function
@@ -140,6 +141,7 @@ replacements! {
         GET_COUNTER, get_counter: fn(Handle, u64, *mut u64) -> Code;
 }
 
+/// `VkMemoryAllocateInfo`.
 #[repr(C)]
 struct Allocation {
     kind: i32,
@@ -175,8 +177,8 @@ unsafe extern "system" fn allocate_memory(device: Handle, info: *const Allocatio
     let number = 1 + ALLOCATIONS.fetch_add(1, SeqCst);
     let size = unsafe { (*info).size };
     let is_too_large = variable("FAULTS_LARGEST").is_some_and(|max_size: u64| size > max_size);
-    let is_too_late = variable("FAULTS_NO_MEMORY_FROM").is_some_and(|first: u64| number >= first);
-    if is_too_large || is_too_late {
+    let is_memory_exhausted = variable("FAULTS_NO_MEMORY_FROM").is_some_and(|first: u64| number >= first);
+    if is_too_large || is_memory_exhausted {
         log(&format!("allocation {number} of {size} refused"));
         return OUT_OF_DEVICE_MEMORY;
     }
@@ -184,17 +186,19 @@ unsafe extern "system" fn allocate_memory(device: Handle, info: *const Allocatio
     unsafe { real::allocate_memory()(device, info, host, out) }
 }
 
-/// Returns true if a submit loses the device; `process_submit` counts in the process, `device_submit` on the device.
+/// Returns true if a submit loses the device. `process_submit` is its number among the submits of the process,
+/// `device_submit` among those of its device.
 fn loses(process_submit: u64, device_submit: u64) -> bool {
     let Ok(spec) = std::env::var("FAULTS_LOSE") else {
         return false;
     };
     match spec.strip_prefix("every:") {
-        Some(n) => n.parse() == Ok(device_submit),
-        None => spec.split(',').any(|n| n.parse() == Ok(process_submit)),
+        Some(number) => number.parse() == Ok(device_submit),
+        None => spec.split(',').any(|number| number.parse() == Ok(process_submit)),
     }
 }
 
+/// Marks the device as lost; `function` is the first to return the error.
 fn lose(function: &str) -> Code {
     log(&format!("lost in {function}"));
     LOST.store(true, SeqCst);
@@ -203,7 +207,7 @@ fn lose(function: &str) -> Code {
     DEVICE_LOST
 }
 
-/// Returns true if `function` is the first to return the pending loss.
+/// Returns true if a loss is pending and `function` is the first to return it.
 fn is_first_to_return_loss(function: &str) -> bool {
     LOSS_PENDING.load(SeqCst) && std::env::var("FAULTS_LOSE_IN").is_ok_and(|first| first == function)
 }
@@ -215,23 +219,23 @@ unsafe fn submit(queue: Handle, forward: impl FnOnce() -> Code) -> Code {
     let process_submit = 1 + SUBMITS.fetch_add(1, SeqCst);
     let device_submit = 1 + SUBMITS_OF_DEVICE.fetch_add(1, SeqCst);
     log(&format!("submit {process_submit}"));
-    if let Some((n, milliseconds)) = std::env::var("FAULTS_SLEEP")
+    if let Some((number, milliseconds)) = std::env::var("FAULTS_SLEEP")
         .ok()
         .as_deref()
         .and_then(|s| s.split_once(':'))
-        && n.parse() == Ok(process_submit)
+        && number.parse() == Ok(process_submit)
     {
         log("sleep");
         std::thread::sleep(Duration::from_millis(milliseconds.parse().unwrap_or(0)));
     }
     if variable("FAULTS_NO_MEMORY_IN") == Some(process_submit) {
-        log("no memory for a submit");
+        log("out of memory in a submit");
         return OUT_OF_DEVICE_MEMORY;
     }
     if !loses(process_submit, device_submit) {
         return forward();
     }
-    // The wrapped driver first finishes all work, so that its objects can be released.
+    // The wrapped driver finishes all dispatches first, because wgpu then releases their objects.
     let loses_later = std::env::var("FAULTS_LOSE_IN").is_ok_and(|first| first != "submit");
     let code = if loses_later { forward() } else { SUCCESS };
     unsafe { real::queue_wait_idle()(queue) };
@@ -250,7 +254,7 @@ unsafe extern "system" fn queue_submit_2(queue: Handle, count: u32, submits: Han
     unsafe { submit(queue, || real::queue_submit_2()(queue, count, submits, fence)) }
 }
 
-/// Returns the loss if the device is lost; otherwise forwards the call.
+/// Returns `VK_ERROR_DEVICE_LOST` if the device is lost; otherwise forwards the call.
 fn forward_unless_lost(function: &str, forward: impl FnOnce() -> Code) -> Code {
     if LOST.load(SeqCst) {
         return DEVICE_LOST;

@@ -1,4 +1,5 @@
-//! The library on a driver that loses its device. Environment variables select the driver, so a child process renders.
+//! The library on a driver that loses its device. Environment variables select the driver, so the library renders in a
+//! child process.
 
 use std::ops::ControlFlow;
 use std::process::Command;
@@ -9,8 +10,8 @@ use crate::test_folder::TestFolder;
 
 use super::driver::{SCENE, driver};
 
-/// Set in the child process to the path of the scene file.
-const FILE: &str = "WGRAY_TEST_FAULTS_SCENE";
+/// Environment variable of the child process: the path of the scene file.
+const SCENE_VARIABLE: &str = "WGRAY_TEST_FAULTS_SCENE";
 
 fn render(scene: &Scene, device: Device) -> Picture {
     let options = Options {
@@ -23,7 +24,9 @@ fn render(scene: &Scene, device: Device) -> Picture {
 /// Renders in the child process that [`images_survive_device_losses`] starts.
 #[test]
 fn render_in_the_child_process() {
-    let Ok(file) = std::env::var(FILE) else { return };
+    let Ok(file) = std::env::var(SCENE_VARIABLE) else {
+        return;
+    };
     let scene = Scene::load(&file).expect("a scene");
     let expected = render(&scene, Device::Cpu);
     let picture = render(&scene, Device::Gpu);
@@ -48,29 +51,30 @@ fn render_in_the_child_process() {
 fn images_survive_device_losses() {
     let Some(driver) = driver() else { return };
     let folder = TestFolder::with_scene(SCENE);
-    // The first image loses its samples; the second image, after 6 submits, loses samples and a readback.
-    for (lose, losses) in [("2", 1), ("2,7,10", 3), ("999", 0)] {
+    // Submit 2 renders samples of the first image, which needs 6 submits because of this loss. Submit 7 renders samples
+    // of the second image, and submit 10 is a readback.
+    for (lost_submits, losses) in [("2", 1), ("2,7,10", 3), ("999", 0)] {
         let log = folder.path("log");
         let _ = std::fs::remove_file(&log); // the log of the previous run
         let output = Command::new(std::env::current_exe().expect("this program"))
             .args(["--exact", "--nocapture", "faults::library::render_in_the_child_process"])
             .envs(driver.environment(&log))
-            .env(FILE, folder.path("scene.toml"))
-            .envs([("FAULTS_LOSE", lose), ("FAULTS_LOSE_IN", "wait")])
+            .env(SCENE_VARIABLE, folder.path("scene.toml"))
+            .envs([("FAULTS_LOSE", lost_submits), ("FAULTS_LOSE_IN", "wait")])
             .output()
             .expect("the test program runs");
         assert!(
             output.status.success(),
-            "{lose}: {}",
+            "{lost_submits}: {}",
             String::from_utf8_lossy(&output.stdout)
         );
-        // wgpu panics at a loss, and this process has no quiet panic hook.
+        // wgpu panics at each loss, and the child process prints these panics because it installs no panic hook.
         let panics = String::from_utf8_lossy(&output.stderr)
             .matches("Error in Device::poll")
             .count();
-        assert_eq!(panics, losses, "{lose}");
+        assert_eq!(panics, losses, "{lost_submits}");
         let log = std::fs::read_to_string(&log).expect("the driver's log");
-        assert_eq!(log.matches("lost").count(), losses, "{lose}: {log}");
-        assert!(log.contains("submit 7\n"), "{lose}: {log}");
+        assert_eq!(log.matches("lost").count(), losses, "{lost_submits}: {log}");
+        assert!(log.contains("submit 7\n"), "{lost_submits}: {log}");
     }
 }

@@ -11,15 +11,15 @@ use super::driver::{RunResult, SCENE, driver};
 /// Values of `FAULTS_LOSE_IN`.
 const LOSS_FUNCTIONS: [&str; 3] = ["submit", "status", "wait"];
 
-/// Submits of [`SCENE`]: warm-up, samples, film, first hits, readback.
+/// Number of submits of a render of [`SCENE`]: warm-up, samples, film, first hits, readback.
 const SUBMITS: usize = 5;
 
 const GPU: [&str; 2] = ["--device", "gpu"];
 const AUTO: [&str; 2] = ["--device", "auto"];
 
-/// Checks that the messages are `reopened` warnings, followed by lines that start with `other_lines`.
+/// Checks the messages: `reopened` warnings about re-opened devices, then lines that start with `other_lines`.
 fn assert_reopened(result: &RunResult, reopened: usize, other_lines: &[&str]) {
-    let lines = result.lines();
+    let lines = result.stderr_lines();
     assert_eq!(lines.len(), reopened + other_lines.len(), "{}", result.stderr);
     for line in &lines[..reopened] {
         assert!(line.starts_with("warning: llvmpipe"), "{line}");
@@ -32,7 +32,7 @@ fn assert_reopened(result: &RunResult, reopened: usize, other_lines: &[&str]) {
 }
 
 #[test]
-fn without_faults_the_driver_renders_as_lavapipe_does() {
+fn without_faults_the_image_equals_the_image_of_the_cpu() {
     let Some(driver) = driver() else { return };
     let folder = TestFolder::with_scene(SCENE);
     let expected = folder.render_expected(driver, &[]);
@@ -47,7 +47,7 @@ fn without_faults_the_driver_renders_as_lavapipe_does() {
         );
         assert!(result.picture == Some(expected.clone()), "{device:?}");
     }
-    // Negative control: another seed.
+    // Negative control: another seed gives another image.
     let other_seed = folder.run_on(driver, &["--device", "gpu", "--seed", "7"], &[]);
     assert!(other_seed.code == 0 && other_seed.picture != Some(expected));
 }
@@ -59,8 +59,12 @@ fn a_device_lost_at_any_submit_is_reopened() {
     let expected = folder.render_expected(driver, &[]);
     for function in LOSS_FUNCTIONS {
         for submit in 1..=SUBMITS {
-            let lose = submit.to_string();
-            let result = folder.run_on(driver, &GPU, &[("FAULTS_LOSE", &lose), ("FAULTS_LOSE_IN", function)]);
+            let lost_submits = submit.to_string();
+            let result = folder.run_on(
+                driver,
+                &GPU,
+                &[("FAULTS_LOSE", &lost_submits), ("FAULTS_LOSE_IN", function)],
+            );
             assert_eq!(result.code, 0, "{function} {submit}: {}", result.stderr);
             assert_reopened(&result, 1, &[]);
             let counts = (
@@ -83,21 +87,21 @@ fn a_device_lost_several_times_is_reopened_each_time() {
     assert_eq!((twice.code, twice.count("lost")), (0, 2), "{}", twice.stderr);
     assert_reopened(&twice, 2, &[]);
     assert!(twice.picture == Some(expected.clone()));
-    // Two losses in the samples, then two in the first hits: at the last submit but one and after the following
-    // warm-up. Four losses in a row would exceed the limit.
+    // Two losses during the samples and two during the first hits: at the second to last submit, and again after the
+    // next warm-up. Four losses in a row, without progress between them, would exceed the limit.
     let hits = twice.count("submit") - 1;
-    let lose = format!("2,4,{hits},{}", hits + 2);
-    // The number of submits before the first hits depends on timing, so a run may miss them.
-    let mut runs = (0..5).map(|_| folder.run_on(driver, &GPU, &[("FAULTS_LOSE", &lose)]));
+    let lost_submits = format!("2,4,{hits},{}", hits + 2);
+    // The number of submits before the first hits depends on timing, so the losses of a run may miss the first hits.
+    let mut runs = (0..5).map(|_| folder.run_on(driver, &GPU, &[("FAULTS_LOSE", &lost_submits)]));
     let result = runs.find(|result| (result.code, result.count("lost")) == (0, 4));
-    let result = result.unwrap_or_else(|| panic!("{lose}: no run of five survived four losses"));
+    let result = result.unwrap_or_else(|| panic!("{lost_submits}: none of five runs survived four losses"));
     assert_reopened(&result, 4, &[]);
     assert!(result.picture == Some(expected));
 }
 
-/// Losses in the middle of many dispatches.
+/// The device is lost once, in the middle of many dispatches.
 #[test]
-fn a_long_render_survives() {
+fn a_long_render_survives_a_device_loss() {
     let Some(driver) = driver() else { return };
     let folder = TestFolder::with_scene(SCENE);
     let size = ["--size", "512x512", "--spp", "16"];
@@ -120,44 +124,44 @@ fn a_long_render_survives() {
 }
 
 #[test]
-fn a_permanently_lost_device_is_an_error_or_the_cpu_renders() {
+fn a_permanent_device_loss_is_an_error_or_falls_back_to_the_cpu() {
     let Some(driver) = driver() else { return };
     let folder = TestFolder::with_scene(SCENE);
     let expected = folder.render_expected(driver, &[]);
-    // The cases run in parallel, because each run waits for a few seconds.
-    let check_permanent_loss = |lose: &str, device: &str| {
+    // The cases run in parallel, because each of them waits a few seconds for the device.
+    let check_permanent_loss = |lost_submits: &str, device: &str| {
         let folder = TestFolder::with_scene(SCENE);
-        let faults = [("FAULTS_LOSE", lose), ("FAULTS_REFUSE", "99")];
+        let faults = [("FAULTS_LOSE", lost_submits), ("FAULTS_REFUSE", "99")];
         let result = folder.run_on(driver, &["--device", device], &faults);
-        assert_eq!((result.code, result.picture.is_some()), (6, false), "{lose}");
+        assert_eq!((result.code, result.picture.is_some()), (6, false), "{lost_submits}");
         assert_reopened(&result, 1, &["error: llvmpipe"]);
         let end = "; it could not be opened again: the driver does not open the device";
         assert!(result.stderr.trim_end().ends_with(end), "{}", result.stderr);
         assert_eq!((result.count("device refused"), result.count("lost")), (3, 1));
         let requeue = ["--device", device, "--requeue-exit", "75"];
         let result = folder.run_on(driver, &requeue, &faults);
-        assert_eq!((result.code, result.picture.is_some()), (75, false), "{lose}");
+        assert_eq!((result.code, result.picture.is_some()), (75, false), "{lost_submits}");
         assert_reopened(
             &result,
             1,
             &["error: llvmpipe", "note: exit code 75 requests another attempt"],
         );
         let result = folder.run_on(driver, &[&AUTO[..], &requeue[2..]].concat(), &faults);
-        assert_eq!(result.code, 0, "{lose}: {}", result.stderr);
+        assert_eq!(result.code, 0, "{lost_submits}: {}", result.stderr);
         assert_reopened(&result, 1, &["warning: rendering on the CPU: llvmpipe"]);
-        assert!(result.picture == Some(expected.clone()), "{lose}");
+        assert!(result.picture == Some(expected.clone()), "{lost_submits}");
     };
     std::thread::scope(|scope| {
-        for (lose, device) in [("1", "gpu"), ("2", "llvmpipe"), ("4", "gpu")] {
+        for (lost_submits, device) in [("1", "gpu"), ("2", "llvmpipe"), ("4", "gpu")] {
             let check_permanent_loss = &check_permanent_loss;
-            scope.spawn(move || check_permanent_loss(lose, device));
+            scope.spawn(move || check_permanent_loss(lost_submits, device));
         }
     });
     let faults = [("FAULTS_LOSE", "2"), ("FAULTS_REFUSE", "99")];
     let result = folder.run_on(driver, &["--device", "auto", "--quiet"], &faults);
     assert_eq!((result.code, result.stderr.as_str()), (0, ""));
     assert!(result.picture == Some(expected.clone()));
-    // The program waits for a device that reopens late.
+    // The program waits for a device that cannot be re-opened at first.
     let faults = [("FAULTS_LOSE", "2"), ("FAULTS_REFUSE", "2")];
     let result = folder.run_on(driver, &GPU, &faults);
     assert_eq!(
@@ -171,43 +175,48 @@ fn a_permanently_lost_device_is_an_error_or_the_cpu_renders() {
 }
 
 #[test]
-fn repeated_losses_reach_a_limit() {
+fn the_number_of_losses_in_a_row_is_limited() {
     let Some(driver) = driver() else { return };
     let folder = TestFolder::with_scene(SCENE);
     let expected = folder.render_expected(driver, &[]);
     // `every:1` loses each device in its warm-up: no device becomes ready again after the first loss, and only that
     // loss is reported. `every:2` loses each device while it renders samples: every loss is reported, the last as an
     // error.
-    let check_repeated_losses = |lose: &str, reopened: usize| {
+    let check_repeated_losses = |lost_submits: &str, reopened: usize| {
         let folder = TestFolder::with_scene(SCENE);
-        let result = folder.run_on(driver, &GPU, &[("FAULTS_LOSE", lose)]);
-        assert_eq!((result.code, result.picture.is_some()), (6, false), "{lose}");
+        let result = folder.run_on(driver, &GPU, &[("FAULTS_LOSE", lost_submits)]);
+        assert_eq!((result.code, result.picture.is_some()), (6, false), "{lost_submits}");
         assert_eq!(
             (result.count("lost"), result.count("device")),
             (4, 4),
-            "{lose}: {:?}",
+            "{lost_submits}: {:?}",
             result.log
         );
         assert_reopened(&result, reopened, &["error: llvmpipe"]);
-        let result = folder.run_on(driver, &AUTO, &[("FAULTS_LOSE", lose)]);
-        assert_eq!((result.code, result.count("lost")), (0, 4), "{lose}: {}", result.stderr);
+        let result = folder.run_on(driver, &AUTO, &[("FAULTS_LOSE", lost_submits)]);
+        assert_eq!(
+            (result.code, result.count("lost")),
+            (0, 4),
+            "{lost_submits}: {}",
+            result.stderr
+        );
         assert_reopened(&result, reopened, &["warning: rendering on the CPU: llvmpipe"]);
-        assert!(result.picture == Some(expected.clone()), "{lose}");
+        assert!(result.picture == Some(expected.clone()), "{lost_submits}");
     };
     std::thread::scope(|scope| {
-        for (lose, reopened) in [("every:1", 1), ("every:2", 3)] {
+        for (lost_submits, reopened) in [("every:1", 1), ("every:2", 3)] {
             let check_repeated_losses = &check_repeated_losses;
-            scope.spawn(move || check_repeated_losses(lose, reopened));
+            scope.spawn(move || check_repeated_losses(lost_submits, reopened));
         }
     });
 }
 
-/// With these return codes, wgpu panics when it drops the queue.
 #[test]
 fn a_panic_on_dropping_a_lost_device_is_caught() {
     let Some(driver) = driver() else { return };
     let folder = TestFolder::with_scene(SCENE);
     let expected = folder.render_expected(driver, &[]);
+    // With these return codes of the wait-idle functions, wgpu panics when it drops the queue.
     for code in ["-1", "-2", "-13"] {
         for function in LOSS_FUNCTIONS {
             let faults = [
@@ -234,7 +243,7 @@ fn a_panic_on_dropping_a_lost_device_is_caught() {
 }
 
 #[test]
-fn a_requested_device_is_opened_repeatedly() {
+fn opening_a_requested_device_is_retried() {
     let Some(driver) = driver() else { return };
     let folder = TestFolder::with_scene(SCENE);
     let expected = folder.render_expected(driver, &[]);
@@ -252,7 +261,7 @@ fn a_requested_device_is_opened_repeatedly() {
     assert_eq!(
         (result.code, result.count("device refused")),
         (0, 1),
-        "the program did not open another device at once: {}",
+        "the program did not select another device after the first failure: {}",
         result.stderr
     );
     assert!(result.picture == Some(expected));
@@ -276,7 +285,7 @@ fn waiting_for_a_device_can_be_interrupted() {
     let folder = TestFolder::with_scene(SCENE);
     let faults = [("FAULTS_LOSE", "2"), ("FAULTS_REFUSE", "99")];
     let mut child = folder.start(driver, &GPU, &faults);
-    // After two failures, the longest pause (2 s) has begun.
+    // After two failures, the program is in its longest pause, of 2 s.
     let log = folder.path("log");
     let refusals = || std::fs::read_to_string(&log).map_or(0, |log| log.matches("device refused").count());
     let start = Instant::now();
@@ -284,14 +293,14 @@ fn waiting_for_a_device_can_be_interrupted() {
         assert!(start.elapsed() < Duration::from_secs(60) && child.try_wait().unwrap().is_none());
         std::thread::sleep(Duration::from_millis(10));
     }
-    let sent_at = Instant::now();
-    let sent = Command::new("kill").args(["-INT", &child.id().to_string()]).status();
-    assert!(sent.unwrap().success());
+    let signal_time = Instant::now();
+    let kill_status = Command::new("kill").args(["-INT", &child.id().to_string()]).status();
+    assert!(kill_status.unwrap().success());
     let status = child.wait().unwrap();
     assert!(
-        sent_at.elapsed() < Duration::from_millis(1500),
+        signal_time.elapsed() < Duration::from_millis(1500),
         "{:?}",
-        sent_at.elapsed()
+        signal_time.elapsed()
     );
     assert_eq!(status.code(), Some(130));
     assert_eq!(refusals(), 2, "the program did not stop during the pause");
@@ -311,11 +320,11 @@ fn random_faults_do_not_change_the_image() {
     let requested_cases = std::env::var(CASES).ok();
     let cases = requested_cases
         .as_ref()
-        .map_or(4, |n| n.parse().expect("WGRAY_TEST_FAULTS is a number"));
+        .map_or(4, |number| number.parse().expect("WGRAY_TEST_FAULTS is a number"));
     let folder = TestFolder::with_scene(SCENE);
     let size = ["--size", "320x240", "--spp", "16"];
     let expected = folder.render_expected(driver, &size);
-    let (mut losses, mut refused, mut on_cpu) = (0, 0, 0);
+    let (mut losses, mut refusals, mut cpu_fallbacks) = (0, 0, 0);
     for case in 0..cases {
         let faults = random_faults(&mut Draws::new(case));
         let faults: Vec<(&str, &str)> = faults.iter().map(|(name, value)| (*name, value.as_str())).collect();
@@ -323,11 +332,11 @@ fn random_faults_do_not_change_the_image() {
         assert_eq!(result.code, 0, "{faults:?}: {}", result.stderr);
         assert!(result.picture.as_ref() == Some(&expected), "{faults:?}");
         losses += result.count("lost");
-        refused += result.log.iter().filter(|line| line.ends_with("refused")).count();
-        on_cpu += usize::from(result.stderr.contains("rendering on the CPU"));
+        refusals += result.log.iter().filter(|line| line.ends_with("refused")).count();
+        cpu_fallbacks += usize::from(result.stderr.contains("rendering on the CPU"));
     }
     if requested_cases.is_some() {
-        let summary = format!("{losses} losses, {refused} refusals, {on_cpu} renders finished on the CPU");
+        let summary = format!("{losses} losses, {refusals} refusals, {cpu_fallbacks} renders finished on the CPU");
         let _ = writeln!(
             std::io::stderr(),
             "{cases} renders with faults: {summary}; all images equal"
@@ -336,16 +345,17 @@ fn random_faults_do_not_change_the_image() {
     assert!(losses as u64 >= cases, "{losses} losses in {cases} renders");
 }
 
-/// Returns losses a few submits apart, failing device creations after each, and sometimes a lack of memory.
+/// Returns random faults: losses a few submits apart, failed device creations after each loss, and sometimes exhausted
+/// memory.
 fn random_faults(draws: &mut Draws) -> Vec<(&'static str, String)> {
     let mut submit = 1 + draws.below(5);
-    let mut lose = submit.to_string();
+    let mut lost_submits = submit.to_string();
     for _ in 0..draws.below(5) {
         submit += 1 + draws.below(5);
-        lose += &format!(",{submit}");
+        lost_submits += &format!(",{submit}");
     }
     let mut faults = vec![
-        ("FAULTS_LOSE", lose),
+        ("FAULTS_LOSE", lost_submits),
         ("FAULTS_LOSE_IN", LOSS_FUNCTIONS[draws.below(3) as usize].to_string()),
         ("FAULTS_REFUSE", draws.below(6).saturating_sub(2).to_string()),
     ];

@@ -1,4 +1,4 @@
-//! Device memory exhaustion: an error with the sizes, or the fallback to the CPU.
+//! If device memory is exhausted, the program reports an error with the sizes or falls back to the CPU.
 
 use crate::test_folder::TestFolder;
 
@@ -7,12 +7,12 @@ use super::driver::{RunResult, SCENE, driver};
 const ADVICE: &str = "; render a crop or a smaller image, or use the CPU \
                       (--crop, --size, --device cpu)\n";
 
-fn assert_out_of_memory(result: &RunResult, parts: &[&str]) {
+fn assert_out_of_memory(result: &RunResult, texts: &[&str]) {
     assert_eq!((result.code, result.picture.is_some()), (7, false), "{}", result.stderr);
     assert!(result.stderr.starts_with("error: llvmpipe"), "{}", result.stderr);
-    assert_eq!(result.lines().len(), 1, "{}", result.stderr);
-    for part in parts {
-        assert!(result.stderr.contains(part), "{part}: {}", result.stderr);
+    assert_eq!(result.stderr_lines().len(), 1, "{}", result.stderr);
+    for text in texts {
+        assert!(result.stderr.contains(text), "{text}: {}", result.stderr);
     }
 }
 
@@ -23,11 +23,11 @@ fn a_film_that_does_not_fit_is_reported_with_its_size() {
     let (large, gpu) = (["--size", "1024x1024"], ["--device", "gpu"]);
     let expected = folder.render_expected(driver, &large);
     let result = folder.run_on(driver, &[large, gpu].concat(), &[("FAULTS_LARGEST", "8388608")]);
-    let parts = [
+    let texts = [
         ": out of memory: the driver cannot allocate 16.0 MiB for a film of 1024 x 1024 pixels",
         ADVICE,
     ];
-    assert_out_of_memory(&result, &parts);
+    assert_out_of_memory(&result, &texts);
     assert!(result.count("allocation") > 0 && result.log.iter().any(|line| line.ends_with("of 16777216 refused")));
     // A crop fits; with a higher limit, the full film fits.
     let crop = ["--size", "1024x1024", "--crop", "0,0,1024,64", "--device", "gpu"];
@@ -41,7 +41,7 @@ fn a_film_that_does_not_fit_is_reported_with_its_size() {
         &[large, ["--device", "auto"]].concat(),
         &[("FAULTS_LARGEST", "8388608")],
     );
-    assert_eq!((result.code, result.lines().len()), (0, 1), "{}", result.stderr);
+    assert_eq!((result.code, result.stderr_lines().len()), (0, 1), "{}", result.stderr);
     assert!(
         result.stderr.starts_with("warning: rendering on the CPU: llvmpipe"),
         "{}",
@@ -50,9 +50,9 @@ fn a_film_that_does_not_fit_is_reported_with_its_size() {
     assert!(result.picture == Some(expected));
 }
 
-/// Each allocation of the device, the film and the readbacks fails in turn.
+/// Memory runs out at each allocation in turn: of the device, the film and the readbacks.
 #[test]
-fn exhausted_memory_is_reported_or_the_cpu_renders() {
+fn exhausted_memory_is_an_error_or_falls_back_to_the_cpu() {
     let Some(driver) = driver() else { return };
     let folder = TestFolder::with_scene(SCENE);
     let large = ["--size", "1024x1024"];
@@ -65,7 +65,7 @@ fn exhausted_memory_is_reported_or_the_cpu_renders() {
         let first_failure = first_failure.to_string();
         let faults = [("FAULTS_NO_MEMORY_FROM", first_failure.as_str())];
         let result = folder.run_on(driver, &[large, ["--device", "gpu"]].concat(), &faults);
-        // The number of allocations depends on timing.
+        // The number of allocations depends on timing, so a run may not reach the first allocation that fails.
         if result.log.iter().any(|line| line.ends_with("refused")) {
             assert_out_of_memory(&result, &[": out of memory: the driver "]);
             failures += 1;
@@ -101,7 +101,7 @@ fn a_scene_that_does_not_fit_is_reported_with_its_size() {
     assert_eq!((result.code, result.stderr.as_str()), (0, ""));
 }
 
-/// wgpu drops the device when a submit runs out of memory.
+/// wgpu drops the device when a submit runs out of memory, so this error resembles a device loss.
 #[test]
 fn a_submit_without_memory_is_not_a_device_loss() {
     let Some(driver) = driver() else { return };
@@ -113,7 +113,7 @@ fn a_submit_without_memory_is_not_a_device_loss() {
         assert_out_of_memory(&result, &[": out of memory: the driver "]);
         let result = folder.run_on(driver, &["--device", "auto"], &faults);
         assert_eq!(
-            (result.code, result.lines().len()),
+            (result.code, result.stderr_lines().len()),
             (0, 1),
             "{submit}: {}",
             result.stderr

@@ -1,4 +1,4 @@
-//! A glTF file with many features has the same bits on CPU and GPU.
+//! The image of a glTF file with many features has the same bits on CPU and GPU.
 
 use serde_json::json;
 use wgray_render::pack::pack;
@@ -8,7 +8,7 @@ use super::read::load_scene;
 use crate::pictures::{RenderMode, differing, exact_modes, reference, render};
 
 #[test]
-fn a_file_has_the_same_bits_on_cpu_and_gpu() {
+fn the_image_of_a_file_has_the_same_bits_on_cpu_and_gpu() {
     let mut builder = Builder::new();
     let colors = builder.texture(
         2,

@@ -124,7 +124,7 @@ fn rotations_take_the_shorter_arc_at_constant_speed() {
         };
         assert_at_times(&builder, &format!("turn{sign}"), expected, &[0.0, 0.25, 0.5, 1.0]);
     }
-    // The sine of the angle between the rotations is almost 0.
+    // Slerp divides by the sine of the angle between the rotations, which is almost 0 here.
     let values = [rotation(10.0).to_array(), rotation(10.001).to_array()];
     let builder = animated_quad("rotation", "LINEAR", &[0.0, 1.0], &values);
     let expected = move |_: f64| -> Box<dyn Fn(DVec3) -> DVec3> { Box::new(move |p| rotation(10.0005) * p) };
@@ -136,7 +136,7 @@ fn rotations_on_splines_are_normalized() {
     let (a, b) = (DQuat::IDENTITY, DQuat::from_axis_angle(DVec3::Z, 2.0));
     let keys = [[0.0; 4], a.to_array(), [0.0; 4], [0.0; 4], b.to_array(), [0.0; 4]];
     let builder = animated_quad("rotation", "CUBICSPLINE", &[0.0, 1.0], &keys);
-    // Both values have weight 1/2.
+    // Halfway between the keys, both values have weight 1/2, and the tangents are 0.
     let mean_rotation = (a + b).normalize();
     let expected = move |_: f64| -> Box<dyn Fn(DVec3) -> DVec3> { Box::new(move |p| mean_rotation * p) };
     assert_at_times(&builder, "turn-cubic", expected, &[0.5]);
@@ -251,7 +251,7 @@ fn morph_target_weights_may_be_animated() {
     let expected =
         |time: f64| -> Box<dyn Fn(DVec3) -> DVec3> { Box::new(move |p| p + DVec3::new(2.0 * time, 1.0 - time, 0.0)) };
     assert_at_times(&builder, "weights", expected, &[0.0, 0.25, 1.0]);
-    // Each key has all in-tangents, all values, all out-tangents.
+    // Each key consists of the in-tangents of all targets, then all values, then all out-tangents.
     let mut builder = builder.clone();
     let keys = [
         [0.0],
@@ -280,7 +280,8 @@ fn morph_target_weights_may_be_animated() {
     assert_corners(&scene, &mapped_quad(|p| p + DVec3::new(1.0, 0.5, 0.0)));
 }
 
-/// Returns a strip whose lower corners follow the first joint, and whose upper corners follow the second joint.
+/// Returns a strip with two joints. The lower corners follow the first joint, the upper left corner follows the second,
+/// and the upper right corner follows both, with weights 0.4 and 0.6.
 fn arm(component: Component) -> Builder {
     let mut builder = Builder::new();
     let points = [[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [-1.0, 2.0, 0.0], [1.0, 2.0, 0.0]];
@@ -300,7 +301,7 @@ fn arm(component: Component) -> Builder {
         "meshes",
         json!({ "primitives": [{ "attributes": attributes, "indices": indices }] }),
     );
-    // In the bind pose, the distance between the joints is 1.
+    // In the bind pose, the second joint is at (0, 1, 0).
     let matrices = [DMat4::IDENTITY, DMat4::from_translation(-DVec3::Y)].map(|m| m.to_cols_array());
     let inverse = builder.accessor("MAT4", Component::F32, matrices.as_flattened());
     let elbow = builder.add("nodes", json!({ "translation": [0, 1, 0] }));

@@ -1,4 +1,4 @@
-//! Builder of small glTF files. The buffer may be at any of the permitted locations.
+//! Builder of small glTF files.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -76,9 +76,9 @@ pub const QUAD: [[f64; 3]; 4] = [[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0,
 pub const QUAD_UVS: [[f64; 2]; 4] = [[0.0, 1.0], [1.0, 1.0], [1.0, 0.0], [0.0, 0.0]];
 pub const QUAD_INDICES: [u32; 6] = [0, 1, 2, 0, 2, 3];
 
-/// Returns columns and rows. Matrix columns start at multiples of 4 bytes.
-fn shape(kind: &str) -> (usize, usize) {
-    match kind {
+/// Returns the numbers of columns and rows of an accessor type.
+fn shape(accessor_type: &str) -> (usize, usize) {
+    match accessor_type {
         "SCALAR" => (1, 1),
         "VEC2" => (1, 2),
         "VEC3" => (1, 3),
@@ -101,7 +101,7 @@ impl Builder {
         }
     }
 
-    /// Appends to a top-level list such as `"nodes"`. Returns the index.
+    /// Appends a value to a top-level list such as `"nodes"`. Returns the index of the value.
     pub fn add(&mut self, list: &str, value: Value) -> usize {
         let list = self.root.entry(list).or_insert_with(|| json!([]));
         let list = list.as_array_mut().expect("a list");
@@ -114,7 +114,9 @@ impl Builder {
     }
 
     pub fn get(&mut self, key: &str) -> &mut Value {
-        self.root.get_mut(key).unwrap_or_else(|| panic!("no {key}"))
+        self.root
+            .get_mut(key)
+            .unwrap_or_else(|| panic!("the file has no {key}"))
     }
 
     pub fn uses(&mut self, extension: &str) {
@@ -131,7 +133,7 @@ impl Builder {
         self.add("extensionsRequired", json!(extension));
     }
 
-    /// Appends bytes at a multiple of 4. Returns the index of their buffer view.
+    /// Appends the bytes to the buffer, aligned to 4 bytes. Returns the index of their buffer view.
     pub fn view(&mut self, bytes: &[u8]) -> usize {
         self.bytes.resize(self.bytes.len().next_multiple_of(4), 0);
         let view = json!({ "buffer": 0, "byteOffset": self.bytes.len(), "byteLength": bytes.len() });
@@ -139,9 +141,9 @@ impl Builder {
         self.add("bufferViews", view)
     }
 
-    /// Encodes elements, each aligned to `align` bytes.
-    pub fn elements(kind: &str, component: Component, values: &[f64], align: usize) -> Vec<u8> {
-        let (columns, rows) = shape(kind);
+    /// Encodes elements, each aligned to `align` bytes. Columns of matrices start at multiples of 4 bytes.
+    pub fn elements(accessor_type: &str, component: Component, values: &[f64], align: usize) -> Vec<u8> {
+        let (columns, rows) = shape(accessor_type);
         let mut bytes = Vec::new();
         for element in values.chunks(columns * rows) {
             bytes.resize(bytes.len().next_multiple_of(align), 0);
@@ -158,28 +160,28 @@ impl Builder {
         bytes
     }
 
-    /// Adds an accessor of tightly packed values, given as they are stored. Returns the index of the accessor.
-    pub fn accessor(&mut self, kind: &str, component: Component, values: &[f64]) -> usize {
-        let (columns, rows) = shape(kind);
-        let bytes = Builder::elements(kind, component, values, 1);
+    /// Adds an accessor of tightly packed values, which are the stored numbers, not normalized. Returns its index.
+    pub fn accessor(&mut self, accessor_type: &str, component: Component, values: &[f64]) -> usize {
+        let (columns, rows) = shape(accessor_type);
+        let bytes = Builder::elements(accessor_type, component, values, 1);
         let view = self.view(&bytes);
         let count = values.len() / (columns * rows);
         self.add(
             "accessors",
-            json!({ "bufferView": view, "componentType": component as u32, "count": count, "type": kind }),
+            json!({ "bufferView": view, "componentType": component as u32, "count": count, "type": accessor_type }),
         )
     }
 
     /// Adds a vertex attribute with `min` and `max`, 4-byte aligned. Returns the index of its accessor.
     pub fn attribute<const N: usize>(&mut self, component: Component, normalized: bool, values: &[[f64; N]]) -> usize {
-        let kind = ["", "SCALAR", "VEC2", "VEC3", "VEC4"][N];
+        let accessor_type = ["", "SCALAR", "VEC2", "VEC3", "VEC4"][N];
         let stored = |value: f64| match (component, normalized) {
             (Component::F32, _) => f64::from(value as f32),
             (_, false) => value,
             (_, true) => (value * component.one()).round(),
         };
         let flat: Vec<f64> = values.iter().flatten().map(|value| stored(*value)).collect();
-        let bytes = Builder::elements(kind, component, &flat, 4);
+        let bytes = Builder::elements(accessor_type, component, &flat, 4);
         let view = self.view(&bytes);
         let size = component.size() * N;
         self.get("bufferViews")[view]["target"] = json!(34962);
@@ -203,7 +205,7 @@ impl Builder {
                 .collect()
         };
         let mut accessor = json!({
-            "bufferView": view, "componentType": component as u32, "count": values.len(), "type": kind,
+            "bufferView": view, "componentType": component as u32, "count": values.len(), "type": accessor_type,
             "min": bound(true), "max": bound(false),
         });
         if normalized && component != Component::F32 {
@@ -247,7 +249,7 @@ impl Builder {
         json!({ "POSITION": position, "NORMAL": normal, "TEXCOORD_0": uv })
     }
 
-    /// Adds a mesh of [`QUAD`] with other attributes. Returns its index.
+    /// Adds a mesh with these attributes and the indices of [`QUAD`]. Returns its index.
     pub fn quad_with(&mut self, attributes: Value, material: Option<usize>) -> usize {
         let indices = self.indices(&QUAD_INDICES);
         let mut primitive = json!({ "attributes": attributes, "indices": indices });
@@ -276,9 +278,9 @@ impl Builder {
     }
 
     /// Adds an image whose bytes are in the buffer. Returns the index of the image.
-    pub fn image(&mut self, bytes: &[u8], kind: &str) -> usize {
+    pub fn image(&mut self, bytes: &[u8], mime_type: &str) -> usize {
         let view = self.view(bytes);
-        self.add("images", json!({ "bufferView": view, "mimeType": kind }))
+        self.add("images", json!({ "bufferView": view, "mimeType": mime_type }))
     }
 
     /// Adds a texture with nearest filtering. Returns its index.
@@ -288,11 +290,12 @@ impl Builder {
         self.add("textures", json!({ "source": image, "sampler": sampler }))
     }
 
-    pub fn plain_texture(&mut self, texel: [u8; 4]) -> usize {
+    /// Adds a texture of one color. Returns its index.
+    pub fn constant_texture(&mut self, texel: [u8; 4]) -> usize {
         self.texture(2, &[texel; 4])
     }
 
-    /// Adds an unlit material, which renders as exactly its base color. Returns its index.
+    /// Adds an unlit material, whose pixels equal its base color. Returns its index.
     pub fn unlit(&mut self, mut pbr: Value) -> usize {
         self.uses("KHR_materials_unlit");
         let map = pbr.as_object_mut().expect("a table");
@@ -338,7 +341,8 @@ impl Builder {
         file
     }
 
-    /// Writes `NAME.glb` or `NAME.gltf`, and a copy to the folder `WGRAY_TEST_GLTF`, if set, for `scripts/check-gltf`.
+    /// Writes `NAME.glb` or `NAME.gltf`. If `WGRAY_TEST_GLTF` is set, also writes a copy to this folder for
+    /// `scripts/check-gltf`.
     pub fn write(&self, folder: &Path, name: &str, packing: Packing) -> PathBuf {
         if let Some(copy_folder) = std::env::var_os("WGRAY_TEST_GLTF") {
             self.write_into(Path::new(&copy_folder), name, packing);
@@ -346,7 +350,7 @@ impl Builder {
         self.write_into(folder, name, packing)
     }
 
-    /// Writes an invalid file, without a copy.
+    /// Writes an invalid file like [`Builder::write`], but no copy, because the Khronos validator would reject it.
     pub fn write_invalid(&self, folder: &Path, name: &str, packing: Packing) -> PathBuf {
         self.write_into(folder, name, packing)
     }
@@ -386,10 +390,10 @@ pub fn base64(bytes: &[u8]) -> String {
     const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     let mut text = String::new();
     for chunk in bytes.chunks(3) {
-        let word = chunk.iter().fold(0, |word, byte| word << 8 | u32::from(*byte)) << (8 * (3 - chunk.len()));
+        let bits = chunk.iter().fold(0, |word, byte| word << 8 | u32::from(*byte)) << (8 * (3 - chunk.len()));
         for k in 0..4 {
             match k <= chunk.len() {
-                true => text.push(char::from(DIGITS[(word >> (18 - 6 * k)) as usize & 63])),
+                true => text.push(char::from(DIGITS[(bits >> (18 - 6 * k)) as usize & 63])),
                 false => text.push('='),
             }
         }

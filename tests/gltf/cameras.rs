@@ -1,4 +1,4 @@
-//! Cameras of a glTF file, and the default camera.
+//! Cameras of glTF files, and the automatic camera of files without cameras.
 
 use glam::{DQuat, DVec3};
 use serde_json::{Value, json};

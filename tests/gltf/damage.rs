@@ -1,4 +1,4 @@
-//! Damaged glTF files are rendered with a replacement and a warning, or rejected with `strict`.
+//! Damaged parts of glTF files are replaced or skipped with a warning; with `strict`, such files are rejected.
 
 use std::path::Path;
 
@@ -16,7 +16,7 @@ fn load(file: &Path, strict: bool) -> Result<Scene, String> {
     Scene::load_with(file, &overrides).map_err(|error| error.to_string())
 }
 
-fn triangles(scene: &Scene) -> usize {
+fn triangle_count(scene: &Scene) -> usize {
     let meshes = wgray_render::pack::pack(scene).bvh.meshes;
     meshes.iter().map(|mesh| mesh.triangles.len()).sum()
 }
@@ -101,13 +101,13 @@ fn triangles_with_invalid_positions_are_skipped() {
             builder.root_node(json!({ "mesh": mesh }));
             let valid_mesh = builder.quad(None);
             builder.root_node(json!({ "mesh": valid_mesh }));
-            // JSON has no NaN, so the bounds cover only the valid vertices.
+            // JSON cannot represent NaN, so `min` and `max` cover only the valid vertices.
             builder.get("accessors")[position]["min"] = json!([-1, -1, 0]);
             builder.get("accessors")[position]["max"] = json!([9, 9, 0]);
             let file = builder.write_invalid(folder.folder(), "positions", Packing::Binary);
             let scene = load(&file, false).unwrap();
             let context = format!("{invalid_vertex} {value}: {:?}", scene.notes);
-            assert_eq!(triangles(&scene), valid_triangles + 2, "{context}");
+            assert_eq!(triangle_count(&scene), valid_triangles + 2, "{context}");
             let rule = "a vertex with a coordinate that is not finite or beyond 1e9";
             let message = match valid_triangles {
                 0 => format!("meshes[0].primitives[0].attributes.POSITION: 2 triangles have {rule}"),
@@ -139,7 +139,7 @@ fn a_node_may_have_any_scale() {
         let file = builder.write(folder.folder(), "scaled", Packing::Binary);
         let scene = load(&file, true).unwrap_or_else(|error| panic!("{error}"));
         assert!(scene.notes.is_empty(), "{:?}", scene.notes);
-        assert_eq!(triangles(&scene), 2, "{scale}");
+        assert_eq!(triangle_count(&scene), 2, "{scale}");
         let (low, high) = scene.bounds().expect("bounds");
         let size = high - low;
         assert!(
@@ -147,14 +147,14 @@ fn a_node_may_have_any_scale() {
             "{scale}: {size}"
         );
     }
-    // Scaled beyond the coordinate limit.
+    // The second node scales its mesh beyond the limit of coordinates, 1e9.
     let mut builder = Builder::new();
     let mesh = builder.quad(None);
     builder.root_node(json!({ "mesh": mesh }));
     builder.root_node(json!({ "mesh": mesh, "scale": [1e12, 1e12, 1e12] }));
     let file = builder.write(folder.folder(), "large", Packing::Binary);
     let scene = load(&file, false).unwrap();
-    assert_eq!(triangles(&scene), 2);
+    assert_eq!(triangle_count(&scene), 2);
     assert_eq!(
         scene.notes,
         [

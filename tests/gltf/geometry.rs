@@ -56,7 +56,7 @@ fn quantize(component: Component, value: f64) -> f64 {
 
 #[test]
 fn positions_may_have_any_integer_type() {
-    // Quantization tools compensate for the integer range by the scale of the node.
+    // The node's scale maps the integer range to the size of the mesh, as in files that quantization tools write.
     for component in [Component::I8, Component::U8, Component::I16, Component::U16] {
         for normalized in [false, true] {
             let signed = matches!(component, Component::I8 | Component::I16);
@@ -141,7 +141,7 @@ fn normals_of_integer_types_are_unit_vectors() {
 
 #[test]
 fn triangles_of_strips_and_fans_have_the_right_winding_order() {
-    // A strip and a fan, counterclockwise from +z (glTF 2.0, 3.7.2.1).
+    // Vertices of a strip and of a fan whose triangles are counterclockwise as seen from +z (glTF 2.0, 3.7.2.1).
     let zigzag = [
         [0.0, 1.0, 0.0],
         [0.0, 0.0, 0.0],
@@ -245,7 +245,7 @@ fn sparse_accessors_replace_values_of_a_buffer_or_zeros() {
         accessor["min"] = json!(bound(f64::min));
         accessor["max"] = json!(bound(f64::max));
         let position = builder.add("accessors", accessor);
-        // Without a base accessor, two corners are at the origin: one triangle remains.
+        // Without a buffer view, vertices 0 and 2 are both at the origin, so a triangle must not contain both.
         let order: &[u32] = if has_base { &QUAD_INDICES } else { &[0, 1, 3] };
         let indices = builder.indices(order);
         let primitive = json!({ "attributes": { "POSITION": position }, "indices": indices });
@@ -292,7 +292,7 @@ fn attributes_may_be_interleaved() {
 
 #[test]
 fn without_normals_triangles_are_flat() {
-    // Missing normals mean flat shading (glTF 2.0, 3.7.2.1).
+    // Primitives without normals have flat shading (glTF 2.0, 3.7.2.1).
     let points = [[-1.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 0.0], [1.0, 0.0, -1.0]];
     let mut builder = Builder::new();
     let position = builder.floats(&points);
@@ -331,7 +331,7 @@ fn vertex_colors_of_each_type_are_factors_of_the_base_color() {
         // `OPAQUE` ignores alpha.
         let rgba = colored_quad(component, &[[0.2, 0.4, 0.8, 0.2]; 4], "OPAQUE");
         assert_all(&scene(&rgba, &format!("colors-{component:?}-4")), [0.2, 0.2, 0.8]);
-        // Alpha is below the cutoff, so the white environment is visible.
+        // Alpha is below the cutoff of 0.5, so only the white environment is visible.
         let masked = colored_quad(component, &[[0.2, 0.4, 0.8, 0.2]; 4], "MASK");
         assert_all(&scene(&masked, &format!("colors-{component:?}-mask")), [1.0, 1.0, 1.0]);
     }
@@ -386,17 +386,17 @@ fn morph_targets_are_added_by_their_weights() {
             "{normal}, not {expected_normal}"
         );
     }
-    // Weights of the node override weights of the mesh.
+    // Weights of the node take precedence over weights of the mesh.
     builder.get("nodes")[node]["weights"] = json!([1.0, -0.5]);
     assert_corners(&scene(&builder, "morph-node"), &expected(1.0, -0.5));
-    // Instances have independent weights.
+    // Another node with the same mesh has its own weights.
     builder.root_node(json!({ "mesh": mesh }));
     let expected = [expected(1.0, -0.5), expected(0.5, 0.25)].concat();
     assert_corners(&scene(&builder, "morph-two"), &expected);
 }
 
 #[test]
-fn a_file_renders_without_a_scene() {
+fn a_file_without_a_scene_gets_the_default_settings() {
     let folder = TestFolder::with_file("a", "");
     for packing in Packing::ALL {
         let file = quad().write(folder.folder(), &format!("whole-{packing:?}"), packing);

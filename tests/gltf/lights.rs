@@ -39,7 +39,7 @@ fn candelas_are_radiant_intensity() {
 fn lux_are_irradiance() {
     let light = json!({ "type": "directional", "intensity": 3, "color": [1, 0.5, 0.25] });
     match &scene(&quad_with_light(light), "light-directional").lights[..] {
-        // -z of the node points down.
+        // The node's -z axis points down.
         [Light::Directional { direction, color }] => {
             assert_near(to_file(*direction).to_array(), [0.0, -1.0, 0.0]);
             assert_near(color.to_array(), [3.0, 1.5, 0.75]);
@@ -77,7 +77,7 @@ fn spots_have_two_angles() {
 }
 
 #[test]
-fn each_node_of_a_light_is_a_light() {
+fn each_node_that_references_a_light_adds_a_light() {
     let mut builder = quad_with_light(json!({ "type": "point" }));
     for x in 0..3 {
         builder.root_node(json!({ "translation": [x, 0, 5], "extensions": { "KHR_lights_punctual": { "light": 0 } } }));
@@ -114,7 +114,7 @@ fn light_intensities_in_lux_and_candela_give_the_closed_form_radiance() {
     let lights = json!([{ "type": "directional", "intensity": 5 }, { "type": "point", "intensity": 12 }]);
     builder.set("extensions", json!({ "KHR_lights_punctual": { "lights": lights } }));
     builder.root_node(json!({ "extensions": { "KHR_lights_punctual": { "light": 0 } } }));
-    // The point light is so far away that its irradiance is uniform to 1e-4.
+    // The point light is so far away that its irradiance on the quad varies by at most 0.03 %.
     builder.root_node(json!({ "translation": [0, 0, 100], "extensions": { "KHR_lights_punctual": { "light": 1 } } }));
     builder.get("extensions")["KHR_lights_punctual"]["lights"][1]["intensity"] = json!(20_000);
     let folder = TestFolder::with_file("a", "");
@@ -128,7 +128,7 @@ fn light_intensities_in_lux_and_candela_give_the_closed_form_radiance() {
     for pixel in pixels(&scene) {
         for (k, albedo) in [0.8, 0.4, 0.2].into_iter().enumerate() {
             let expected = albedo / std::f64::consts::PI * irradiance;
-            // The tolerance is large because each sample selects one of the two lights at random.
+            // The tolerance of a pixel is large because each sample selects one of the two lights at random.
             assert!(
                 (f64::from(pixel[k]) / expected - 1.0).abs() < 0.15,
                 "{pixel:?}, not {expected}"

@@ -106,11 +106,11 @@ fn transmission_without_a_volume_is_thin_walled() {
             json!({ "thicknessFactor": thickness, "attenuationDistance": 2, "attenuationColor": [0.5, 0.25, 1] });
         scene(&quad_with_material(material), name)
     };
-    // 0 is thin-walled (`KHR_materials_volume`).
+    // A thickness of 0 means thin-walled (`KHR_materials_volume`).
     assert!(principled(&volume(0.0, "volume-thin")).thin);
     let thick = volume(0.5, "volume");
     assert!(!principled(&thick).thin);
-    // Beer-Lambert: the color is the transmittance over the distance.
+    // Beer-Lambert law: the attenuation color is the transmittance over the attenuation distance, 2.
     let expected = [0.5_f64, 0.25, 1.0].map(|transmittance| -transmittance.ln() / 2.0);
     assert_near(principled(&thick).absorption.to_array(), expected);
 }
@@ -189,7 +189,7 @@ fn specular_glossiness_materials_become_dielectrics() {
 fn a_clearcoat_may_have_its_own_normal_map() {
     let mut builder = Builder::new();
     builder.uses("KHR_materials_clearcoat");
-    let maps = [[204, 128, 226, 255], [128, 204, 226, 255]].map(|texel| builder.plain_texture(texel));
+    let maps = [[204, 128, 226, 255], [128, 204, 226, 255]].map(|texel| builder.constant_texture(texel));
     let coat = json!({ "clearcoatFactor": 1, "clearcoatNormalTexture": { "index": maps[1], "scale": 0.5 } });
     let material = builder.add(
         "materials",
@@ -224,7 +224,7 @@ fn unlit_materials_emit_their_base_color() {
 
 #[test]
 fn smooth_metal_in_a_white_environment_has_its_base_color() {
-    // At normal incidence Schlick's Fresnel term is the base color.
+    // At normal incidence, Schlick's Fresnel term is the base color.
     let metal = json!({ "pbrMetallicRoughness": { "baseColorFactor": [0.25, 0.5, 0.75, 1], "roughnessFactor": 0 } });
     assert_all(&scene(&quad_with_material(metal), "metal"), [0.25, 0.5, 0.75]);
 }
@@ -249,7 +249,7 @@ fn alpha_modes_are_applied() {
     assert_all(&unlit_with_alpha("MASK", Some(0.375)), surface);
     assert_all(&unlit_with_alpha("MASK", Some(0.0)), surface);
     assert_all(&unlit_with_alpha("MASK", Some(2.0)), background);
-    // `BLEND` is stochastic.
+    // With `BLEND`, each sample sees either the surface or the background, at random.
     let mut scene = unlit_with_alpha("BLEND", None);
     scene.render.pixel_samples.count = 64 * 64;
     let pixels = super::read::pixels(&scene);
@@ -346,17 +346,17 @@ fn a_scene_may_replace_a_material_of_the_file() {
 
 #[test]
 fn unknown_extensions_are_rejected_if_required_and_reported_if_used() {
-    for extension in ["KHR_draco_mesh_compression", "EXT_texture_avif", "EXT_of_nobody"] {
+    for extension in ["KHR_draco_mesh_compression", "EXT_texture_avif", "EXT_unknown"] {
         let mut builder = quad_with_material(json!({}));
         builder.requires(extension);
         let message = rejection(&builder, "");
         assert!(message.contains(extension), "{message}");
     }
     let mut builder = quad_with_material(json!({}));
-    builder.uses("EXT_of_nobody");
+    builder.uses("EXT_unknown");
     let scene = scene(&builder, "used-unknown");
     assert!(
-        scene.notes.iter().any(|note| note.message.contains("EXT_of_nobody")),
+        scene.notes.iter().any(|note| note.message.contains("EXT_unknown")),
         "{:?}",
         scene.notes
     );

@@ -4,10 +4,11 @@
 //     npm install meshoptimizer@1.3.0
 //     node tests/gltf/meshopt.mjs > crates/scene/src/gltf/meshopt/streams.txt
 //
-// With a number N as argument, it prints N random streams instead, for tests that do not store the streams.
+// With a number N as argument, the script prints N random streams instead, for tests that do not store the streams.
 //
-// Each line contains: name, mode, filter, stride, count, the stream in base64, and the decoded bytes: in base64 for
-// filters, whose results may be rounded, otherwise as their 64-bit FNV-1a hash.
+// Each line contains the name, mode, filter, stride and count, the stream in base64, and the decoded bytes. Bytes of
+// filtered streams are in base64, because decoders may round them differently. Other bytes are stored as their 64-bit
+// FNV-1a hash.
 
 import { createRequire } from "node:module";
 import path from "node:path";
@@ -31,18 +32,18 @@ function hash(bytes) {
 
 const base64 = (bytes) => Buffer.from(bytes).toString("base64");
 
-function line(name, mode, filter, stride, count, stream) {
+function printLine(name, mode, filter, stride, count, stream) {
 	const decoded = new Uint8Array(count * stride);
 	MeshoptDecoder.decodeGltfBuffer(decoded, count, stride, stream, mode, filter);
 	const expected = filter === "NONE" ? hash(decoded) : base64(decoded);
 	console.log([name, mode, filter, stride, count, base64(stream), expected].join(" "));
 }
 
-// Generators of the elements of a kind, as bytes.
+// Generators of test data. Each returns the bytes of `count` elements of `stride` bytes.
 const KINDS = {
 	zeros: (count, stride) => new Uint8Array(count * stride),
 	random: (count, stride) => Uint8Array.from({ length: count * stride }, () => random(256)),
-	// Bytes with small changes and occasional large changes.
+	// Bytes that change little from element to element, except for a few large changes.
 	smooth: (count, stride) => {
 		const current = Uint8Array.from({ length: stride }, () => random(256));
 		return Uint8Array.from({ length: count * stride }, (_, i) => {
@@ -67,7 +68,7 @@ const KINDS = {
 		}
 		return new Uint8Array(values.buffer);
 	},
-	// Floats whose lowest bits are zero.
+	// Floats whose lowest 14 bits are zero.
 	rounded: (count, stride) => {
 		const bytes = KINDS.floats(count, stride);
 		const words = new Uint32Array(bytes.buffer);
@@ -76,13 +77,13 @@ const KINDS = {
 	},
 };
 
-function attributes(kind, stride, count, level, version) {
+function printAttributes(kind, stride, count, level, version) {
 	const bytes = KINDS[kind](count, stride);
 	const stream = MeshoptEncoder.encodeVertexBufferLevel(bytes, count, stride, level, version);
-	line(`${kind}-${stride}-${count}-${level}-v${version}`, "ATTRIBUTES", "NONE", stride, count, stream);
+	printLine(`${kind}-${stride}-${count}-${level}-v${version}`, "ATTRIBUTES", "NONE", stride, count, stream);
 }
 
-// Returns the triangles of a grid by row, with `strays` random triangles between them.
+// Returns the indices of the triangles of a grid, row by row, with `strays` random triangles between them.
 function grid(side, strays) {
 	const indices = [];
 	for (let y = 0; y < side; y++) {
@@ -99,14 +100,15 @@ function grid(side, strays) {
 	return Uint32Array.from(indices);
 }
 
-function indices(name, values, mode, stride) {
+function printIndices(name, values, mode, stride) {
 	const typed = stride === 2 ? Uint16Array.from(values) : Uint32Array.from(values);
 	const bytes = new Uint8Array(typed.buffer);
 	const encode = mode === "TRIANGLES" ? MeshoptEncoder.encodeIndexBuffer : MeshoptEncoder.encodeIndexSequence;
-	line(name, mode, "NONE", stride, typed.length, encode(bytes, typed.length, stride));
+	printLine(name, mode, "NONE", stride, typed.length, encode(bytes, typed.length, stride));
 }
 
-// Returns random unit vectors, some along an axis, with a fourth component of 1 or -1 if `dimensions` is 3.
+// Returns random unit vectors, of which every fifth is parallel to an axis. If `dimensions` is 3, a fourth component of
+// 1 or -1 follows.
 function units(count, dimensions) {
 	const values = [];
 	for (let i = 0; i < count; i++) {
@@ -119,7 +121,7 @@ function units(count, dimensions) {
 	return Float32Array.from(values);
 }
 
-function filteredAttributes(filter, stride, bits, version, count = 24) {
+function printFilteredAttributes(filter, stride, bits, version, count = 24) {
 	let elements;
 	if (filter === "OCTAHEDRAL") elements = MeshoptEncoder.encodeFilterOct(units(count, 3), count, stride, bits);
 	if (filter === "QUATERNION") elements = MeshoptEncoder.encodeFilterQuat(units(count, 4), count, stride, bits);
@@ -132,7 +134,7 @@ function filteredAttributes(filter, stride, bits, version, count = 24) {
 		elements = MeshoptEncoder.encodeFilterColor(values, count, stride, bits);
 	}
 	const stream = MeshoptEncoder.encodeVertexBufferLevel(elements, count, stride, 2, version);
-	line(`${filter.toLowerCase()}-${stride}-${bits}-v${version}`, "ATTRIBUTES", filter, stride, count, stream);
+	printLine(`${filter.toLowerCase()}-${stride}-${bits}-v${version}`, "ATTRIBUTES", filter, stride, count, stream);
 }
 
 const streamCount = Number(process.argv[2] ?? 0);
@@ -151,26 +153,26 @@ if (streamCount === 0) {
 		["floats", 12, 100],
 		["rounded", 16, 70],
 	]) {
-		attributes(kind, stride, count, 0, 0);
-		for (const level of [0, 3]) attributes(kind, stride, count, level, 1);
+		printAttributes(kind, stride, count, 0, 0);
+		for (const level of [0, 3]) printAttributes(kind, stride, count, level, 1);
 	}
-	attributes("random", 16, 300, 0, 1);
+	printAttributes("random", 16, 300, 0, 1);
 	for (const stride of [2, 4]) {
-		indices(`grid-${stride}`, grid(8, 0), "TRIANGLES", stride);
-		indices(`strays-${stride}`, grid(8, 60), "TRIANGLES", stride);
-		indices(`twice-${stride}`, [...grid(4, 0), ...grid(4, 3)], "TRIANGLES", stride);
-		indices(`rows-${stride}`, grid(6, 0), "INDICES", stride);
+		printIndices(`grid-${stride}`, grid(8, 0), "TRIANGLES", stride);
+		printIndices(`strays-${stride}`, grid(8, 60), "TRIANGLES", stride);
+		printIndices(`twice-${stride}`, [...grid(4, 0), ...grid(4, 3)], "TRIANGLES", stride);
+		printIndices(`rows-${stride}`, grid(6, 0), "INDICES", stride);
 		const strip = Array.from({ length: 60 }, (_, i) => (i % 2 ? i : 1000 + i * 3));
-		indices(`strip-${stride}`, [...strip, 65534, 0, 65000], "INDICES", stride);
+		printIndices(`strip-${stride}`, [...strip, 65534, 0, 65000], "INDICES", stride);
 	}
-	indices("large", [4294967294, 0, 7, 3000000000, 2147483648, 4294967294], "TRIANGLES", 4);
+	printIndices("large", [4294967294, 0, 7, 3000000000, 2147483648, 4294967294], "TRIANGLES", 4);
 	for (const version of [0, 1]) {
-		for (const bits of [2, 5, 8]) filteredAttributes("OCTAHEDRAL", 4, bits, version);
-		for (const bits of [9, 12, 16]) filteredAttributes("OCTAHEDRAL", 8, bits, version);
-		for (const bits of [4, 11, 16]) filteredAttributes("QUATERNION", 8, bits, version);
-		for (const bits of [1, 12, 24]) filteredAttributes("EXPONENTIAL", 12, bits, version);
-		for (const bits of [2, 7, 8]) filteredAttributes("COLOR", 4, bits, version);
-		for (const bits of [9, 12, 16]) filteredAttributes("COLOR", 8, bits, version);
+		for (const bits of [2, 5, 8]) printFilteredAttributes("OCTAHEDRAL", 4, bits, version);
+		for (const bits of [9, 12, 16]) printFilteredAttributes("OCTAHEDRAL", 8, bits, version);
+		for (const bits of [4, 11, 16]) printFilteredAttributes("QUATERNION", 8, bits, version);
+		for (const bits of [1, 12, 24]) printFilteredAttributes("EXPONENTIAL", 12, bits, version);
+		for (const bits of [2, 7, 8]) printFilteredAttributes("COLOR", 4, bits, version);
+		for (const bits of [9, 12, 16]) printFilteredAttributes("COLOR", 8, bits, version);
 	}
 }
 for (let i = 0; i < streamCount; i++) {
@@ -180,12 +182,12 @@ for (let i = 0; i < streamCount; i++) {
 		case 0:
 		case 1: {
 			const stride = 4 * (1 + random(random(2) ? 64 : 8));
-			attributes(pick(Object.keys(KINDS)), stride, 1 + random(700), version * random(4), version);
+			printAttributes(pick(Object.keys(KINDS)), stride, 1 + random(700), version * random(4), version);
 			break;
 		}
 		case 2: {
 			const [mode, stride] = [pick(["TRIANGLES", "INDICES"]), pick([2, 4])];
-			indices("indices", grid(1 + random(30), random(2) * random(200)), mode, stride);
+			printIndices("indices", grid(1 + random(30), random(2) * random(200)), mode, stride);
 			break;
 		}
 		default: {
@@ -193,7 +195,7 @@ for (let i = 0; i < streamCount; i++) {
 			const stride = filter === "QUATERNION" ? 8 : filter === "EXPONENTIAL" ? 4 * (1 + random(8)) : pick([4, 8]);
 			const minBits = { OCTAHEDRAL: 2, QUATERNION: 4, EXPONENTIAL: 1, COLOR: 2 }[filter];
 			const maxBits = filter === "EXPONENTIAL" ? 24 : filter === "QUATERNION" ? 16 : stride * 2;
-			filteredAttributes(filter, stride, minBits + random(maxBits - minBits + 1), version, 1 + random(300));
+			printFilteredAttributes(filter, stride, minBits + random(maxBits - minBits + 1), version, 1 + random(300));
 		}
 	}
 }

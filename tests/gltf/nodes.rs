@@ -28,7 +28,7 @@ fn transforms_of_nodes_are_multiplied_from_the_root() {
         "translation": [4, 5, 6], "rotation": rotation.to_array(), "scale": [1, 2, 0.5], "children": [leaf],
     });
     builder.root_node(outer);
-    // A scale after a rotation shears.
+    // The non-uniform scale of the outer node shears the transform of the leaf.
     let map = DAffine3::from_scale_rotation_translation(DVec3::new(1.0, 2.0, 0.5), rotation, DVec3::new(4.0, 5.0, 6.0));
     let expected = mapped_quad(|p| map.transform_point3(inner.transform_point3(p)));
     let scene = scene(&builder, "hierarchy");
@@ -53,11 +53,11 @@ fn mirrored_meshes_keep_their_outside() {
         let scene = scene(&builder, &format!("mirrored-{name}"));
         assert_corners(&scene, &mapped_quad(|p| p * DVec3::from_array(scale)));
         // A negative determinant reverses the winding order (glTF 2.0, 3.7.4).
-        let outside = DVec3::new(0.0, 0.0, if name == "three" { -1.0 } else { 1.0 });
+        let front = DVec3::new(0.0, 0.0, if name == "three" { -1.0 } else { 1.0 });
         for triangle in triangles(&scene) {
-            assert_eq!(triangle.geometric_normal(), outside, "{name}");
+            assert_eq!(triangle.geometric_normal(), front, "{name}");
             assert!(
-                triangle.normals.iter().all(|normal| normal.distance(outside) < 1e-6),
+                triangle.normals.iter().all(|normal| normal.distance(front) < 1e-6),
                 "{name}"
             );
         }
@@ -81,7 +81,7 @@ fn meshes_flattened_along_their_normal_are_kept() {
         builder.root_node(json!({ "mesh": mesh, "translation": [0, 0, 2], "scale": scale }));
         scene(&builder, "flattened")
     };
-    // The quad is flattened along its normal, or its scale is below the minimum scale of an instance.
+    // The area of the quad is not 0, but a scale is 0 or below the minimum scale of an instance.
     for (scale, factor) in [([1.0, 1.0, 0.0], 1.0), ([1e-7; 3], 1e-7), ([-1e-7; 3], -1e-7)] {
         let scene = flattened(scale);
         assert_corners(&scene, &mapped_quad(|p| p * factor + 2.0 * DVec3::Z));
@@ -91,7 +91,7 @@ fn meshes_flattened_along_their_normal_are_kept() {
             scene.notes
         );
     }
-    // The mesh has zero area, for example because an animation hides it.
+    // The area of the mesh is 0. Animations hide meshes by such scales.
     for scale in [[1.0, 0.0, 1.0], [0.0; 3], [1e-12; 3]] {
         let scene = flattened(scale);
         assert!(scene.shapes.is_empty());
@@ -144,7 +144,7 @@ fn instances_of_a_node_are_below_it() {
     let instancing = json!({ "EXT_mesh_gpu_instancing": { "attributes": attributes } });
     builder.root_node(json!({ "mesh": mesh, "scale": [1, 1, 2], "translation": [0, 10, 0], "extensions": instancing }));
     let first = mapped_quad(|p| p + DVec3::new(0.0, 10.0, 0.0));
-    // The instance is scaled, rotated by 90 degrees and translated; the transform of the node follows.
+    // The second instance is scaled, rotated by 90 degrees and translated; then the transform of the node applies.
     let second = mapped_quad(|p| DVec3::new(-p.y + 3.0, 2.0 * p.x + 10.0, p.z));
     assert_corners(&scene(&builder, "gpu-instancing"), &[first, second].concat());
 }
@@ -261,7 +261,7 @@ fn a_file_may_be_translated_rotated_and_scaled() {
     let mut builder = Builder::new();
     let mesh = builder.quad(None);
     builder.root_node(json!({ "mesh": mesh, "translation": [1, 0, 0] }));
-    // z of the scene is y of the file.
+    // The z axis of the scene is the y axis of the file.
     let keys = "scale = 2\nrotate = { axis = [0, 0, 1], degrees = 90 }\ntranslate = [0, 0, 5]";
     let rotation = DMat3::from_axis_angle(DVec3::Y, std::f64::consts::FRAC_PI_2);
     let expected = mapped_quad(|p| rotation * (2.0 * (p + DVec3::X)) + 5.0 * DVec3::Y);

@@ -27,7 +27,7 @@ fn every_row_names_an_existing_test() {
             if name.ends_with(".rs") {
                 file = Some(read(name));
             } else {
-                let text = file.as_ref().unwrap_or_else(|| panic!("a file before {name}"));
+                let text = file.as_ref().unwrap_or_else(|| panic!("no file name precedes {name}"));
                 assert!(text.contains(&format!("#[test]\nfn {name}()")), "{name}");
                 count += 1;
             }

@@ -11,7 +11,7 @@ use super::build::{Builder, Packing};
 use super::read::triangles;
 use crate::test_folder::TestFolder;
 
-/// Writes a model of a spike that starts at the origin and has length 3 along an axis.
+/// Writes a model of a spike from the origin to 3 along an axis.
 fn write_spike(folder: &TestFolder, axis: DVec3, has_camera: bool) -> PathBuf {
     let mut builder = Builder::new();
     let side = axis.any_orthonormal_vector() * 0.25;
@@ -58,7 +58,7 @@ fn any_axis_can_point_up() {
         };
         let scene = load(&file, presentation, Some(View::Front)).unwrap();
         let triangle = triangles(&scene)[0].corners;
-        // The coordinates are as if the file were upright.
+        // After the rotation, the spike points along +y, the up axis of glTF files.
         assert!(triangle[2].distance(DVec3::Y * 3.0) < 1e-6, "{name}: {triangle:?}");
         // The camera frames the model in its new orientation.
         let camera = scene.camera;
@@ -94,8 +94,8 @@ fn the_ground_lies_below_the_model() {
             panic!("{up}: {:?}", scene.shapes);
         };
         assert_eq!(scene.material_names[material], "ground");
-        let gap = min_z - center.z;
-        assert!(gap > 0.0 && gap < 1e-3, "{up}: {center}");
+        let gap_to_model = min_z - center.z;
+        assert!(gap_to_model > 0.0 && gap_to_model < 1e-3, "{up}: {center}");
         assert!(radius > 10.0, "{radius}");
         // The camera frames the model, not the ground.
         let without_ground = Presentation {
@@ -134,11 +134,11 @@ fn a_ground_that_hides_the_model_is_reported() {
 fn the_automatic_camera_is_adjusted() {
     let folder = TestFolder::with_file("a", "");
     let file = write_spike(&folder, DVec3::Y, true);
-    let fov = |fov| Presentation {
+    let with_fov = |fov| Presentation {
         fov: Some(fov),
         ..Presentation::default()
     };
-    let scene = load(&file, fov(50.0), Some(View::Front)).unwrap();
+    let scene = load(&file, with_fov(50.0), Some(View::Front)).unwrap();
     let Projection::Perspective { fov: found } = scene.camera.projection else {
         panic!("{:?}", scene.camera);
     };
@@ -153,17 +153,17 @@ fn the_automatic_camera_is_adjusted() {
     let camera = load(&file, orbit, None).unwrap().camera;
     assert!(camera.forward.distance(DVec3::NEG_X) < 1e-9, "{camera:?}");
     for invalid_fov in [0.5, 171.0, f64::NAN] {
-        let message = load(&file, fov(invalid_fov), Some(View::Front)).unwrap_err();
+        let message = load(&file, with_fov(invalid_fov), Some(View::Front)).unwrap_err();
         assert_eq!(message, format!("fov: {invalid_fov} must be from 1 to 170 degrees"));
     }
     let rule = "only applies to the automatic camera, and the file has its own camera; add --view or --orbit";
-    assert_eq!(load(&file, fov(50.0), None).unwrap_err(), format!("fov: {rule}"));
+    assert_eq!(load(&file, with_fov(50.0), None).unwrap_err(), format!("fov: {rule}"));
     let up = Presentation {
         up: Some("z".parse().unwrap()),
         ..Presentation::default()
     };
     assert_eq!(load(&file, up, None).unwrap_err(), format!("up: {rule}"));
-    // The ground does not depend on the camera.
+    // The option `ground` also applies to files with a camera.
     let ground = Presentation {
         ground: true,
         ..Presentation::default()

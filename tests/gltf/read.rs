@@ -1,4 +1,4 @@
-//! Loads and renders glTF files in the coordinates of the file.
+//! Functions that load and render glTF files. Coordinates are those of the file.
 
 use std::path::Path;
 
@@ -9,8 +9,8 @@ use wgray::{Device, Options};
 use super::build::{Builder, Packing};
 use crate::test_folder::TestFolder;
 
-/// A camera at +z of the file (-y of the scene), placed so that [`QUAD`](super::build::QUAD) fills the image. The
-/// environment is white.
+/// A scene whose camera is on the +z axis of the file (-y of the scene), so that [`QUAD`](super::build::QUAD) fills the
+/// image. The environment is white.
 const SCENE: &str = r#"
 image = { width = 6, height = 6 }
 camera = { type = "orthographic", position = [0, -10, 0], look_at = [0, 0, 0], height = 2 }
@@ -29,16 +29,16 @@ pub struct Triangle {
     pub corners: [DVec3; 3],
     /// Zero if the mesh has no normals.
     pub normals: [DVec3; 3],
-    /// In glTF convention: v points down.
+    /// In the convention of glTF: v increases downward.
     pub uvs: [DVec2; 3],
     /// Index into [`Scene::materials`].
     pub material: usize,
-    /// True if mirrored: the winding is clockwise.
+    /// True if the transform mirrors the triangle, so that its winding is clockwise.
     pub mirrored: bool,
 }
 
 impl Triangle {
-    /// Returns the geometric normal.
+    /// Returns the geometric normal, which points to the front side.
     pub fn geometric_normal(&self) -> DVec3 {
         let [a, b, c] = self.corners;
         let normal = (b - a).cross(c - a).normalize();
@@ -46,17 +46,17 @@ impl Triangle {
     }
 }
 
-/// Converts scene to file coordinates, where +y is up.
+/// Converts scene coordinates to file coordinates, where +y is up.
 pub fn to_file(p: DVec3) -> DVec3 {
     DVec3::new(p.x, p.z, -p.y)
 }
 
-/// Loads the scene with additional keys of its shape.
+/// Loads [`SCENE`] with this glTF file; `keys` are additional keys of its shape.
 pub fn load_scene(file: &Path, keys: &str) -> Scene {
     try_load_scene(file, keys).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// Loads the scene as [`load_scene`], or returns the error.
+/// Like [`load_scene`], but returns the error message instead of a panic.
 pub fn try_load_scene(file: &Path, keys: &str) -> Result<Scene, String> {
     let scene_folder = file.parent().expect("a folder");
     let name = file.file_name().expect("a name").to_string_lossy();
@@ -66,21 +66,22 @@ pub fn try_load_scene(file: &Path, keys: &str) -> Result<Scene, String> {
     Scene::load(&path).map_err(|error| error.to_string())
 }
 
+/// Writes the file and loads [`SCENE`] with it.
 pub fn scene(builder: &Builder, name: &str) -> Scene {
     let folder = TestFolder::with_file("a", "");
     load_scene(&builder.write(folder.folder(), name, Packing::Binary), "")
 }
 
-/// Loads the scene as [`scene`], with additional keys.
+/// Like [`scene`], with additional keys of the shape.
 pub fn scene_with_keys(builder: &Builder, name: &str, keys: &str) -> Scene {
     let folder = TestFolder::with_file("a", "");
     load_scene(&builder.write(folder.folder(), name, Packing::Binary), keys)
 }
 
-/// Returns the error message of an invalid file.
+/// Returns the error message for an invalid file or invalid keys.
 pub fn rejection(builder: &Builder, keys: &str) -> String {
     let folder = TestFolder::with_file("a", "");
-    let file = builder.write_invalid(folder.folder(), "bad", Packing::Binary);
+    let file = builder.write_invalid(folder.folder(), "invalid", Packing::Binary);
     match try_load_scene(&file, keys) {
         Ok(_) => panic!("the file was not rejected"),
         Err(message) => message,
@@ -99,7 +100,7 @@ pub fn triangles(scene: &Scene) -> Vec<Triangle> {
         else {
             continue;
         };
-        let normals = to_world.matrix3.inverse().transpose();
+        let normal_matrix = to_world.matrix3.inverse().transpose();
         for (i, triangle) in mesh.triangles.iter().enumerate() {
             let vertices = triangle.map(|vertex| vertex as usize);
             let group = mesh.group_of.get(i).map_or(0, |group| *group as usize);
@@ -108,7 +109,7 @@ pub fn triangles(scene: &Scene) -> Vec<Triangle> {
                     .map(|v| to_file(to_world.transform_point3(mesh.center + mesh.positions[v].as_dvec3()))),
                 normals: vertices.map(|v| {
                     let normal = mesh.normals.get(v).map_or(DVec3::ZERO, |normal| normal.as_dvec3());
-                    to_file((normals * normal).normalize_or_zero())
+                    to_file((normal_matrix * normal).normalize_or_zero())
                 }),
                 uvs: vertices.map(|v| {
                     let uv = mesh.uvs.get(v).map_or(DVec2::ZERO, |uv| uv.as_dvec2());
@@ -171,7 +172,7 @@ pub fn plain_color(color: Color) -> [f64; 3] {
     }
 }
 
-/// Asserts that values are equal in single precision.
+/// Asserts that values differ by at most 1e-6, relative to values above 1.
 #[track_caller]
 pub fn assert_near<const N: usize>(found: [f64; N], expected: [f64; N]) {
     let is_near = |(a, b): (&f64, &f64)| (a - b).abs() <= 1e-6 * b.abs().max(1.0);
@@ -190,7 +191,7 @@ pub fn pixels(scene: &Scene) -> Vec<[f32; 3]> {
     wgray::render(scene, &options).expect("an image").pixels().colors
 }
 
-/// Asserts one color for all pixels, within 1e-5.
+/// Asserts that all pixels have this color, within 1e-5.
 #[track_caller]
 pub fn assert_all(scene: &Scene, expected: [f64; 3]) {
     let pixels = pixels(scene);

@@ -18,7 +18,7 @@ fn add_textured_quad(builder: &mut Builder, info: Value) {
     builder.root_node(json!({ "mesh": mesh }));
 }
 
-/// Asserts the colors of the four quarters: top left, top right, bottom left, bottom right.
+/// Asserts the colors of the quarters of the image: top left, top right, bottom left, bottom right.
 #[track_caller]
 fn assert_quarters(scene: &Scene, expected: [[u8; 4]; 4]) {
     let pixels = pixels(scene);
@@ -82,7 +82,7 @@ fn jpeg_and_webp_are_read() {
     let texture = builder.add("textures", texture);
     add_textured_quad(&mut builder, json!({ "index": texture }));
     assert_quarters(&scene(&builder, "webp"), [RED, GREEN, BLUE, WHITE]);
-    // A JPEG stores a block of 8 x 8 texels of one color almost exactly.
+    // A JPEG file stores blocks of 8 x 8 texels of one color with a small error.
     let large: Vec<u8> = (0..256).flat_map(|i| [[255, 0, 0], [255; 3]][(i / 8) % 2]).collect();
     let mut jpeg = Vec::new();
     let mut encoder = image::codecs::jpeg::JpegEncoder::new_with_quality(&mut jpeg, 100);
@@ -101,12 +101,12 @@ fn jpeg_and_webp_are_read() {
     );
 }
 
-/// Reads an output of `tests/textures/ktx2.mjs`.
+/// Reads a file that `tests/textures/ktx2.mjs` wrote.
 fn ktx2_file(name: &str) -> Vec<u8> {
     std::fs::read(crate::sources::path(&format!("tests/textures/ktx2/{name}"))).expect("a file")
 }
 
-/// Returns an unlit quad with an image, for KTX2 through `KHR_texture_basisu`.
+/// Returns an unlit quad with the image as its texture. KTX2 images are referenced through `KHR_texture_basisu`.
 fn with_image(bytes: &[u8], mime_type: &str, material_keys: &Value) -> Builder {
     let mut builder = Builder::new();
     let image = builder.image(bytes, mime_type);
@@ -133,19 +133,19 @@ fn ktx2_files_are_read() {
     // UASTC represents a block of one color exactly.
     let builder = with_image(&ktx2_file("zstandard-quarters.ktx2"), "image/ktx2", &json!({}));
     assert_quarters(&scene(&builder, "zstandard-quarters"), [RED, GREEN, BLUE, WHITE]);
-    // A PNG file has the same texels.
+    // For each of these KTX2 files, a PNG file contains the same texels.
     let blend = json!({ "alphaMode": "BLEND" });
-    let mut pictures = Vec::new();
+    let mut images = Vec::new();
     for name in ["etc1s-48x20-alpha", "uastc-48x20-alpha", "etc1s-quarters"] {
-        let [ktx2, png] = [("ktx2", "image/ktx2"), ("png", "image/png")].map(|(extension, kind)| {
-            let builder = with_image(&ktx2_file(&format!("{name}.{extension}")), kind, &blend);
+        let [ktx2, png] = [("ktx2", "image/ktx2"), ("png", "image/png")].map(|(extension, mime_type)| {
+            let builder = with_image(&ktx2_file(&format!("{name}.{extension}")), mime_type, &blend);
             pixels(&scene(&builder, &format!("{name}-{extension}")))
         });
         assert_eq!(ktx2, png, "{name}");
-        pictures.push(ktx2);
+        images.push(ktx2);
     }
     assert!(
-        pictures[0] != pictures[1] && pictures[0] != pictures[2],
+        images[0] != images[1] && images[0] != images[2],
         "the textures are equal"
     );
 }
@@ -153,12 +153,12 @@ fn ktx2_files_are_read() {
 #[test]
 fn base_color_is_srgb_and_multiplied_by_its_factor() {
     let mut builder = Builder::new();
-    let texture = builder.plain_texture([128, 255, 64, 255]);
+    let texture = builder.constant_texture([128, 255, 64, 255]);
     let pbr = json!({ "baseColorTexture": { "index": texture }, "baseColorFactor": [0.5, 0.25, 1, 1] });
     let material = builder.unlit(pbr);
     let mesh = builder.quad(Some(material));
     builder.root_node(json!({ "mesh": mesh }));
-    // IEC 61966-2-1.
+    // The sRGB transfer function (IEC 61966-2-1).
     let linear = |byte: f64| ((byte / 255.0 + 0.055) / 1.055).powf(2.4);
     assert_all(&scene(&builder, "srgb"), [0.5 * linear(128.0), 0.25, linear(64.0)]);
 }
@@ -274,14 +274,14 @@ fn texture_transforms_follow_khr_texture_transform() {
     );
     let lower = json!({ "offset": [0.5, 0.5], "scale": [0.5, 0.5] });
     assert_quarters(&transformed("transform-lower", lower), [WHITE; 4]);
-    // Examples of the extension: a clockwise rotation of the full image and of a part of the image, and a flip.
+    // Examples of the extension's specification: clockwise rotations of the full image and of a quarter, and a flip.
     let rotated = json!({ "offset": [0, 1], "rotation": quarter_turn });
     assert_quarters(&transformed("transform-turn", rotated), [BLUE, RED, WHITE, GREEN]);
     let rotated = json!({ "offset": [0, 1], "rotation": quarter_turn, "scale": [0.5, 0.5] });
     assert_quarters(&transformed("transform-turn-quarter", rotated), [BLUE; 4]);
     let flipped = json!({ "offset": [0, 1], "scale": [1, -1] });
     assert_quarters(&transformed("transform-flip", flipped), [BLUE, WHITE, RED, GREEN]);
-    // The scale precedes the rotation.
+    // The scale is applied before the rotation.
     let scaled_and_rotated = json!({ "offset": [0, 1], "rotation": quarter_turn, "scale": [0.5, 1] });
     assert_quarters(
         &transformed("transform-order", scaled_and_rotated),
@@ -294,20 +294,20 @@ fn texture_transforms_follow_khr_texture_transform() {
     );
 }
 
-/// A constant texture and its untextured equivalent.
-struct Row {
+/// A material with a texture of one color, and the equivalent material without a texture.
+struct Case {
     name: &'static str,
     texel: [u8; 4],
-    /// `TEXTURE` stands for the texture reference.
+    /// `TEXTURE` stands for the reference to the texture.
     textured: Value,
     plain: Value,
 }
 
-fn rows() -> Vec<Row> {
+fn cases() -> Vec<Case> {
     let pbr = |value: Value| json!({ "pbrMetallicRoughness": value });
-    let extension = |name: &str, value: Value| json!({ "pbrMetallicRoughness": { "metallicFactor": 0, "roughnessFactor": 0.5 }, "extensions": { name: value } });
-    let glossy = |name: &str, value: Value| json!({ "pbrMetallicRoughness": { "metallicFactor": 1, "roughnessFactor": 0.3 }, "extensions": { name: value } });
-    let row = |name, texel, textured, plain| Row {
+    let dielectric = |name: &str, value: Value| json!({ "pbrMetallicRoughness": { "metallicFactor": 0, "roughnessFactor": 0.5 }, "extensions": { name: value } });
+    let metal = |name: &str, value: Value| json!({ "pbrMetallicRoughness": { "metallicFactor": 1, "roughnessFactor": 0.3 }, "extensions": { name: value } });
+    let case = |name, texel, textured, plain| Case {
         name,
         texel,
         textured,
@@ -315,21 +315,21 @@ fn rows() -> Vec<Row> {
     };
     // The component of an anisotropy direction that the byte 128 encodes.
     let near_zero: f64 = 128.0 / 255.0 * 2.0 - 1.0;
-    // The emissive rows are delta-specular, because NEE samples textured emission differently.
+    // The emissive materials are delta-specular, because NEE samples textured emission in a different way.
     vec![
-        row(
+        case(
             "base-color",
             [255, 0, 255, 255],
             pbr(json!({ "baseColorTexture": "TEXTURE", "baseColorFactor": [0.5, 0.5, 0.25, 1], "metallicFactor": 0 })),
             pbr(json!({ "baseColorFactor": [0.5, 0, 0.25, 1], "metallicFactor": 0 })),
         ),
-        row(
+        case(
             "metallic-roughness",
             [0, 102, 51, 255],
             pbr(json!({ "metallicRoughnessTexture": "TEXTURE", "metallicFactor": 0.5, "roughnessFactor": 0.75 })),
             pbr(json!({ "metallicFactor": 0.1, "roughnessFactor": 0.3 })),
         ),
-        row(
+        case(
             "emissive",
             [255, 0, 255, 255],
             json!({
@@ -338,7 +338,7 @@ fn rows() -> Vec<Row> {
             }),
             json!({ "emissiveFactor": [0.5, 0, 0.25], "pbrMetallicRoughness": { "roughnessFactor": 0 } }),
         ),
-        row(
+        case(
             "emissive-strong",
             [255, 0, 255, 255],
             json!({
@@ -351,104 +351,104 @@ fn rows() -> Vec<Row> {
                 "extensions": { "KHR_materials_emissive_strength": { "emissiveStrength": 4 } },
             }),
         ),
-        row(
+        case(
             "specular",
             [255, 255, 255, 51],
-            extension(
+            dielectric(
                 "KHR_materials_specular",
                 json!({ "specularTexture": "TEXTURE", "specularFactor": 0.5 }),
             ),
-            extension("KHR_materials_specular", json!({ "specularFactor": 0.1 })),
+            dielectric("KHR_materials_specular", json!({ "specularFactor": 0.1 })),
         ),
-        row(
+        case(
             "specular-color",
             [255, 0, 255, 51],
-            extension(
+            dielectric(
                 "KHR_materials_specular",
                 json!({ "specularColorTexture": "TEXTURE", "specularColorFactor": [0.5, 0.5, 1] }),
             ),
-            extension("KHR_materials_specular", json!({ "specularColorFactor": [0.5, 0, 1] })),
+            dielectric("KHR_materials_specular", json!({ "specularColorFactor": [0.5, 0, 1] })),
         ),
-        row(
+        case(
             "transmission",
             [51, 255, 255, 255],
-            extension(
+            dielectric(
                 "KHR_materials_transmission",
                 json!({ "transmissionTexture": "TEXTURE", "transmissionFactor": 0.5 }),
             ),
-            extension("KHR_materials_transmission", json!({ "transmissionFactor": 0.1 })),
+            dielectric("KHR_materials_transmission", json!({ "transmissionFactor": 0.1 })),
         ),
-        row(
+        case(
             "clearcoat",
             [51, 255, 255, 255],
-            extension(
+            dielectric(
                 "KHR_materials_clearcoat",
                 json!({ "clearcoatTexture": "TEXTURE", "clearcoatFactor": 0.5 }),
             ),
-            extension("KHR_materials_clearcoat", json!({ "clearcoatFactor": 0.1 })),
+            dielectric("KHR_materials_clearcoat", json!({ "clearcoatFactor": 0.1 })),
         ),
-        row(
+        case(
             "clearcoat-roughness",
             [255, 102, 255, 255],
-            extension(
+            dielectric(
                 "KHR_materials_clearcoat",
                 json!({
                     "clearcoatRoughnessTexture": "TEXTURE", "clearcoatRoughnessFactor": 0.75, "clearcoatFactor": 1,
                 }),
             ),
-            extension(
+            dielectric(
                 "KHR_materials_clearcoat",
                 json!({ "clearcoatRoughnessFactor": 0.3, "clearcoatFactor": 1 }),
             ),
         ),
-        row(
+        case(
             "sheen-color",
             [255, 0, 255, 255],
-            extension(
+            dielectric(
                 "KHR_materials_sheen",
                 json!({
                     "sheenColorTexture": "TEXTURE", "sheenColorFactor": [0.5, 0.5, 1], "sheenRoughnessFactor": 0.5,
                 }),
             ),
-            extension(
+            dielectric(
                 "KHR_materials_sheen",
                 json!({ "sheenColorFactor": [0.5, 0, 1], "sheenRoughnessFactor": 0.5 }),
             ),
         ),
-        row(
+        case(
             "sheen-roughness",
             [255, 255, 255, 102],
-            extension(
+            dielectric(
                 "KHR_materials_sheen",
                 json!({
                     "sheenRoughnessTexture": "TEXTURE", "sheenColorFactor": [1, 1, 1], "sheenRoughnessFactor": 0.75,
                 }),
             ),
-            extension(
+            dielectric(
                 "KHR_materials_sheen",
                 json!({ "sheenColorFactor": [1, 1, 1], "sheenRoughnessFactor": 0.3 }),
             ),
         ),
-        row(
+        case(
             "anisotropy",
             [255, 128, 153, 255],
-            glossy(
+            metal(
                 "KHR_materials_anisotropy",
                 json!({ "anisotropyTexture": "TEXTURE", "anisotropyStrength": 0.5 }),
             ),
-            glossy(
+            metal(
                 "KHR_materials_anisotropy",
                 json!({ "anisotropyStrength": 0.3, "anisotropyRotation": near_zero.atan2(1.0) }),
             ),
         ),
-        row(
+        case(
             "anisotropy-direction",
             [128, 255, 255, 255],
-            glossy(
+            metal(
                 "KHR_materials_anisotropy",
                 json!({ "anisotropyTexture": "TEXTURE", "anisotropyStrength": 0.8, "anisotropyRotation": 0.25 }),
             ),
-            glossy(
+            metal(
                 "KHR_materials_anisotropy",
                 json!({ "anisotropyStrength": 0.8, "anisotropyRotation": 0.25 + 1.0_f64.atan2(near_zero) }),
             ),
@@ -459,7 +459,7 @@ fn rows() -> Vec<Row> {
 fn tilted_quad(name: &str, texel: [u8; 4], material: &Value) -> Scene {
     let mut builder = Builder::new();
     builder.uses("KHR_lights_punctual");
-    let texture = builder.plain_texture(texel);
+    let texture = builder.constant_texture(texel);
     let text = material
         .to_string()
         .replace("\"TEXTURE\"", &json!({ "index": texture }).to_string());
@@ -481,11 +481,11 @@ fn tilted_quad(name: &str, texel: [u8; 4], material: &Value) -> Scene {
 
 #[test]
 fn constant_textures_equal_plain_values() {
-    for row in rows() {
-        let name = format!("texture-{}", row.name);
-        let textured = pixels(&tilted_quad(&name, row.texel, &row.textured));
-        let plain = pixels(&tilted_quad(&format!("{name}-plain"), row.texel, &row.plain));
-        let white = pixels(&tilted_quad(&format!("{name}-white"), WHITE, &row.textured));
+    for case in cases() {
+        let name = format!("texture-{}", case.name);
+        let textured = pixels(&tilted_quad(&name, case.texel, &case.textured));
+        let plain = pixels(&tilted_quad(&format!("{name}-plain"), case.texel, &case.plain));
+        let white = pixels(&tilted_quad(&format!("{name}-white"), WHITE, &case.textured));
         let max_difference = |a: &[[f32; 3]], b: &[[f32; 3]]| {
             let pairs = a.as_flattened().iter().zip(b.as_flattened());
             pairs
@@ -493,17 +493,21 @@ fn constant_textures_equal_plain_values() {
                 .fold(0.0, f32::max)
         };
         // Textured anisotropy uses a coarser multiple-scattering table.
-        let tolerance = if row.name.starts_with("anisotropy") { 0.01 } else { 1e-5 };
+        let tolerance = if case.name.starts_with("anisotropy") {
+            0.01
+        } else {
+            1e-5
+        };
         assert!(
             max_difference(&textured, &plain) < tolerance,
             "{}: {textured:?} {plain:?}",
-            row.name
+            case.name
         );
         // Negative control: with a white texel, the image differs visibly.
         assert!(
             max_difference(&white, &plain) > 0.1,
             "{}: {white:?} {plain:?}",
-            row.name
+            case.name
         );
     }
 }
@@ -511,7 +515,7 @@ fn constant_textures_equal_plain_values() {
 #[test]
 fn occlusion_textures_are_ignored_and_reported() {
     let mut builder = Builder::new();
-    let texture = builder.plain_texture([0, 0, 0, 255]);
+    let texture = builder.constant_texture([0, 0, 0, 255]);
     let material = json!({
         "occlusionTexture": { "index": texture },
         "pbrMetallicRoughness": { "baseColorFactor": [0.25, 0.5, 0.75, 1], "roughnessFactor": 0 },
@@ -528,12 +532,12 @@ fn occlusion_textures_are_ignored_and_reported() {
     );
 }
 
-/// Returns the shading normal in file coordinates.
+/// Returns the shading normal of a quad with a normal map, in file coordinates.
 fn shading_normal(name: &str, map: Value, uvs: [[f64; 2]; 4], tangent: Option<[f64; 4]>) -> [f64; 3] {
     let mut builder = Builder::new();
     builder.uses("KHR_texture_transform");
-    // The texel encodes about (0.6, 0.2, 0.77).
-    let texture = builder.plain_texture([204, 153, 226, 255]);
+    // The texel encodes the tangent-space normal (0.6, 0.2, 0.77), rounded.
+    let texture = builder.constant_texture([204, 153, 226, 255]);
     let mut info = map;
     info["index"] = json!(texture);
     let material = builder.add("materials", json!({ "normalTexture": info }));

@@ -1,4 +1,5 @@
-//! Small files that could take minutes or gigabytes must give an error that names the limit, or an image.
+//! Small files whose rendering could need minutes or gigabytes are rejected with a message that names the limit, or
+//! they render within the limits of [`run`].
 
 use std::fs;
 use std::path::Path;
@@ -8,14 +9,14 @@ use serde_json::{Value, json};
 use super::seeds::{START, TEXTURE, container, ktx2, triangle};
 use super::{RunResult, render, render_with, run};
 
-fn model(json: &Value, binary: &[u8]) -> RunResult {
+fn render_glb(json: &Value, binary: &[u8]) -> RunResult {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("a.glb"), container(json, binary)).unwrap();
     render(folder.path(), "a.glb")
 }
 
 fn assert_rejected(json: &Value, binary: &[u8], message: &str) {
-    let result = model(json, binary);
+    let result = render_glb(json, binary);
     assert!(
         result.code == 3 && result.output.contains(message),
         "{}: {}",
@@ -24,8 +25,9 @@ fn assert_rejected(json: &Value, binary: &[u8], message: &str) {
     );
 }
 
-fn zeros(count: u32, kind: &str) -> Value {
-    json!({ "componentType": 5126, "count": count, "type": kind })
+/// Returns a float accessor without a buffer view: all of its values are 0.
+fn zeros(count: u32, accessor_type: &str) -> Value {
+    json!({ "componentType": 5126, "count": count, "type": accessor_type })
 }
 
 fn push(list: &mut Value, value: Value) {
@@ -35,17 +37,17 @@ fn push(list: &mut Value, value: Value) {
 #[test]
 fn instances_are_in_proportion_to_the_file() {
     let (mut json, binary) = triangle();
-    let node = |count| json!([{ "mesh": 0, "extensions": { "EXT_mesh_gpu_instancing": { "attributes": { "TRANSLATION": count } } } }]);
+    let instanced_node = |accessor| json!([{ "mesh": 0, "extensions": { "EXT_mesh_gpu_instancing": { "attributes": { "TRANSLATION": accessor } } } }]);
     push(&mut json["accessors"], zeros(1 << 20, "VEC3"));
     push(&mut json["accessors"], zeros(1 << 16, "VEC3"));
-    json["nodes"] = node(1);
+    json["nodes"] = instanced_node(1);
     assert_rejected(&json, &binary, "nodes[0]: a file of ");
     assert_rejected(&json, &binary, " bytes must have at most 656");
-    json["nodes"] = node(2);
-    assert_eq!(model(&json, &binary).code, 0);
-    // The length of the JSON text limits the number of nodes.
+    json["nodes"] = instanced_node(2);
+    assert_eq!(render_glb(&json, &binary).code, 0);
+    // Nodes without instances need no such limit: the length of the JSON text bounds their number.
     json["nodes"] = json!(vec![json!({ "mesh": 0 }); 100_000]);
-    assert_eq!(model(&json, &binary).code, 0);
+    assert_eq!(render_glb(&json, &binary).code, 0);
 }
 
 #[test]
@@ -67,7 +69,7 @@ fn the_total_number_of_triangles_is_limited() {
     meshes(&mut json, 1000);
     assert_rejected(&json, &binary, " triangles");
     meshes(&mut json, 20);
-    assert_eq!(model(&json, &binary).code, 0);
+    assert_eq!(render_glb(&json, &binary).code, 0);
 }
 
 #[test]
@@ -112,7 +114,7 @@ fn repeated_reads_of_accessors_are_limited() {
 #[test]
 fn compressed_views_are_in_proportion() {
     let (mut json, mut binary) = triangle();
-    // The header of a stream that declares 4 GB of zeros.
+    // The stream consists only of its header; the buffer view declares 4 GiB.
     binary.push(0xa0);
     json["buffers"][0]["byteLength"] = json!(binary.len());
     json["extensionsUsed"] = json!(["EXT_meshopt_compression"]);
@@ -181,7 +183,7 @@ fn shapes_that_repeat_a_file_are_limited() {
 }
 
 /// Returns a PNG of zeros, encoded row by row.
-fn blank(width: u32, height: u32, color: png::ColorType, depth: png::BitDepth) -> Vec<u8> {
+fn zero_png(width: u32, height: u32, color: png::ColorType, depth: png::BitDepth) -> Vec<u8> {
     use std::io::Write as _;
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, width, height);
@@ -200,8 +202,8 @@ fn blank(width: u32, height: u32, color: png::ColorType, depth: png::BitDepth) -
 
 #[test]
 fn images_that_decode_to_a_thousand_times_their_size_are_rejected() {
-    // A file of 65 KB with 67 million texels.
-    let image = blank(8192, 8192, png::ColorType::Grayscale, png::BitDepth::Eight);
+    // A PNG file of 65 KB with 67 million texels.
+    let image = zero_png(8192, 8192, png::ColorType::Grayscale, png::BitDepth::Eight);
     let (mut json, mut binary) = triangle();
     let start = binary.len();
     binary.extend(&image);
@@ -217,8 +219,8 @@ fn images_that_decode_to_a_thousand_times_their_size_are_rejected() {
     let primitive = |i: usize| json!({ "attributes": { "POSITION": 0 }, "material": i });
     json["meshes"][0]["primitives"] = (0..50).map(primitive).collect();
     assert_rejected(&json, &binary, "texels in total; for files of ");
-    // A file of 2 MB decodes to 2 GB. Large images of models are halved.
-    let rgba16 = blank(16_384, 16_384, png::ColorType::Rgba, png::BitDepth::Sixteen);
+    // A PNG file of 2 MB decodes to 2 GB. The limit applies although large images of models are downsampled.
+    let rgba16 = zero_png(16_384, 16_384, png::ColorType::Rgba, png::BitDepth::Sixteen);
     binary.truncate(start);
     binary.extend(&rgba16);
     json["buffers"][0]["byteLength"] = json!(binary.len());
@@ -236,7 +238,7 @@ fn images_that_decode_to_a_thousand_times_their_size_are_rejected() {
     );
 }
 
-/// A file of 24,000 bytes would decode to 1.5 GB; other headers declare more texels than the file contains.
+/// The first file has 24,000 bytes and would decode to 1.5 GB; the headers of the others declare too many texels.
 #[test]
 fn ktx2_files_are_refused_by_their_headers() {
     let folder = tempfile::tempdir().unwrap();
@@ -280,11 +282,10 @@ fn ktx2_files_are_refused_by_their_headers() {
     assert_rejected(&bytes, "must have at most 16384 texels along a side");
 }
 
-/// The data window may exceed the display window.
 #[test]
 fn windows_of_exr_files_are_refused_by_their_headers() {
     let folder = tempfile::tempdir().unwrap();
-    let valid = folder.path().join("sound.exr");
+    let valid = folder.path().join("valid.exr");
     image::Rgb32FImage::new(8, 6).save(&valid).unwrap();
     let valid = fs::read(valid).unwrap();
     let window_offset = |name: &str| {
@@ -297,7 +298,8 @@ fn windows_of_exr_files_are_refused_by_their_headers() {
                  [textures.t]\ntype = 'image'\nfile = 'a.exr'\n[materials.m]\ntype = 'phong'\ncolor = { texture = 't' }\n\
                  [[shapes]]\ntype = 'sphere'\nmaterial = 'm'\ncenter = [0, 0, 0]\nradius = 1\n";
     fs::write(folder.path().join("s.toml"), scene).unwrap();
-    for (window, numbers, value, code, rule) in [
+    for (window, indices, value, code, rule) in [
+        // The data window may exceed the display window.
         (data, 0..1, 0, 0, ""),
         (data, 0..1, -(1 << 28), 3, "must have at most 16384 texels along a side"),
         (data, 2..3, 1 << 28, 3, "must have at most 16384 texels along a side"),
@@ -312,8 +314,8 @@ fn windows_of_exr_files_are_refused_by_their_headers() {
         ),
     ] {
         let mut file = valid.clone();
-        for number in numbers {
-            let offset = window + 4 * number;
+        for index in indices {
+            let offset = window + 4 * index;
             file[offset..offset + 4].copy_from_slice(&i32::to_le_bytes(value));
         }
         fs::write(folder.path().join("a.exr"), file).unwrap();
@@ -336,15 +338,15 @@ fn pipes_and_devices_are_not_read() {
         let created = std::process::Command::new("mkfifo").arg(folder.join(name)).status();
         assert!(created.unwrap().success());
     }
-    let plain = ["render", "plain.toml", "--device", "cpu", "-o", "out.png"];
+    let render_plain = ["render", "plain.toml", "--device", "cpu", "-o", "out.png"];
     for name in ["pipe", "/dev/zero"] {
         for (arguments, codes) in [
             (vec!["check", name], [3]),
             (vec!["diff", name, "t.png"], [1]),
             (vec!["merge", name, "-o", "out.exr"], [1]),
-            ([&plain[..], &["--checkpoint", name, "--resume"]].concat(), [2]),
+            ([&render_plain[..], &["--checkpoint", name, "--resume"]].concat(), [2]),
             (
-                [&plain[..], &["--environment", name, "--integrator", "path"]].concat(),
+                [&render_plain[..], &["--environment", name, "--integrator", "path"]].concat(),
                 [2],
             ),
         ] {
@@ -374,7 +376,7 @@ fn pipes_and_devices_are_not_read() {
             result.output
         );
     }
-    // Pipes of a shell have a writer.
+    // The pipes of a shell have a writer, so they can be read.
     let result = shell(
         folder,
         "\"$0\" check <(cat plain.toml) && \"$0\" check /dev/stdin < plain.toml && cat plain.toml | \"$0\" check /dev/stdin",
@@ -394,28 +396,36 @@ fn shell(folder: &Path, script: &str) -> String {
 #[test]
 fn deeply_nested_and_unterminated_values_are_rejected() {
     let folder = tempfile::tempdir().unwrap();
-    let deep = 100_000;
-    let dots = vec!["a"; deep].join(".");
-    let rule = "max recursion depth";
-    let json = "lists and objects must be nested at most 127 levels deep";
+    let depth = 100_000;
+    let dotted_key = vec!["a"; depth].join(".");
+    let toml_rule = "max recursion depth";
+    let json_rule = "lists and objects must be nested at most 127 levels deep";
     for (name, text, message) in [
-        ("a.toml", format!("x = {}{}", "[".repeat(deep), "]".repeat(deep)), rule),
         (
             "a.toml",
-            format!("x = {}1{}", "{a = ".repeat(deep), "}".repeat(deep)),
-            rule,
+            format!("x = {}{}", "[".repeat(depth), "]".repeat(depth)),
+            toml_rule,
         ),
-        ("a.toml", format!("b = 1\n{dots} = 1"), "a.toml:1:1: recursion limit"),
-        ("a.toml", format!("[{dots}]"), "a.toml:1:1: recursion limit"),
-        ("a.toml", "[".repeat(deep), "a.toml:1:"),
+        (
+            "a.toml",
+            format!("x = {}1{}", "{a = ".repeat(depth), "}".repeat(depth)),
+            toml_rule,
+        ),
+        (
+            "a.toml",
+            format!("b = 1\n{dotted_key} = 1"),
+            "a.toml:1:1: recursion limit",
+        ),
+        ("a.toml", format!("[{dotted_key}]"), "a.toml:1:1: recursion limit"),
+        ("a.toml", "[".repeat(depth), "a.toml:1:"),
         (
             "a.toml",
             format!("x = \"{}", "a".repeat(3_000_000)),
             "invalid basic string",
         ),
-        ("a.json", "[".repeat(deep), json),
-        ("a.gltf", format!("{{\"x\":{}", "[".repeat(deep)), json),
-        ("a.gltf", format!("{{\"asset\":{}", "{\"a\":".repeat(deep)), json),
+        ("a.json", "[".repeat(depth), json_rule),
+        ("a.gltf", format!("{{\"x\":{}", "[".repeat(depth)), json_rule),
+        ("a.gltf", format!("{{\"asset\":{}", "{\"a\":".repeat(depth)), json_rule),
     ] {
         fs::write(folder.path().join(name), text).unwrap();
         let result = run(folder.path(), &["check", name]);
@@ -430,7 +440,7 @@ fn deeply_nested_and_unterminated_values_are_rejected() {
 
 #[test]
 fn control_characters_are_escaped_in_messages() {
-    // `run` rejects control characters.
+    // `run` panics if the output contains control characters.
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     super::seeds::write_referenced_files(folder);

@@ -23,13 +23,13 @@ struct RunResult {
     seconds: f64,
 }
 
-/// Maximum address space in KiB, for the program, its image and two stacks.
+/// Maximum address space in KiB, including the executable and the stacks of two threads.
 const MAX_MEMORY_KIB: u64 = 1 << 20;
 /// Maximum CPU time in seconds, over all threads.
 const MAX_CPU_SECONDS: u64 = 10;
 const TIMEOUT: Duration = Duration::from_secs(60);
 
-/// Runs the program within these limits.
+/// Runs the program with these limits.
 ///
 /// # Panics
 ///
@@ -88,7 +88,7 @@ fn render(folder: &Path, scene: &str) -> RunResult {
     render_with(folder, scene, &[])
 }
 
-fn render_with(folder: &Path, scene: &str, extra: &[&str]) -> RunResult {
+fn render_with(folder: &Path, scene: &str, extra_options: &[&str]) -> RunResult {
     let options = [
         "render",
         scene,
@@ -103,5 +103,5 @@ fn render_with(folder: &Path, scene: &str, extra: &[&str]) -> RunResult {
         "-o",
         "out.png",
     ];
-    run(folder, &[&options, extra].concat())
+    run(folder, &[&options, extra_options].concat())
 }

@@ -8,7 +8,7 @@ use super::seeds::{Format, ReadCommand, SCENES, START, all_formats, write_refere
 use super::{RunResult, render, run};
 use crate::random::Random;
 
-/// Bits of integers at the ends of ranges, and of special floats.
+/// Bit patterns of extreme integers and of special floats.
 const EXTREME_BITS: [u32; 8] = [
     0,
     1,
@@ -19,7 +19,7 @@ const EXTREME_BITS: [u32; 8] = [
     0x7f80_0000,
     0x0100_0000,
 ];
-/// Texts to insert: numbers at the ends of ranges, control characters and syntax errors.
+/// Texts to insert: extreme numbers, control characters, syntax errors and a path.
 const TEXTS: [&[u8]; 16] = [
     b"-1",
     b"0",
@@ -60,7 +60,7 @@ fn mutate_bytes(bytes: &mut Vec<u8>, random: &Random) {
             }
             6 => drop(bytes.splice(offset..offset + length.min(3), random.pick(&TEXTS).iter().copied())),
             _ if random.once_in(8) => bytes.truncate(offset),
-            // Replaces the next number of a text.
+            // Replaces the next decimal number.
             _ => {
                 let is_digit = |byte: &u8| byte.is_ascii_digit() || b".-".contains(byte);
                 if let Some(start) = bytes[offset..].iter().position(is_digit).map(|start| offset + start) {
@@ -75,7 +75,7 @@ fn mutate_bytes(bytes: &mut Vec<u8>, random: &Random) {
     }
 }
 
-/// Mutates the values of a file if its format has a serializer, otherwise or rarely the bytes.
+/// In two of three cases, mutates the values of the file if its format has a serializer; otherwise mutates the bytes.
 fn mutate(format: &Format, random: &Random) -> Vec<u8> {
     if let Some((values, serialize)) = format.values.as_ref().filter(|_| !random.once_in(3)) {
         let mut values = values.clone();
@@ -92,25 +92,25 @@ fn mutate(format: &Format, random: &Random) -> Vec<u8> {
 }
 
 #[test]
-fn changed_files_are_read_or_rejected_with_a_message() {
-    // The count is small by default; the seeds are fixed.
+fn mutated_files_are_read_or_rejected_with_a_message() {
+    // Number of mutations of each format. The seeds are fixed.
     let count: usize = std::env::var("WGRAY_TEST_HOSTILE").map_or(8, |count| count.parse().unwrap());
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
-    for (number, format) in all_formats(folder).into_iter().enumerate() {
-        // All scenes together count as one format.
+    for (format_index, format) in all_formats(folder).into_iter().enumerate() {
+        // All scenes together get the number of mutations of one format.
         let count = if format.extension == "toml" {
             count.div_ceil(SCENES.len())
         } else {
             count
         };
         let file = format!("a.{}", format.extension);
-        let random = Random::new(number as u64);
+        let random = Random::new(format_index as u64);
         let mut codes: BTreeMap<i32, usize> = BTreeMap::new();
         let mut max_seconds = 0.0_f64;
         let run_commands = |bytes: &[u8]| -> Vec<RunResult> {
             fs::write(folder.join(&file), bytes).unwrap();
-            let scene = |text: &str| {
+            let write_scene = |text: &str| {
                 fs::write(
                     folder.join("names.toml"),
                     START.to_owned() + &text.replace("FILE", &file),
@@ -133,11 +133,11 @@ fn changed_files_are_read_or_rejected_with_a_message() {
                     if format.extension == "mtl" {
                         fs::write(folder.join("a.mtl"), bytes).unwrap();
                     }
-                    scene(text);
+                    write_scene(text);
                     vec![render(folder, "names.toml")]
                 }
                 ReadCommand::Picture(text) => {
-                    scene(text);
+                    write_scene(text);
                     vec![render(folder, "names.toml"), run(folder, &["diff", &file, "t.png"])]
                 }
                 ReadCommand::Checkpoint => vec![run(
@@ -156,15 +156,15 @@ fn changed_files_are_read_or_rejected_with_a_message() {
                 result.output
             );
         }
-        for number in 0..count {
+        for mutation_index in 0..count {
             let bytes = mutate(&format, &random);
             let results = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| run_commands(&bytes)));
             let save_file = || {
-                let path = std::env::temp_dir().join(format!("wgray-hostile-{number}.{}", format.extension));
+                let path = std::env::temp_dir().join(format!("wgray-hostile-{mutation_index}.{}", format.extension));
                 fs::write(&path, &bytes).unwrap();
                 path
             };
-            let results = results.unwrap_or_else(|_| panic!("{}: the file is kept", save_file().display()));
+            let results = results.unwrap_or_else(|_| panic!("the mutated file is saved as {}", save_file().display()));
             for result in results {
                 let is_permitted = result.code == 0 || format.codes.contains(&result.code);
                 assert!(

@@ -8,10 +8,10 @@ use serde_json::json;
 use super::seeds::{START, triangle};
 use super::{RunResult, render, render_with};
 
-/// Contents that no message may contain.
+/// Contents of the secret files, which no message may contain.
 const SECRET: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n# secret\n";
 
-/// Creates a scene folder, with secret files next to it.
+/// Creates a scene folder with secret files next to it and, on Unix, links that lead to them.
 fn create_folders() -> (tempfile::TempDir, PathBuf) {
     let outer = tempfile::tempdir().unwrap();
     let folder = outer.path().join("scene");
@@ -30,6 +30,7 @@ fn create_folders() -> (tempfile::TempDir, PathBuf) {
     (outer, folder)
 }
 
+/// Returns names that lead from the scene folder to the secret file.
 fn escaping_names(outer: &Path, extension: &str) -> Vec<String> {
     let secret = outer.join(format!("secret.{extension}"));
     let absolute = secret.display().to_string();
@@ -137,7 +138,7 @@ fn a_gltf_file_reads_no_file_outside_the_asset_root() {
             }
             fs::write(folder.join("a.gltf"), json.to_string()).unwrap();
             assert_rejected(&render_with(&folder, "a.gltf", &["--strict"]), &name);
-            // A scene with this glTF file is rejected, too.
+            // A scene that imports this glTF file is rejected, too.
             fs::write(
                 folder.join("a.toml"),
                 format!("{START}[[shapes]]\ntype = 'gltf'\nfile = 'a.gltf'\n"),
@@ -177,7 +178,7 @@ fn a_mesh_reads_no_file_outside_the_asset_root() {
         fs::write(folder.join("a.obj"), mesh("in.mtl")).unwrap();
         fs::write(folder.join("in.mtl"), format!("{material}map_Kd {name}\n")).unwrap();
         let result = render(&folder, "a.toml");
-        // Without `--strict`, the file gives a warning.
+        // Without `--strict`, a texture that cannot be read causes only a warning.
         assert!(
             result.output.contains("map_Kd") && !result.output.contains("# secret"),
             "{name}: {}",

@@ -1,4 +1,4 @@
-//! Valid files of every format, to be mutated.
+//! A valid file of every format. The tests mutate these files.
 
 use std::fs;
 use std::io::Cursor;
@@ -9,36 +9,39 @@ use image::{DynamicImage, ImageFormat, Rgb, Rgb32FImage, Rgba, RgbaImage};
 use serde_json::{Value, json};
 
 use super::everything::everything;
-use crate::sources::path as project;
+use crate::sources::path as project_path;
 
 pub type Serializer = fn(&Value) -> Option<Vec<u8>>;
 
-/// A file format.
+/// A file format with a valid file.
 pub struct Format {
     /// Extension of the file name.
     pub extension: &'static str,
     /// A valid file.
     pub bytes: Vec<u8>,
-    /// The values of the file and their serializer, for formats that consist of values.
+    /// The file as a tree of values and the serializer of such trees, if the format has one.
     pub values: Option<(Value, Serializer)>,
     /// Permitted exit codes for a mutated file, in addition to 0.
     pub codes: &'static [i32],
     pub command: ReadCommand,
 }
 
-/// Command that reads a file.
+/// Command that reads the file.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum ReadCommand {
+    /// `wgray render` of the file.
     Scene,
-    /// `wgray render` of a scene that consists of [`START`] and this text.
+    /// `wgray render` of a scene that consists of [`START`] and this text, in which `FILE` stands for the file.
     Named(&'static str),
     /// `wgray render` of a scene as for `Named`, then `wgray diff` of the file.
     Picture(&'static str),
+    /// `wgray render --resume` with the file as its checkpoint.
     Checkpoint,
+    /// `wgray merge` of the file.
     Part,
 }
 
-/// Start of a scene that references a file.
+/// Keys that a scene needs in addition to shapes and materials.
 pub const START: &str = "
 image = { width = 8, height = 6 }
 camera = { position = [0, -4, 1], look_at = [0, 0, 0], fov = 50 }
@@ -136,23 +139,24 @@ fn model() -> (Value, Vec<u8>) {
     (json, file)
 }
 
+/// Returns a .glb file.
 pub fn container(json: &Value, binary: &[u8]) -> Vec<u8> {
     let mut text = json.to_string().into_bytes();
     text.resize(text.len().next_multiple_of(4), b' ');
     let mut binary = binary.to_vec();
     binary.resize(binary.len().next_multiple_of(4), 0);
     let mut file = b"glTF".to_vec();
-    let mut words = |words: &[usize], bytes: &[u8]| {
+    let mut append = |words: &[usize], bytes: &[u8]| {
         file.extend(words.iter().flat_map(|word| (*word as u32).to_le_bytes()));
         file.extend(bytes);
     };
-    words(&[2, 12 + 8 + text.len() + 8 + binary.len()], &[]);
-    words(&[text.len(), 0x4E4F_534A], &text);
-    words(&[binary.len(), 0x004E_4942], &binary);
+    append(&[2, 12 + 8 + text.len() + 8 + binary.len()], &[]);
+    append(&[text.len(), 0x4E4F_534A], &text);
+    append(&[binary.len(), 0x004E_4942], &binary);
     file
 }
 
-/// Serializes a .gltf file with a data URI.
+/// Returns a .gltf file with its buffer in a data URI.
 fn to_gltf(json: &Value) -> Option<Vec<u8>> {
     let (_, binary) = everything();
     let mut json = json.clone();
@@ -233,12 +237,12 @@ pub fn all_formats(folder: &Path) -> Vec<Format> {
         command,
     };
     let image_format = |extension, encoding, text| Format {
-        // `wgray diff`: unreadable (1), different (5), too large (7).
+        // `wgray diff` exits with 1 for an unreadable file, 5 for different images and 7 for images that are too large.
         codes: &[1, 3, 5, 7],
         ..new_format(extension, image(encoding), ReadCommand::Picture(text))
     };
     let scenes = SCENES.map(|name| {
-        let text = fs::read_to_string(project(&format!("scenes/{name}.toml"))).unwrap();
+        let text = fs::read_to_string(project_path(&format!("scenes/{name}.toml"))).unwrap();
         Format {
             values: Some((toml::from_str(&text).unwrap(), to_toml)),
             ..new_format("toml", text.into_bytes(), ReadCommand::Scene)
@@ -280,12 +284,12 @@ pub fn all_formats(folder: &Path) -> Vec<Format> {
     scenes.into_iter().chain(other_formats).collect()
 }
 
-/// Reads a KTX2 file of `tests/textures/ktx2.mjs`.
+/// Reads a KTX2 file that `tests/textures/ktx2.mjs` wrote.
 pub fn ktx2(name: &str) -> Vec<u8> {
-    fs::read(project(&format!("tests/textures/ktx2/{name}.ktx2"))).unwrap()
+    fs::read(project_path(&format!("tests/textures/ktx2/{name}.ktx2"))).unwrap()
 }
 
-/// Returns a mesh of one triangle.
+/// Returns the JSON and the buffer of a glTF file with one triangle.
 pub fn triangle() -> (Value, Vec<u8>) {
     let corners = [DVec3::ZERO, DVec3::X, DVec3::Y];
     let numbers = corners.iter().flat_map(|corner| corner.to_array());

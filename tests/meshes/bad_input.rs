@@ -339,7 +339,7 @@ fn unusable_paths_are_reported() {
     );
 }
 
-/// Returns valid files with all features.
+/// Returns valid mesh files, which together use all features of the formats.
 fn valid_files() -> Vec<(&'static str, Vec<u8>)> {
     let mut files = in_all_formats();
     let text = "mtllib none.mtl\no a\nv 0 0 0\nv 1 0 0\nv 1 1 0 1\nvt 0 0.5\nvt 1\nvn 0 0 -1\nvn 0 1 0\nusemtl red\n\
@@ -390,7 +390,7 @@ fn truncated_files_are_meshes_or_errors() {
     }
 }
 
-/// An MTL file with every statement, for the materials `a` and `b c`.
+/// An MTL file with every supported statement, for the materials `a` and `b c`.
 const MTL: &str = "# all\nnewmtl a\nKa 1 1 1\nKd 0.5 0.25 \\\n0.125\nKs 0.5\nNs 20\nd 0.5\nillum 2\nmap_Kd -s 2 2 a.png\n\
                    newmtl b c\r\nKe 1 0 0\r\nTr 1\r\nNi 1.5\r\nmap_Bump -bm 1 b.png\r\n";
 
@@ -439,7 +439,7 @@ fn check_mtl(folder: &std::path::Path, mtl: &[u8]) -> bool {
 }
 
 #[test]
-fn truncated_material_files_are_scenes() {
+fn scenes_with_truncated_material_files_are_valid() {
     let folder = tempfile::tempdir().unwrap();
     let scenes = (0..=MTL.len()).filter(|end| check_mtl(folder.path(), &MTL.as_bytes()[..*end]));
     let last = MTL.find("b c").unwrap() + 3;
@@ -448,7 +448,7 @@ fn truncated_material_files_are_scenes() {
 }
 
 #[test]
-fn material_files_with_random_bytes_are_scenes() {
+fn scenes_with_random_bytes_in_material_files_are_valid() {
     let folder = tempfile::tempdir().unwrap();
     let random = Random::new(17);
     let long = [b"newmtl ".as_slice(), &[b'x'; 5000], b"\nmap_Kd ", &[b'y'; 5000], b"\n"].concat();
@@ -470,7 +470,7 @@ fn material_files_with_random_bytes_are_scenes() {
         b"\xff",
         &long,
     ];
-    let (mut scenes, mut errors) = (0, 0);
+    let (mut complete, mut incomplete) = (0, 0);
     for _ in 0..1000 {
         let mut bytes = MTL.as_bytes().to_vec();
         for _ in 0..=random.below(6) {
@@ -486,11 +486,14 @@ fn material_files_with_random_bytes_are_scenes() {
             }
         }
         match check_mtl(folder.path(), &bytes) {
-            true => scenes += 1,
-            false => errors += 1,
+            true => complete += 1,
+            false => incomplete += 1,
         }
     }
-    assert!(scenes > 100 && errors > 100, "{scenes} scenes, {errors} errors");
+    assert!(
+        complete > 100 && incomplete > 100,
+        "both materials are defined: {complete}, not defined: {incomplete}"
+    );
 }
 
 #[test]

@@ -19,7 +19,7 @@ fn assert_bounds(scene: &Scene, expected: (DVec3, DVec3), case: &str) {
     for (found, corner) in [(low, expected.0), (high, expected.1)] {
         // Stored positions have 24 significant bits.
         let error = (found - corner).abs().max_element();
-        assert!(error <= 1e-6 * size, "{case}: {found} must be {corner}");
+        assert!(error <= 1e-6 * size, "{case}: {found}, expected {corner}");
     }
 }
 

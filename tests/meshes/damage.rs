@@ -183,7 +183,7 @@ fn stl_facets_with_non_finite_vertices_are_skipped() {
 }
 
 #[test]
-fn texts_may_be_utf_16() {
+fn obj_files_may_be_utf_16() {
     let text = format!("{SQUARE}f 1 2 3\n");
     for is_big_endian in [true, false] {
         let bytes = |unit: u16| {
@@ -206,7 +206,7 @@ fn obj_files_may_have_colors() {
     let text = "v 0 0 0 1 0 0.5\nv 1 0 0 0 1 0 1\nv 1 1 0 0.5\nf 1 2 3\n";
     let mesh = load("a.obj", text, None).unwrap();
     let colors: Vec<[f32; 4]> = mesh.colors.iter().map(|color| color.to_array()).collect();
-    // 0.5 decoded from sRGB by a table is 0.214; a vertex without a color is white.
+    // 0.5 is decoded from sRGB to 0.214; a vertex without a color is white.
     assert_eq!(colors[0][..2], [1.0, 0.0]);
     assert!((colors[0][2] - 0.214_041).abs() < 1e-6);
     assert_eq!(colors[1..], [[0.0, 1.0, 0.0, 1.0], [1.0; 4]]);

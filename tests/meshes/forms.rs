@@ -12,16 +12,16 @@ use wgray_render::records::Packed;
 
 use crate::random::Random;
 
-/// An indexed triangle mesh, counterclockwise from outside.
+/// An indexed triangle mesh. Seen from outside, the corners of triangles are counterclockwise.
 #[derive(Clone, Debug)]
-pub struct Form {
+pub struct TriangleMesh {
     pub points: Vec<DVec3>,
     pub triangles: Vec<[u32; 3]>,
 }
 
-impl Form {
+impl TriangleMesh {
     /// Returns the cube from -1 to 1.
-    pub fn cube() -> Form {
+    pub fn cube() -> TriangleMesh {
         let point = |i: u32| {
             let side = |axis: u32| if i >> axis & 1 == 1 { 1.0 } else { -1.0 };
             DVec3::new(side(0), side(1), side(2))
@@ -34,7 +34,7 @@ impl Form {
             [0, 4, 6, 2],
             [1, 3, 7, 5],
         ];
-        Form {
+        TriangleMesh {
             points: (0..8).map(point).collect(),
             triangles: faces
                 .iter()
@@ -44,7 +44,7 @@ impl Form {
     }
 
     /// Returns a unit icosphere, subdivided `subdivisions` times.
-    pub fn icosphere(subdivisions: u32) -> Form {
+    pub fn icosphere(subdivisions: u32) -> TriangleMesh {
         let golden_ratio = (1.0 + 5f64.sqrt()) / 2.0;
         let mut points = Vec::new();
         for (a, b) in [
@@ -68,14 +68,14 @@ impl Form {
                 }
             }
         }
-        let mut form = Form { points, triangles };
+        let mut triangle_mesh = TriangleMesh { points, triangles };
         for _ in 0..subdivisions {
-            form = form.subdivided();
+            triangle_mesh = triangle_mesh.subdivided();
         }
-        form
+        triangle_mesh
     }
 
-    fn subdivided(&self) -> Form {
+    fn subdivided(&self) -> TriangleMesh {
         let (mut points, mut middles, mut triangles) = (self.points.clone(), HashMap::new(), Vec::new());
         for &[a, b, c] in &self.triangles {
             let [ab, bc, ca] = [(a, b), (b, c), (c, a)].map(|(i, j)| {
@@ -86,11 +86,11 @@ impl Form {
             });
             triangles.extend([[a, ab, ca], [b, bc, ab], [c, ca, bc], [ab, bc, ca]]);
         }
-        Form { points, triangles }
+        TriangleMesh { points, triangles }
     }
 
     /// Returns a bipyramid over a polygon with sides of very different lengths.
-    pub fn slivers(sides: u32, random: &Random) -> Form {
+    pub fn slivers(sides: u32, random: &Random) -> TriangleMesh {
         let mut angles: Vec<f64> = (0..sides).map(|_| TAU * random.unit()).collect();
         angles.sort_by(f64::total_cmp);
         let rim = angles.iter().map(|angle| DVec3::new(angle.cos(), angle.sin(), 0.0));
@@ -99,11 +99,11 @@ impl Form {
         let triangles = (0..sides)
             .flat_map(|i| [[0, 2 + i, next(i)], [1, next(i), 2 + i]])
             .collect();
-        Form { points, triangles }
+        TriangleMesh { points, triangles }
     }
 
     /// Returns triangles of random size and shape, some of which share vertices.
-    pub fn soup(triangles: u32, random: &Random) -> Form {
+    pub fn soup(triangles: u32, random: &Random) -> TriangleMesh {
         let point = || DVec3::from_array([(); 3].map(|()| random.between(-1.0, 1.0)));
         let (mut points, mut faces) = (Vec::new(), Vec::new());
         for i in 0..triangles {
@@ -127,7 +127,7 @@ impl Form {
                 },
             ]);
         }
-        Form {
+        TriangleMesh {
             points,
             triangles: faces,
         }
@@ -185,7 +185,7 @@ ior = 1.5
 /// A grid of vertices on a parametric surface over u and v from 0 to 1. Vertices of a seam are duplicated.
 #[derive(Clone, Debug)]
 pub struct Sheet {
-    pub form: Form,
+    pub triangle_mesh: TriangleMesh,
     pub normals: Vec<DVec3>,
     pub uvs: Vec<[f64; 2]>,
 }
@@ -209,7 +209,7 @@ impl Sheet {
             }
         }
         Sheet {
-            form: Form { points, triangles },
+            triangle_mesh: TriangleMesh { points, triangles },
             normals,
             uvs,
         }
@@ -235,6 +235,6 @@ impl Sheet {
     }
 
     pub fn obj(&self) -> String {
-        self.form.obj(Some(&self.normals), Some(&self.uvs))
+        self.triangle_mesh.obj(Some(&self.normals), Some(&self.uvs))
     }
 }

@@ -1,4 +1,4 @@
-//! Meshes built in code: edited clones, and violations of the rules.
+//! Meshes built in code: edited clones, and meshes that violate a rule.
 
 use std::sync::Arc;
 
@@ -82,7 +82,7 @@ fn the_bvh_of_a_mesh_is_cached() {
 }
 
 #[test]
-fn broken_rules_are_errors() {
+fn meshes_that_violate_a_rule_are_rejected() {
     type Edit = fn(&mut Mesh);
     let cases: [(Edit, &str); 20] = [
         (|m| *m = Mesh::default(), "triangles: must not be empty"),

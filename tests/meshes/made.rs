@@ -38,7 +38,7 @@ fn the_knot_file_matches_the_example() {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/meshes/knot.obj");
     assert!(
         fs::read_to_string(path).unwrap() == make_mesh::knot(),
-        "{path} is not what examples/make_mesh.rs prints"
+        "{path} differs from the output of examples/make_mesh.rs"
     );
 }
 

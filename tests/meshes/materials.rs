@@ -69,7 +69,7 @@ fn defaults_are_a_rough_surface_without_highlights() {
         );
         assert_eq!(material.emission, Color::BLACK);
     }
-    // A higher exponent is a smoother surface.
+    // A higher exponent makes the surface smoother.
     let roughness = |exponent: f64| match principled(&material(&format!("Ks 1\nNs {exponent}\n")).0).roughness {
         Value::Plain(roughness) => roughness,
         other => panic!("{other:?}"),
@@ -98,7 +98,7 @@ fn maps_replace_values() {
     assert_eq!(principled.alpha_mode, AlphaMode::Blend);
     // Maps with linear texels share a texture; sRGB colors need a separate texture.
     let Value::Texture(metallic, _) = principled.metallic else {
-        unreachable!("it is a texture")
+        unreachable!("`metallic` is a texture")
     };
     assert_eq!(material.normal_map.map(|map| map.texture), Some(metallic));
     assert_ne!(material.emission, Color::Texture(metallic));
@@ -133,7 +133,7 @@ fn strict_rejects_missing_maps() {
         path.display()
     );
     assert!(message.starts_with(&start) && !message.contains("ignored"), "{message}");
-    // Images that exist but cannot be used.
+    // Paths that cannot be used: a folder, and a path outside of the folder of the mesh.
     fs::create_dir(folder.path().join("folder.png")).unwrap();
     for (map, rule) in [("folder.png", "must be a file"), ("../none.png", "cannot be read")] {
         write(folder.path(), &format!("map_Kd {map}\n"));

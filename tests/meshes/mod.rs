@@ -18,7 +18,7 @@ mod watertight;
 
 use wgray::mesh::{Mesh, Normals};
 
-/// Loads a mesh file with this content. Error messages begin with the name of the file.
+/// Writes a mesh file and loads it. Error messages begin with the name of the file.
 pub fn load(name: &str, bytes: impl AsRef<[u8]>, normals: Option<Normals>) -> Result<Mesh, String> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join(name);

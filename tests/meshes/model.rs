@@ -84,7 +84,7 @@ fn any_axis_may_be_up() {
 }
 
 #[test]
-fn vertex_colors_are_shown() {
+fn materials_use_the_vertex_colors_of_the_file() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.obj");
     for (text, expected) in [
@@ -105,7 +105,7 @@ fn vertex_colors_are_shown() {
 }
 
 #[test]
-fn the_description_of_a_mesh_is_the_same_scene() {
+fn the_description_of_a_mesh_gives_the_same_scene() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.obj");
     fs::write(folder.path().join("a.mtl"), "newmtl red\nKd 1 0 0\n").unwrap();
@@ -127,8 +127,8 @@ fn the_description_of_a_mesh_is_the_same_scene() {
     assert_eq!(reloaded.render, scene.render);
     assert_eq!(scene.material_names, ["red", "default"]);
     // The list of files of the scene contains files that the mesh refers to.
-    let has = |name: &str| scene.files.iter().any(|file| file.ends_with(name));
-    assert!(has("a.obj") && has("a.mtl"), "{:?}", scene.files);
+    let is_listed = |name: &str| scene.files.iter().any(|file| file.ends_with(name));
+    assert!(is_listed("a.obj") && is_listed("a.mtl"), "{:?}", scene.files);
     assert!(matches!(scene.shapes[0].geometry, Geometry::Mesh { .. }));
 }
 
@@ -261,7 +261,7 @@ fn strict_rejects_damage() {
 }
 
 #[test]
-fn options_of_gltf_files_are_rejected() {
+fn gltf_options_are_rejected_for_mesh_files() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.stl");
     fs::write(&path, "solid").unwrap();

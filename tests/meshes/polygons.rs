@@ -50,7 +50,7 @@ fn assert_covers(mesh: &Mesh, points: &[DVec3], case: &str) {
         mismatches += usize::from(count != usize::from(is_inside(points, point)));
     }
     // Positions are rounded to f32, which may misclassify a point at an edge.
-    assert!(mismatches <= 1, "{case}: {mismatches} points");
+    assert!(mismatches <= 1, "{case}: misclassified points: {mismatches}");
     let total: DVec3 = areas(mesh).into_iter().sum();
     assert!(
         areas(mesh).iter().all(|area| area.dot(total) > 0.0),
@@ -59,11 +59,11 @@ fn assert_covers(mesh: &Mesh, points: &[DVec3], case: &str) {
 }
 
 const ARROW: [[f64; 2]; 4] = [[0.0, 0.0], [2.0, -1.0], [1.0, 0.0], [2.0, 1.0]];
-const L: [[f64; 2]; 6] = [[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [1.0, 1.0], [1.0, 2.0], [0.0, 2.0]];
+const L_SHAPE: [[f64; 2]; 6] = [[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [1.0, 1.0], [1.0, 2.0], [0.0, 2.0]];
 
 #[test]
 fn concave_polygons_are_covered() {
-    for shape in [&ARROW[..], &L[..]] {
+    for shape in [&ARROW[..], &L_SHAPE[..]] {
         for first in 0..shape.len() {
             for is_reversed in [false, true] {
                 let mut points = flat(shape);
@@ -87,10 +87,10 @@ fn ply_polygons_are_covered() {
     let mut text = "ply\nformat ascii 1.0\nelement face 1\nproperty list int int vertex_indices\nelement vertex 6\n\
                     property float x\nproperty float y\nproperty float z\nend_header\n6 1 2 3 4 5 0\n"
         .to_owned();
-    for [x, y] in L {
+    for [x, y] in L_SHAPE {
         text += &format!("{x} {y} 0\n");
     }
-    assert_covers(&load("a.ply", text, None).unwrap(), &flat(&L), "PLY");
+    assert_covers(&load("a.ply", text, None).unwrap(), &flat(&L_SHAPE), "PLY");
 }
 
 /// Returns a simple, star-shaped polygon with `count` corners at random radii from `min_radius` to 1.
@@ -110,7 +110,7 @@ fn random_polygons_are_covered() {
         let mesh = load("a.obj", polygon(&points), None).unwrap();
         assert_covers(&mesh, &points, &format!("{round}"));
         assert!(mesh.notes.is_empty(), "{round}: {:?}", mesh.notes);
-        // The area is the same in another plane.
+        // A polygon in a tilted plane has the same area.
         let [u, v] = [DVec3::new(0.6, 0.0, 0.8), DVec3::new(-0.48, 0.8, 0.36)];
         let rotated: Vec<DVec3> = points.iter().map(|p| u * p.x + v * p.y).collect();
         let rotated_mesh = load("a.obj", polygon(&rotated), None).unwrap();
@@ -120,7 +120,7 @@ fn random_polygons_are_covered() {
 }
 
 #[test]
-fn ten_thousand_corners_are_covered() {
+fn a_polygon_of_ten_thousand_corners_is_covered() {
     let points = star(&Random::new(3), 10_000, 0.5);
     let mesh = load("a.obj", polygon(&points), None).unwrap();
     let polygon_area: f64 = (points.iter().zip(points.iter().cycle().skip(1)))
@@ -135,7 +135,7 @@ fn ten_thousand_corners_are_covered() {
 }
 
 #[test]
-fn convex_polygons_are_fans() {
+fn convex_polygons_are_split_into_fans() {
     let regular = |count: usize| {
         let angle = |i: usize| TAU * i as f64 / count as f64;
         (0..count)
@@ -156,8 +156,11 @@ fn degenerate_polygons_are_reported() {
         Ok(mesh) => mesh.notes.iter().map(ToString::to_string).collect(),
         Err(message) => vec![message],
     };
-    let bow = flat(&[[0.0, 0.0], [1.0, 1.0], [1.0, 0.0], [0.0, 1.0]]);
-    assert_eq!(notes(&bow)[0], "1 polygon intersects itself; split into a triangle fan");
+    let bow_tie = flat(&[[0.0, 0.0], [1.0, 1.0], [1.0, 0.0], [0.0, 1.0]]);
+    assert_eq!(
+        notes(&bow_tie)[0],
+        "1 polygon intersects itself; split into a triangle fan"
+    );
     let pentagram: Vec<DVec3> = (0..5)
         .map(|i| {
             DVec3::new(
@@ -214,12 +217,12 @@ fn degenerate_polygons_are_reported() {
 }
 
 #[test]
-fn random_corners_are_meshes_or_errors() {
+fn polygons_with_random_corners_give_meshes_or_errors() {
     let random = Random::new(21);
     for round in 0..400 {
         let count = 3 + round % 90;
         let scale = [1.0, 1e-6, 1e8, 1e-30][round % 4];
-        // Few distinct values: many points coincide or are collinear.
+        // With few distinct values, many points coincide or are collinear.
         let coordinate = || match round % 3 {
             0 => f64::from(random.below(4)) * scale,
             _ => random.between(-1.0, 1.0) * scale,

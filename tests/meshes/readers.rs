@@ -30,7 +30,7 @@ fn crystal() -> (Vec<[f32; 3]>, Vec<Vec<u32>>) {
     (positions, faces)
 }
 
-/// Returns one mesh in each format.
+/// Returns the solid of [`crystal`] as a file in each format: name and contents.
 pub fn in_all_formats() -> Vec<(&'static str, Vec<u8>)> {
     let (positions, faces) = crystal();
     let fans: Vec<[u32; 3]> = faces
@@ -97,7 +97,7 @@ fn ply_header(format: &str) -> String {
 }
 
 #[test]
-fn all_formats_have_the_same_triangles() {
+fn readers_of_all_formats_return_the_same_triangles() {
     let (positions, faces) = crystal();
     let mut expected = Vec::new();
     for face in &faces {
@@ -115,7 +115,7 @@ fn all_formats_have_the_same_triangles() {
                 .collect();
             assert_eq!(mesh.center.to_array(), [0.0; 3], "{name}");
             assert_eq!(triangles, expected, "{name}");
-            // The unused position is dropped.
+            // The unused position is removed.
             assert_eq!(mesh.positions.len(), 5, "{name}");
             assert_eq!(mesh.groups.len(), 1, "{name}");
             assert_eq!(mesh.notes, Vec::<String>::new(), "{name}");
@@ -125,7 +125,7 @@ fn all_formats_have_the_same_triangles() {
 }
 
 #[test]
-fn obj_corners_may_have_any_form() {
+fn obj_corners_may_have_any_syntax() {
     let text = "# a square\r\nv 0 0 0 1.0 0.5 0.5\r\nv 1 0 0 1\nv 1 1 0\n\tv 0 1 0 # the last one\nvt 0 0\nvt 1 0 0\nvt 1\n\
                 vn 0 0 2\nf 1 2 \\\n 3\nf -4/1 -2/3/1 \\\r\n  4//1\ncurv 0 1 \\\n 2 3\ns off\nl 1 2\n";
     let mesh = load("a.obj", text, None).unwrap();
@@ -144,7 +144,7 @@ fn equal_obj_corners_share_a_vertex() {
         format!("{SQUARE}vt 0 0\nvt 0 1\nvn 0 0 1\nf 1/1/1 2/1/1 3/1/1\nf 1/1/1 3/2/1 4/1/1\nf 4/1/1 3/2/1 1/1/1\n");
     let mesh = load("a.obj", &text, None).unwrap();
     assert_eq!(mesh.triangles, [[0, 1, 2], [0, 3, 4], [4, 3, 0]]);
-    // Unused normals do not separate vertices.
+    // Different normals split a vertex only if normals are read.
     let text = format!("{SQUARE}vn 0 0 1\nvn 1 0 0\nf 1//1 2//1 3//1\nf 1//2 3//2 4//2\n");
     let count = |normals| load("a.obj", &text, normals).unwrap().positions.len();
     assert_eq!(count(None), 6);
@@ -160,7 +160,7 @@ fn lines_may_end_with_carriage_returns() {
     let mesh = load("a.obj", text.replace('\n', "\r"), None).unwrap();
     assert_eq!(corners(&mesh), TWO_TRIANGLES);
     assert_eq!(mesh.groups, expected.groups);
-    // Line numbers count lone carriage returns.
+    // A lone carriage return ends a line and is counted in line numbers.
     let error = load("a.obj", "v 0 0 0\r\rv 0 1\r", None).unwrap_err();
     assert_eq!(error, "a.obj:3: z is missing");
     let mesh = load("a.stl", SOLIDS.replace('\n', "\r"), None).unwrap();
@@ -179,7 +179,7 @@ fn a_backslash_may_end_a_file() {
 }
 
 #[test]
-fn polygons_are_fans() {
+fn a_convex_obj_polygon_is_split_into_a_fan() {
     let mesh = load(
         "a.obj",
         "v 0 0 0\nv 2 0 0\nv 3 1 0\nv 2 2 0\nv 0 2 0\nf 5 1 2 3 4\n",
@@ -279,8 +279,8 @@ fn materials_come_from_the_folder_of_the_mesh() {
     let mesh = Mesh::load(&path, None).unwrap();
     let libraries = &mesh.libraries;
     let files: Vec<_> = libraries.iter().map(|library| library.file.clone()).collect();
-    let named = ["more/my red.mtl", "../outside.mtl", "blue.mtl", "none.mtl"];
-    assert_eq!(files, named.map(|name| inner.join(name)));
+    let library_paths = ["more/my red.mtl", "../outside.mtl", "blue.mtl", "none.mtl"];
+    assert_eq!(files, library_paths.map(|name| inner.join(name)));
     let names = libraries.iter().flat_map(|library| &library.materials);
     let names: Vec<_> = names.map(|material| (material.name.as_str(), material.line)).collect();
     assert_eq!(names, [("red", 1), ("blue", 1)]);
@@ -303,16 +303,16 @@ fn material_files_may_have_paths_of_other_machines() {
     std::fs::write(folder.path().join("a b.mtl"), "newmtl a\n").unwrap();
     std::fs::write(folder.path().join("in/c.mtl"), "newmtl c\n").unwrap();
     let path = folder.path().join("a.obj");
-    for (named, expected) in [
+    for (library_path, expected) in [
         ("C:\\some body\\a b.mtl", "a"),
         ("/some body/a b.mtl", "a"),
         (".\\in\\c.mtl", "c"),
         ("in/c.mtl", "c"),
     ] {
-        std::fs::write(&path, format!("mtllib {named}\n{SQUARE}f 1 2 3\n")).unwrap();
+        std::fs::write(&path, format!("mtllib {library_path}\n{SQUARE}f 1 2 3\n")).unwrap();
         let mesh = Mesh::load(&path, None).unwrap();
-        assert_eq!(mesh.notes, Vec::<String>::new(), "{named}");
-        assert_eq!(mesh.libraries[0].materials[0].name, expected, "{named}");
+        assert_eq!(mesh.notes, Vec::<String>::new(), "{library_path}");
+        assert_eq!(mesh.libraries[0].materials[0].name, expected, "{library_path}");
     }
     // A file name without a folder is only looked up in the folder of the mesh.
     std::fs::write(&path, format!("mtllib c.mtl\n{SQUARE}f 1 2 3\n")).unwrap();
@@ -346,7 +346,7 @@ fn ply_may_have_all_types_in_any_order() {
     );
 }
 
-/// Returns a binary PLY file with faces first, 64-bit floats and normals.
+/// Returns a binary PLY file with the faces before the vertices, 64-bit floats and normals.
 fn faces_first(is_big_endian: bool, normal: [f64; 3]) -> Vec<u8> {
     let name = if is_big_endian { "big" } else { "little" };
     let mut bytes = format!(
@@ -401,7 +401,7 @@ fn stl_solids_are_groups() {
     assert!(mesh.normals.is_empty());
     let names: Vec<&str> = mesh.groups.iter().map(|group| group.name.as_str()).collect();
     assert_eq!((names, mesh.group_of), (vec!["a b", "", "a b"], vec![0, 1]));
-    // Facet normals separate vertices.
+    // Different facet normals split a vertex.
     let mesh = load("a.stl", SOLIDS, Some(Normals::File)).unwrap();
     let normals: Vec<f32> = mesh.normals.iter().map(|normal| normal.z).collect();
     assert_eq!(normals, [-1.0, -1.0, -1.0, 1.0, 1.0, 1.0]);
@@ -427,7 +427,7 @@ fn binary_stl_is_recognized_by_its_size() {
 
 #[test]
 fn smooth_normals_are_weighted_by_angles() {
-    // A corner of a cube with two, three and two triangles on its sides, separated by texture coordinates.
+    // A corner of a cube, with two, three and two triangles on the three faces; texture coordinates split the vertex.
     let text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nv 1 1 0\nv 1 0 1\nv 1 0 0.5\nv 0 1 1\nvt 0 0\nvt 0 1\nvt 1 0\n\
                 f 1/1 3/1 5/1\nf 1/1 5/1 2/1\nf 1/2 2/2 7/2\nf 1/2 7/2 6/2\nf 1/2 6/2 4/2\nf 1/3 4/3 8/3\nf 1/3 8/3 3/3\n";
     let mesh = load("a.obj", text, Some(Normals::Smooth)).unwrap();
@@ -482,7 +482,7 @@ fn a_mesh_far_from_the_origin_keeps_its_precision() {
         assert!((corner[0] - x).abs() < 1e-9, "{corner:?}");
     }
     assert_eq!(mesh.center.y, -3.0);
-    // Bounds that contain the origin are not recentered.
+    // A mesh whose bounds contain the origin is not recentered.
     let mesh = load("a.obj", "v 0 0 1e-20\nv 0.7 0 1\nv 1 0.1 0\nf 1 2 3\n", None).unwrap();
     assert_eq!(mesh.center.to_array(), [0.0; 3]);
     assert_eq!(mesh.positions[0].to_array(), [0.0, 0.0, 1e-20]);

@@ -4,16 +4,20 @@ use glam::DVec3;
 use wgray_render::cpu::camera::camera_ray;
 use wgray_render::records::Packed;
 
-use super::forms::{Form, scene};
+use super::forms::{TriangleMesh, scene};
 use crate::pictures::{RenderMode, first_hits, reference, render};
 
 const CENTER: DVec3 = DVec3::new(0.0, 0.0, 1.3);
 const LIGHT: DVec3 = DVec3::new(0.3, 0.2, -1.0);
 const OUTSIDE: &str = "[0.5, -6, 3.5]";
 
-fn pack_above_floor(form: &Form, normals: &str, camera: &str) -> Packed {
+fn pack_above_floor(triangle_mesh: &TriangleMesh, normals: &str, camera: &str) -> Packed {
     let folder = tempfile::tempdir().expect("a folder");
-    std::fs::write(folder.path().join("sphere.obj"), form.obj(Some(&form.points), None)).expect("a mesh");
+    std::fs::write(
+        folder.path().join("sphere.obj"),
+        triangle_mesh.obj(Some(&triangle_mesh.points), None),
+    )
+    .expect("a mesh");
     let text = format!(
         "image = {{ width = 200, height = 150 }}
         camera = {{ position = {camera}, look_at = [0, 0, 0.9], fov = 40 }}
@@ -54,7 +58,7 @@ fn entry(origin: DVec3, direction: DVec3, radius: f64) -> Option<f64> {
         .filter(|t| *t > 0.0)
 }
 
-/// Numbers of pixels; those of `wrong_` fields contradict the bounds.
+/// Numbers of pixels. The pixels of `wrong_` fields contradict the bounds.
 #[derive(Debug, Default, PartialEq)]
 struct Counts {
     wrong_hits: usize,
@@ -67,8 +71,8 @@ struct Counts {
 }
 
 /// Classifies all pixels; `inner_radius` is the radius of the inscribed sphere.
-fn classify(form: &Form, inner_radius: f64, normals: &str) -> Counts {
-    let packed = pack_above_floor(form, normals, OUTSIDE);
+fn classify(triangle_mesh: &TriangleMesh, inner_radius: f64, normals: &str) -> Counts {
+    let packed = pack_above_floor(triangle_mesh, normals, OUTSIDE);
     let hits = first_hits(&packed, RenderMode::Cpu);
     let radiances: Vec<[f32; 3]> = reference(&packed).means().collect();
     let to_light = -LIGHT.normalize();
@@ -109,17 +113,17 @@ fn classify(form: &Form, inner_radius: f64, normals: &str) -> Counts {
     counts
 }
 
-fn inner_radius(form: &Form) -> f64 {
+fn inner_radius(triangle_mesh: &TriangleMesh) -> f64 {
     let height = |t: &[u32; 3]| {
-        let [a, b, c] = t.map(|i| form.points[i as usize]);
+        let [a, b, c] = t.map(|i| triangle_mesh.points[i as usize]);
         (b - a).cross(c - a).normalize().dot(a)
     };
-    form.triangles.iter().map(height).fold(1.0, f64::min)
+    triangle_mesh.triangles.iter().map(height).fold(1.0, f64::min)
 }
 
 #[test]
 fn a_fine_triangle_mesh_approximates_a_sphere() {
-    let fine = Form::icosphere(6);
+    let fine = TriangleMesh::icosphere(6);
     assert_eq!(fine.triangles.len(), 81_920);
     let fine_inner = inner_radius(&fine);
     let result = classify(&fine, fine_inner, "file");
@@ -135,31 +139,31 @@ fn a_fine_triangle_mesh_approximates_a_sphere() {
     );
     // Negative control: a coarse flat-shaded mesh violates the bounds of the fine mesh. With vertex normals, the coarse
     // mesh satisfies the bounds for its own inner radius.
-    let coarse = Form::icosphere(2);
+    let coarse = TriangleMesh::icosphere(2);
     let coarse_counts = classify(&coarse, fine_inner, "flat");
     assert!(
         coarse_counts.wrong_hits > 1000 && coarse_counts.wrong_shadows > 10 && coarse_counts.wrong_light > 10,
         "{coarse_counts:?}"
     );
-    let file_bounds_counts = classify(&coarse, inner_radius(&coarse), "file");
+    let smooth_counts = classify(&coarse, inner_radius(&coarse), "file");
     assert_eq!(
         (
-            file_bounds_counts.wrong_hits,
-            file_bounds_counts.wrong_shadows,
-            file_bounds_counts.wrong_light
+            smooth_counts.wrong_hits,
+            smooth_counts.wrong_shadows,
+            smooth_counts.wrong_light
         ),
         (0, 0, 0),
-        "{file_bounds_counts:?}"
+        "{smooth_counts:?}"
     );
 }
 
-/// The light is behind the surface, at any angle.
+/// For a camera inside the mesh, the light is behind every surface.
 #[test]
 fn no_light_enters_a_closed_mesh() {
     for detail in [1, 2, 4] {
-        let form = Form::icosphere(detail);
+        let triangle_mesh = TriangleMesh::icosphere(detail);
         for camera in ["[0.2, -0.5, 1.6]", "[-0.3, 0.1, 0.8]", "[0, 0.6, 1.2]"] {
-            let packed = pack_above_floor(&form, "smooth", camera);
+            let packed = pack_above_floor(&triangle_mesh, "smooth", camera);
             for mode in [RenderMode::Cpu, RenderMode::Baked] {
                 let lit = render(&packed, mode)
                     .means()
@@ -168,7 +172,7 @@ fn no_light_enters_a_closed_mesh() {
                 assert_eq!(lit, 0, "{detail} {camera} {mode:?}");
             }
         }
-        let outside = pack_above_floor(&form, "smooth", OUTSIDE);
+        let outside = pack_above_floor(&triangle_mesh, "smooth", OUTSIDE);
         let lit = reference(&outside).means().filter(|radiance| radiance[0] > 0.0).count();
         assert!(lit > 1000, "{detail}: {lit}");
     }

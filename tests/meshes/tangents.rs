@@ -73,8 +73,8 @@ const BARYCENTRICS: [Vec2; 7] = [
 
 /// Returns the maximum errors in degrees: with interpolated tangents, and with tangents per triangle.
 fn errors(packed: &Packed, surface: impl Fn(f64, f64) -> Option<[DVec3; 2]>) -> [f64; 2] {
-    let i = &packed.bvh.instances[0];
-    let to_world = DMat3::from_cols(i.u.as_dvec3(), i.v.as_dvec3(), i.w.as_dvec3());
+    let instance = &packed.bvh.instances[0];
+    let to_world = DMat3::from_cols(instance.u.as_dvec3(), instance.v.as_dvec3(), instance.w.as_dvec3());
     let mut max_errors = [0.0; 2];
     for slot in 0..packed.bvh.meshes[0].triangles.len() {
         for b in BARYCENTRICS {
@@ -119,7 +119,7 @@ fn tangents_match_the_surface() {
         ("scale = 1e-5", 1.5),
     ] {
         let packed = pack_tilted(&Sheet::sphere(32, 16).obj(), "", shape);
-        // The derivative by u vanishes at the poles.
+        // The derivative with respect to u vanishes at the poles.
         let found = errors(&packed, |u, v| {
             (0.12..0.88).contains(&v).then(|| derivatives(sphere, u, v))
         });
@@ -230,7 +230,9 @@ fn triangles_of_a_smooth_mesh_are_not_visible() {
     // Negative control: tangents per triangle make the triangles visible.
     packed.bvh.instances[0].tangents = NO_INDEX;
     let per_triangle = max_pixel_step(&packed);
-    println!("steps of {found}, {per_triangle} without tangents");
+    println!(
+        "largest step between pixels: {found} with tangents per vertex, {per_triangle} with tangents per triangle"
+    );
     assert!(found < 0.005 && per_triangle > 0.015, "{found} {per_triangle}");
 }
 
@@ -249,7 +251,7 @@ fn tangents_of_mirrored_texture_coordinates_are_not_averaged() {
     }
     let packed = pack_tilted(&sheet.obj(), "", "");
     let mesh = &packed.bvh.meshes[0];
-    // The shared vertices of the middle are split.
+    // The shared vertices on the middle line are split.
     assert_eq!(mesh.vertices.len(), 9 * 5 + 5);
     assert_eq!(mesh.attributes.len(), mesh.vertices.len());
     assert_eq!(mesh.tangents.len(), mesh.vertices.len());
@@ -278,17 +280,20 @@ fn tangents_are_averaged_only_across_continuous_textures() {
         let sheet = |left: f64| Sheet::of(2, 2, |u, v| [DVec3::new(left + u, v, 0.0), DVec3::Z]);
         let (mut joined, right) = (sheet(0.0), sheet(1.0));
         let (sin, cos) = rotation.to_radians().sin_cos();
-        let offset = joined.form.points.len() as u32;
-        for p in &right.form.points {
+        let offset = joined.triangle_mesh.points.len() as u32;
+        for p in &right.triangle_mesh.points {
             let (x, y) = (p.x - 1.0, p.y - 0.5);
             joined
                 .uvs
                 .push([1.0 + shift + x * cos + y * sin, 0.5 + y * cos - x * sin]);
         }
-        joined.form.points.extend(right.form.points);
+        joined.triangle_mesh.points.extend(right.triangle_mesh.points);
         joined.normals.extend(right.normals);
-        let triangles = right.form.triangles.into_iter();
-        joined.form.triangles.extend(triangles.map(|t| t.map(|i| offset + i)));
+        let triangles = right.triangle_mesh.triangles.into_iter();
+        joined
+            .triangle_mesh
+            .triangles
+            .extend(triangles.map(|t| t.map(|i| offset + i)));
         let packed = pack_tilted(&joined.obj(), "", "");
         let mesh = &packed.bvh.meshes[0];
         let mut directions: Vec<f32> = mesh

@@ -21,14 +21,14 @@ use wgray_render::records::{
     SAMPLE_BLOCK,
 };
 
-use super::forms::{Form, HEAD, scene};
+use super::forms::{HEAD, TriangleMesh, scene};
 use crate::random::Random;
 use crate::random_scenes::any_scene;
 use crate::scenes;
 
-/// Returns the corners in object space.
-fn corners(scene: &Packed, i: &Instance, slot: usize) -> [Vec3; 3] {
-    let mesh = &scene.bvh.meshes[i.mesh as usize];
+/// Returns the corners of a triangle in object space.
+fn corners(scene: &Packed, instance: &Instance, slot: usize) -> [Vec3; 3] {
+    let mesh = &scene.bvh.meshes[instance.mesh as usize];
     let triangle = mesh.triangles[slot];
     [triangle.x, triangle.y, triangle.z].map(|vertex| mesh.vertices[vertex as usize].xyz())
 }
@@ -66,13 +66,13 @@ fn brute_force_hit(scene: &Packed, ray: Ray, origin_prim: UVec2, inside_prim: UV
             }
             continue;
         }
-        let i = &scene.bvh.instances[item.index as usize];
+        let instance = &scene.bvh.instances[item.index as usize];
         let t_min = interval.x.max(0.0);
-        let direction = vector_to_mesh(i, ray.direction);
-        let origin = point_to_mesh(i, ray.origin) + direction * t_min;
-        let s = slabs(origin, direction, mesh_pad(i, origin));
-        for (slot, triangle) in scene.bvh.meshes[i.mesh as usize].triangles.iter().enumerate() {
-            let [v0, v1, v2] = corners(scene, i, slot);
+        let direction = vector_to_mesh(instance, ray.direction);
+        let origin = point_to_mesh(instance, ray.origin) + direction * t_min;
+        let s = slabs(origin, direction, mesh_pad(instance, origin));
+        for (slot, triangle) in scene.bvh.meshes[instance.mesh as usize].triangles.iter().enumerate() {
+            let [v0, v1, v2] = corners(scene, instance, slot);
             let crossing = triangle_crossing(v0, v1, v2, origin, shear_of(direction), s);
             let found = Hit {
                 t: t_min + crossing.t.max(0.0),
@@ -103,19 +103,19 @@ fn brute_force_occlusion(scene: &Packed, surface: &Surface, light: &Light, block
                 continue;
             }
             let is_occluded = if item.kind & 0xff == INSTANCE {
-                let i = &scene.bvh.instances[item.index as usize];
-                let mesh_origin = point_to_mesh(i, origin);
-                let [towards, u, v] = [segments.towards, segments.u, segments.v].map(|v| vector_to_mesh(i, v));
+                let instance = &scene.bvh.instances[item.index as usize];
+                let mesh_origin = point_to_mesh(instance, origin);
+                let [towards, u, v] = [segments.towards, segments.u, segments.v].map(|v| vector_to_mesh(instance, v));
                 let direction = segment(wgray_render::cpu::light::LightSegments { towards, u, v }, point);
-                let s = slabs(mesh_origin, direction, mesh_pad(i, mesh_origin));
-                let mesh = &scene.bvh.meshes[i.mesh as usize];
+                let s = slabs(mesh_origin, direction, mesh_pad(instance, mesh_origin));
+                let mesh = &scene.bvh.meshes[instance.mesh as usize];
                 mesh.triangles.iter().enumerate().any(|(slot, triangle)| {
                     let group = mesh.groups.get(slot).copied().unwrap_or(0);
-                    let casts = scene.bvh.group_words[(i.materials + group) as usize] & NO_SHADOW == 0;
-                    let [v0, v1, v2] = corners(scene, i, slot);
+                    let casts_shadows = scene.bvh.group_words[(instance.materials + group) as usize] & NO_SHADOW == 0;
+                    let [v0, v1, v2] = corners(scene, instance, slot);
                     let crossing = triangle_crossing(v0, v1, v2, mesh_origin, shear_of(direction), s);
                     let is_origin = surface.exclude_front == UVec2::new(item.index + 1, triangle.w);
-                    casts && !is_origin && crossing.is_hit && crossing.t > 0.0 && crossing.t < light.t_max
+                    casts_shadows && !is_origin && crossing.is_hit && crossing.t > 0.0 && crossing.t < light.t_max
                 })
             } else {
                 let (origin_prim, from_inside) = (
@@ -160,8 +160,8 @@ impl<'a> RaySampler<'a> {
 
     fn random_point(&self) -> Vec3 {
         let center = (self.low + self.high) * 0.5;
-        let part = Vec3::new(self.unit(), self.unit(), self.unit()) * 2.0 - 1.0;
-        center + part * (self.high - center) * self.random.pick(&[1.0, 2.0, 20.0])
+        let relative = Vec3::new(self.unit(), self.unit(), self.unit()) * 2.0 - 1.0;
+        center + relative * (self.high - center) * self.random.pick(&[1.0, 2.0, 20.0])
     }
 
     /// Returns a point and the triangle that it lies on, if any.
@@ -181,9 +181,9 @@ impl<'a> RaySampler<'a> {
             };
             return (point, NO_PRIMITIVE);
         }
-        let i = &scene.bvh.instances[item.index as usize];
-        let slot = random.below(scene.bvh.meshes[i.mesh as usize].triangles.len() as u32) as usize;
-        let [a, b, c] = corners(scene, i, slot);
+        let instance = &scene.bvh.instances[item.index as usize];
+        let slot = random.below(scene.bvh.meshes[instance.mesh as usize].triangles.len() as u32) as usize;
+        let [a, b, c] = corners(scene, instance, slot);
         let p = match random.below(4) {
             0 => a,
             1 => a + (b - a) * self.unit(),
@@ -192,10 +192,13 @@ impl<'a> RaySampler<'a> {
                 a + (b - a) * x + (c - a) * y
             }
         };
-        let point = i.anchor + i.u * p.x + i.v * p.y + i.w * p.z;
+        let point = instance.anchor + instance.u * p.x + instance.v * p.y + instance.w * p.z;
         (
             point,
-            UVec2::new(item.index + 1, scene.bvh.meshes[i.mesh as usize].triangles[slot].w),
+            UVec2::new(
+                item.index + 1,
+                scene.bvh.meshes[instance.mesh as usize].triangles[slot].w,
+            ),
         )
     }
 
@@ -286,7 +289,7 @@ fn bits(hit: Hit) -> [u32; 5] {
     [hit.t.to_bits(), hit.instance, hit.primitive, u, v]
 }
 
-/// Returns the numbers of rays and of shadow blocks that differ from brute force, of hits and of occluded blocks.
+/// Returns four numbers: rays and shadow blocks that differ from brute force, hits, and occluded shadow blocks.
 fn differing(scene: &Packed, rays: u32, seed: u64) -> [u32; 4] {
     let random = Random::new(seed);
     let sampler = RaySampler::new(scene, &random);
@@ -360,23 +363,23 @@ fn random_bvh(boxes: &[Aabb], random: &Random) -> (Vec<bvh::Node>, Vec<u32>) {
         let mut node = grid(&bounds);
         node.first_item = order.len() as u32;
         node.first_child = nodes.len() as u32;
-        let mut parts: Vec<Vec<u32>> = vec![Vec::new(); 8];
+        let mut children: Vec<Vec<u32>> = vec![Vec::new(); 8];
         let used = 2 + random.below(7) as usize;
         for (i, item) in items.iter().enumerate() {
-            parts[(i * 5 + random.below(2) as usize) % used].push(*item);
+            children[(i * 5 + random.below(2) as usize) % used].push(*item);
         }
-        for (slot, part) in parts.iter().enumerate() {
+        for (slot, child) in children.iter().enumerate() {
             (0..3).for_each(|axis| (node.low[axis][slot], node.high[axis][slot]) = (255, 0));
-            if part.is_empty() {
+            if child.is_empty() {
                 continue;
             }
-            set_bounds(&mut node, slot, &union(part));
-            if part.len() <= 1 + random.below(4) as usize {
-                node.leaves[slot] = (part.len() << 5 | (order.len() - node.first_item as usize)) as u8;
-                order.extend(part);
+            set_bounds(&mut node, slot, &union(child));
+            if child.len() <= 1 + random.below(4) as usize {
+                node.leaves[slot] = (child.len() << 5 | (order.len() - node.first_item as usize)) as u8;
+                order.extend(child);
             } else {
                 node.inner |= 1 << slot;
-                pending.push_back((nodes.len(), part.clone()));
+                pending.push_back((nodes.len(), child.clone()));
                 nodes.push(empty);
             }
         }
@@ -420,12 +423,21 @@ fn build_too_small(boxes: &[Aabb]) -> (Vec<bvh::Node>, Vec<u32>) {
     (nodes, order)
 }
 
-/// Returns spheres and instances of random triangles: mirrored, sheared, tiny, grouped, or glass without shadows.
+/// Returns a scene with spheres and with instances of random triangles. Some instances are mirrored, sheared or tiny,
+/// some have groups, and some are of glass and cast no shadow.
 fn soups() -> Packed {
     let folder = tempfile::tempdir().expect("a folder");
     let random = Random::new(11);
-    std::fs::write(folder.path().join("a.obj"), Form::soup(300, &random).obj(None, None)).expect("a mesh");
-    std::fs::write(folder.path().join("b.obj"), Form::soup(37, &random).obj(None, None)).expect("a mesh");
+    std::fs::write(
+        folder.path().join("a.obj"),
+        TriangleMesh::soup(300, &random).obj(None, None),
+    )
+    .expect("a mesh");
+    std::fs::write(
+        folder.path().join("b.obj"),
+        TriangleMesh::soup(37, &random).obj(None, None),
+    )
+    .expect("a mesh");
     let mut text = format!(
         "{HEAD}[render]
         shadows = 'transparent'
@@ -532,7 +544,7 @@ fn a_bvh_with_too_small_boxes_is_detected() {
 }
 
 #[test]
-fn bvhs_of_random_scenes_miss_nothing() {
+fn bvhs_of_random_scenes_miss_no_hit_and_no_shadow() {
     let mut runner = TestRunner::new_with_rng(Config::default(), TestRng::deterministic_rng(RngAlgorithm::ChaCha));
     let strategy = any_scene::description();
     let mut with_bvh = 0;

@@ -1,5 +1,5 @@
-//! Vertex colors, texture coordinate sets, tangents, texture factors and single-sided materials: closed forms, and
-//! equal bits on CPU and GPU.
+//! Vertex colors, texture coordinate sets, tangents, texture factors and single-sided materials: closed-form
+//! values, and equal bits on CPU and GPU.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -17,10 +17,10 @@ use crate::textures::{write_exr, write_png};
 /// A square from (-1, -1) to (1, 1), with texture coordinates from 0 to 1.
 const QUAD: &str = "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nvn 0 0 1\n\
                     f 1/1/1 2/2/1 3/3/1 4/4/1\n";
-/// A camera above the square, whose image is the square.
+/// A camera above the square; the square fills the image.
 const CAMERA_ABOVE: &str =
     "camera = { type = 'orthographic', position = [0, 0, 9], look_at = [0, 0, 0], up = [0, 1, 0], height = 2 }\n";
-const CAMERA_ASIDE: &str = "camera = { position = [0.4, -2.2, 1.9], look_at = [0, 0, 0], fov = 60 }\n";
+const OBLIQUE_CAMERA: &str = "camera = { position = [0.4, -2.2, 1.9], look_at = [0, 0, 0], fov = 60 }\n";
 const SHAPE: &str = "[[shapes]]\ntype = 'mesh'\nfile = 'quad.obj'\nmaterial = 'm'\n";
 const COLORS: [[f32; 4]; 4] = [
     [1.0, 0.0, 0.25, 1.0],
@@ -81,13 +81,13 @@ fn pixel_center(i: usize) -> (f64, f64) {
 }
 
 #[test]
-fn colors_of_vertices_are_interpolated() {
+fn vertex_colors_are_interpolated() {
     let folder = tempfile::tempdir().unwrap();
-    // A linear color has its mean at the center of a pixel, except on the diagonal.
+    // The mean of a linear color over a pixel is the color at the pixel's center, except on the diagonal of the square.
     let emission = "materials.m = { type = 'principled', base_color = [0, 0, 0], specular = 0, emission = [2, 2, 2], vertex_colors = 'emission' }\n";
     let base = "environment = { color = [1, 1, 1] }\n\
                 materials.m = { type = 'principled', metallic = 0, specular = 0, vertex_colors = 'base_color' }\n";
-    for (material, factor, error) in [(emission, 2.0, 0.02), (base, 1.0, 0.02)] {
+    for (material, factor, tolerance) in [(emission, 2.0, 0.02), (base, 1.0, 0.02)] {
         let packed = scene(
             folder.path(),
             64,
@@ -102,7 +102,7 @@ fn colors_of_vertices_are_interpolated() {
                 for k in 0..3 {
                     let expected = factor * expected[k];
                     assert!(
-                        (found[k] - expected).abs() < error,
+                        (found[k] - expected).abs() < tolerance,
                         "{mode:?} {x} {y}: {found:?} {expected}"
                     );
                 }
@@ -148,7 +148,7 @@ fn base_colors_above_one_are_clamped_and_emission_is_not() {
 }
 
 #[test]
-fn the_alpha_of_vertices_is_a_factor_of_alpha() {
+fn vertex_alpha_multiplies_the_alpha_of_the_material() {
     let folder = tempfile::tempdir().unwrap();
     let text = |colors: &str, mode: &str, alpha: f64| {
         format!(
@@ -184,7 +184,7 @@ fn the_alpha_of_vertices_is_a_factor_of_alpha() {
                 }
             }
             let mean = blended_means.iter().map(|pixel| pixel[0]).sum::<f64>() / 400.0;
-            // The mean of two triangles; both contain the ends of the diagonal.
+            // The mean over two triangles, which share the two vertices on the diagonal.
             let alpha = 0.8 * (2.0 * (1.0 + 0.5) + 0.0 + 1.0) / 6.0;
             assert!((mean - (1.0 - alpha)).abs() < 0.01, "{mode:?}: {mean} {alpha}");
             assert!(means(&render(&opaque, mode)).iter().all(|pixel| pixel[0] == 0.0));
@@ -247,7 +247,7 @@ fn set_uv_sets(mesh: &mut Mesh) {
 }
 
 #[test]
-fn textures_use_their_set_of_coordinates() {
+fn textures_use_the_selected_set_of_coordinates() {
     let folder = tempfile::tempdir().unwrap();
     write_exr(&folder.path().join("t.exr"), 8, 8, |x, y| {
         [
@@ -258,7 +258,7 @@ fn textures_use_their_set_of_coordinates() {
     });
     let text = |set: u32, filter: &str, keys: &str| {
         format!(
-            "{CAMERA_ASIDE}environment = {{ color = [0.5, 0.5, 0.5] }}\n\
+            "{OBLIQUE_CAMERA}environment = {{ color = [0.5, 0.5, 0.5] }}\n\
              [textures.t]\ntype = 'image'\nfile = 't.exr'\nfilter = '{filter}'\nuv_set = {set}\n\
              [textures.first]\ntype = 'image'\nfile = 't.exr'\nfilter = '{filter}'\n\
              [materials.m]\ntype = 'principled'\nroughness = {{ texture = 'first', channel = 'g' }}\n{keys}\n{SHAPE}"
@@ -279,7 +279,7 @@ fn textures_use_their_set_of_coordinates() {
             .map(|set| scene(folder.path(), 4, &text(set, filter, keys), set_uv_sets))
             .collect();
         for set in 0..4 {
-            // The control mesh has only this set. Roughness is omitted, because its texture coordinates would differ.
+            // The expected mesh has only this set. The roughness texture is omitted, because it uses set 0.
             let without_roughness =
                 |text: String| text.replace("roughness = { texture = 'first', channel = 'g' }\n", "");
             let keep_one_uv_set = |mesh: &mut Mesh| {
@@ -309,7 +309,7 @@ fn textures_use_their_set_of_coordinates() {
                 .all(|(a, b)| (0..3).all(|k| (a[k] - b[k]).abs() < 1e-4));
             assert!(is_near, "{keys} {filter} {set}");
         }
-        // Kernels with a BVH take seconds to compile.
+        // The GPU renders only one set, because kernels with a BVH take seconds to compile.
         if filter != "nearest" && exact_modes().len() > 1 {
             let packed = &by_set[3];
             assert_eq!(
@@ -328,7 +328,7 @@ fn textures_use_their_set_of_coordinates() {
 }
 
 #[test]
-fn a_missing_set_of_coordinates_is_a_single_point() {
+fn textures_with_a_missing_uv_set_use_a_single_point() {
     let folder = tempfile::tempdir().unwrap();
     write_exr(&folder.path().join("t.exr"), 4, 4, |x, y| [x as f32, y as f32, 1.0]);
     let text = format!(
@@ -349,7 +349,7 @@ fn a_missing_set_of_coordinates_is_a_single_point() {
 }
 
 #[test]
-fn factors_are_multiplied_by_the_texels() {
+fn texture_factors_multiply_the_texels() {
     let folder = tempfile::tempdir().unwrap();
     write_png(&folder.path().join("t.png"), 2, 2, |_, _| [255, 51, 102]);
     image::RgbaImage::from_pixel(2, 2, image::Rgba([255, 255, 255, 51]))
@@ -364,7 +364,7 @@ fn factors_are_multiplied_by_the_texels() {
              [materials.m]\ntype = 'principled'\nmetallic = 0\nspecular = 0\n{keys}\n{SHAPE}"
         )
     };
-    for (keys, expected, error) in [
+    for (keys, expected, tolerance) in [
         ("base_color = { texture = 't' }", [0.5, 0.2, 0.1], 1e-4),
         (
             "base_color = [0, 0, 0]\nemission = { texture = 'light' }",
@@ -388,7 +388,7 @@ fn factors_are_multiplied_by_the_texels() {
             let found = means(&render(&packed, mode));
             let mean: [f64; 3] = std::array::from_fn(|k| found.iter().map(|pixel| pixel[k]).sum::<f64>() / 400.0);
             assert!(
-                (0..3).all(|k| (mean[k] - expected[k]).abs() <= error),
+                (0..3).all(|k| (mean[k] - expected[k]).abs() <= tolerance),
                 "{keys} {mode:?}: {mean:?}"
             );
         }
@@ -529,7 +529,7 @@ fn only_camera_rays_skip_back_faces() {
 }
 
 #[test]
-fn a_mesh_keeps_its_own_tangents() {
+fn tangents_of_a_mesh_override_its_texture_coordinates() {
     // The map tilts the normal along u; the tangents of the mesh contradict the texture coordinates.
     let folder = tempfile::tempdir().unwrap();
     write_exr(&folder.path().join("n.exr"), 2, 2, |_, _| [0.8, 0.6, 0.9]);
@@ -618,7 +618,7 @@ fn anisotropy_directions_come_from_an_image() {
     let folder = tempfile::tempdir().unwrap();
     let text = |keys: &str| {
         format!(
-            "{CAMERA_ASIDE}environment = {{ color = [0.1, 0.1, 0.1] }}\n\
+            "{OBLIQUE_CAMERA}environment = {{ color = [0.1, 0.1, 0.1] }}\n\
              textures.d = {{ type = 'image', file = 'd.exr', factor = [1, 1, 0.8, 1], rotate = 40, filter = 'nearest' }}\n\
              [[lights]]\ntype = 'point'\nposition = [0.2, 1.5, 1]\ncolor = [1, 1, 1]\n\
              [materials.m]\ntype = 'principled'\nroughness = 0.3\n{keys}\n{SHAPE}"
@@ -667,7 +667,7 @@ fn anisotropy_directions_come_from_an_image() {
 }
 
 #[test]
-fn images_without_directions_are_rejected() {
+fn invalid_direction_maps_are_rejected() {
     let folder = tempfile::tempdir().unwrap();
     write_png(&folder.path().join("t.png"), 2, 2, |_, _| [255, 51, 102]);
     let message = |texture: &str| {

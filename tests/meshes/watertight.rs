@@ -8,11 +8,11 @@ use wgray_render::cpu::shadow::SampleBlock;
 use wgray_render::cpu::surface::Surface;
 use wgray_render::records::{CASTS_SHADOW, GRID, INFINITE_T, Instance, Light, NO_INDEX, NO_PRIMITIVE, Packed};
 
-use super::forms::{Form, HEAD, scene};
+use super::forms::{HEAD, TriangleMesh, scene};
 use crate::random::Random;
 use crate::sources;
 
-/// Transforms, with distances from the origin up to 2e6 times the size.
+/// Transforms of a mesh. The distance from the origin is up to 2e6 times the size of the mesh.
 const TRANSFORMS: &[&str] = &[
     "",
     "rotate = [30, 40, 50]",
@@ -47,11 +47,11 @@ struct Solid {
 
 impl Solid {
     fn new(scene: &Packed) -> Solid {
-        let (i, mesh): (&Instance, _) = (&scene.bvh.instances[0], &scene.bvh.meshes[0]);
-        let columns = DMat3::from_cols(i.u.as_dvec3(), i.v.as_dvec3(), i.w.as_dvec3());
+        let (instance, mesh): (&Instance, _) = (&scene.bvh.instances[0], &scene.bvh.meshes[0]);
+        let columns = DMat3::from_cols(instance.u.as_dvec3(), instance.v.as_dvec3(), instance.w.as_dvec3());
         let corner = |vertex: u32| {
             let p = mesh.vertices[vertex as usize].xyz().as_dvec3();
-            i.anchor.as_dvec3() + columns * p
+            instance.anchor.as_dvec3() + columns * p
         };
         let corners: Vec<[DVec3; 3]> = mesh.triangles.iter().map(|t| [t.x, t.y, t.z].map(corner)).collect();
         let center = corners.iter().flatten().sum::<DVec3>() / (3.0 * corners.len() as f64);
@@ -131,9 +131,9 @@ fn leaks(scene: &Packed, solid: &Solid, from_inside: bool, random: &Random) -> b
         to_center
     };
     let hit = closest_hit(scene, ray, NO_PRIMITIVE, NO_PRIMITIVE);
-    let casts = scene.bvh.items.iter().any(|item| item.kind & CASTS_SHADOW != 0);
+    let casts_shadows = scene.bvh.items.iter().any(|item| item.kind & CASTS_SHADOW != 0);
     let light_t = if from_inside { 2.0 } else { 1.0 + to_center / to_target };
-    !(f64::from(hit.t) <= limit) || casts && !is_occluded(scene, origin, direction, light_t)
+    !(f64::from(hit.t) <= limit) || casts_shadows && !is_occluded(scene, origin, direction, light_t)
 }
 
 /// Returns true if a point light at `origin + light_t * direction` is occluded.
@@ -172,13 +172,13 @@ fn is_occluded(scene: &Packed, origin: Vec3, direction: Vec3, light_t: f64) -> b
     occluded_samples(scene, &surface, &light, block, 0) == 1
 }
 
-fn convex_forms() -> [(&'static str, Form); 4] {
-    let mut slivers = Form::slivers(600, &Random::new(1));
+fn convex_meshes() -> [(&'static str, TriangleMesh); 4] {
+    let mut slivers = TriangleMesh::slivers(600, &Random::new(1));
     slivers.points.iter_mut().for_each(|p| p.z *= 0.7);
     [
-        ("a cube", Form::cube()),
-        ("an icosahedron", Form::icosphere(0)),
-        ("an icosphere", Form::icosphere(4)),
+        ("a cube", TriangleMesh::cube()),
+        ("an icosahedron", TriangleMesh::icosphere(0)),
+        ("an icosphere", TriangleMesh::icosphere(4)),
         ("slivers", slivers),
     ]
 }
@@ -186,13 +186,13 @@ fn convex_forms() -> [(&'static str, Form); 4] {
 #[test]
 fn no_ray_passes_through_a_closed_mesh() {
     let mut total = 0;
-    for (name, form) in convex_forms() {
-        let obj = form.obj(None, None);
+    for (name, triangle_mesh) in convex_meshes() {
+        let obj = triangle_mesh.obj(None, None);
         for transform in TRANSFORMS {
             let scene = pack_mesh(&obj, transform);
             assert_eq!(
                 scene.bvh.meshes[0].triangles.len(),
-                form.triangles.len(),
+                triangle_mesh.triangles.len(),
                 "{name}: triangles are missing"
             );
             for from_inside in [false, true] {
@@ -211,9 +211,9 @@ fn no_ray_passes_through_a_closed_mesh() {
 }
 
 #[test]
-fn a_hole_in_a_mesh_is_found() {
-    for (name, form) in convex_forms() {
-        let mut open = form.clone();
+fn a_hole_in_a_mesh_is_detected() {
+    for (name, triangle_mesh) in convex_meshes() {
+        let mut open = triangle_mesh.clone();
         open.triangles.pop();
         for transform in TRANSFORMS {
             let scene = pack_mesh(&open.obj(None, None), transform);
@@ -226,8 +226,8 @@ fn a_hole_in_a_mesh_is_found() {
 /// Negative control: triangles outside of a mesh do not share edges.
 #[test]
 fn standalone_triangles_are_not_watertight() {
-    let form = Form::icosphere(2);
-    let mesh = pack_mesh(&form.obj(None, None), "rotate = [30, 40, 50]");
+    let triangle_mesh = TriangleMesh::icosphere(2);
+    let mesh = pack_mesh(&triangle_mesh.obj(None, None), "rotate = [30, 40, 50]");
     let mut text = HEAD.to_string();
     for corners in Solid::new(&mesh).corners {
         let [a, b, c] = corners.map(|p| p.to_array());
@@ -262,10 +262,10 @@ fn no_ray_passes_through_the_knot() {
         assert_eq!((outside.1, inside.1), (0, 0), "{transform:?}");
     }
     // Negative control: every 50th triangle is removed.
-    let mut removed = 0;
+    let mut face_count = 0;
     let remaining = knot.lines().filter(|line| {
-        removed += u32::from(line.starts_with("f "));
-        !(line.starts_with("f ") && removed % 50 == 0)
+        face_count += u32::from(line.starts_with("f "));
+        !(line.starts_with("f ") && face_count % 50 == 0)
     });
     let packed = pack_mesh(&remaining.collect::<Vec<_>>().join("\n"), "");
     let full_solid = Solid::new(&pack_mesh(&knot, ""));
@@ -273,7 +273,8 @@ fn no_ray_passes_through_the_knot() {
     assert!(outside.1 > 10 && inside.1 > 10, "{outside:?} {inside:?}");
 }
 
-/// Returns the number of rays and the number of those that leak through the knot: from outside, and from inside.
+/// Returns the number of rays and the number of leaking rays, first for rays from outside the knot, then for rays from
+/// inside.
 fn knot_rays(scene: &Packed, solid: &Solid, rays: u32) -> [(u32, u32); 2] {
     let side = f64::from(scene.bvh.instances[0].side);
     let normal = |[a, b, c]: [DVec3; 3]| (b - a).cross(c - a).normalize() * side;

@@ -1,4 +1,4 @@
-// Controls of the page never write by accident, and disabled controls show the reason.
+// Controls of the page do not write by accident, and disabled controls show why they are disabled.
 
 import assert from "node:assert/strict";
 import fs from "node:fs";
@@ -26,7 +26,7 @@ async function drag(page, dx = 60) {
   await waitUntilSettled(page);
 }
 
-async function waitForText(text) {
+async function waitForSceneText(text) {
   const deadline = Date.now() + TIMEOUT;
   while (!studio.read("scene.toml").includes(text)) {
     assert.ok(Date.now() < deadline, `no ${text} in ${studio.read("scene.toml")}`);
@@ -120,7 +120,7 @@ test("without a connection, nothing can be downloaded, and the zoom bar stays op
   await page.locator("#zoom", { hasText: /^\d+%$/ }).waitFor();
   await studio.start(studio.port);
   await page.locator("#save-png[href]").waitFor();
-  // These controls stay disabled for another reason.
+  // These controls stay disabled: there is nothing to reset, to undo or to save.
   for (const id of ["#reset-look", "#undo-write", "#reset-sliders", "#save"]) assert.ok(await page.locator(id).isDisabled(), id);
 });
 
@@ -143,7 +143,7 @@ test("the undo button shows why undo is not possible after another program has c
   await control(page, "shapes[0].radius", 1).fill("0.35");
   await page.keyboard.press("Enter");
   await page.locator("#undo-write:enabled").click();
-  await waitForText("radius = 0.25");
+  await waitForSceneText("radius = 0.25");
   assert.deepEqual(page.errors, []);
 });
 
@@ -151,14 +151,14 @@ test("exposure out of range is reported, and its slider and box agree", async ()
   await studio.start();
   const page = await open(browser, studio);
   const [box, slider] = [page.locator("#exposure-number"), page.locator("#exposure")];
-  for (const [typed, shown] of [["500", "100"], ["-700", "-100"], ["500", "100"], ["12.5", "12.5"]]) {
+  for (const [typed, expected] of [["500", "100"], ["-700", "-100"], ["500", "100"], ["12.5", "12.5"]]) {
     await box.fill(typed);
     await page.keyboard.press("Enter");
     await waitUntilSettled(page);
-    const notice = page.locator("#notice.bad", { hasText: `from -100 to 100 stops: ${typed} became ${shown}` });
-    if (typed !== shown) await notice.waitFor();
+    const notice = page.locator("#notice.bad", { hasText: `from -100 to 100 stops: ${typed} became ${expected}` });
+    if (typed !== expected) await notice.waitFor();
     else await page.locator("#notice").waitFor({ state: "hidden" });
-    assert.deepEqual([await box.inputValue(), await slider.inputValue()], [shown, shown]);
+    assert.deepEqual([await box.inputValue(), await slider.inputValue()], [expected, expected]);
   }
   await box.fill("-0.79435");
   await page.keyboard.press("Enter");
@@ -170,10 +170,10 @@ test("exposure out of range is reported, and its slider and box agree", async ()
     context.font = font;
     return box.clientWidth - parseFloat(paddingLeft) - parseFloat(paddingRight) - context.measureText(box.value).width;
   });
-  assert.ok(freeWidth >= 0, `${freeWidth} px for the digits`);
+  assert.ok(freeWidth >= 0, `the box is ${-freeWidth} pixels too narrow for the digits`);
 });
 
-test("once the view has moved, the camera's values are labeled as values of the file", async () => {
+test("after the view has moved, a note explains that the camera's values are those of the file", async () => {
   await studio.start();
   const page = await open(browser, studio);
   await choose(page, "camera");
@@ -188,7 +188,7 @@ test("once the view has moved, the camera's values are labeled as values of the 
   await page.waitForFunction(() => document.getElementById("object-note").textContent === "");
 });
 
-test("a shader that is broken at the start is reported as an error", async () => {
+test("an invalid shader at the start is reported as an error", async () => {
   studio.breakShader();
   await studio.start();
   const page = await visit(browser, studio);

@@ -1,4 +1,4 @@
-// Fields of the page in use: half-typed numbers, touch, keys, focus.
+// Input fields of the page: half-typed numbers, touch, keys and focus.
 
 import assert from "node:assert/strict";
 import { after, afterEach, before, beforeEach, test } from "node:test";
@@ -38,7 +38,7 @@ async function waitForValue(locator, value) {
   await locator.page().waitForFunction(([node, value]) => node.value === value, [node, value]);
 }
 
-async function waitForText(text) {
+async function waitForSceneText(text) {
   const deadline = Date.now() + TIMEOUT;
   while (!studio.read("scene.toml").includes(text)) {
     assert.ok(Date.now() < deadline, `no ${text} in ${studio.read("scene.toml")}`);
@@ -70,19 +70,19 @@ test("a half-typed number stays while other controls come and go", async () => {
   const [page, otherPage] = [await open(browser, studio), await open(browser, studio)];
   await choose(page, "shapes[0]");
   await choose(otherPage, "shapes[0]");
-  const z = box(page, "shapes[0].center", 2);
-  await z.focus();
+  const zBox = box(page, "shapes[0].center", 2);
+  await zBox.focus();
   await page.keyboard.press("Control+a");
   await page.keyboard.type("0.7");
   await box(otherPage, "shapes[0].material").selectOption("grey");
   await box(page, "materials.grey.color").waitFor();
   assert.equal(await page.locator('[data-name="materials.red"]').count(), 0);
-  assert.equal(await z.inputValue(), "0.7");
-  assert.ok(await isFocused(z));
+  assert.equal(await zBox.inputValue(), "0.7");
+  assert.ok(await isFocused(zBox));
   assert.ok(studio.read("scene.toml").includes("center = [0, 0, 0.5]"), "a half-typed number was written");
   await page.keyboard.type("5");
   await page.keyboard.press("Enter");
-  await waitForText("center = [0, 0, 0.75]");
+  await waitForSceneText("center = [0, 0, 0.75]");
   // A removed box discards its text; the keys that follow have no effect.
   const sent = await recordChanges(page);
   await box(page, "materials.grey.shininess", 1).focus();
@@ -93,7 +93,7 @@ test("a half-typed number stays while other controls come and go", async () => {
   await page.keyboard.type("5r");
   assert.deepEqual(await sent(), []);
   assert.equal(studio.read("scene.toml").match(/shininess = 16/g).length, 2);
-  // A number that moves from the defaults to the values of the file keeps its focus; the list stays open.
+  // A field that moves from the defaults to the values of the file keeps the focus; the list of defaults stays open.
   await choose(page, "render");
   const defaults = page.locator('[data-name="render"] .absent');
   await defaults.locator("> summary").click();
@@ -104,7 +104,7 @@ test("a half-typed number stays while other controls come and go", async () => {
   await seedInFile.waitFor();
   assert.ok(await isFocused(seedInFile));
   assert.ok(await defaults.evaluate((node) => node.open));
-  // Removing the value with a key moves the field back, with the focus.
+  // If a key removes the value, the field moves back to the defaults and keeps the focus.
   await page.locator('[data-path="render.seed"]').getByRole("button", { name: "default" }).focus();
   await page.keyboard.press("Enter");
   await seedInFile.waitFor({ state: "detached" });
@@ -128,7 +128,7 @@ test("a half-typed value of a shader override stays while sliders are added and 
   await waitForValue(slider(page, "level"), "0.25");
   await waitUntilSettled(page);
   assert.deepEqual((await sent()).map((text) => JSON.parse(text).slide.value), [0.25]);
-  // Key steps work as in any other box.
+  // The arrow keys change the value in steps, as in any other box.
   await page.keyboard.press("ArrowUp");
   await waitForValue(slider(page, "level"), "0.26");
   await page.keyboard.press("Control+a");
@@ -175,12 +175,12 @@ test("touch scrolling changes no values; dragging and tapping do", async () => {
     const area = await control.boundingBox();
     const [x, y] = [area.x + area.width * 0.15, area.y + area.height / 2];
     const touch = (type, touchPoints) => client.send("Input.dispatchTouchEvent", { type, touchPoints });
-    const top = await page.evaluate(() => scrollY);
+    const oldScrollY = await page.evaluate(() => scrollY);
     await touch("touchStart", [{ x, y }]);
     for (let i = 1; i <= 12; i++) await touch("touchMove", [{ x: x + (dx * i) / 12, y: y + (dy * i) / 12 }]);
     await touch("touchEnd", []);
     await waitForScrollEnd();
-    return (await page.evaluate(() => scrollY)) - top;
+    return (await page.evaluate(() => scrollY)) - oldScrollY;
   };
   const sliders = [box(page, "shapes[0].radius"), slider(page, "level"), page.locator("#exposure")];
   const boxes = [box(page, "shapes[0].radius", 1), number(page, "level"), page.locator("#exposure-number")];
@@ -198,7 +198,7 @@ test("touch scrolling changes no values; dragging and tapping do", async () => {
     assert.equal((await sent()).length, 1);
     await waitUntilSettled(page);
   }
-  // Afterwards boxes follow the file, and another object can be shown.
+  // After these gestures, boxes still follow the file, and another object can be selected.
   const radius = box(page, "shapes[0].radius", 1);
   await swipe(radius, 5, -96);
   studio.write("scene.toml", SCENE.replace("radius = 0.5", "radius = 0.35"));
@@ -226,7 +226,7 @@ test("keys act on the control that has the focus", async () => {
   await page.waitForFunction(() => Number(document.querySelector('[data-control="shapes[0].radius 1"]').value) < 0.01);
   await page.locator("#object-find").focus();
   for (const key of ["Home", "r", "5", " "]) await page.keyboard.press(key);
-  // Camera keys need the focus of the image.
+  // The keys of the camera act only while the image has the focus.
   for (const control of ["#transform", "#help summary", "#copy", "#exposure-number"]) {
     await page.locator(control).focus();
     for (const key of ["Home", "f", "r"]) await page.keyboard.press(key);
@@ -243,7 +243,7 @@ test("keys act on the control that has the focus", async () => {
   assert.deepEqual(await sent(), ['{"frame":null}', '{"view":"normal"}']);
 });
 
-test("on a narrow or zoomed-in screen the focus is never behind the image", async () => {
+test("on a narrow or zoomed-in screen, the focus is never behind the image", async () => {
   for (const options of [PHONE, { viewport: { width: 600, height: 400 } }]) {
     const page = await open(browser, studio, options);
     await choose(page, "shapes[0]");
@@ -307,21 +307,21 @@ test("a viewer beyond the limit gets a message, and connects when a slot becomes
   await latePage.locator("#badge.live").waitFor({ state: "attached" });
 });
 
-test("forced colours show the progress", async () => {
+test("the progress is visible with forced colors", async () => {
   const page = await open(browser, studio, { forcedColors: "active" });
   const bar = page.locator("#bar");
-  const colors = async () => {
+  const countColors = async () => {
     const [, , bytes] = await decode(page, [...await bar.screenshot()]);
     return new Set(bytes.match(/\d+,\d+,\d+/g)).size;
   };
   await page.evaluate(() => (document.getElementById("bar").value = 0.5));
-  assert.ok((await colors()) >= 3, "fewer than three colors: edge, finished part, remaining part");
+  assert.ok((await countColors()) >= 3, "fewer than three colors: edge, finished part, remaining part");
 });
 
 test("the sample count of a grid steps from one square number to the next", async () => {
   const page = await open(browser, studio);
   await choose(page, "render");
-  const waitForCount = (number) => waitForText(`count = ${number} }\nlight`);
+  const waitForCount = (number) => waitForSceneText(`count = ${number} }\nlight`);
   const [range, field] = [0, 1].map((nth) => box(page, "render.pixel_samples.count", nth));
   await range.focus();
   await page.keyboard.press("ArrowRight");
@@ -365,7 +365,7 @@ test("the sample count of a grid steps from one square number to the next", asyn
   assert.equal(await page.locator("#max-samples").inputValue(), "");
   // Other patterns accept any count.
   await box(page, "render.pixel_samples.pattern").selectOption("sobol");
-  await waitForText('pattern = "sobol", count = 9');
+  await waitForSceneText('pattern = "sobol", count = 9');
   await page.locator('[data-control="render.pixel_samples.count 0"][max="1000"]').waitFor();
   await field.focus();
   await page.keyboard.press("ArrowUp");
@@ -373,20 +373,20 @@ test("the sample count of a grid steps from one square number to the next", asyn
   assert.deepEqual(page.errors, []);
 });
 
-test("the focus of a control that is disabled or removed stays near, and returns with the control", async () => {
+test("the focus of a control that is disabled or removed moves to a nearby element and returns with the control", async () => {
   const page = await open(browser, studio);
   const isParentFocused = (id) => page.evaluate((id) => document.activeElement === document.getElementById(id).parentElement, id);
   await choose(page, "shapes[0]");
   await box(page, "shapes[0].radius", 1).fill("0.4");
   await page.keyboard.press("Enter");
-  await waitForText("radius = 0.4");
+  await waitForSceneText("radius = 0.4");
   await page.locator("#undo-write:enabled").focus();
   await page.keyboard.press("Enter");
   await page.locator("#undo-write:disabled").waitFor();
   assert.ok(await isParentFocused("undo-write"));
   await page.keyboard.press("Tab");
   assert.ok(await isFocused(page.locator("#redo-write")), "the focus did not move to the neighboring button");
-  // A control that has the focus can be hidden: the button beside a field, the canvas of a comparison.
+  // A control with the focus may also be hidden: the button beside a field, or the canvas of a comparison.
   await slider(page, "level").focus();
   await page.keyboard.press("ArrowRight");
   await page.getByRole("button", { name: "Reset level" }).focus();
@@ -399,7 +399,7 @@ test("the focus of a control that is disabled or removed stays near, and returns
   await page.keyboard.press("1");
   await page.locator("[data-part=second] canvas").waitFor({ state: "hidden" });
   assert.ok(await isFocused(canvas(page)));
-  // The button that deletes a view has the focus.
+  // The button that deletes a view has the focus and disappears with the view.
   await page.keyboard.press("b");
   await page.getByRole("button", { name: "Delete view 1" }).focus();
   await page.keyboard.press("Enter");

@@ -7,7 +7,7 @@ import { after, afterEach, before, beforeEach, test } from "node:test";
 
 import { SCENE, Studio, assertSameImage, canvas, decode, launch, open, shownImage, waitUntilSettled } from "./studio.mjs";
 
-const PATH = SCENE.replace("[render]", "[render]\nintegrator = \"path\"\nbackground = [0.1, 0.2, 0.4]");
+const PATH_SCENE = SCENE.replace("[render]", "[render]\nintegrator = \"path\"\nbackground = [0.1, 0.2, 0.4]");
 
 let browser;
 let studio;
@@ -27,12 +27,12 @@ async function selectView(page, view) {
 }
 
 test("film layers are views with the images and files of a render", async () => {
-  studio.write("scene.toml", PATH);
+  studio.write("scene.toml", PATH_SCENE);
   await studio.start();
   const page = await open(browser, studio);
   const colorImage = await shownImage(page);
-  const compiled = () => page.locator("#compile").innerText();
-  const firstCompile = await compiled();
+  const compileTime = () => page.locator("#compile").innerText();
+  const colorCompileTime = await compileTime();
   const names = ["direct", "indirect", "emission", "albedo"];
   studio.renderTo(studio.path("rendered.png"), ["--aov", names.join()]);
   const images = new Set([String(colorImage)]);
@@ -49,13 +49,13 @@ test("film layers are views with the images and files of a render", async () => 
   assert.equal(await page.locator("#samples").innerText(), "4 of 4");
   await canvas(page).hover();
   await page.locator("#values", { hasText: /albedo [\d.]+ +[\d.]+ +[\d.]+.*bits.*shown/ }).waitFor();
-  const layersCompile = await compiled();
-  assert.notEqual(layersCompile, firstCompile, "the layers did not compile another kernel");
+  const layerCompileTime = await compileTime();
+  assert.notEqual(layerCompileTime, colorCompileTime, "the layers did not compile another kernel");
   await page.keyboard.press("1");
   await page.waitForFunction(() => document.getElementById("panels").dataset.view === "color");
   await waitUntilSettled(page);
   assertSameImage(await shownImage(page), colorImage);
-  assert.equal(await compiled(), layersCompile, "the kernel of the light layers was compiled again");
+  assert.equal(await compileTime(), layerCompileTime, "the kernel of the color view was compiled again");
   assert.deepEqual(page.errors, []);
 });
 
@@ -68,14 +68,14 @@ test("a layer that a scene lacks is disabled with the reason until the scene has
   assert.equal(await direct.getAttribute("title"), "needs integrator = \"path\"");
   assert.equal(await group.getAttribute("label"), "Light: needs integrator = \"path\"");
   assert.ok(await page.locator("#layers [value=shading_normal]").isEnabled());
-  studio.write("scene.toml", PATH.replace(
+  studio.write("scene.toml", PATH_SCENE.replace(
     "pixel_samples = { pattern = \"grid\", count = 4 }",
     "pixel_samples = { pattern = \"jittered\", count = 4 }\nadaptive = { error = 0.05, max_samples = 68 }",
   ));
   await page.waitForFunction(() => !document.querySelector("#layers [value=direct]").disabled);
   assert.ok(await variance.isEnabled());
   assert.equal(await group.getAttribute("label"), "Light");
-  // A legend shows the false colours of the variance.
+  // A legend shows the false colors of the variance.
   await selectView(page, "variance");
   await page.locator("#legend", { hasText: "2⁻¹²" }).waitFor();
   await canvas(page).hover();

@@ -30,7 +30,7 @@ test("every frame on the screen is acknowledged by its number", async () => {
   await page.keyboard.press("ArrowLeft");
   await waitForImage(page, oldRevision);
   await waitUntilSettled(page);
-  await page.waitForTimeout(100); // one more screen refresh
+  await page.waitForTimeout(100); // a few more refreshes of the screen
   const numbers = (await sent()).map(({ shown }) => shown);
   assert.ok(numbers.length > 0);
   assert.deepEqual(numbers, [...numbers].sort((a, b) => a - b));
@@ -100,7 +100,7 @@ test("a badge on the image counts invalid pixels, and a click on the badge opens
   assert.deepEqual(page.errors, []);
 });
 
-test("an image full of invalid pixels gets no rings", async () => {
+test("an image full of invalid pixels has colored pixels, but no rings", async () => {
   const page = await open(browser, studio);
   editKernel("sum.x = zero / zero;");
   await page.locator("#invalid", { hasText: /^10,800 NaN pixels$/ }).waitFor();
@@ -130,8 +130,8 @@ test("a dolly passes the look-at point, and its distance is limited", async () =
   const start = await camera(page);
   const near = await dolly("PageUp", 60);
   const nearer = await dolly("PageUp", 10);
-  const moved = Math.hypot(...point(nearer, "position").map((v, i) => v - point(near, "position")[i]));
-  assert.ok(moved > 0.02, `10 steps move the camera by ${moved}`);
+  const movedDistance = Math.hypot(...point(nearer, "position").map((v, i) => v - point(near, "position")[i]));
+  assert.ok(movedDistance > 0.02, `10 steps move the camera by ${movedDistance}`);
   await page.keyboard.press("r");
   await page.locator("#reset:disabled").waitFor();
   const far = await dolly("PageDown", 100);
@@ -140,7 +140,7 @@ test("a dolly passes the look-at point, and its distance is limited", async () =
   assert.deepEqual(page.errors, []);
 });
 
-test("on a phone the toolbar scrolls to the selected view", async () => {
+test("on a phone, the toolbar scrolls to the selected view", async () => {
   const page = await open(browser, studio, { viewport: { width: 390, height: 844 }, hasTouch: true, isMobile: true });
   const isInView = (selector) => page.waitForFunction((selector) => {
     const { left, right } = document.querySelector(selector).getBoundingClientRect();

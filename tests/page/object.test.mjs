@@ -1,4 +1,4 @@
-// Objects on the page: selection, editing by controls, undo.
+// Objects on the page: selection, edits with controls, and undo.
 
 import assert from "node:assert/strict";
 import { after, afterEach, before, beforeEach, test } from "node:test";
@@ -21,7 +21,7 @@ afterEach(async () => {
 
 const box = (page, path, nth = 0) => page.locator(`[data-control="${path} ${nth}"]`);
 
-async function waitForText(text) {
+async function waitForSceneText(text) {
   const deadline = Date.now() + TIMEOUT;
   while (!studio.read("scene.toml").includes(text)) {
     assert.ok(Date.now() < deadline, `no ${text} in ${studio.read("scene.toml")}`);
@@ -48,26 +48,26 @@ test("a click shows the object, and its controls write to the scene file", async
   const lines = page.locator("#object-groups > details").first().locator("pre");
   const lineNumber = SCENE.split("\n").indexOf("[[shapes]]") + 1;
   assert.match(await lines.innerText(), new RegExp(`^ *${lineNumber}  \\[\\[shapes\\]\\]\\n`));
-  // If a key changes the value, the box, the file and the shown lines follow.
+  // After a key has changed the value, the box, the file and the displayed lines contain the new value.
   await box(page, "shapes[0].radius").focus();
   await page.keyboard.press("ArrowLeft");
   await page.locator("#undo-write", { hasText: "shapes[0].radius" }).waitFor();
   const radius = Number(await box(page, "shapes[0].radius", 1).inputValue());
   assert.ok(radius < 0.5 && radius > 0.4, `${radius}`);
-  await waitForText(`radius = ${radius}\n`);
+  await waitForSceneText(`radius = ${radius}\n`);
   await lines.filter({ hasText: `radius = ${radius}` }).waitFor();
   await waitUntilSettled(page);
   await waitForRender(page, studio);
-  // A colour is set as linear numbers and as sRGB.
+  // A color is set by linear numbers or as sRGB.
   await box(page, "materials.red.color", 1).fill("0.25");
   await page.keyboard.press("Enter");
-  await waitForText("color = [0.25, 0.1, 0.1]");
+  await waitForSceneText("color = [0.25, 0.1, 0.1]");
   await box(page, "materials.red.color").fill("#ffffff");
-  await waitForText("color = [1, 1, 1]");
+  await waitForSceneText("color = [1, 1, 1]");
   await page.locator("#undo-write", { hasText: "materials.red.color" }).waitFor();
   await box(page, "shapes[0].material").selectOption("grey");
-  await waitForText('center = [0, 0, 0.5]\nradius');
-  await waitForText('material = "grey"\ncenter = [0, 0, 0.5]');
+  await waitForSceneText('center = [0, 0, 0.5]\nradius');
+  await waitForSceneText('material = "grey"\ncenter = [0, 0, 0.5]');
   await page.locator('details[data-name="materials.grey"]').waitFor();
   assert.deepEqual(page.errors, []);
 });
@@ -77,24 +77,24 @@ test("changes of the file are undone and redone by keys", async () => {
   await choose(page, "shapes[0]");
   await box(page, "shapes[0].center", 2).fill("0.75");
   await page.keyboard.press("Enter");
-  await waitForText("center = [0, 0, 0.75]");
-  const afterFirst = studio.read("scene.toml");
+  await waitForSceneText("center = [0, 0, 0.75]");
+  const textAfterFirstChange = studio.read("scene.toml");
   await box(page, "shapes[0].radius", 1).fill("0.25");
   await page.keyboard.press("Enter");
   await page.locator("#undo-write", { hasText: "shapes[0].radius" }).waitFor();
-  // In a text box, Ctrl+Z is a key of the browser.
+  // In a text box, the browser handles Ctrl+Z.
   await canvas(page).focus();
   await page.keyboard.press("Control+z");
   await page.locator("#redo-write", { hasText: "shapes[0].radius" }).waitFor();
   await waitUntilSettled(page);
-  assert.equal(studio.read("scene.toml"), afterFirst);
-  assert.equal(afterFirst, SCENE.replace("center = [0, 0, 0.5]", "center = [0, 0, 0.75]"));
+  assert.equal(studio.read("scene.toml"), textAfterFirstChange);
+  assert.equal(textAfterFirstChange, SCENE.replace("center = [0, 0, 0.5]", "center = [0, 0, 0.75]"));
   await page.keyboard.press("Control+Shift+z");
   await page.locator("#undo-write", { hasText: "shapes[0].radius" }).waitFor();
-  assert.equal(studio.read("scene.toml"), afterFirst.replace("radius = 0.5", "radius = 0.25"));
+  assert.equal(studio.read("scene.toml"), textAfterFirstChange.replace("radius = 0.5", "radius = 0.25"));
 });
 
-test("an invalid value is reported at its control, and the file stays", async () => {
+test("an invalid value is reported at its control, and the file is unchanged", async () => {
   const page = await open(browser, studio);
   await choose(page, "shapes[0]");
   await box(page, "shapes[0].radius", 1).fill("-1");
@@ -105,7 +105,7 @@ test("an invalid value is reported at its control, and the file stays", async ()
   await box(page, "shapes[0].radius", 1).fill("0.25");
   await page.keyboard.press("Enter");
   await error.waitFor({ state: "hidden" });
-  await waitForText("radius = 0.25");
+  await waitForSceneText("radius = 0.25");
 });
 
 test("an object stays selected after reloads, and its removal is reported", async () => {
@@ -122,11 +122,11 @@ test("an object stays selected after reloads, and its removal is reported", asyn
 test("number boxes are dragged and stepped, and each gesture is one undo step", async () => {
   const page = await open(browser, studio);
   await choose(page, "camera");
-  const x = box(page, "camera.position", 0);
-  await x.scrollIntoViewIfNeeded();
-  const area = await x.boundingBox();
+  const xBox = box(page, "camera.position", 0);
+  await xBox.scrollIntoViewIfNeeded();
+  const area = await xBox.boundingBox();
   const [left, top] = [area.x + area.width / 2, area.y + area.height / 2];
-  // 10 pixels are one step of a tenth of the magnitude; with Shift, 100 pixels are one step.
+  // A drag by 10 pixels changes the value by one step, 0.1 here; with Shift, a step needs 100 pixels.
   await page.mouse.move(left, top);
   await page.mouse.down();
   for (const dx of [5, 20, 60, 100]) await page.mouse.move(left + dx, top);
@@ -134,9 +134,9 @@ test("number boxes are dragged and stepped, and each gesture is one undo step", 
   await page.mouse.move(left + 150, top);
   await page.keyboard.up("Shift");
   await page.mouse.up();
-  await waitForText("position = [1.05, -4, 1] # a comment");
-  assert.equal(await x.inputValue(), "1.05");
-  assert.equal(await x.evaluate((box) => box === document.activeElement), false);
+  await waitForSceneText("position = [1.05, -4, 1] # a comment");
+  assert.equal(await xBox.inputValue(), "1.05");
+  assert.equal(await xBox.evaluate((box) => box === document.activeElement), false);
   await waitUntilSettled(page);
   await page.locator("#undo-write", { hasText: "camera.position" }).click();
   await page.locator("#redo-write", { hasText: "camera.position" }).waitFor();
@@ -146,30 +146,30 @@ test("number boxes are dragged and stepped, and each gesture is one undo step", 
   await page.mouse.move(left, top);
   await page.mouse.down();
   await page.mouse.move(left + 40, top);
-  await waitForText("position = [0.4, -4, 1]");
+  await waitForSceneText("position = [0.4, -4, 1]");
   await page.keyboard.press("Escape");
-  await waitForText("position = [0, -4, 1]");
+  await waitForSceneText("position = [0, -4, 1]");
   await page.mouse.up();
   await page.waitForFunction(() => document.getElementById("undo-write").disabled);
   // A click focuses the box for typing.
   await page.mouse.click(left, top);
-  assert.equal(await x.evaluate((box) => box === document.activeElement), true);
+  assert.equal(await xBox.evaluate((box) => box === document.activeElement), true);
   // A held key is one undo step.
   for (let i = 0; i < 4; i++) await page.keyboard.down("ArrowUp");
   await page.keyboard.up("ArrowUp");
-  await waitForText("position = [0.4, -4, 1]");
+  await waitForSceneText("position = [0.4, -4, 1]");
   await page.keyboard.press("PageDown");
-  await waitForText("position = [-0.6, -4, 1]");
+  await waitForSceneText("position = [-0.6, -4, 1]");
   await page.keyboard.press("Shift+ArrowUp");
-  await waitForText("position = [-0.59, -4, 1]");
+  await waitForSceneText("position = [-0.59, -4, 1]");
   for (const text of ["-0.6", "0.4", "0"]) {
     await page.click("#undo-write");
-    await waitForText(`position = [${text}, -4, 1]`);
+    await waitForSceneText(`position = [${text}, -4, 1]`);
     await waitUntilSettled(page);
   }
   assert.equal(studio.read("scene.toml"), SCENE);
   // A held key is also one undo step right after a click.
-  await x.evaluate(async (box) => {
+  await xBox.evaluate(async (box) => {
     const fire = (EventType, type, options) => box.dispatchEvent(new EventType(type, { bubbles: true, ...options }));
     fire(PointerEvent, "pointerdown", { button: 1 });
     fire(PointerEvent, "pointerup", { button: 1 });
@@ -178,9 +178,9 @@ test("number boxes are dragged and stepped, and each gesture is one undo step", 
     fire(KeyboardEvent, "keydown", { key: "ArrowUp", repeat: true });
     fire(KeyboardEvent, "keyup", { key: "ArrowUp" });
   });
-  await waitForText("position = [0.2, -4, 1]");
+  await waitForSceneText("position = [0.2, -4, 1]");
   await page.click("#undo-write");
-  await waitForText("position = [0, -4, 1]");
+  await waitForSceneText("position = [0, -4, 1]");
   assert.deepEqual(page.errors, []);
 });
 
@@ -210,7 +210,7 @@ test("drags, keys and sliders send no value out of range", async () => {
   await page.waitForFunction(() => document.querySelector('[data-control="lights[0].color 1"]').value === "0.5");
   await red.focus();
   for (let i = 0; i < 7; i++) await page.keyboard.press("PageDown");
-  await waitForText("color = [0, 0.8, 0.8]");
+  await waitForSceneText("color = [0, 0.8, 0.8]");
   await waitUntilSettled(page);
   // The number of blades is 0 or at least 3; steps skip 1 and 2.
   await choose(page, "camera");
@@ -223,12 +223,12 @@ test("drags, keys and sliders send no value out of range", async () => {
   for (const key of ["ArrowUp", "ArrowDown", "ArrowDown"]) await page.keyboard.press(key);
   await page.waitForFunction(() => window.sent.at(-1).value === 0);
   await waitUntilSettled(page);
-  const all = await page.evaluate(() => window.sent);
-  const sent = all.filter(({ path }) => path !== "camera.blades");
-  const blades = all.filter((set) => !sent.includes(set)).map(({ value }) => value);
+  const changes = await page.evaluate(() => window.sent);
+  const otherChanges = changes.filter(({ path }) => path !== "camera.blades");
+  const blades = changes.filter((set) => !otherChanges.includes(set)).map(({ value }) => value);
   assert.ok(blades[0] === 3 && blades.every((x) => x === 0 || x >= 3), `${blades}`);
-  assert.ok(sent.length >= 4); // at least the first and the last of each burst
-  for (const { path, value } of sent) {
+  assert.ok(otherChanges.length >= 4); // at least the first and the last of each burst
+  for (const { path, value } of otherChanges) {
     const [min, max] = path.endsWith("radius") ? [1e-9, 1e9] : [0, 1e6];
     for (const x of [value].flat()) assert.ok(x >= min && x <= max, `${path}: ${x}`);
   }
@@ -249,21 +249,21 @@ test("one slider scales a light and keeps its tint", async () => {
   assert.ok(Number(await slider.getAttribute("max")) >= 4, "the range ends too close to the value");
   assert.equal(await slider.getAttribute("min"), "0");
   await slider.fill("4");
-  await waitForText("color = [4, 2, 1]");
+  await waitForSceneText("color = [4, 2, 1]");
   await page.locator("#undo-write", { hasText: "lights[0].color" }).waitFor();
   await slider.focus();
   await page.keyboard.press("Home");
-  await waitForText("color = [0, 0, 0]");
+  await waitForSceneText("color = [0, 0, 0]");
   await waitUntilSettled(page);
   await strength.fill("30");
   await page.keyboard.press("Enter");
-  await waitForText("color = [30, 15, 7.5]");
+  await waitForSceneText("color = [30, 15, 7.5]");
   await waitUntilSettled(page);
   // The slider's range extends beyond the value.
   await page.waitForFunction((slider) => Number(slider.max) >= 60, await slider.elementHandle());
   for (const text of ["[0, 0, 0]", "[4, 2, 1]", "[2, 1, 0.5]"]) {
     await page.click("#undo-write");
-    await waitForText(`color = ${text}`);
+    await waitForSceneText(`color = ${text}`);
     await waitUntilSettled(page);
   }
   // A reflectance has no strength slider.
@@ -273,12 +273,12 @@ test("one slider scales a light and keeps its tint", async () => {
   assert.deepEqual(page.errors, []);
 });
 
-test("other viewers' changes of a vector survive a drag of one of its numbers", async () => {
+test("edits of a vector in the file survive a drag of one of its numbers", async () => {
   const page = await open(browser, studio);
   await choose(page, "shapes[0]");
-  const x = box(page, "shapes[0].center");
-  await x.scrollIntoViewIfNeeded();
-  const area = await x.boundingBox();
+  const xBox = box(page, "shapes[0].center");
+  await xBox.scrollIntoViewIfNeeded();
+  const area = await xBox.boundingBox();
   const dragStart = [area.x + area.width / 2, area.y + area.height / 2];
   const drag = async (dx) => {
     await page.mouse.move(dragStart[0], dragStart[1]);
@@ -286,19 +286,19 @@ test("other viewers' changes of a vector survive a drag of one of its numbers", 
     await page.mouse.move(dragStart[0] + dx, dragStart[1]);
   };
   await drag(20);
-  await waitForText("center = [0.02, 0, 0.5]");
+  await waitForSceneText("center = [0.02, 0, 0.5]");
   studio.edit("scene.toml", "center = [0.02, 0, 0.5]", "center = [0.02, 0.25, 0.75]");
   await page.mouse.move(dragStart[0] + 40, dragStart[1]);
   await page.mouse.up();
-  await waitForText("center = [0.04, 0.25, 0.75]");
-  // The changes of other viewers survive a cancelled drag, too.
+  await waitForSceneText("center = [0.04, 0.25, 0.75]");
+  // Edits of the file survive a cancelled drag, too.
   await waitUntilSettled(page);
   await drag(20);
-  await waitForText("center = [0.06, 0.25, 0.75]");
+  await waitForSceneText("center = [0.06, 0.25, 0.75]");
   studio.edit("scene.toml", "center = [0.06, 0.25, 0.75]", "center = [0.06, 0.5, 0.75]");
   await page.keyboard.press("Escape");
   await page.mouse.up();
-  await waitForText("center = [0.04, 0.5, 0.75]");
+  await waitForSceneText("center = [0.04, 0.5, 0.75]");
   await waitUntilSettled(page);
   // Each of several quick changes is one undo step.
   const errorCount = await page.evaluate(() => {
@@ -312,11 +312,11 @@ test("other viewers' changes of a vector survive a drag of one of its numbers", 
     return document.querySelectorAll("[data-path] [role=alert]:not([hidden])").length;
   });
   assert.equal(errorCount, 0);
-  await waitForText("center = [1, 2, 3]");
+  await waitForSceneText("center = [1, 2, 3]");
   for (const center of ["[1, 2, 0.75]", "[1, 0.5, 0.75]", "[0.04, 0.5, 0.75]"]) {
     await waitUntilSettled(page);
     await page.click("#undo-write");
-    await waitForText(`center = ${center}`);
+    await waitForSceneText(`center = ${center}`);
   }
   assert.deepEqual(page.errors, []);
 });

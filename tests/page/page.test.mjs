@@ -76,7 +76,7 @@ test("a shader error shows its file and line, and the image stays until the shad
   assert.doesNotMatch(studio.stderr, /\x1b/, "a pipe received color codes");
 });
 
-test("a broken scene shows its line", async () => {
+test("an invalid scene is reported with its line", async () => {
   const page = await open(browser, studio);
   studio.edit("scene.toml", "radius = 0.5", "radius = -0.5");
   await page.locator("#problems h2", { hasText: /scene\.toml:\d+:\d+$/ }).waitFor();
@@ -141,7 +141,7 @@ test("drags move the camera, and saving writes what the page shows", async () =>
     assert.ok(saved.includes(expected), saved);
   }
   for (const line of cameraText.split("\n").filter((line) => /^(position|look_at)/.test(line))) {
-    assert.ok(saved.includes(line), `${line} in ${saved}`);
+    assert.ok(saved.includes(line), `${line} is not in ${saved}`);
   }
   assert.equal(await text(page, "#camera-text"), cameraText);
   assert.deepEqual(page.errors, []);
@@ -164,7 +164,7 @@ test("the camera is copied as text and reset", async () => {
   assert.equal(await text(page, "#camera-text"), start);
 });
 
-test("a pixel's linear value is read under the pointer", async () => {
+test("the linear value of the pixel under the pointer is shown", async () => {
   const page = await open(browser, studio);
   const [width, , bytes] = await shownImage(page);
   const image = canvas(page);
@@ -172,11 +172,11 @@ test("a pixel's linear value is read under the pointer", async () => {
   await image.hover({ position: { x: Number(left) + 60.5, y: Number(top) + 45.5 } });
   await page.locator("#values", { hasText: "pixel 60 45" }).waitFor();
   const linear = /linear RGB ([\d.e+-]+) +([\d.e+-]+) +([\d.e+-]+)/.exec(await text(page, "#values"));
-  const match = /shown (\d+) (\d+) (\d+)/.exec(await text(page, "#values"));
+  const shown = /shown (\d+) (\d+) (\d+)/.exec(await text(page, "#values"));
   const encoded = linear.slice(1).map((v) => Math.round(255 * Math.min(1, Number(v)) ** (1 / 2.2)));
   const start = 3 * (45 * width + 60);
   assert.deepEqual(encoded, bytes.split(",").slice(start, start + 3).map(Number));
-  assert.deepEqual(match.slice(1).map(Number), encoded);
+  assert.deepEqual(shown.slice(1).map(Number), encoded);
 });
 
 test("all views differ, and the GPU agrees with the CPU", async () => {
@@ -245,13 +245,13 @@ test("all controls can be reached and operated by the keyboard", async () => {
   const page = await open(browser, studio);
   const start = await text(page, "#camera-text");
   const focused = () => page.evaluate(() => `${document.activeElement.tagName} ${document.activeElement.id || document.activeElement.value || ""}`.trim());
-  const reached = [];
+  const focusStops = [];
   for (let i = 0; i < 30; i++) {
     await page.keyboard.press("Tab");
-    reached.push(await focused());
+    focusStops.push(await focused());
   }
   for (const expected of ["CANVAS", "INPUT color", "INPUT orbit", "BUTTON zoom-in", "BUTTON copy", "SUMMARY", "INPUT exposure", "SELECT layers"]) {
-    assert.ok(reached.includes(expected), `${expected} in ${reached}`);
+    assert.ok(focusStops.includes(expected), `${expected} is not in ${focusStops}`);
   }
   await canvas(page).focus();
   let last = start;
@@ -332,11 +332,11 @@ test("pages of other origins are rejected", async () => {
   const server = http.createServer((_, response) => response.end("<!doctype html><title>elsewhere</title>"));
   await new Promise((resolve) => server.listen(0, "127.0.0.1", resolve));
   try {
-    const socket = `ws://127.0.0.1:${studio.port}/socket`;
+    const socketUrl = `ws://127.0.0.1:${studio.port}/socket`;
     await page.goto(`http://127.0.0.1:${server.address().port}/`);
-    assert.equal(await page.evaluate(connects, socket), false);
+    assert.equal(await page.evaluate(connects, socketUrl), false);
     const programPage = await open(browser, studio);
-    assert.equal(await programPage.evaluate(connects, socket), true);
+    assert.equal(await programPage.evaluate(connects, socketUrl), true);
   } finally {
     server.closeAllConnections();
     server.close();
@@ -368,17 +368,17 @@ test("invalid pixels are marked and counted", async () => {
   const page = await open(browser, studio);
   const oldImage = await shownImage(page);
   assert.ok(await page.locator("#faults").isHidden());
-  const broken = `let zero = f32(params.samples.x) * 0.0;
+  const invalidPixels = `let zero = f32(params.samples.x) * 0.0;
     if pixel.y == 3u && pixel.x == 0u { sum.x = zero / zero; }
     if pixel.y == 3u && pixel.x == 1u { sum.x = 1.0 / zero; }
     if pixel.y == 3u && pixel.x == 2u { sum.x = -1.0 / zero; }
     if pixel.y == 80u { sum.z = -1.0; }
     film[index] = sum;`;
-  studio.edit("shaders/kernels/render.wgsl", "film[index] = sum;", broken);
+  studio.edit("shaders/kernels/render.wgsl", "film[index] = sum;", invalidPixels);
   const counts = page.locator("#fault-counts");
   await page.locator("#fault-counts", { hasText: "pixels: 1 NaN, 2 infinite, 120 negative" }).waitFor();
   await waitUntilSettled(page);
-  const pixelAt = (picture, x, y) => picture[2].split(",").slice(3 * (y * 120 + x), 3 * (y * 120 + x) + 3).join();
+  const pixelAt = (image, x, y) => image[2].split(",").slice(3 * (y * 120 + x), 3 * (y * 120 + x) + 3).join();
   const markColors = await page.evaluate(() => [...document.querySelectorAll("#faults b")].map((b) => getComputedStyle(b).backgroundColor));
   assert.deepEqual(markColors, ["rgb(255, 0, 255)", "rgb(0, 255, 255)", "rgb(0, 255, 0)"]);
   await page.click("#zoom-in");
@@ -445,14 +445,14 @@ test("an edited field of view keeps a moved camera", async () => {
 
 test("an image that is too large is shown smaller with a message", async () => {
   studio.edit("scene.toml", "count = 4 }", "count = 1 }");
-  for (const [size, smaller] of [["3000x3000", /^\d+ × \d+$/], ["65536x1", /^16384 × 1$/], ["1x65536", /^1 × 16384$/]]) {
+  for (const [size, reducedSize] of [["3000x3000", /^\d+ × \d+$/], ["65536x1", /^16384 × 1$/], ["1x65536", /^1 × 16384$/]]) {
     await studio.stop();
     await studio.start(0, ["--size", size]);
     const page = await open(browser, studio);
     await waitUntilSettled(page);
     assert.equal(await text(page, "#size"), size.replace("x", " × "));
     const isFullSize = await page.locator("#smaller").isHidden(); // a device with enough memory shows the full image
-    if (!isFullSize || size !== "3000x3000") assert.match(await text(page, "#smaller"), smaller);
+    if (!isFullSize || size !== "3000x3000") assert.match(await text(page, "#smaller"), reducedSize);
     if (!isFullSize) assert.match(studio.stderr, /too large to display; showing \d+ x \d+/);
     await page.click("#zoom-one");
     await waitUntilSettled(page);

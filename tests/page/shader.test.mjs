@@ -22,12 +22,12 @@ afterEach(async () => {
   await studio.remove();
 });
 
-const compiled = (page) => page.locator("#compile").innerText();
+const readCompileTime = (page) => page.locator("#compile").innerText();
 
 test("a slider changes the image without a compilation, and its declaration is copied", async () => {
   await studio.start();
   const page = await open(browser, studio);
-  const [firstImage, compileTime] = [await shownImage(page), await compiled(page)];
+  const [firstImage, compileTime] = [await shownImage(page), await readCompileTime(page)];
   const slider = page.getByRole("slider", { name: "level", exact: true });
   await slider.focus();
   for (let i = 0; i < 3; i++) await page.keyboard.press("PageUp");
@@ -52,7 +52,7 @@ test("a slider changes the image without a compilation, and its declaration is c
   await page.click("#reset-sliders");
   await waitUntilSettled(page);
   assertSameImage(await shownImage(page), firstImage);
-  assert.equal(await compiled(page), compileTime, "a kernel was compiled");
+  assert.equal(await readCompileTime(page), compileTime, "a kernel was compiled");
   await page.locator("#copy-sliders:disabled").waitFor();
   assert.deepEqual(page.errors, []);
 });
@@ -63,14 +63,14 @@ test("timings of kernels and frame stages are shown", async () => {
   await page.locator("#times summary").click();
   const row = (name) => page.locator("#times tbody tr", { has: page.getByRole("rowheader", { name, exact: true }) });
   await row("render").first().waitFor();
-  for (const part of ["read files", "compile", "read back", "make PNG", "send"]) {
-    await row(part).waitFor();
-    assert.match(await row(part).innerText(), /[\d.]+ (s|ms|µs)/, part);
+  for (const stage of ["read files", "compile", "read back", "make PNG", "send"]) {
+    await row(stage).waitFor();
+    assert.match(await row(stage).innerText(), /[\d.]+ (s|ms|µs)/, stage);
   }
   assert.deepEqual(page.errors, []);
 });
 
-test("an error shows three lines and a link that opens the editor", async () => {
+test("an error is shown with three lines of the shader and a link that opens the editor", async () => {
   await studio.start();
   const page = await open(browser, studio);
   studio.breakShader();
@@ -79,8 +79,8 @@ test("an error shows three lines and a link that opens the editor", async () => 
   const file = encodeURI(studio.path(KERNEL));
   const line = studio.errorLine();
   assert.ok((await link.getAttribute("href")).startsWith(`vscode://file${file}:${line}:`), await link.getAttribute("href"));
-  const numbers = (await page.locator("#problem-list pre").innerText()).match(/^ *\d+(?= \|)/gm).map(Number);
-  assert.deepEqual(numbers, [line - 1, line, line + 1]);
+  const lineNumbers = (await page.locator("#problem-list pre").innerText()).match(/^ *\d+(?= \|)/gm).map(Number);
+  assert.deepEqual(lineNumbers, [line - 1, line, line + 1]);
   const sliderLink = page.locator("#sliders a").first();
   assert.match(await sliderLink.getAttribute("href"), /^vscode:\/\/file\/.*render\.wgsl:\d+:1$/);
   // Without an editor, no links are shown.

@@ -1,4 +1,4 @@
-// Helpers of the page's tests: a scene in a temporary folder, the program, and the browser.
+// Functions for the tests of the page: a scene in a temporary folder, the program and the browser.
 
 import assert from "node:assert/strict";
 import { spawn, execFileSync } from "node:child_process";
@@ -12,7 +12,7 @@ const ROOT = path.resolve(path.dirname(fileURLToPath(import.meta.url)), "../..")
 export const PROGRAM = process.env.WGRAY_PROGRAM;
 const { chromium } = createRequire(path.join(process.env.WGRAY_PAGE_MODULES, "/"))("playwright-core");
 
-// Timeout of each wait in milliseconds, for a busy machine.
+// Timeout of each wait in milliseconds, long enough for a busy machine.
 export const TIMEOUT = 40_000;
 
 export const SCENE = `# a small scene
@@ -91,7 +91,7 @@ export class Studio {
     this.write(name, text.replace(old, replacement));
   }
 
-  // Saves a shader that leaves only the red channel.
+  // Saves a kernel that sets the green and the blue channel to 0.
   redden() {
     this.edit(KERNEL, RADIANCE, `(${RADIANCE} * vec4f(1.0, 0.0, 0.0, 1.0))`);
   }
@@ -125,7 +125,7 @@ export class Studio {
     execFileSync(PROGRAM, ["diff", a, b], { stdio: "pipe" });
   }
 
-  // Starts the program; resolves once it has printed the address.
+  // Starts the program. Resolves when the program has printed its address.
   async start(port = 0, extraArgs = [], scene = "scene.toml") {
     const args = ["dev", scene, "--shaders", "shaders", "--listen", `127.0.0.1:${port}`, ...extraArgs];
     this.program = spawn(PROGRAM, args, { cwd: this.folder, stdio: ["ignore", "inherit", "pipe"] });
@@ -193,18 +193,18 @@ export async function visit(browser, studio, options = {}) {
   return page;
 }
 
-// Serves the page from the folder WGRAY_PAGE, without a build.
+// Serves the page from the folder WGRAY_PAGE, so that changes of the page need no build of the program.
 function fromDisk(route) {
   const file = path.join(process.env.WGRAY_PAGE, path.basename(new URL(route.request().url()).pathname) || "index.html");
   return fs.existsSync(file) ? route.fulfill({ path: file }) : route.continue();
 }
 
-// Waits for a finished image whose revision is greater than `after`; returns the revision of the image.
-export async function waitForImage(page, after = 0) {
-  const handle = await page.waitForFunction((after) => {
+// Waits for a finished image that is newer than `oldRevision`. Returns the revision of the image.
+export async function waitForImage(page, oldRevision = 0) {
+  const handle = await page.waitForFunction((oldRevision) => {
     const { revision, done } = document.getElementById("panels").dataset;
-    return done === "true" && Number(revision) > after ? Number(revision) : null;
-  }, after);
+    return done === "true" && Number(revision) > oldRevision ? Number(revision) : null;
+  }, oldRevision);
   return handle.jsonValue();
 }
 
@@ -221,7 +221,7 @@ export function revision(page) {
 
 export const canvas = (page, part = "picture") => page.locator(`[data-part=${part}] canvas`);
 
-// Returns input number `nth`, counted from 0, of a value of the selected object.
+// Returns the input with index `nth` among the inputs of a value of the selected object.
 export const control = (page, path, nth = 0) => page.locator(`[data-control="${path} ${nth}"]`);
 
 export async function choose(page, name) {
@@ -257,7 +257,7 @@ export async function shownImage(page, part = "picture") {
   }, part);
 }
 
-// Returns the pixels of a PNG file in the form of `shownImage`.
+// Returns the pixels of a PNG file in the format of `shownImage`.
 export function decode(page, png) {
   return page.evaluate(async (png) => {
     const blob = new Blob([new Uint8Array(png)], { type: "image/png" });

@@ -97,7 +97,7 @@ test("in fly mode, keys move the camera and drags turn the camera", async () => 
   await page.keyboard.up("w");
   await waitUntilSettled(page);
   const flownCamera = await camera(page);
-  assert.ok(point(flownCamera, "position")[1] > point(start, "position")[1], "the camera did not fly forwards");
+  assert.ok(point(flownCamera, "position")[1] > point(start, "position")[1], "the camera did not fly forward");
   await drag(page);
   const turnedCamera = await waitForMove(page, flownCamera);
   assert.deepEqual(point(turnedCamera, "position"), point(flownCamera, "position"));
@@ -139,7 +139,7 @@ test("bookmarks are stored in the browser and restore the view", async () => {
   assert.equal(await page.locator("#bookmarks li").count(), 0);
 });
 
-test("two fingers pan and dolly, a tap reads a pixel", async () => {
+test("a pinch dollies, and a tap reads a pixel", async () => {
   const page = await open(browser, studio, { viewport: { width: 390, height: 844 }, hasTouch: true, isMobile: true });
   const start = await camera(page);
   const [x, y] = await windowPosition(page, 0.5, 0.5);
@@ -154,9 +154,9 @@ test("two fingers pan and dolly, a tap reads a pixel", async () => {
   for (const halfDistance of [36, 42, 50, 60]) await touch("touchMove", halfDistance);
   await touch("touchEnd");
   const near = await waitForMove(page, start);
-  const height = (text) => Number(/position = \[[^,]*, ([^,]*)/.exec(text)[1]);
-  assert.ok(Math.abs(height(near)) < 0.7 * Math.abs(height(start)), near);
-  // Touch targets are large enough; the image stays in view.
+  const cameraY = (text) => Number(/position = \[[^,]*, ([^,]*)/.exec(text)[1]);
+  assert.ok(Math.abs(cameraY(near)) < 0.7 * Math.abs(cameraY(start)), near);
+  // Touch targets have at least 44 x 44 pixels, and the image stays in view.
   const smallTargets = await page.evaluate(() => [...document.querySelectorAll("aside button, aside select, aside summary, aside input[type=number], #toolbar span, #zooming button")]
     .filter((control) => control.checkVisibility()).map((control) => [control.id || control.textContent, control.getBoundingClientRect()])
     .filter(([, box]) => box.height < 44 || box.width < 44).map(([name, box]) => `${name}: ${box.width} x ${box.height}`));
@@ -166,7 +166,7 @@ test("two fingers pan and dolly, a tap reads a pixel", async () => {
   assert.ok(box.y >= 0 && box.y + box.height < 844, "the image scrolled out of view");
 });
 
-test("exposure, transform and false colours change the display, not the values", async () => {
+test("exposure, transform and false colors change the display, not the values", async () => {
   const page = await open(browser, studio);
   const [x, y] = await windowPosition(page, 0.5, 0.4);
   await page.mouse.move(x, y);
@@ -185,14 +185,14 @@ test("exposure, transform and false colours change the display, not the values",
   assert.ok(await page.locator("#reset-look").isDisabled());
   await page.fill("#exposure-number", "1.5");
   await changeDisplay(() => page.keyboard.press("Enter"));
-  // A render with this exposure is equal.
+  // A render with this exposure gives the same image.
   studio.edit("scene.toml", "height = 90", "height = 90\nexposure = 1.5");
   assertSameImage(images[1], await decode(page, studio.render()));
   await waitUntilSettled(page);
   await changeDisplay(() => page.selectOption("#transform", "agx"));
   await changeDisplay(() => page.check("#false-color"));
   assert.ok(await page.locator("#legend").isVisible());
-  assert.equal(new Set(images.map(String)).size, 4, "two displays are equal");
+  assert.equal(new Set(images.map(String)).size, 4, "two of the displayed images are equal");
   await page.click("#zoom-fit");
   await page.mouse.move(x, y);
   await page.locator("#values", { hasText: "linear RGB" }).waitFor();
@@ -235,7 +235,7 @@ test("the image is compared with its earlier state, with a kept image and with f
   assertSameImage(await shownImage(page, "second"), oldImage, "the second image is not the image before the edit");
   await page.locator("#rmse", { hasText: /^0\.\d+$/ }).waitFor();
   await page.locator("#flip", { hasText: /^0\.\d+$/ }).waitFor();
-  // One panel shows both images, with a divider or alternating.
+  // A single panel can show both images: on both sides of a divider, or in alternation.
   await page.getByLabel("Wipe").check();
   assert.ok(await canvas(page, "second").isHidden());
   const wipedImage = await shownImage(page, "first");
@@ -250,7 +250,7 @@ test("the image is compared with its earlier state, with a kept image and with f
   await page.keyboard.press("x");
   assertSameImage(await shownImage(page, "first"), oldImage);
   await page.keyboard.press("x");
-  // An EXR file of the same scene has the same values.
+  // An EXR file that `wgray render` writes has the same bits.
   await page.getByLabel("Side by side").check();
   const exr = studio.path("reference.exr");
   studio.renderTo(exr);
@@ -297,7 +297,7 @@ test("rendering can be paused, limited, reduced in resolution and saved as files
   const oldRevision = await revision(page);
   await page.click("#restart");
   await waitForImage(page, oldRevision);
-  // A saved file equals a rendered file.
+  // A file saved from the page equals a file that `wgray render` writes.
   for (const format of ["png", "exr"]) {
     const [download] = await Promise.all([page.waitForEvent("download"), page.click(`#save-${format}`)]);
     assert.equal(download.suggestedFilename(), `scene.${format}`);
@@ -323,7 +323,7 @@ test("rendering can be paused, limited, reduced in resolution and saved as files
 });
 
 // Returns the texts whose contrast is less than WCAG 2.1 requires.
-const LOW_CONTRASTS = () => {
+const findLowContrasts = () => {
   const context = new OffscreenCanvas(1, 1).getContext("2d", { willReadFrequently: true });
   const blend = (colors) => {
     context.clearRect(0, 0, 1, 1);
@@ -341,22 +341,22 @@ const LOW_CONTRASTS = () => {
     const layers = [];
     for (let ancestor = node; ancestor; ancestor = ancestor.parentElement) layers.unshift(getComputedStyle(ancestor).backgroundColor);
     const background = ["#fff", ...layers];
-    const [a, b] = [luminance(blend([...background, getComputedStyle(node).color])), luminance(blend(background))];
-    const contrast = (Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05);
+    const luminances = [luminance(blend([...background, getComputedStyle(node).color])), luminance(blend(background))];
+    const contrast = (Math.max(...luminances) + 0.05) / (Math.min(...luminances) + 0.05);
     if (contrast < 4.5) failures.push(`${node.tagName} ${node.id} ${node.textContent.trim().slice(0, 30)}: ${contrast.toFixed(2)}`);
   }
   return failures;
 };
 
-test("texts have enough contrast in both themes, controls have names, forced colours show the selection", async () => {
+test("texts have enough contrast in both themes, controls have names, the selection is visible with forced colors", async () => {
   for (const colorScheme of ["light", "dark"]) {
     const page = await open(browser, studio, { colorScheme });
     await page.evaluate(() => document.querySelectorAll("details").forEach((details) => (details.open = true)));
     studio.breakShader();
     await page.locator("#problems h2").waitFor();
-    assert.deepEqual(await page.evaluate(LOW_CONTRASTS), [], colorScheme);
+    assert.deepEqual(await page.evaluate(findLowContrasts), [], colorScheme);
     await page.evaluate(() => document.documentElement.style.setProperty("--quiet", "#777"));
-    assert.notDeepEqual(await page.evaluate(LOW_CONTRASTS), [], "the contrast check finds no violation");
+    assert.notDeepEqual(await page.evaluate(findLowContrasts), [], "the contrast check finds no violation");
     studio.fixShader();
     await page.locator("#problems").waitFor({ state: "hidden" });
     const snapshot = await page.locator("body").ariaSnapshot();
@@ -386,11 +386,11 @@ test("a drag is shown at an interactive rate to one viewer and to eleven viewers
     const start = Date.now();
     for (let i = 0; Date.now() - start < 2000; i++) await page.mouse.move(x + 60 * Math.sin(i / 20), y + 10 * Math.cos(i / 20));
     const times = await page.evaluate(() => window.seen.map(([, time]) => time));
-    const gaps = times.slice(1).map((time, i) => time - times[i]).sort((a, b) => a - b);
-    const median = gaps[gaps.length >> 1];
-    t.diagnostic(`${(1000 / median).toFixed(1)} frames per second, 95th percentile of the frame times ${Math.round(gaps[Math.floor(gaps.length * 0.95)])} ms`);
-    // The limits are loose, because the machine may be busy.
-    assert.ok(gaps.length > 10 && median < 150, `${median} ms between two frames`);
+    const frameTimes = times.slice(1).map((time, i) => time - times[i]).sort((a, b) => a - b);
+    const median = frameTimes[frameTimes.length >> 1];
+    t.diagnostic(`${(1000 / median).toFixed(1)} frames per second, 95th percentile of the frame times ${Math.round(frameTimes[Math.floor(frameTimes.length * 0.95)])} ms`);
+    // The limit of 150 ms is loose, because the machine may be busy.
+    assert.ok(frameTimes.length > 10 && median < 150, `${median} ms between two frames`);
   };
   await drag();
   // Opens ten more viewers, which draw nothing.

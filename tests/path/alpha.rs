@@ -1,4 +1,4 @@
-//! Alpha-tested and alpha-blended surfaces: closed forms, mask shadows, identical bits on both backends.
+//! Alpha-tested and alpha-blended surfaces: closed-form values, shadows of masks, identical bits on both backends.
 
 use wgray::scene::{Assets, Description};
 use wgray_render::pack::pack;
@@ -35,9 +35,9 @@ fn blended_layers_transmit_one_minus_alpha() {
         let expected = (1.0f64 - alpha).powi(layers);
         for mode in both() {
             let found = mean(&render(&packed, mode))[0];
-            let error = (expected * (1.0 - expected) / (256.0 * 256.0)).sqrt();
+            let standard_error = (expected * (1.0 - expected) / (256.0 * 256.0)).sqrt();
             assert!(
-                (found - expected).abs() <= 5.0 * error,
+                (found - expected).abs() <= 5.0 * standard_error,
                 "{alpha} {layers} {mode:?}: {found} {expected}"
             );
         }
@@ -92,7 +92,7 @@ fn shadows_scale_with_alpha() {
 
 #[test]
 fn transparent_surfaces_do_not_change_mis_weights() {
-    // NEE and BSDF sampling find the light, with and without a fully transparent surface.
+    // NEE and BSDF sampling both contribute, with and without a fully transparent surface.
     let scene_with = |has_surface: bool| {
         let shape = if has_surface {
             square(0.5, 4.0, "surface")
@@ -118,7 +118,7 @@ fn transparent_surfaces_do_not_change_mis_weights() {
     }
 }
 
-/// Returns a quad above a floor, with a disk in its alpha channel.
+/// Returns a scene with a quad above a floor. The alpha of the quad is 1 in a disk, otherwise 0.
 fn leaf(folder: &std::path::Path, mode: &str, camera: &str) -> Packed {
     let size = 64u32;
     let texel = |x: u32, y: u32| {
@@ -147,7 +147,7 @@ fn leaf(folder: &std::path::Path, mode: &str, camera: &str) -> Packed {
 }
 
 #[test]
-fn a_mask_casts_its_shadow() {
+fn a_masked_surface_casts_the_shadow_of_its_mask() {
     let folder = tempfile::tempdir().unwrap();
     let camera_below =
         "camera = { type = 'orthographic', position = [0, 0, 0.5], look_at = [0, 0, 0], up = [0, 1, 0], height = 2 }\n";

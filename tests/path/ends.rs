@@ -170,13 +170,13 @@ fn reflectances_above_one_are_clamped() {
 fn glass_with_shading_normals_creates_no_energy() {
     // White furnace: a cube and a coarse sphere of glass with smooth normals.
     let folder = tempfile::tempdir().expect("a folder");
-    let cube = crate::meshes::forms::Form::cube();
-    let ball = crate::meshes::forms::Form::icosphere(1);
-    for (name, form) in [("cube", cube), ("ball", ball)] {
-        let normals: Vec<_> = form.points.iter().map(|p| p.normalize()).collect();
+    let cube = crate::meshes::forms::TriangleMesh::cube();
+    let ball = crate::meshes::forms::TriangleMesh::icosphere(1);
+    for (name, triangle_mesh) in [("cube", cube), ("ball", ball)] {
+        let normals: Vec<_> = triangle_mesh.points.iter().map(|p| p.normalize()).collect();
         std::fs::write(
             folder.path().join(format!("{name}.obj")),
-            form.obj(Some(&normals), None),
+            triangle_mesh.obj(Some(&normals), None),
         )
         .expect("a mesh");
         for ior in [0.5, 1.5, 2.4] {

@@ -74,9 +74,9 @@ fn mixture(packed: &Packed, material: &Material, wo: Vec3, side: f32) -> Princip
     principled_mixture(material, wo, side > 0.0, Vec3::Z, ALL_LOBES, energy)
 }
 
-/// Integrates `f` over reflected and, with an `ior` of the far side, refracted directions: midpoint rule over
-/// microfacet normals by the inverse CDF of their distribution (Walter et al. 2007, section 5.2). Transmitted radiance
-/// is not scaled by the squared index.
+/// Integrates `f` over reflected directions and, if `ior` is set, over refracted directions, by the midpoint rule over
+/// microfacet normals. The normals are spaced by the inverse CDF of their distribution (Walter et al. 2007, section
+/// 5.2). Transmitted radiance is not scaled by the squared index.
 fn furnace(alpha: Vec2, ior: Option<f64>, thin: bool, wo: Vec3, f: impl Fn(Vec3) -> f32) -> f64 {
     // The integrand is periodic in the longitude, so few longitudes suffice.
     let (steps, longitudes) = (360, 120);
@@ -84,7 +84,7 @@ fn furnace(alpha: Vec2, ior: Option<f64>, thin: bool, wo: Vec3, f: impl Fn(Vec3)
     let o = wo.as_dvec3();
     let mut sum = 0.0;
     for i in 0..steps {
-        // The steps are finer at steep slopes, which are visible at grazing angles.
+        // The steps are finer at steep slopes, because steep slopes dominate at grazing angles.
         let t = (f64::from(i) + 0.5) / f64::from(steps);
         let (u, du) = (1.0 - (1.0 - t) * (1.0 - t), 2.0 * (1.0 - t));
         let r = (u / (1.0 - u)).sqrt();
@@ -139,7 +139,7 @@ fn albedo(packed: &Packed, material: &Material, wo: Vec3, side: f32, compensated
 }
 
 #[test]
-fn anisotropic_metal_conserves_energy() {
+fn anisotropic_metal_and_glass_conserve_energy() {
     let kinds = [
         ("type = 'conductor'", 0.01, false),
         ("type = 'dielectric', thin = true, ior = 1.5", 0.01, false),
@@ -167,11 +167,11 @@ fn anisotropic_metal_conserves_energy() {
     }
     assert!(
         deviations.is_empty(),
-        "values outside the tolerance: {}: {deviations:#?}",
+        "number of albedos outside the tolerance: {}: {deviations:#?}",
         deviations.len()
     );
-    // Negative control: without compensation, energy is lost, and the argument and the key of the scene file have the
-    // same effect.
+    // Negative control: without compensation, energy is lost. The argument `compensated` and the scene key
+    // `energy_compensation` have the same effect.
     let packed = scene_of("type = 'conductor', roughness = 0.6, anisotropy = 0.7");
     let loss = 1.0 - albedo(&packed, &packed.materials[0], direction(0.4, 0.7), 1.0, false);
     assert!(loss > 0.1, "{loss}");
@@ -373,7 +373,7 @@ fn glass_around_the_camera_absorbs_over_the_full_path() {
                 (found / expected - 1.0).abs() < 2e-3,
                 "{mode:?}, {between}: {found}, expected {expected}"
             );
-            // Negative control: absorption only behind the first surface gives another value.
+            // Negative control: if only the glass behind the first surface absorbed, the value would differ.
             let partial = (1.0 - 0.04) * (-a * 0.7).exp() * 1.5 * 1.5;
             assert!(
                 (found / partial - 1.0).abs() > 0.1,

@@ -1,4 +1,5 @@
-//! Environment maps: radiance against sums over texels, sampled directions against the PDF, documented orientation.
+//! Environment maps: irradiance compared with sums over texels, sampled directions compared with the PDF, and the
+//! documented orientation.
 
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
@@ -50,7 +51,8 @@ fn with_environment(environment: &str, image: Option<&Image>, (samples, depth): 
     )
 }
 
-/// Returns the bilinear radiance at (u, v), v from the upper edge. The poles are the means of the outermost rows.
+/// Returns the bilinear radiance at (u, v), where v is measured from the upper edge. The radiance at a pole is the mean
+/// of the outermost row.
 fn radiance(image: &Image, u: f64, v: f64) -> DVec3 {
     let Texels::Floats(texels) = &image.texels else {
         panic!("an image of bytes")
@@ -141,7 +143,7 @@ fn irradiance_matches_a_sum_over_all_directions() {
     for (image, points) in &images {
         for (rotation, normal) in [
             ("", DVec3::Z),
-            // To rotate the map is to rotate the normal by the inverse rotation.
+            // Rotating the map is equivalent to rotating the normal by the inverse rotation.
             ("\nrotate = { axis = [0, 1, 0], degrees = -50 }", tilted),
             ("\nrotate = [0, 90, 0]", DVec3::NEG_X),
         ] {
@@ -309,7 +311,7 @@ fn light_and_bsdf_sampling_of_the_map_agree() {
 }
 
 #[test]
-fn the_light_of_map_and_lights_adds_up() {
+fn light_of_the_map_and_of_other_emitters_adds_up() {
     let image = sunny();
     let lights = "[[lights]]\ntype = 'point'\nposition = [1, -1, 2]\ncolor = [2, 2, 2]\n\
                  [[lights]]\ntype = 'directional'\ndirection = [1, 2, -3]\ncolor = [1, 1, 0.5]\n\
@@ -318,7 +320,7 @@ fn the_light_of_map_and_lights_adds_up() {
     let dark = EMITTERS.replace(", emission = [5, 3, 1]", "");
     for mode in both() {
         let sum = |packed: Packed| mean(&render(&packed, mode));
-        // The rectangle of the area light occludes the other lights. It is black in the scene with the map alone.
+        // The rectangle of the area light occludes other light, so the scene with only the map has a black rectangle.
         let rectangle = lights.split("[[lights]]").last().unwrap_or_default();
         let black_rectangle = format!(
             "[[lights]]{}",
@@ -339,8 +341,8 @@ fn the_light_of_map_and_lights_adds_up() {
 
 #[test]
 fn the_floor_occludes_light_from_below() {
-    // Area lights would skip the floor as an occluder, because no shape is below the floor. The lower half of the ball
-    // is lit only from below.
+    // For area lights, the renderer would skip the floor as an occluder, because no shape is below the floor. The lower
+    // half of the ball is lit only from below.
     let below = image(8, 4, |_, y| [if y > 2 { 5.0 } else { 0.0 }; 3]);
     let floors = [
         "type = 'plane'\nmaterial = 'm'\npoint = [0, 0, 0]\nnormal = [0, 0, 1]\ntangent = [1, 0, 0]",
@@ -369,7 +371,7 @@ fn the_floor_occludes_light_from_below() {
 
 #[test]
 fn an_invisible_map_emits_and_is_reflected() {
-    let balls = "camera = { position = [0, -4, 0], look_at = [0, 0, 0], fov = 40 }\n\
+    let ball = "camera = { position = [0, -4, 0], look_at = [0, 0, 0], fov = 40 }\n\
                  materials.m = { type = 'conductor', color = [1, 1, 1] }\n\
                  [[shapes]]\ntype = 'sphere'\nmaterial = 'm'\ncenter = [0, 0, 0]\nradius = 0.7\n";
     let white = image(4, 2, |_, _| [1.0; 3]);
@@ -377,7 +379,7 @@ fn an_invisible_map_emits_and_is_reflected() {
         for mode in both() {
             let picture = |visible: bool| {
                 let keys = format!("{environment}\nvisible = {visible}");
-                render(&with_environment(&keys, Some(&white), (16, 4), balls), mode)
+                render(&with_environment(&keys, Some(&white), (16, 4), ball), mode)
             };
             let (shown, hidden) = (picture(true), picture(false));
             let pixel = |film: &wgray_render::film::Film, i: usize| film.means().nth(i).unwrap_or_default();
@@ -394,7 +396,7 @@ fn an_invisible_map_emits_and_is_reflected() {
 
 #[test]
 fn only_the_camera_sees_the_background() {
-    let balls = "camera = { position = [0, -4, 0], look_at = [0, 0, 0], fov = 40 }\n\
+    let ball = "camera = { position = [0, -4, 0], look_at = [0, 0, 0], fov = 40 }\n\
                  materials.m = { type = 'conductor', color = [1, 1, 1] }\n\
                  [[shapes]]\ntype = 'sphere'\nmaterial = 'm'\ncenter = [0, 0, 0]\nradius = 0.7\n";
     let white = image(4, 2, |_, _| [1.0; 3]);
@@ -404,7 +406,7 @@ fn only_the_camera_sees_the_background() {
         let films: Vec<_> = modes
             .map(|mode| {
                 let keys = format!("{environment}\nbackground = [0.5, 0.25, 8]");
-                let film = render(&with_environment(&keys, Some(&white), (16, 4), balls), mode);
+                let film = render(&with_environment(&keys, Some(&white), (16, 4), ball), mode);
                 let pixel = |i: usize| film.means().nth(i).unwrap_or_default();
                 assert_eq!(pixel(0), [0.5, 0.25, 8.0], "{environment}, {mode:?}");
                 let [x, ..] = pixel(8 * 16 + 8);
@@ -488,7 +490,7 @@ fn sampled_directions_follow_their_pdf() {
         one_bright_texel(16, 8, (3, 0)),
         sunny(),
     ];
-    // Normal 0 selects all directions.
+    // A zero normal selects all directions.
     let normals = [Vec3::ZERO, Vec3::Z, Vec3::new(0.6, -0.48, -0.64)];
     for (image, normal) in (images.iter()).flat_map(|image| normals.map(|normal| (image, normal))) {
         let packed = with_map(image, "", (1, 1), GROUND);
@@ -527,16 +529,16 @@ fn sampled_directions_follow_their_pdf() {
             (sum, degrees_of_freedom)
         };
         let (sum, degrees_of_freedom) = statistic(&expected[0]);
-        // Six standard deviations, plus the error of the grid.
+        // The mean plus six standard deviations, plus the error of the grid.
         let max_sum = degrees_of_freedom + 6.0 * (2.0 * degrees_of_freedom).sqrt() + 20.0;
         assert!(
             degrees_of_freedom > 2.0 && sum < max_sum,
-            "{size:?}: {sum} of {degrees_of_freedom}"
+            "{size:?}: chi-square {sum} for {degrees_of_freedom} degrees of freedom"
         );
         let (wrong, _) = statistic(&expected[1]);
         assert!(
             wrong > max_sum,
-            "{size:?}: a wrong PDF is accepted: {wrong} of {degrees_of_freedom}"
+            "{size:?}: a wrong PDF is accepted: chi-square {wrong} for {degrees_of_freedom} degrees of freedom"
         );
     }
 }

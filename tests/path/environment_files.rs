@@ -30,7 +30,7 @@ fn load(folder: &Path, environment: &str) -> Result<Scene, String> {
 }
 
 #[test]
-fn images_of_every_kind_are_read() {
+fn images_of_every_format_are_read() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name);
     write_exr(&path("sky.exr"), 4, 2, |_, _| [0.5; 3]);

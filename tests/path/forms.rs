@@ -1,4 +1,4 @@
-//! Closed-form radiance on both backends. Each control is a wrong value that must fail.
+//! Closed-form radiance on both backends. The negative controls check that wrong values are rejected.
 
 use std::f64::consts::PI;
 
@@ -17,8 +17,8 @@ fn camera_above(x: f64, y: f64, z: f64, height: f64) -> String {
 const FLOOR: &str =
     "[[shapes]]\ntype = 'plane'\nmaterial = 'm'\npoint = [0, 0, 0]\nnormal = [0, 0, 1]\ntangent = [1, 0, 0]\n";
 
-fn is_near(found: f64, expected: f64, relative: f64) -> bool {
-    (found - expected).abs() <= relative * expected.abs()
+fn is_near(found: f64, expected: f64, relative_tolerance: f64) -> bool {
+    (found - expected).abs() <= relative_tolerance * expected.abs()
 }
 
 #[test]
@@ -67,7 +67,7 @@ fn a_convex_body_in_a_furnace_shows_its_albedo() {
 
 #[test]
 fn bounces_in_a_closed_emitter_are_a_geometric_series() {
-    // In a closed emitter of albedo a and emission e, n bounces give e times the sum of a^k up to k = n.
+    // In a closed emitter of albedo a and emission e, paths of up to n bounces give e times the sum of a^k up to k = n.
     let (albedo, emission) = (0.6, 0.5);
     let bodies = [
         "[[shapes]]\ntype = 'sphere'\nmaterial = 'm'\ncenter = [0, 0, 0]\nradius = 2\n".to_owned(),
@@ -109,8 +109,8 @@ fn bounces_in_a_closed_emitter_are_a_geometric_series() {
     }
 }
 
-/// Returns the form factor of a parallel rectangle at height h with a corner straight above the point: Howell, "A
-/// Catalog of Radiation Heat Transfer Configuration Factors", B-3.
+/// Returns the form factor from a point on the floor to a parallel rectangle of size a x b at height h, one corner of
+/// which is straight above the point: Howell, "A Catalog of Radiation Heat Transfer Configuration Factors", B-3.
 fn corner_factor(a: f64, b: f64, h: f64) -> f64 {
     let (x, y) = (a / h, b / h);
     let (p, q) = ((1.0 + x * x).sqrt(), (1.0 + y * y).sqrt());
@@ -163,7 +163,7 @@ fn a_rectangle_lights_the_floor_by_its_form_factor() {
 
 #[test]
 fn spheres_and_disks_light_the_floor_by_their_form_factors() {
-    // Form factors of shapes straight above a point: sphere (r / d)^2 cos, disk r^2 / (r^2 + h^2).
+    // Form factors of shapes of radius r centered at height h above a point: sphere (r / h)^2, disk r^2 / (r^2 + h^2).
     for scale in [1e-3, 1.0, 1e3] {
         for r in [1e-3, 0.3, 0.999] {
             let h = 1.0;
@@ -203,7 +203,8 @@ fn spheres_and_disks_light_the_floor_by_their_form_factors() {
     }
 }
 
-/// Returns the form factor of a horizontal cylinder straight above a point, by the midpoint rule over the surface.
+/// Returns the form factor of a horizontal cylinder whose center is straight above a point, by the midpoint rule over
+/// the surface.
 fn cylinder_factor(height: f64, radius: f64, length: f64) -> f64 {
     let (arcs, slices) = (400, 400);
     let mut sum = 0.0;
@@ -301,12 +302,13 @@ fn point_lights_fall_off_and_directional_lights_do_not() {
 
 #[test]
 fn a_glass_slab_transmits_by_fresnel_and_beer() {
-    // Normal incidence: r = ((n - 1) / (n + 1))^2 at each face; each pass attenuates by exp(-a d).
+    // Normal incidence: each face reflects r = ((n - 1) / (n + 1))^2, and the slab attenuates each pass by
+    // exp(-absorption * thickness).
     let n = 1.5_f64;
     let r = ((n - 1.0) / (n + 1.0)).powi(2);
     for (absorption, thickness) in [(0.0, 0.5), (0.7, 0.5), (3.0, 1.0)] {
-        let a = f64::exp(-absorption * thickness);
-        let transmitted = (1.0 - r).powi(2) * a / (1.0 - r * r * a * a);
+        let attenuation = f64::exp(-absorption * thickness);
+        let transmitted = (1.0 - r).powi(2) * attenuation / (1.0 - r * r * attenuation * attenuation);
         let text = format!(
             "{}environment = {{ color = [0, 0, 0] }}\n\
              materials.m = {{ type = 'dielectric', ior = {n}, absorption = [{absorption}, {absorption}, {absorption}] }}\n\
@@ -329,7 +331,7 @@ fn a_glass_slab_transmits_by_fresnel_and_beer() {
 }
 
 #[test]
-fn radiance_in_glass_is_the_square_of_its_index() {
+fn radiance_in_glass_is_scaled_by_the_squared_index() {
     // With radiance 1 outside, the radiance in glass is n^2, internal reflections included.
     let text = format!(
         "{INSIDE}environment = {{ color = [1, 1, 1] }}\nmaterials.m = {{ type = 'dielectric', ior = 1.5 }}\n\

@@ -42,7 +42,7 @@ fn only_mirrors_show_camera_invisible_emitters() {
     ];
     for (integrator, light) in cases {
         let (visible, hidden) = (room(integrator, &light(true)), room(integrator, &light(false)));
-        let without = room(integrator, "");
+        let without_emitter = room(integrator, "");
         let expected = reference(&hidden);
         for mode in exact_modes() {
             assert_eq!(
@@ -53,7 +53,7 @@ fn only_mirrors_show_camera_invisible_emitters() {
         }
         for mode in both() {
             let (visible, hidden) = (means(&render(&visible, mode)), means(&render(&hidden, mode)));
-            // Pixels beside the emitter are unchanged; some of them show the emitter in the mirror.
+            // Pixels outside of the emitter are unchanged; some of these pixels show the emitter in the mirror.
             let covered = |i: usize| (i % 24).abs_diff(12) < 4 && (i / 24).abs_diff(12) < 4;
             let uncovered = || (0..24 * 24).filter(|i| !covered(*i));
             assert!(uncovered().all(|i| visible[i] == hidden[i]), "{mode:?}, {integrator}");
@@ -76,7 +76,10 @@ fn only_mirrors_show_camera_invisible_emitters() {
         }
         for i in 0..24 * 24 {
             let pixel = UVec2::new(i % 24, i / 24);
-            let (a, b) = (pixel_first_hit(&hidden, pixel), pixel_first_hit(&without, pixel));
+            let (a, b) = (
+                pixel_first_hit(&hidden, pixel),
+                pixel_first_hit(&without_emitter, pixel),
+            );
             assert_eq!(a.shape == NO_INDEX, b.shape == NO_INDEX, "{pixel}");
             assert!(
                 (a.depth - b.depth).abs() < 1e-5 && (a.normal - b.normal).length() < 1e-6,

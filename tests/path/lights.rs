@@ -15,7 +15,7 @@ const FLOOR: &str =
     "[[shapes]]\ntype = 'plane'\nmaterial = 'm'\npoint = [0, 0, 0]\nnormal = [0, 0, 1]\ntangent = [1, 0, 0]\n";
 
 #[test]
-fn selection_is_by_power_and_one_quarter_uniform() {
+fn selection_is_three_quarters_by_power_and_one_quarter_uniform() {
     // Lights of powers 1 to 16 and a black light: too few for a light tree.
     let mut text = format!("{CAMERA}{FLOOR}");
     for i in 0..=16 {

@@ -1,4 +1,4 @@
-//! The light tree: selection probabilities, sums over many lights, limits of the ranges.
+//! The light tree: selection probabilities, sums over many lights, limits of the parameters.
 
 use std::fmt::Write as _;
 
@@ -22,16 +22,18 @@ const FLOOR: &str =
 fn light(i: u32, random: &Random) -> String {
     let coordinate = |scale: f64, low: f64| low + scale * random.unit();
     let (x, y, z) = (coordinate(2.0, -1.0), coordinate(2.0, -1.0), coordinate(0.8, 0.2));
-    let c = 0.5 + random.unit();
+    let intensity = 0.5 + random.unit();
     match i % 5 {
-        0 => format!("[[lights]]\ntype = 'point'\nposition = [{x}, {y}, {z}]\ncolor = [{c}, {c}, {c}]\n"),
+        0 => format!(
+            "[[lights]]\ntype = 'point'\nposition = [{x}, {y}, {z}]\ncolor = [{intensity}, {intensity}, {intensity}]\n"
+        ),
         1 => format!("[[shapes]]\ntype = 'sphere'\nmaterial = 's'\ncenter = [{x}, {y}, {z}]\nradius = 0.07\n"),
         2 => format!(
             "[[lights]]\ntype = 'rectangle'\ncenter = [{x}, {y}, {z}]\nsize = [0.2, 0.1]\nnormal = [{y}, {x}, -1]\n\
-             tangent = [1, 0, 0]\ncolor = [{c}, 3, 2]\n"
+             tangent = [1, 0, 0]\ncolor = [{intensity}, 3, 2]\n"
         ),
         3 => format!(
-            "[[lights]]\ntype = 'spot'\nposition = [{x}, {y}, {z}]\ndirection = [{y}, 0, -1]\ncolor = [{c}, 3, 2]\ncone_angle = 50\n"
+            "[[lights]]\ntype = 'spot'\nposition = [{x}, {y}, {z}]\ndirection = [{y}, 0, -1]\ncolor = [{intensity}, 3, 2]\ncone_angle = 50\n"
         ),
         _ => format!(
             "[[shapes]]\ntype = 'triangle'\nmaterial = 's'\nvertices = [[{x}, {y}, {z}], [{}, {y}, {z}], [{x}, {}, {z}]]\n",
@@ -127,7 +129,7 @@ fn selection_frequencies_and_hit_pdfs_match_the_tree() {
             // Samples are stratified in groups of 64, so chi-square is well below its value for independent samples.
             assert!(
                 term_count > 5.0 && chi_square < term_count + 6.0 * (2.0_f64 * term_count).sqrt(),
-                "{chi_square} of {term_count}"
+                "chi-square {chi_square} for {term_count} leaves"
             );
         }
     }
@@ -181,7 +183,7 @@ fn many_lights_give_the_same_bits_on_all_backends() {
 }
 
 #[test]
-fn limits_of_the_ranges_give_finite_values() {
+fn parameter_limits_of_lights_give_finite_values() {
     let mut text =
         format!("{CAMERA}materials.dark = {{ type = 'diffuse', color = [0, 0, 0], emission = [0, 0, 0] }}\n{FLOOR}");
     for i in 0..12 {
@@ -257,7 +259,7 @@ fn a_hundred_thousand_lights_render() {
 #[test]
 fn emissive_meshes_are_in_the_light_tree() {
     let folder = tempfile::tempdir().expect("a folder");
-    let ball = crate::meshes::forms::Form::icosphere(1);
+    let ball = crate::meshes::forms::TriangleMesh::icosphere(1);
     std::fs::write(folder.path().join("ball.obj"), ball.obj(None, None)).expect("a mesh");
     let text = |shapes: &str, samples: u32| {
         format!(

@@ -14,7 +14,7 @@ use wgray_render::cpu::sequence::sobol_sample;
 use wgray_render::cpu::thin::{thin_eval, thin_pdf, thin_sample};
 use wgray_render::records::{DIFFUSE, METAL, Material, PHONG, ROUGH_GLASS, THIN};
 
-struct Lobes {
+struct Bsdf {
     name: String,
     material: Material,
     /// True if a white material of this kind conserves energy.
@@ -22,7 +22,7 @@ struct Lobes {
 }
 
 /// Returns the factor that undoes the scaling of transmission by the squared index.
-fn per_index(material: &Material, wi: Vec3) -> f64 {
+fn inverse_transmission_scale(material: &Material, wi: Vec3) -> f64 {
     if wi.z < 0.0 && material.kind == ROUGH_GLASS {
         f64::from(material.ior).powi(2)
     } else {
@@ -30,7 +30,7 @@ fn per_index(material: &Material, wi: Vec3) -> f64 {
     }
 }
 
-impl Lobes {
+impl Bsdf {
     fn eval(&self, wo: Vec3, wi: Vec3) -> Vec3 {
         let angles = angles_at(Vec3::Z, wo, wi);
         match self.material.kind {
@@ -91,7 +91,7 @@ impl Lobes {
     fn albedo(&self, wo: Vec3) -> f64 {
         integral(wo, |wi| {
             if wi.z > 0.0 || self.has_facets() {
-                f64::from(self.eval(wo, wi).x) * per_index(&self.material, wi)
+                f64::from(self.eval(wo, wi).x) * inverse_transmission_scale(&self.material, wi)
             } else {
                 0.0
             }
@@ -99,8 +99,8 @@ impl Lobes {
     }
 }
 
-fn all() -> Vec<Lobes> {
-    let diffuse = |roughness: f32| Lobes {
+fn all() -> Vec<Bsdf> {
+    let diffuse = |roughness: f32| Bsdf {
         name: format!("diffuse, roughness {roughness}"),
         material: Material {
             kind: DIFFUSE,
@@ -110,7 +110,7 @@ fn all() -> Vec<Lobes> {
         },
         conserves_energy: true,
     };
-    let phong = |kd: f32, ks: f32, shininess: f32| Lobes {
+    let phong = |kd: f32, ks: f32, shininess: f32| Bsdf {
         name: format!("phong {kd} {ks} {shininess}"),
         material: Material {
             kind: PHONG,
@@ -142,14 +142,16 @@ fn all() -> Vec<Lobes> {
     };
     for (roughness, anisotropy) in [(0.3, 0.0), (0.6, 0.0), (1.0, 0.0), (0.4, 0.5)] {
         for conserves_energy in [false, true] {
-            list.push(Lobes {
-                name: format!("metal, roughness {roughness} {anisotropy}, {conserves_energy}"),
+            list.push(Bsdf {
+                name: format!(
+                    "metal, roughness {roughness}, anisotropy {anisotropy}, conserves energy: {conserves_energy}"
+                ),
                 material: rough(METAL, roughness, anisotropy),
                 conserves_energy,
             });
         }
     }
-    list.push(Lobes {
+    list.push(Bsdf {
         name: "gold".to_owned(),
         material: Material {
             eta: Vec3::new(0.17, 0.35, 1.5),
@@ -159,8 +161,8 @@ fn all() -> Vec<Lobes> {
         conserves_energy: false,
     });
     for (ior, roughness, anisotropy) in [(1.5, 0.4, 0.0), (1.5, 1.0, 0.0), (0.7, 0.5, 0.0), (2.4, 0.5, 0.6)] {
-        list.push(Lobes {
-            name: format!("rough glass {ior}, roughness {roughness} {anisotropy}"),
+        list.push(Bsdf {
+            name: format!("rough glass {ior}, roughness {roughness}, anisotropy {anisotropy}"),
             material: Material {
                 ior,
                 ..rough(ROUGH_GLASS, roughness, anisotropy)
@@ -169,8 +171,8 @@ fn all() -> Vec<Lobes> {
         });
     }
     for (roughness, anisotropy, conserves_energy) in [(0.4, 0.0, true), (1.0, 0.0, false), (0.5, 0.7, false)] {
-        list.push(Lobes {
-            name: format!("sheet, roughness {roughness} {anisotropy}"),
+        list.push(Bsdf {
+            name: format!("thin dielectric, roughness {roughness}, anisotropy {anisotropy}"),
             material: Material {
                 ior: 1.5,
                 ..rough(THIN, roughness, anisotropy)
@@ -199,7 +201,6 @@ fn integral(wo: Vec3, mut f: impl FnMut(Vec3) -> f64) -> f64 {
     let v = axis.cross(u);
     let mut sum = 0.0;
     for i in 0..rings {
-        // Finer near the axis.
         let edge = |i: i32| PI * (f64::from(i) / f64::from(rings)).powi(2);
         let (inner, outer) = (edge(i), edge(i + 1));
         let angle = (inner + outer) / 2.0;
@@ -215,13 +216,13 @@ fn integral(wo: Vec3, mut f: impl FnMut(Vec3) -> f64) -> f64 {
 
 #[test]
 fn no_bsdf_gains_energy_in_a_white_furnace() {
-    for lobes in all() {
+    for bsdf in all() {
         for wo in view_directions() {
-            let albedo = lobes.albedo(wo);
-            let name = &lobes.name;
-            if lobes.conserves_energy {
-                // The energy loss is a fit.
-                let tolerance = if lobes.has_facets() { 0.01 } else { 2e-3 };
+            let albedo = bsdf.albedo(wo);
+            let name = &bsdf.name;
+            if bsdf.conserves_energy {
+                // The energy loss is a fitted function.
+                let tolerance = if bsdf.has_facets() { 0.01 } else { 2e-3 };
                 assert!((albedo - 1.0).abs() < tolerance, "{name}, {wo}: {albedo}");
             } else {
                 assert!(albedo < 1.001 && albedo > 0.0, "{name}, {wo}: {albedo}");
@@ -244,21 +245,21 @@ fn no_bsdf_gains_energy_in_a_white_furnace() {
 
 #[test]
 fn reflection_is_reciprocal() {
-    // Turquin's factor depends only on wo and is not reciprocal.
-    for lobes in all()
+    // Turquin's compensation factor depends only on wo and is not reciprocal.
+    for bsdf in all()
         .into_iter()
-        .filter(|lobes| !(lobes.conserves_energy && lobes.has_facets()))
+        .filter(|bsdf| !(bsdf.conserves_energy && bsdf.has_facets()))
     {
         for wo in view_directions() {
             for wi in [direction(0.8, 0.1), direction(0.3, 3.9), direction(0.02, 2.0)] {
-                let forward = lobes.eval(wo, wi) / wi.z;
-                let backward = lobes.eval(wi, wo) / wo.z;
+                let forward = bsdf.eval(wo, wi) / wi.z;
+                let backward = bsdf.eval(wi, wo) / wo.z;
                 // Fresnel reflectance is steep near the critical angle.
-                let tolerance = if lobes.material.kind == ROUGH_GLASS { 4e-3 } else { 2e-5 };
+                let tolerance = if bsdf.material.kind == ROUGH_GLASS { 4e-3 } else { 2e-5 };
                 assert!(
                     forward.abs_diff_eq(backward, tolerance * forward.x.max(1.0)),
                     "{}: {forward} {backward}",
-                    lobes.name
+                    bsdf.name
                 );
             }
         }
@@ -268,59 +269,59 @@ fn reflection_is_reciprocal() {
 /// Refraction scales radiance by the squared index: Veach's thesis, equation 5.14.
 #[test]
 fn refraction_is_reciprocal_up_to_the_squared_index() {
-    for lobes in all().iter().filter(|lobes| lobes.material.kind == ROUGH_GLASS) {
-        let n = lobes.material.ior;
+    for bsdf in all().iter().filter(|bsdf| bsdf.material.kind == ROUGH_GLASS) {
+        let n = bsdf.material.ior;
         let inverse = Material {
             ior: 1.0 / n,
-            ..lobes.material
+            ..bsdf.material
         };
         let flipped = |v: Vec3| Vec3::new(v.x, v.y, -v.z);
         let mut compared = 0;
         for wo in view_directions() {
             for wi in [direction(0.9, 3.6), direction(0.5, 4.0), direction(0.3, 2.0)].map(flipped) {
-                let forward = rough_dielectric_eval(&lobes.material, wo, wi).x / -wi.z;
+                let forward = rough_dielectric_eval(&bsdf.material, wo, wi).x / -wi.z;
                 let backward = rough_dielectric_eval(&inverse, flipped(wi), flipped(wo)).x / wo.z;
                 let expected = forward * n * n;
                 assert!(
                     (backward - expected).abs() < 4e-3 * expected.max(1e-3),
                     "{}, {wo} {wi}: {forward} {backward}",
-                    lobes.name
+                    bsdf.name
                 );
                 compared += u32::from(forward > 1e-3);
             }
         }
-        assert!(compared > 3, "{}: only {compared} values were compared", lobes.name);
+        assert!(compared > 3, "{}: only {compared} values were compared", bsdf.name);
     }
 }
 
 #[test]
 fn pdfs_integrate_to_one() {
-    for lobes in all() {
+    for bsdf in all() {
         for wo in view_directions() {
-            let total = integral(wo, |wi| f64::from(lobes.pdf(wo, wi)));
+            let total = integral(wo, |wi| f64::from(bsdf.pdf(wo, wi)));
             // For microfacets, the PDF integrates to the fraction of valid samples.
             let count = 65_536;
             let valid = (0..count).filter(|i| {
                 let u = sobol_sample(*i, glam::UVec2::new(1, 2));
                 let random = sobol_sample(*i, glam::UVec2::new(3, 4)).x;
-                !lobes.has_facets() || lobes.sample(wo, u, random).is_some()
+                !bsdf.has_facets() || bsdf.sample(wo, u, random).is_some()
             });
             let expected = valid.count() as f64 / f64::from(count);
             assert!(
                 (total - expected).abs() < 3e-3,
                 "{}, {wo}: {total} {expected}",
-                lobes.name
+                bsdf.name
             );
         }
     }
 }
 
 /// Returns Pearson's chi-square of sampled directions and its degrees of freedom; small cells are merged.
-fn chi_square(lobes: &Lobes, wo: Vec3, pdf: impl Fn(Vec3) -> f64) -> (f64, f64) {
+fn chi_square(bsdf: &Bsdf, wo: Vec3, pdf: impl Fn(Vec3) -> f64) -> (f64, f64) {
     const SAMPLES: u32 = 200_000;
     const RINGS: usize = 40;
     const SPOKES: usize = 40;
-    // Cells are in the frame of the mirrored direction, around which lobes are narrow.
+    // Cells are in the frame of the mirrored direction, around which the lobes are narrow.
     let axis = Vec3::new(-wo.x, -wo.y, wo.z).as_dvec3().normalize();
     let u = axis.any_orthonormal_vector();
     let v = axis.cross(u);
@@ -335,11 +336,11 @@ fn chi_square(lobes: &Lobes, wo: Vec3, pdf: impl Fn(Vec3) -> f64) -> (f64, f64) 
         // Independent samples, because low-discrepancy sequences are too even.
         let bits = wgray_render::cpu::rng::hash4(glam::UVec4::new(i, 7, 11, 13));
         let [a, b, c] = [bits.x, bits.y, bits.z].map(wgray_render::cpu::rng::unit_float);
-        let Some(wi) = lobes.sample(wo, Vec2::new(a, b), c) else {
+        let Some(wi) = bsdf.sample(wo, Vec2::new(a, b), c) else {
             continue;
         };
         let wi = wi.as_dvec3();
-        assert!((wi.length() - 1.0).abs() < 1e-5, "{}: {wi}", lobes.name);
+        assert!((wi.length() - 1.0).abs() < 1e-5, "{}: {wi}", bsdf.name);
         counts[cell(wi)] += 1.0;
     }
     let mut expected = vec![0.0; RINGS * SPOKES];
@@ -373,23 +374,23 @@ fn chi_square(lobes: &Lobes, wo: Vec3, pdf: impl Fn(Vec3) -> f64) -> (f64, f64) 
 
 #[test]
 fn sampled_directions_follow_their_pdf() {
-    for lobes in all() {
+    for bsdf in all() {
         for wo in [direction(0.95, 0.4), direction(0.3, 2.5)] {
-            let (sum, degrees_of_freedom) = chi_square(&lobes, wo, |wi| f64::from(lobes.pdf(wo, wi)));
-            // Six standard deviations.
+            let (sum, degrees_of_freedom) = chi_square(&bsdf, wo, |wi| f64::from(bsdf.pdf(wo, wi)));
+            // The mean plus six standard deviations.
             let max_sum = degrees_of_freedom + 6.0 * (2.0 * degrees_of_freedom).sqrt();
             assert!(
                 degrees_of_freedom > 5.0 && sum < max_sum,
-                "{}, {wo}: {sum} of {degrees_of_freedom}",
-                lobes.name
+                "{}, {wo}: chi-square {sum} for {degrees_of_freedom} degrees of freedom",
+                bsdf.name
             );
-            let (wrong, _) = chi_square(&lobes, wo, |wi| {
-                f64::from(lobes.pdf(wo, wi)) * if wi.x > 0.0 { 1.08 } else { 0.92 }
+            let (wrong, _) = chi_square(&bsdf, wo, |wi| {
+                f64::from(bsdf.pdf(wo, wi)) * if wi.x > 0.0 { 1.08 } else { 0.92 }
             });
             assert!(
                 wrong > max_sum,
-                "{}: a wrong PDF is accepted: {wrong} of {degrees_of_freedom}",
-                lobes.name
+                "{}: a wrong PDF is accepted: chi-square {wrong} for {degrees_of_freedom} degrees of freedom",
+                bsdf.name
             );
         }
     }
@@ -398,46 +399,42 @@ fn sampled_directions_follow_their_pdf() {
 #[test]
 fn mean_sample_weights_equal_the_albedo() {
     // The mean of eval / pdf equals the albedo by quadrature.
-    for lobes in all() {
+    for bsdf in all() {
         for wo in view_directions() {
-            let expected = lobes.albedo(wo);
+            let expected = bsdf.albedo(wo);
             let count = 65_536;
             let mut sum = 0.0;
             for i in 0..count {
                 let u = sobol_sample(i, glam::UVec2::new(1, 2));
                 let random = sobol_sample(i, glam::UVec2::new(3, 4)).x;
-                let Some(wi) = lobes.sample(wo, u, random) else {
+                let Some(wi) = bsdf.sample(wo, u, random) else {
                     continue;
                 };
-                let pdf = lobes.pdf(wo, wi);
-                if (wi.z > 0.0 || lobes.has_facets()) && pdf > 0.0 {
-                    let weight = f64::from(lobes.eval(wo, wi).x) / f64::from(pdf);
-                    sum += weight * per_index(&lobes.material, wi);
-                    if let Some(found) = lobes.facet_sample(wo, u, random) {
-                        // Weight and PDF agree, except for rounding at grazing angles.
+                let pdf = bsdf.pdf(wo, wi);
+                if (wi.z > 0.0 || bsdf.has_facets()) && pdf > 0.0 {
+                    let weight = f64::from(bsdf.eval(wo, wi).x) / f64::from(pdf);
+                    sum += weight * inverse_transmission_scale(&bsdf.material, wi);
+                    if let Some(found) = bsdf.facet_sample(wo, u, random) {
+                        // Weight and PDF of the sample agree with `eval` and `pdf`, except at grazing angles.
                         let weight_error = (f64::from(found.weight.x) - weight).abs() / weight.max(1e-3);
                         let pdf_error = f64::from((found.pdf - pdf).abs() / pdf);
                         let is_grazing = wi.z.abs() < 0.02 || wo.z < 0.02;
                         assert!(
                             is_grazing || weight_error < 5e-3 && pdf_error < 2e-2,
                             "{}: {wo} {wi} {weight_error} {pdf_error}",
-                            lobes.name
+                            bsdf.name
                         );
                     }
                 }
             }
             let mean = sum / f64::from(count);
-            assert!(
-                (mean - expected).abs() < 6e-3,
-                "{}, {wo}: {mean} {expected}",
-                lobes.name
-            );
+            assert!((mean - expected).abs() < 6e-3, "{}, {wo}: {mean} {expected}", bsdf.name);
         }
     }
 }
 
 #[test]
-fn limits_of_all_ranges_give_finite_values() {
+fn parameter_limits_give_finite_values() {
     let tiny = f32::from_bits(1);
     let directions = [
         Vec3::Z,
@@ -466,7 +463,7 @@ fn limits_of_all_ranges_give_finite_values() {
                         k: Vec3::splat(k),
                         ..Material::zeroed()
                     };
-                    let lobes = Lobes {
+                    let bsdf = Bsdf {
                         name: format!("{kind} {roughness} {anisotropy} {ior} {eta} {k}"),
                         material,
                         conserves_energy: true,
@@ -474,19 +471,19 @@ fn limits_of_all_ranges_give_finite_values() {
                     for wo in directions {
                         for u in points {
                             for random in [0.0, 0.5, 1.0 - 6e-8] {
-                                let found = lobes.facet_sample(wo, u, random).unwrap();
+                                let found = bsdf.facet_sample(wo, u, random).unwrap();
                                 let is_finite = found.weight.is_finite() && found.pdf.is_finite() && found.pdf >= 0.0;
-                                assert!(is_finite && found.wi.is_finite(), "{} {wo} {u}: {found:?}", lobes.name);
-                                assert!(found.weight.min_element() >= 0.0, "{} {wo} {u}: {found:?}", lobes.name);
+                                assert!(is_finite && found.wi.is_finite(), "{} {wo} {u}: {found:?}", bsdf.name);
+                                assert!(found.weight.min_element() >= 0.0, "{} {wo} {u}: {found:?}", bsdf.name);
                                 // With compensation, the weight of a sample may exceed 1.
-                                assert!(found.weight.max_element() < 1e5, "{} {wo} {u}: {found:?}", lobes.name);
+                                assert!(found.weight.max_element() < 1e5, "{} {wo} {u}: {found:?}", bsdf.name);
                             }
                         }
                         for wi in directions {
                             for wi in [wi, -wi] {
-                                let (value, pdf) = (lobes.eval(wo, wi), lobes.pdf(wo, wi));
+                                let (value, pdf) = (bsdf.eval(wo, wi), bsdf.pdf(wo, wi));
                                 let is_finite = value.is_finite() && pdf.is_finite() && value.min_element() >= 0.0;
-                                assert!(is_finite && pdf >= 0.0, "{} {wo} {wi}: {value} {pdf}", lobes.name);
+                                assert!(is_finite && pdf >= 0.0, "{} {wo} {wi}: {value} {pdf}", bsdf.name);
                             }
                         }
                     }

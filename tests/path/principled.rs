@@ -1,5 +1,5 @@
 //! The `principled` BSDF over a grid of parameters: white furnace, sample weights, sampled directions against the PDF,
-//! and each layer against its standalone BSDF.
+//! and the diffuse and metal lobes against reference BSDFs.
 
 use std::f64::consts::{PI, TAU};
 
@@ -103,8 +103,8 @@ fn integral(wo: Vec3, eta: f32, f: impl Fn(Vec3) -> f64) -> f64 {
     let mut sum = 0.0;
     for upper in [true, false] {
         let sign = if upper { 1.0 } else { -1.0 };
-        let bent = if upper { 1.0 } else { f64::from(eta) };
-        let (x, y) = (-f64::from(wo.x) * bent, -f64::from(wo.y) * bent);
+        let index_ratio = if upper { 1.0 } else { f64::from(eta) };
+        let (x, y) = (-f64::from(wo.x) * index_ratio, -f64::from(wo.y) * index_ratio);
         let axis = DVec3::new(x, y, sign * (1.0 - x * x - y * y).max(0.0).sqrt()).normalize();
         let u = axis.any_orthonormal_vector();
         let v = axis.cross(u);
@@ -128,7 +128,7 @@ fn integral(wo: Vec3, eta: f32, f: impl Fn(Vec3) -> f64) -> f64 {
 #[test]
 fn principled_lobes_gain_no_energy_in_a_white_furnace() {
     for (name, material) in grid() {
-        // Transmitted radiance is not scaled by the squared index.
+        // The factor `scale` undoes the scaling of transmitted radiance by the squared index.
         for wo in view_directions() {
             let m = mixture(&material, wo);
             let scale = |wi: Vec3| {
@@ -142,8 +142,10 @@ fn principled_lobes_gain_no_energy_in_a_white_furnace() {
                 f64::from(principled_eval(&m, wo, wi, ALL_LOBES).x) * scale(wi)
             });
             assert!(albedo < 1.01 && albedo > 0.0, "{name}, {wo}: {albedo}");
-            let is_lossless = ["dielectric", "coated"].iter().any(|kind| name.starts_with(kind));
-            if is_lossless || name.starts_with("metal") {
+            let is_lossless = ["dielectric", "coated", "metal"]
+                .iter()
+                .any(|kind| name.starts_with(kind));
+            if is_lossless {
                 assert!((albedo - 1.0).abs() < 0.02, "{name}, {wo}: {albedo}");
             }
         }
@@ -213,7 +215,7 @@ fn mean_sample_weights_equal_the_principled_albedo() {
     }
 }
 
-/// Returns Pearson's chi-square of sampled directions in cells of equal solid angle.
+/// Returns Pearson's chi-square of sampled directions in cells of equal solid angle, and its degrees of freedom.
 fn chi_square(m: &PrincipledLobes, wo: Vec3, pdf: impl Fn(Vec3) -> f64) -> (f64, f64) {
     const SAMPLES: u32 = 100_000;
     const HEIGHTS: usize = 24;
@@ -262,21 +264,21 @@ fn sampled_directions_follow_their_pdf() {
             let max_sum = degrees_of_freedom + 7.0 * (2.0 * degrees_of_freedom).sqrt();
             assert!(
                 degrees_of_freedom > 5.0 && sum < max_sum,
-                "{name}, {wo}: {sum} of {degrees_of_freedom}"
+                "{name}, {wo}: chi-square {sum} for {degrees_of_freedom} degrees of freedom"
             );
             let (wrong, _) = chi_square(&m, wo, |wi| {
                 f64::from(principled_pdf(&m, wo, wi, ALL_LOBES)) * if wi.x > 0.0 { 1.1 } else { 0.9 }
             });
             assert!(
                 wrong > max_sum,
-                "{name}: a wrong PDF is accepted: {wrong} of {degrees_of_freedom}"
+                "{name}: a wrong PDF is accepted: chi-square {wrong} for {degrees_of_freedom} degrees of freedom"
             );
         }
     }
 }
 
 #[test]
-fn each_layer_equals_its_standalone_bsdf() {
+fn diffuse_and_metal_lobes_equal_reference_bsdfs() {
     for wo in view_directions() {
         for wi in [direction(0.9, 1.0), direction(0.4, 3.0), direction(0.05, 5.0)] {
             // Without metal and specular reflection, the material is bit-identical to `diffuse`.
@@ -409,7 +411,7 @@ fn smooth_lobes_are_deltas_and_all_values_are_finite() {
     }
 }
 
-fn picture_of(keys: &str, textures: &str) -> wgray_render::records::Packed {
+fn sphere_scene(keys: &str, textures: &str) -> wgray_render::records::Packed {
     super::scene(
         16,
         4,
@@ -428,7 +430,7 @@ fn values_come_from_the_channels_of_a_texture() {
         "constant" => "[textures.t]\ntype = 'constant'\ncolor = [0.75, 0.5, 0.25]",
         _ => "[textures.t]\ntype = 'checker'\neven = [0.75, 0.5, 0.25]\nodd = [0.75, 0.5, 0.25]",
     };
-    let plain = picture_of(
+    let plain = sphere_scene(
         "metallic = 0.25\nroughness = 0.5\nclearcoat = 0.75\nclearcoat_roughness = 0.5",
         "",
     );
@@ -436,8 +438,8 @@ fn values_come_from_the_channels_of_a_texture() {
                     clearcoat = { texture = 't' }\nclearcoat_roughness = { texture = 't', channel = 'g' }";
     let expected = crate::pictures::reference(&plain);
     for kind in ["constant", "checker"] {
-        let packed = picture_of(textured, texture(kind));
-        // Texture lookups: one for all four values of a texture, none for a constant.
+        let packed = sphere_scene(textured, texture(kind));
+        // All four values share one texture lookup; a constant texture needs no lookup.
         assert_eq!(packed.textures.lookups.len(), usize::from(kind == "checker"));
         for mode in crate::pictures::exact_modes() {
             assert_eq!(
@@ -448,7 +450,7 @@ fn values_come_from_the_channels_of_a_texture() {
         }
     }
     // Negative control: another channel gives another image.
-    let wrong_channel = picture_of(&textured.replace("'b'", "'g'"), texture("checker"));
+    let wrong_channel = sphere_scene(&textured.replace("'b'", "'g'"), texture("checker"));
     assert!(crate::pictures::differing(&crate::pictures::reference(&wrong_channel), &expected) > 20);
 }
 

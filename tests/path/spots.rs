@@ -1,4 +1,4 @@
-//! Spot lights against closed forms.
+//! Spot lights, compared with closed-form values.
 
 use wgray_render::records::Packed;
 
@@ -95,7 +95,7 @@ fn a_180_degree_spot_equals_a_point_light_and_a_tiny_cone_lights_almost_nothing(
                     "{mode:?}: {a:?}, expected {b:?}"
                 );
             }
-            // A disk of radius 0.00016: about 1e-8 of the floor.
+            // The cone lights a disk of radius 0.00016, about 1e-8 of the floor.
             assert!(mean(&render(&narrow, mode))[0] < 1e-4, "{mode:?}");
             assert_eq!(
                 mean(&render(&away, mode)),

@@ -132,7 +132,7 @@ fn light_and_bsdf_sampling_agree() {
             };
             let [both, light, bsdf, wrong] = [MIS, LIGHT, BSDF, WRONG].map(reflected);
             for i in 0..3 {
-                let near = |x: f64, relative: f64| (x - both[i]).abs() < relative * both[i];
+                let near = |x: f64, tolerance: f64| (x - both[i]).abs() < tolerance * both[i];
                 assert!(
                     near(light[i], 1e-2),
                     "light sampling alone differs: {light:?}, expected {both:?}\n{shape}{material}"

@@ -24,9 +24,13 @@ use self::shapes::*;
 use self::values::*;
 use crate::patterns;
 
-pub fn packed(d: &Description) -> Packed {
+pub fn packed(description: &Description) -> Packed {
     let assets = Assets::beside(folder());
-    pack(&d.validate_with(&assets).unwrap_or_else(|problem| panic!("{problem}")))
+    pack(
+        &description
+            .validate_with(&assets)
+            .unwrap_or_else(|problem| panic!("{problem}")),
+    )
 }
 
 #[derive(Clone, Debug)]
@@ -104,14 +108,14 @@ fn light() -> impl Strategy<Value = LightDescription> {
         .prop_map(|(direction, color)| LightDescription::Directional(DirectionalLightDescription { direction, color }));
     let angles = (select(&[180.0, 90.0, 40.0, 15.0][..]), select(&[0.0, 0.5, 1.0][..]));
     let spot =
-        (point(), direction(), color(1.0), angles).prop_map(|(position, direction, color, (cone_angle, share))| {
+        (point(), direction(), color(1.0), angles).prop_map(|(position, direction, color, (cone_angle, fraction))| {
             LightDescription::Spot(SpotLightDescription {
                 position,
                 direction: Some(direction),
                 look_at: None,
                 color,
                 cone_angle,
-                inner_angle: share * cone_angle,
+                inner_angle: fraction * cone_angle,
             })
         });
     prop_oneof![4 => rectangle, 2 => point_light, 2 => directional, 1 => spot]
@@ -190,7 +194,7 @@ fn render() -> impl Strategy<Value = RenderDescription> {
             background,
             shadow_epsilon,
             seed,
-            (pixel, pixels, light, lights),
+            (pixel_pattern, pixel_samples, light_pattern, light_samples),
             (opaque, max_depth, filtered, kind, adaptive),
         )| {
             RenderDescription {
@@ -201,10 +205,10 @@ fn render() -> impl Strategy<Value = RenderDescription> {
                 max_depth,
                 ray_differentials: filtered,
                 seed,
-                pixel_samples: patterns::samples(pixel, pixels),
-                light_samples: patterns::samples(light, lights),
+                pixel_samples: patterns::samples(pixel_pattern, pixel_samples),
+                light_samples: patterns::samples(light_pattern, light_samples),
                 filter: PixelFilterDescription { kind, radius: None },
-                adaptive: (adaptive && pixel.is_extensible()).then_some(AdaptiveDescription {
+                adaptive: (adaptive && pixel_pattern.is_extensible()).then_some(AdaptiveDescription {
                     error: 0.02,
                     max_samples: Some(16),
                 }),
@@ -269,7 +273,7 @@ fn description_with(
                 (scale, offset),
             )| {
                 let names = ["a", "b", "c"].map(str::to_string);
-                let mut d = Description {
+                let mut description = Description {
                     environment: None,
                     image: ImageDescription::new(width, height),
                     camera,
@@ -283,20 +287,22 @@ fn description_with(
                 };
                 if let Some(paths) = paths {
                     let names = ["a", "b", "c"].map(str::to_string);
-                    d.materials = names.into_iter().zip(paths.materials).collect();
+                    description.materials = names.into_iter().zip(paths.materials).collect();
                     if let Some(environment) = paths.environment {
-                        d.render.background = DVec3::ZERO;
-                        d.environment = Some(environment);
+                        description.render.background = DVec3::ZERO;
+                        description.environment = Some(environment);
                     }
-                    d.render.integrator = Some(Integrator::Path);
-                    d.render.max_depth = paths.max_depth;
-                    d.render.rr_depth = paths.rr_depth;
-                    d.render.clamp = paths.clamp;
-                    d.render.alpha = paths.alpha.then_some(true);
+                    description.render.integrator = Some(Integrator::Path);
+                    description.render.max_depth = paths.max_depth;
+                    description.render.rr_depth = paths.rr_depth;
+                    description.render.clamp = paths.clamp;
+                    description.render.alpha = paths.alpha.then_some(true);
                 }
-                moved(&mut d, scale, DVec3::new(offset, -offset, offset));
-                d
+                moved(&mut description, scale, DVec3::new(offset, -offset, offset));
+                description
             },
         )
-        .prop_filter("a valid scene", |d| d.validate_with(&Assets::beside(folder())).is_ok())
+        .prop_filter("a valid scene", |description| {
+            description.validate_with(&Assets::beside(folder())).is_ok()
+        })
 }

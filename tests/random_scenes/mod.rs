@@ -20,8 +20,8 @@ use crate::{patterns, rounding, sources};
 /// Environment variable: number of scenes. If set, each run has different scenes.
 const CASES: &str = "WGRAY_TEST_CASES";
 
-fn check(d: &Description, shaders: &Shaders) -> Result<(), String> {
-    let packed = any_scene::packed(d);
+fn check(description: &Description, shaders: &Shaders) -> Result<(), String> {
+    let packed = any_scene::packed(description);
     let cpu = reference(&packed);
     if !cpu.sums.iter().all(|sum| sum.is_finite()) {
         return Err("a pixel is NaN or infinite".into());
@@ -33,7 +33,7 @@ fn check(d: &Description, shaders: &Shaders) -> Result<(), String> {
         }
     }
     // First hits are compared only in some scenes, because they need another kernel.
-    if d.render.seed.is_multiple_of(4) {
+    if description.render.seed.is_multiple_of(4) {
         let (gpu, cpu) = (
             first_hits(&packed, RenderMode::Buffers),
             first_hits(&packed, RenderMode::Cpu),
@@ -57,25 +57,25 @@ fn find_failing(cases: u32, shrinks: u32, deterministic: bool, shaders: &Shaders
     } else {
         TestRunner::new(config)
     };
-    let result = runner.run(&any_scene::description(), |d| {
-        check(&d, shaders).map_err(TestCaseError::fail)
+    let result = runner.run(&any_scene::description(), |description| {
+        check(&description, shaders).map_err(TestCaseError::fail)
     });
     match result {
         Ok(()) => None,
-        Err(TestError::Fail(reason, d)) => Some((d, reason.to_string())),
+        Err(TestError::Fail(reason, description)) => Some((description, reason.to_string())),
         Err(TestError::Abort(reason)) => panic!("{reason}"),
     }
 }
 
 /// Saves a scene for `wgray render`.
-fn save(d: &Description, name: &str) -> PathBuf {
+fn save(description: &Description, name: &str) -> PathBuf {
     let path = any_scene::folder().join(name);
-    std::fs::write(&path, toml::to_string(d).expect("a scene as TOML")).expect("a file for the scene");
+    std::fs::write(&path, toml::to_string(description).expect("a scene as TOML")).expect("a file for the scene");
     path
 }
 
 #[test]
-fn random_scenes_are_the_same_on_gpu_and_cpu() {
+fn random_scenes_are_bit_identical_on_gpu_and_cpu() {
     if !adapter::device().is_some_and(bit_exact) {
         return;
     }
@@ -83,34 +83,34 @@ fn random_scenes_are_the_same_on_gpu_and_cpu() {
     let count = cases
         .as_deref()
         .map_or(12, |n| n.parse().expect("WGRAY_TEST_CASES is a number"));
-    if let Some((d, reason)) = find_failing(count, 300, cases.is_none(), sources::shaders()) {
-        let path = save(&d, "failing-scene.toml");
+    if let Some((description, reason)) = find_failing(count, 300, cases.is_none(), sources::shaders()) {
+        let path = save(&description, "failing-scene.toml");
         panic!("{reason}: wgray render {}", path.display());
     }
-    println!("{count} random scenes, with buffers and with constants: every pixel has the same bits");
+    println!("{count} random scenes, baked and with buffers: all pixels are bit-identical");
 }
 
 /// The scenes have so many samples that some drivers would terminate the loops of a dispatch.
 #[test]
-fn random_scenes_of_many_samples_are_the_same() {
+fn random_scenes_with_many_samples_are_bit_identical() {
     if !adapter::device().is_some_and(bit_exact) {
         return;
     }
     let mut runner = TestRunner::new_with_rng(Config::default(), TestRng::deterministic_rng(RngAlgorithm::ChaCha));
     let strategy = any_scene::description();
     for case in 0..5 {
-        let mut d = strategy.new_tree(&mut runner).expect("a scene").current();
-        (d.image.width, d.image.height) = (3, 2);
-        let integrator = d.integrator();
-        let (pixel, light) = (&d.render.pixel_samples, &d.render.light_samples);
+        let mut description = strategy.new_tree(&mut runner).expect("a scene").current();
+        (description.image.width, description.image.height) = (3, 2);
+        let integrator = description.integrator();
+        let (pixel, light) = (&description.render.pixel_samples, &description.render.light_samples);
         let [pixel, light] = [pixel, light].map(|samples| samples.pattern(integrator));
-        d.render.light_samples = patterns::samples(light, 256);
-        match &mut d.render.adaptive {
+        description.render.light_samples = patterns::samples(light, 256);
+        match &mut description.render.adaptive {
             Some(adaptive) => adaptive.max_samples = Some(1024),
-            None => d.render.pixel_samples = patterns::samples(pixel, 576),
+            None => description.render.pixel_samples = patterns::samples(pixel, 576),
         }
-        if let Err(reason) = check(&d, sources::shaders()) {
-            let path = save(&d, "failing-scene-of-many-samples.toml");
+        if let Err(reason) = check(&description, sources::shaders()) {
+            let path = save(&description, "failing-scene-of-many-samples.toml");
             panic!("case {case}: {reason}: wgray render {}", path.display());
         }
     }
@@ -136,15 +136,15 @@ fn random_scenes_are_within_tolerance_without_guaranteed_bits() {
         (0.8, DVec3::new(-0.3, 0.6, 0.1)),
     ];
     let scenes = (0..8).flat_map(|_| {
-        let d = strategy.new_tree(&mut runner).expect("a scene").current();
+        let description = strategy.new_tree(&mut runner).expect("a scene").current();
         placements.map(|(scale, offset)| {
-            let mut d = d.clone();
-            any_scene::moved(&mut d, scale, offset);
-            d
+            let mut description = description.clone();
+            any_scene::moved(&mut description, scale, offset);
+            description
         })
     });
-    for d in scenes {
-        let packed = any_scene::packed(&d);
+    for description in scenes {
+        let packed = any_scene::packed(&description);
         let cpu = reference(&packed);
         let with_plain_wgsl = render_with(&packed, RenderMode::Plain, sources::shaders());
         if bit_exact(device) {
@@ -180,11 +180,11 @@ fn random_scenes_detect_a_difference_of_one_ulp() {
         return;
     }
     let shaders = sources::edited_shaders("camera.wgsl", "y = 1.0 - at.y", "y = 1.0000001 - at.y");
-    let (d, reason) = find_failing(40, 10, true, &shaders).expect("a scene that differs");
+    let (description, reason) = find_failing(40, 10, true, &shaders).expect("a scene that differs");
     assert!(reason.contains("pixels differ"), "{reason}");
-    let path = save(&d, "scene-of-a-negative-control.toml");
+    let path = save(&description, "scene-of-a-negative-control.toml");
     let scene = Scene::load(&path).unwrap_or_else(|error| panic!("{error}"));
-    assert_eq!(wgray_render::pack::pack(&scene), any_scene::packed(&d));
+    assert_eq!(wgray_render::pack::pack(&scene), any_scene::packed(&description));
 }
 
 /// Random scenes contain every type of the parser, except `EXCLUDED`.
@@ -201,8 +201,8 @@ fn random_scenes_cover_every_type() {
     let strategy = any_scene::description();
     let mut found = BTreeSet::new();
     for _ in 0..300 {
-        let d = strategy.new_tree(&mut runner).expect("a scene").current();
-        let text = toml::to_string(&d).expect("a scene as TOML");
+        let description = strategy.new_tree(&mut runner).expect("a scene").current();
+        let text = toml::to_string(&description).expect("a scene as TOML");
         found.extend(
             text.lines()
                 .filter_map(|line| line.strip_prefix("type = "))
@@ -217,7 +217,7 @@ fn random_scenes_cover_every_type() {
     let mut types: BTreeSet<String> = patterns::all().into_iter().map(|(name, _)| name).collect();
     let files = sources::path("crates/scene/src/description")
         .read_dir()
-        .expect("the parts of a description");
+        .expect("the folder of the descriptions");
     let files = files.map(|entry| entry.expect("a file").path());
     for file in files {
         let text = std::fs::read_to_string(file).expect("the descriptions");
@@ -232,5 +232,5 @@ fn random_scenes_cover_every_type() {
     assert!(types.len() > 15, "the types were not found: {types:?}");
     types.retain(|name| !EXCLUDED.iter().any(|(excluded, _)| excluded == name));
     let missing: Vec<_> = types.difference(&found).collect();
-    assert!(missing.is_empty(), "no random scene has {missing:?}");
+    assert!(missing.is_empty(), "no random scene contains {missing:?}");
 }

@@ -1,4 +1,4 @@
-//! Adaptive sampling: equal bits on CPU and GPU for any partition of the work, sample counts, variance estimates.
+//! Adaptive sampling: equal bits on CPU and GPU for any work split, sample counts, variance estimates.
 
 use glam::{DVec3, UVec2, Vec4};
 use wgray::scene::{AdaptiveDescription, Overrides, Pattern, PixelFilterDescription, PixelFilterKind, Scene};
@@ -73,7 +73,7 @@ fn adaptive_images_do_not_depend_on_backend_or_work_split() {
 }
 
 #[test]
-fn a_crop_is_a_part_of_the_image() {
+fn a_crop_equals_the_region_of_the_full_image() {
     let packed = adaptive(Pattern::Sobol, 0.01, 100);
     let expected = reference(&packed);
     for mode in exact_modes() {
@@ -84,14 +84,14 @@ fn a_crop_is_a_part_of_the_image() {
             (40, 0, 41, 33),
             (0, 32, 41, 33),
         ] {
-            let part = Region { x0, y0, x1, y1 };
+            let region = Region { x0, y0, x1, y1 };
             for band_pixels in [1 << 20, 50] {
                 let split = WorkSplit {
                     band_pixels,
                     ..WorkSplit::default()
                 };
-                let found = film(&mut *backend(&packed, mode), &packed, part, &split);
-                assert_eq!(differing(&found, &crop(&expected, part)), 0, "{mode:?}, {part:?}");
+                let found = film(&mut *backend(&packed, mode), &packed, region, &split);
+                assert_eq!(differing(&found, &crop(&expected, region)), 0, "{mode:?}, {region:?}");
             }
         }
     }
@@ -100,7 +100,7 @@ fn a_crop_is_a_part_of_the_image() {
 /// Returns the sample count from the neighbors' pilot samples in double precision, or `None` if the count depends on
 /// rounding.
 fn expected_count(packed: &Packed, pixel: UVec2, pilot: u32, error: f64, max_count: u32) -> Option<u32> {
-    let (mut squares, mut neighbors, mut deviations, mut fourth) = (0.0, 0.0, 0.0, 0.0);
+    let (mut squares, mut neighbors, mut deviations, mut fourth_moments) = (0.0, 0.0, 0.0, 0.0);
     for (dx, dy) in [(0, -1), (-1, 0), (1, 0), (0, 1)] {
         let (x, y) = (pixel.x.checked_add_signed(dx), pixel.y.checked_add_signed(dy));
         let Some((x, y)) = x
@@ -118,15 +118,15 @@ fn expected_count(packed: &Packed, pixel: UVec2, pilot: u32, error: f64, max_cou
             let deviation = (value - previous_mean) * (value - mean);
             sum += deviation;
             deviations += deviation.element_sum();
-            fourth += deviation.element_sum().powi(2);
+            fourth_moments += deviation.element_sum().powi(2);
         }
         let slope = mean.to_array().map(|v| v.clamp(0.01, 1.0).powf(1.0 / 2.2 - 1.0) / 2.2);
         squares += (sum / (n - 1.0) * DVec3::from(slope).powf(2.0)).element_sum() / 3.0;
         neighbors += 1.0;
     }
     let variance_limit = squares / neighbors / (error * error);
-    let effective_samples = if fourth > 0.0 {
-        deviations * deviations / fourth
+    let effective_samples = if fourth_moments > 0.0 {
+        deviations * deviations / fourth_moments
     } else {
         0.0
     };
@@ -141,13 +141,13 @@ fn expected_count(packed: &Packed, pixel: UVec2, pilot: u32, error: f64, max_cou
 
 #[test]
 fn sample_counts_follow_the_pilot_samples_of_neighbors() {
-    for (round, pilot, error, max_count) in [
+    for (samples_per_round, pilot, error, max_count) in [
         (16, 16, 0.01, 100),
         (4, 16, 0.02, 256),
         (3, 18, 0.005, 1000),
         (1, 16, 0.03, 40),
     ] {
-        let packed = cornell(Pattern::Sobol, round, |description| {
+        let packed = cornell(Pattern::Sobol, samples_per_round, |description| {
             let max_samples = Some(max_count);
             description.render.adaptive = Some(AdaptiveDescription { error, max_samples });
         });
@@ -156,7 +156,7 @@ fn sample_counts_follow_the_pilot_samples_of_neighbors() {
         for (pixel, count) in film.sample_counts().enumerate() {
             let position = UVec2::new(pixel as u32 % 41, pixel as u32 / 41);
             if let Some(expected) = expected_count(&packed, position, pilot, error, max_count) {
-                assert_eq!(count, expected, "{round}, {position}");
+                assert_eq!(count, expected, "{samples_per_round}, {position}");
                 checked += 1;
             }
             counts.push(count);
@@ -174,7 +174,7 @@ fn sample_counts_follow_the_pilot_samples_of_neighbors() {
 fn extreme_errors_give_the_minimum_or_maximum_samples() {
     let uniform = |count| {
         cornell(Pattern::Sobol, count, |description| {
-            // Light samples continue the sequence of the previous pixel sample.
+            // Light samples continue the sequence of the previous pixel sample, whatever the number of pixel samples.
             description.render.adaptive = None;
         })
     };
@@ -186,9 +186,9 @@ fn extreme_errors_give_the_minimum_or_maximum_samples() {
 }
 
 #[test]
-fn minimum_image_and_pilot_sizes() {
-    let counts = |width, height, round, max_count| {
-        let packed = cornell(Pattern::Random, round, |description| {
+fn tiny_images_and_few_pilot_samples_agree_in_all_modes() {
+    let counts = |width, height, samples_per_round, max_count| {
+        let packed = cornell(Pattern::Random, samples_per_round, |description| {
             (description.image.width, description.image.height) = (width, height);
             let max_samples = Some(max_count);
             description.render.adaptive = Some(AdaptiveDescription {
@@ -210,8 +210,8 @@ fn minimum_image_and_pilot_sizes() {
     assert!(counts(5, 5, 1, 17).iter().all(|n| [16, 17].contains(n)));
 }
 
-/// The first argument holds sums over pixels: the variance, the squared deviations, their squares, and the number of
-/// pixels.
+/// The first argument of `samples_wanted` contains sums over pixels: the variances, the squared deviations, the squares
+/// of the squared deviations, and the number of pixels.
 #[test]
 fn effective_samples_limit_the_doublings() {
     let count_for = |pilot_sums: [f32; 4], error: f32, max_count| {
@@ -238,7 +238,7 @@ fn effective_samples_limit_the_doublings() {
 }
 
 #[test]
-fn moments_are_the_variance_of_the_samples() {
+fn the_variance_of_the_mean_matches_the_samples() {
     let packed = adaptive(Pattern::Random, 0.01, 48);
     let film = reference(&packed);
     for (pixel, sum) in film.sums.iter().enumerate() {
@@ -307,7 +307,7 @@ fn weighted_moments_of_a_constant_are_zero() {
 }
 
 #[test]
-fn the_estimate_is_an_upper_bound_on_average() {
+fn the_target_error_is_an_upper_bound_on_average() {
     let packed = adaptive(Pattern::Sobol, 0.02, 1024);
     let film = reference(&packed);
     let converged = reference(&cornell(Pattern::Sobol, 2048, |description| {

@@ -46,7 +46,7 @@ fn moment(kind: PixelFilterKind, power: i32) -> f64 {
 }
 
 #[test]
-fn filters_have_their_integrals() {
+fn filters_have_the_expected_integrals() {
     // Mitchell's filter has unit integral at radius 2. The cosines of the Blackman-Harris window integrate to 0.
     let gaussian = 0.833_287 - 2.0 * (-4.5f64).exp(); // sqrt(2 pi) / 3 erf(3 / sqrt 2), minus the offset
     let expected = [2.0, 1.0, gaussian, 0.5, 2.0 * 0.35875];
@@ -105,7 +105,7 @@ fn tables_have_the_moments_of_their_filters() {
                     let expected = moment(other, power) / moment(other, 0) * radius.powi(power);
                     assert!(
                         (found - expected).abs() > 3e-3 * radius.powi(power),
-                        "{kind:?} or {other:?}"
+                        "{kind:?} and {other:?} have the same moment"
                     );
                 }
             }

@@ -5,8 +5,8 @@ use wgray_render::cpu::sampling::{sample_key, sample_square};
 use wgray_render::cpu::sequence::{halton_sample, radical_inverse_3, shuffled_index, sobol_reversed, sobol_sample};
 use wgray_render::records::{GRID, HALTON, JITTERED, RANDOM, ROTATED_GRID, SOBOL};
 
-/// The first two-dimensional Sobol' points times 32: scipy 1.17.1, `qmc.Sobol(2, scramble=False)`, with the direction
-/// numbers of Joe and Kuo (2008).
+/// The first 32 points of the two-dimensional Sobol' sequence, multiplied by 32. Source: scipy 1.17.1,
+/// `qmc.Sobol(2, scramble=False)`, with the direction numbers of Joe and Kuo (2008).
 const SOBOL_POINTS: [[u32; 2]; 32] = [
     [0, 0],
     [16, 16],
@@ -47,7 +47,7 @@ fn gray(i: u32) -> u32 {
     i ^ (i >> 1)
 }
 
-/// Radical inverses in base 3 times 3^15: scipy 1.17.1, `qmc.Halton(2, scramble=False)`.
+/// Radical inverses in base 3, multiplied by 3^15. Source: scipy 1.17.1, `qmc.Halton(2, scramble=False)`.
 const HALTON_3: [u32; 12] = [
     0, 4782969, 9565938, 1594323, 6377292, 11160261, 3188646, 7971615, 12754584, 531441, 5314410, 10097379,
 ];
@@ -65,7 +65,7 @@ fn sequences_match_published_values() {
     for i in 0..32 {
         let j = gray(i);
         let point = [j.reverse_bits() >> 27, sobol_reversed(j).reverse_bits() >> 27];
-        assert_eq!(point, SOBOL_POINTS[i as usize], "Sobol's point {j}");
+        assert_eq!(point, SOBOL_POINTS[i as usize], "Sobol' point {j}");
     }
     for (i, expected) in (0..).zip(HALTON_3) {
         assert_eq!(radical_inverse_3(i), expected, "{i} in base 3");
@@ -90,7 +90,7 @@ fn the_second_sobol_coordinate_is_the_product_with_pascals_matrix() {
     }
 }
 
-/// Returns true if 2^m points are a (0, m, 2)-net in base 2: one in each elementary interval.
+/// Returns true if 2^m points are a (0, m, 2)-net in base 2: each elementary interval contains one point.
 fn is_net(points: &[Vec2]) -> bool {
     let m = points.len().ilog2();
     (0..=m).all(|column_bits| {
@@ -163,18 +163,18 @@ fn shuffling_maps_aligned_runs_to_aligned_runs() {
 }
 
 #[test]
-fn aligned_runs_of_halton_points_have_one_in_each_interval() {
+fn aligned_runs_of_halton_points_have_one_point_in_each_interval() {
     for key in keys(20) {
         for digits in 1..=5u32 {
             let count = 3u32.pow(digits);
             // An aligned run of 256 indices is shuffled to another run, of which 3^digits consecutive indices are used.
             let mut run: Vec<u32> = (512..768).map(|i| shuffled_index(i, key.x ^ key.y)).collect();
             run.sort_unstable();
-            let mut parts: Vec<u32> = (run[..count as usize].iter())
+            let mut intervals: Vec<u32> = (run[..count as usize].iter())
                 .map(|i| radical_inverse_3(*i) / 3u32.pow(15 - digits))
                 .collect();
-            parts.sort_unstable();
-            assert!(parts.into_iter().eq(0..count), "{digits} digits");
+            intervals.sort_unstable();
+            assert!(intervals.into_iter().eq(0..count), "{digits} digits");
         }
         for i in 0..1000 {
             let p = halton_sample(i * 4_294_967, key);
@@ -231,7 +231,7 @@ fn discrepancies(pattern: u32, side: u32, count: u32) -> Vec<f64> {
 }
 
 #[test]
-fn star_discrepancies_keep_their_bounds() {
+fn star_discrepancies_are_within_their_bounds() {
     let max = |values: Vec<f64>| values.into_iter().fold(0.0, f64::max);
     let mean = |values: Vec<f64>| values.iter().sum::<f64>() / values.len() as f64;
     let n = 32.0;

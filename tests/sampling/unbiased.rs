@@ -1,5 +1,5 @@
-//! Adaptive sampling against converged images and uniform sampling: thin objects keep their brightness, errors do not
-//! grow.
+//! Adaptive sampling against converged images and uniform sampling: thin objects keep their brightness, and
+//! errors do not exceed the errors of uniform sampling.
 
 use std::fmt::Write;
 
@@ -12,24 +12,27 @@ use crate::scenes;
 /// Sobol' samples per round, and the target error of adaptive sampling.
 #[derive(Clone, Copy, Debug)]
 struct Sampling {
-    round: u32,
+    samples_per_round: u32,
     error: Option<f64>,
 }
 
 fn scene(size: u32, height: f64, sampling: Sampling, content: &str) -> Packed {
-    let Sampling { round, error } = sampling;
+    let Sampling {
+        samples_per_round,
+        error,
+    } = sampling;
     let adaptive = error.map_or(String::new(), |error| {
         format!(", adaptive = {{ error = {error}, max_samples = 256 }}")
     });
     scenes::parse(&format!(
         "image = {{ width = {size}, height = {size} }}\n\
          camera = {{ type = 'orthographic', position = [0, 0, 5], look_at = [0, 0, 0], up = [0, 1, 0], height = {height} }}\n\
-         render = {{ ambient = [1, 1, 1], pixel_samples = {{ pattern = 'sobol', count = {round} }}{adaptive} }}\n\
+         render = {{ ambient = [1, 1, 1], pixel_samples = {{ pattern = 'sobol', count = {samples_per_round} }}{adaptive} }}\n\
          materials.white = {{ type = 'phong', color = [1, 1, 1], specular = [0, 0, 0] }}\n{content}"
     ))
 }
 
-/// Returns white dots of 0.2 pixels, one per square of `spacing` pixels.
+/// Returns a scene of white dots 0.2 pixels wide, one in each square of `spacing` x `spacing` pixels.
 fn dots(spacing: u32, sampling: Sampling) -> Packed {
     let size = 20;
     let mut content = String::new();
@@ -149,15 +152,21 @@ const SETTINGS: [(u32, f64); 2] = [(16, 0.02), (4, 0.01)];
 #[test]
 fn small_rounds_have_the_same_pilot_pass() {
     for error in [0.02, 0.01] {
-        let [a, b] = [4, 16].map(|round| {
+        let [a, b] = [4, 16].map(|samples_per_round| {
             let error = Some(error);
-            seeded(lines(Sampling { round, error }), 1)
+            seeded(
+                lines(Sampling {
+                    samples_per_round,
+                    error,
+                }),
+                1,
+            )
         });
         assert_eq!((a.sums, a.moments), (b.sums, b.moments));
     }
 }
 
-/// Three standard errors contain 99.7 % of means; the seeds are fixed.
+/// The tolerance includes three standard errors, which contain 99.7 % of means.
 #[test]
 fn dots_and_lines_keep_their_brightness() {
     // Disks of radius 0.1 inside the image.
@@ -174,16 +183,16 @@ fn dots_and_lines_keep_their_brightness() {
         ("lines", brightness_of_lines, Box::new(lines)),
     ];
     for (name, expected, make) in &cases {
-        for (round, error) in SETTINGS {
+        for (samples_per_round, error) in SETTINGS {
             let sampling = Sampling {
-                round,
+                samples_per_round,
                 error: Some(error),
             };
             let films: Vec<Film> = (0..24).map(|seed| seeded(make(sampling), seed)).collect();
-            let (found, deviation) = estimate(&films.iter().map(brightness).collect::<Vec<_>>());
+            let (found, standard_error) = estimate(&films.iter().map(brightness).collect::<Vec<_>>());
             assert!(
-                (found - expected).abs() < 0.003 * expected + 3.0 * deviation,
-                "{name}, {sampling:?}: {found} +- {deviation}, expected {expected}"
+                (found - expected).abs() < 0.003 * expected + 3.0 * standard_error,
+                "{name}, {sampling:?}: {found} +- {standard_error}, expected {expected}"
             );
         }
     }
@@ -198,16 +207,22 @@ fn dots_and_lines_keep_their_brightness() {
             .map(|(few, many)| if few.x == 0.0 { few } else { many });
         kept_sums.map(|sum| f64::from(mean(*sum)[0])).sum::<f64>() / few.sums.len() as f64
     });
-    let (found, deviation) = estimate(&estimates.collect::<Vec<_>>());
+    let (found, standard_error) = estimate(&estimates.collect::<Vec<_>>());
     let expected = brightness_of_dots(2);
-    assert!(found + 3.0 * deviation < 0.8 * expected, "{found} +- {deviation}");
+    assert!(
+        found + 3.0 * standard_error < 0.8 * expected,
+        "{found} +- {standard_error}"
+    );
 }
 
-fn uniform(round: u32) -> Sampling {
-    Sampling { round, error: None }
+fn uniform(samples_per_round: u32) -> Sampling {
+    Sampling {
+        samples_per_round,
+        error: None,
+    }
 }
 
-/// Returns the RMS error of uniform sampling, interpolated between powers of two with a power law.
+/// Returns the RMS error of uniform sampling with `samples` samples, interpolated between powers of two by a power law.
 fn error_of_uniform(make: &dyn Fn(Sampling) -> Packed, converged: &[f64], seeds: u32, samples: f64) -> f64 {
     let lower = samples.log2().floor().min(8.0);
     let mean_square_error = |count: f64| {
@@ -232,9 +247,9 @@ fn adaptive_errors_do_not_exceed_errors_of_uniform_sampling() {
     ];
     for (name, make) in &cases {
         let converged = displayed(&seeded(make(uniform(4096)), 99));
-        for (round, error) in SETTINGS {
+        for (samples_per_round, error) in SETTINGS {
             let sampling = Sampling {
-                round,
+                samples_per_round,
                 error: Some(error),
             };
             let films: Vec<Film> = (0..seeds).map(|seed| seeded(make(sampling), seed)).collect();
@@ -244,12 +259,12 @@ fn adaptive_errors_do_not_exceed_errors_of_uniform_sampling() {
             let samples = counts.iter().map(|n| f64::from(*n)).sum::<f64>() / counts.len() as f64;
             let expected = error_of_uniform(make, &converged, seeds, samples);
             println!(
-                "{name}, {sampling:?}: {samples:.1} samples, {found:.4} against {expected:.4}: {:.2}",
+                "{name}, {sampling:?}: {samples:.1} samples, RMS error {found:.4}, uniform sampling {expected:.4}, ratio {:.2}",
                 found / expected
             );
             assert!(
                 found < 1.1 * expected,
-                "{name}, {sampling:?}: {found} against {expected}"
+                "{name}, {sampling:?}: RMS error {found}, uniform sampling {expected}"
             );
         }
     }

@@ -41,7 +41,7 @@ fn scenes(folder: &Path) -> Vec<(String, Packed)> {
     scenes
 }
 
-/// Returns smooth meshes with normal maps: with cyclic, and with mirrored texture coordinates.
+/// Returns a scene with smooth meshes that have normal maps and cyclic or mirrored texture coordinates.
 fn meshes(folder: &Path) -> String {
     let cyclic = Sheet::torus(12, 8);
     let mut mirrored = cyclic.clone();
@@ -151,7 +151,7 @@ fn every_shape(filter: &str, wrap: &str) -> String {
 }
 
 #[test]
-fn images_are_the_same_on_gpu_and_cpu() {
+fn images_agree_on_gpu_and_cpu() {
     if adapter::device().is_none() {
         return;
     }

@@ -103,7 +103,7 @@ fn invalid_images_are_rejected() {
         ("empty.png", "must be a PNG, JPEG, WebP, KTX2, EXR or HDR file"),
         ("text.png", "must be a PNG, JPEG, WebP, KTX2, EXR or HDR file"),
         ("s.toml", "must be a PNG, JPEG, WebP, KTX2, EXR or HDR file"),
-        ("named.jpg", "must match its extension; it is a file of type PNG"),
+        ("named.jpg", "must have the extension of its format, PNG"),
         (
             "nan.exr",
             "has 1 invalid texel, at (2, 1); texel values must be from 0 to 1e6",
@@ -461,7 +461,7 @@ fn the_command_line_ends_with_exit_code_3() {
     assert_eq!(accepted.status.code(), Some(0), "{accepted:?}");
 }
 
-/// Covers every documented key for a texture channel.
+/// Covers every key whose documented type is "number or texture".
 #[test]
 fn only_images_have_an_alpha_channel() {
     let folder = tempfile::tempdir().unwrap();

@@ -58,7 +58,7 @@ fn an_unreadable_image_is_replaced_by_its_factor() {
         assert_eq!(
             scene.notes.len(),
             1,
-            "the file needs exactly one message: {:?}",
+            "expected exactly one message about the file: {:?}",
             scene.notes
         );
         let note = &scene.notes[0];

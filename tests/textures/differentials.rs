@@ -61,15 +61,16 @@ fn ellipsoid(material: &str) -> String {
     )
 }
 
-/// The scene of [`over_plane`] in f64.
+/// The scene of [`ellipsoid_over_plane`] in f64.
 struct Exact<'a> {
     scene: &'a Packed,
-    ellipsoid: Option<bool>, // true for glass
+    /// `None` without an ellipsoid, true for a glass ellipsoid, false for a mirror.
+    ellipsoid: Option<bool>,
 }
 
 /// Traces rays that end at the plane, after specular bounces at the ellipsoid.
 impl Exact<'_> {
-    fn rows() -> (DVec3, DMat3) {
+    fn center_and_inverse() -> (DVec3, DMat3) {
         let (a, b, c) = (
             DVec3::new(0.9, 0.2, 0.0),
             DVec3::new(-0.1, 0.6, 0.1),
@@ -93,7 +94,7 @@ impl Exact<'_> {
     }
 
     fn ellipsoid(o: DVec3, d: DVec3) -> Option<f64> {
-        let (center, m) = Self::rows();
+        let (center, m) = Self::center_and_inverse();
         let (o, d) = (m * (o - center), m * d);
         let (a, b, c) = (d.length_squared(), o.dot(d), o.length_squared() - 1.0);
         let root = (b * b - a * c).sqrt();
@@ -108,7 +109,7 @@ impl Exact<'_> {
             let Some((glass, t)) = hit.filter(|(_, t)| plane <= 0.0 || *t < plane) else {
                 return o + d * plane;
             };
-            let (center, m) = Self::rows();
+            let (center, m) = Self::center_and_inverse();
             o += d * t;
             let outward = (m.transpose() * (m * (o - center))).normalize();
             let n = if outward.dot(d) > 0.0 { -outward } else { outward };
@@ -149,8 +150,8 @@ fn first_nonspecular_hit(scene: &Packed, pixel: Vec2) -> Option<(Primitive, Surf
             continue;
         }
         let surface = with_coordinates(surface_of(scene, &prim, hit, path.ray), &prim.primitive);
-        let arrival = hit_differential(scene, &prim, hit, surface, path.ray, path.differential);
-        return Some((prim.primitive, surface, arrival, path.depth));
+        let hit_diff = hit_differential(scene, &prim, hit, surface, path.ray, path.differential);
+        return Some((prim.primitive, surface, hit_diff, path.depth));
     }
 }
 
@@ -163,7 +164,7 @@ fn assert_differentials(scene: &Packed, glass: Option<bool>, bounces: u32) {
     for y in 0..48 {
         for x in 0..64 {
             let pixel = Vec2::new(x as f32 + 0.5, y as f32 + 0.5);
-            let Some((_, surface, arrival, depth)) = first_nonspecular_hit(scene, pixel) else {
+            let Some((_, surface, hit_diff, depth)) = first_nonspecular_hit(scene, pixel) else {
                 continue;
             };
             let end = exact.end(pixel.as_dvec2());
@@ -173,7 +174,7 @@ fn assert_differentials(scene: &Packed, glass: Option<bool>, bounces: u32) {
                 continue;
             }
             let h = 1e-3;
-            for (step, found) in [(DVec2::X, arrival.x), (DVec2::Y, arrival.y)] {
+            for (step, found) in [(DVec2::X, hit_diff.x), (DVec2::Y, hit_diff.y)] {
                 let neighbor = |side: f64| exact.end(pixel.as_dvec2() + step * (h * side));
                 let expected = (neighbor(1.0) - neighbor(-1.0)) / (2.0 * h);
                 let error = (found.position.as_dvec3() - expected).length();
@@ -221,7 +222,7 @@ fn texture_differentials_on_an_ellipsoid_match_adjacent_rays() {
         scene: &scene,
         ellipsoid: None,
     };
-    let (center, m) = Exact::rows();
+    let (center, m) = Exact::center_and_inverse();
     let uv = |pixel: DVec2| {
         let (o, d) = exact.camera(pixel);
         let l = m * (o + d * Exact::ellipsoid(o, d)? - center);
@@ -234,13 +235,13 @@ fn texture_differentials_on_an_ellipsoid_match_adjacent_rays() {
     for y in 0..48 {
         for x in 0..64 {
             let pixel = Vec2::new(x as f32 + 0.5, y as f32 + 0.5);
-            let Some((q, surface, arrival, _)) = first_nonspecular_hit(&scene, pixel) else {
+            let Some((q, surface, hit_diff, _)) = first_nonspecular_hit(&scene, pixel) else {
                 continue;
             };
             if q.kind != wgray_render::records::ELLIPSOID {
                 continue;
             }
-            let found = surface_footprint(&q, surface, arrival.x.position, arrival.y.position);
+            let found = surface_footprint(&q, surface, hit_diff.x.position, hit_diff.y.position);
             let h = 1e-3;
             for (step, found) in [(DVec2::X, found.dx), (DVec2::Y, found.dy)] {
                 let pixel = pixel.as_dvec2();
@@ -264,7 +265,7 @@ fn texture_differentials_on_an_ellipsoid_match_adjacent_rays() {
 
 /// Negative control: without the derivative of the normal, the error is large.
 #[test]
-fn a_curved_mirror_needs_its_curvature() {
+fn differentials_at_a_curved_mirror_depend_on_the_curvature() {
     let scene = ellipsoid_over_plane(PERSPECTIVE, &ellipsoid("mirror"));
     let exact = Exact {
         scene: &scene,
@@ -276,22 +277,22 @@ fn a_curved_mirror_needs_its_curvature() {
     let hit = closest_hit(&scene, ray, NO_PRIMITIVE, NO_PRIMITIVE);
     let prim = fetch_hit_primitive(&scene, hit);
     let surface = surface_of(&scene, &prim, hit, ray);
-    let arrival = hit_differential(&scene, &prim, hit, surface, ray, differential);
+    let hit_diff = hit_differential(&scene, &prim, hit, surface, ray, differential);
     let reflected = |pixel: DVec2| {
         let (o, d) = exact.camera(pixel);
-        let (center, m) = Exact::rows();
+        let (center, m) = Exact::center_and_inverse();
         let p = o + d * Exact::ellipsoid(o, d).unwrap();
         d.reflect((m.transpose() * (m * (p - center))).normalize())
     };
     let expected =
         (reflected(pixel.as_dvec2() + DVec2::X * 1e-3) - reflected(pixel.as_dvec2() - DVec2::X * 1e-3)) / 2e-3;
     let error = |dn: Vec3| {
-        let found = reflected_derivative(arrival.x, ray.direction, surface.normal, dn)
+        let found = reflected_derivative(hit_diff.x, ray.direction, surface.normal, dn)
             .direction
             .as_dvec3();
         (found - expected).length() / expected.length()
     };
-    assert!(error(arrival.normal_x) < 1e-3, "{}", error(arrival.normal_x));
+    assert!(error(hit_diff.normal_x) < 1e-3, "{}", error(hit_diff.normal_x));
     assert!(error(Vec3::ZERO) > 0.3, "{}", error(Vec3::ZERO));
 }
 
@@ -330,8 +331,8 @@ struct Point {
 
 /// Returns the intersection of a ray with the plane of a triangle.
 fn hit_triangle_plane(sheet: &Sheet, matrix: DMat3, triangle: usize, (o, d): (DVec3, DVec3)) -> Point {
-    let corners = sheet.form.triangles[triangle].map(|vertex| vertex as usize);
-    let [p, q, r] = corners.map(|corner| matrix * sheet.form.points[corner] + 0.1);
+    let corners = sheet.triangle_mesh.triangles[triangle].map(|vertex| vertex as usize);
+    let [p, q, r] = corners.map(|corner| matrix * sheet.triangle_mesh.points[corner] + 0.1);
     let (e, f) = (q - p, r - p);
     let normal_direction = e.cross(f);
     let position = o + d * ((p - o).dot(normal_direction) / d.dot(normal_direction));
@@ -395,8 +396,8 @@ fn differentials_on_a_mesh_match_adjacent_rays() {
                 continue;
             }
             let differential = camera_differential(&packed.camera, pixel, 1.0);
-            let arrival = hit_differential(&packed, &prim, hit, surface, ray, differential);
-            let footprint = footprint_of(&prim, hit, surface, arrival);
+            let hit_diff = hit_differential(&packed, &prim, hit, surface, ray, differential);
+            let footprint = footprint_of(&prim, hit, surface, hit_diff);
             let point = |pixel: DVec2| {
                 let (o, d) = exact.camera(pixel);
                 hit_triangle_plane(&sheet, matrix, hit.primitive as usize, (o + packed.origin, d))
@@ -414,8 +415,8 @@ fn differentials_on_a_mesh_match_adjacent_rays() {
             );
             let h = 1e-3;
             for (step, found, uv, normal) in [
-                (DVec2::X, arrival.x, footprint.dx, arrival.normal_x),
-                (DVec2::Y, arrival.y, footprint.dy, arrival.normal_y),
+                (DVec2::X, hit_diff.x, footprint.dx, hit_diff.normal_x),
+                (DVec2::Y, hit_diff.y, footprint.dy, hit_diff.normal_y),
             ] {
                 let (after, before) = (point(pixel.as_dvec2() + step * h), point(pixel.as_dvec2() - step * h));
                 let position_derivative = (after.position - before.position) / (2.0 * h);

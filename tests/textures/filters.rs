@@ -86,7 +86,7 @@ fn a_constant_image_is_constant_under_every_filter_and_footprint() {
 }
 
 #[test]
-fn cached_weights_equal_the_reference_weights() {
+fn cached_weights_give_the_colors_of_the_reference() {
     let bits = |color: Vec3| color.to_array().map(f32::to_bits);
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name);
@@ -190,7 +190,8 @@ fn ewa_is_a_gaussian_mean_over_the_ellipse() {
     let n = 32;
     let texels = noise(folder.path(), n, n);
     let scene = textured(folder.path(), "type = 'image'\nfile = 'noise.exr'\nfilter = 'ewa'");
-    // exp(-2 q) - exp(-2) where q = p^T (M + I)^-1 p < 1: footprint M and reconstruction I in texels.
+    // The weight is exp(-2 q) - exp(-2) if q = p^T (M + I)^-1 p < 1, where M is the footprint and I the reconstruction
+    // filter, in texels.
     let exact = |uv: DVec2, dx: DVec2, dy: DVec2| {
         let edges = DMat2::from_cols(dx, dy) * f64::from(n);
         let inverse = (edges * edges.transpose() + DMat2::IDENTITY).inverse();
@@ -259,7 +260,7 @@ fn wide_footprints_average_the_full_image() {
     }
 }
 
-/// Trilinear filtering blurs the detail.
+/// Negative control: trilinear filtering blurs the detail.
 #[test]
 fn ewa_keeps_detail_across_a_long_footprint() {
     let folder = tempfile::tempdir().unwrap();
@@ -278,8 +279,8 @@ fn ewa_keeps_detail_across_a_long_footprint() {
     assert!(contrast("trilinear") < 0.3, "{}", contrast("trilinear"));
 }
 
-/// Returns a scene with 128 x 128 gray texels and EWA filtering, the scene with trilinear filtering, and the texels as
-/// a list, bottom row first.
+/// Returns two scenes with a texture of 128 x 128 gray texels, one with EWA and one with trilinear filtering, and the
+/// texels, bottom row first.
 fn gray(folder: &Path, name: &str, texel: impl Fn(usize, usize) -> f32) -> (Packed, Packed, Vec<f64>) {
     write_exr(&folder.join(name), 128, 128, |x, y| {
         [texel(x as usize, 127 - y as usize); 3]
@@ -402,9 +403,9 @@ fn ewa_over_the_pyramid_nearly_equals_ewa_over_the_finest_level() {
     assert!(worse_cases > cases / 2, "{worse_cases} of {cases}");
 }
 
-/// The cost is bounded for any shape.
+/// The cost is bounded for images of any shape.
 #[test]
-fn ewa_is_bounded_for_flat_images() {
+fn the_cost_of_ewa_is_bounded_for_narrow_images() {
     let folder = tempfile::tempdir().unwrap();
     let start = std::time::Instant::now();
     for (width, height) in [(4096, 1), (1, 4096), (4095, 2), (3, 4096)] {
@@ -429,7 +430,7 @@ fn ewa_is_bounded_for_flat_images() {
         }
     }
     let seconds = start.elapsed().as_secs_f64();
-    assert!(seconds < 20.0, "{seconds} s"); // minutes without the bound
+    assert!(seconds < 20.0, "{seconds} s"); // without the bound, the lookups take minutes
 }
 
 /// Texels of 8-bit images are exact, and mip levels keep the mean: a white texel among dark texels is never lost.
@@ -480,7 +481,7 @@ fn mip_levels_of_8_bit_images_keep_the_mean() {
 }
 
 #[test]
-fn the_ellipse_of_a_footprint_has_its_conjugate_diameters() {
+fn the_ellipse_of_a_footprint_has_the_footprint_as_conjugate_diameters() {
     let numbers = Random::new(3);
     let mut clamped = 0;
     for _ in 0..1000 {
@@ -506,9 +507,9 @@ fn the_ellipse_of_a_footprint_has_its_conjugate_diameters() {
     assert!(clamped > 100);
 }
 
-/// The distance to the edge and the size of the footprint do not matter.
+/// The color does not depend on the distance to the edge or on the size of the footprint.
 #[test]
-fn beyond_a_clamped_edge_only_its_color_is_visible() {
+fn beyond_a_clamped_edge_only_the_color_of_the_edge_is_visible() {
     let folder = tempfile::tempdir().unwrap();
     let border = |i: u32| !(4..60).contains(&i);
     let framed = |x, y| if border(x) || border(y) { [0; 3] } else { [255; 3] };

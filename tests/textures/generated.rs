@@ -1,5 +1,5 @@
-//! Generator of the images in `scenes/textures/`. A test compares the files with the generator, and writes them if the
-//! environment variable `WGRAY_WRITE_TEXTURES` is 1.
+//! Generator of the images in `scenes/textures/`. A test compares the files with the generator, and writes the files if
+//! the environment variable `WGRAY_WRITE_TEXTURES` is 1.
 
 use std::path::Path;
 

@@ -5,11 +5,11 @@ use wgray::scene::{Overrides, Scene, Texels, TextureKind};
 
 const SIZE: (usize, usize) = (3, 2);
 
-fn write(path: &std::path::Path, names: &[&str], sample: impl Fn(Vec<f32>) -> FlatSamples) {
+fn write(path: &std::path::Path, names: &[&str], to_channel: impl Fn(Vec<f32>) -> FlatSamples) {
     let texels = SIZE.0 * SIZE.1;
     let channels = names.iter().enumerate().map(|(i, name)| {
         let values = (0..texels).map(|texel| (10 * i + texel) as f32 * 0.25);
-        AnyChannel::new(*name, sample(values.collect()))
+        AnyChannel::new(*name, to_channel(values.collect()))
     });
     let image = Image::from_channels(SIZE, AnyChannels::sort(channels.collect()));
     image.write().to_file(path).unwrap();

@@ -36,12 +36,12 @@ function png(width, height, rgba) {
 	head.set([8, 6], 8);
 	const rows = Buffer.alloc(height * (width * 4 + 1));
 	for (let y = 0; y < height; y++) rows.set(rgba.subarray(y * width * 4, (y + 1) * width * 4), y * (width * 4 + 1) + 1);
-	const parts = [chunk("IHDR", head), chunk("IDAT", zlib.deflateSync(rows, { level: 9 })), chunk("IEND", Buffer.alloc(0))];
-	return Buffer.concat([Buffer.from("\x89PNG\r\n\x1a\n", "latin1"), ...parts]);
+	const chunks = [chunk("IHDR", head), chunk("IDAT", zlib.deflateSync(rows, { level: 9 })), chunk("IEND", Buffer.alloc(0))];
+	return Buffer.concat([Buffer.from("\x89PNG\r\n\x1a\n", "latin1"), ...chunks]);
 }
 
-// Returns an image of smooth colors with some noise, so that all parts of the encodings occur; alpha increases to the
-// right.
+// Returns an image of smooth colors with some noise, so that all features of the encodings are used; alpha increases
+// to the right.
 function picture(width, height, hasAlpha) {
 	let state = 1;
 	const noise = () => ((state = (Math.imul(state, 1664525) + 1013904223) >>> 0) / 2 ** 32) * 40;
@@ -54,7 +54,7 @@ function picture(width, height, hasAlpha) {
 	return { width, height, data };
 }
 
-// Returns four quarters of one color each; the encodings store a block of one of these colors without loss.
+// Returns an image of four quarters, each of one color; the encodings store a block of one of these colors without loss.
 function quarters() {
 	const colors = [[255, 0, 0], [0, 255, 0], [0, 0, 255], [255, 255, 255]];
 	const data = new Uint8Array(16 * 16 * 4);

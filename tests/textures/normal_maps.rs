@@ -13,7 +13,7 @@ use wgray_render::records::Packed;
 use super::{scene, write_exr};
 use crate::random::Random;
 
-/// Returns shapes with the constant normal map (x, y, z) / |(x, y, z)|.
+/// Returns a scene of three shapes with a normal map that contains `normal` everywhere.
 fn shapes(normal: Vec3, keys: &str, strength: f32) -> Packed {
     let folder = tempfile::tempdir().unwrap();
     let texel = normal * 0.5 + 0.5;
@@ -51,7 +51,7 @@ fn shapes(normal: Vec3, keys: &str, strength: f32) -> Packed {
     scene(&text, folder.path())
 }
 
-/// Returns the mapped normal for a ray from `origin` to `target`.
+/// Returns the mapped normal at `target`, seen from `origin`.
 fn normal(scene: &Packed, primitive: usize, origin: Vec3, target: Vec3) -> Vec3 {
     let ray = Ray {
         origin,
@@ -125,7 +125,7 @@ fn strength_scales_the_slope() {
 }
 
 #[test]
-fn a_flat_map_changes_nothing() {
+fn a_flat_normal_map_does_not_change_normals() {
     let flat = shapes(Vec3::Z, "", 1.0);
     let numbers = Random::new(8);
     for _ in 0..200 {

@@ -1,4 +1,4 @@
-//! Procedural textures compared with numerical means.
+//! Procedural textures, compared with numerical and exact means.
 
 use std::f64::consts::TAU;
 use std::path::Path;
@@ -34,7 +34,7 @@ fn numeric_mean(kind: u32, width: f64, f: Footprint, n: i32) -> f64 {
     sum / f64::from(n * n)
 }
 
-/// Clips to `normal . p <= limit`.
+/// Clips a polygon to the half-plane `normal . p <= limit`.
 fn clip(polygon: &[DVec2], normal: DVec2, limit: f64) -> Vec<DVec2> {
     let mut clipped_polygon = Vec::new();
     for (i, &a) in polygon.iter().enumerate() {
@@ -56,8 +56,8 @@ fn area(polygon: &[DVec2]) -> f64 {
 }
 
 /// Clips a polygon to the strip between two positions along an axis.
-fn clip_to_strip(polygon: &[DVec2], axis: DVec2, from: f64, to: f64) -> Vec<DVec2> {
-    clip(&clip(polygon, axis, to), -axis, -from)
+fn clip_to_strip(polygon: &[DVec2], axis: DVec2, low: f64, high: f64) -> Vec<DVec2> {
+    clip(&clip(polygon, axis, high), -axis, -low)
 }
 
 /// Returns the exact mean over the parallelogram, cell by cell.
@@ -103,7 +103,8 @@ fn exact_mean(kind: u32, width: f64, f: Footprint) -> f64 {
     sum / area(&parallelogram) + if kind == CHECKER { 0.0 } else { 1.0 }
 }
 
-/// Returns a sheared footprint: at any angle or at almost 45 degrees, square to very thin, and sometimes near a corner.
+/// Returns a sheared footprint: at any angle or at almost 45 degrees, square to very thin, and sometimes near a corner
+/// of the pattern.
 fn random_footprint(size: f64, aspects: &[f64], numbers: &Random) -> Footprint {
     let angle = if numbers.once_in(2) {
         numbers.between(0.0, TAU)
@@ -156,7 +157,7 @@ fn footprints_of_any_size_and_angle_have_the_exact_mean() {
 
 /// At 45 degrees and with one to two squares per pixel, there is no moiré.
 #[test]
-fn slanted_checkers_have_their_contrast() {
+fn slanted_checkers_keep_their_contrast() {
     for size in [1.0, 1.5, 2.0] {
         let edge = |eighths: f32| Vec2::from_angle(eighths * std::f32::consts::FRAC_PI_4) * size;
         let (mut low, mut high) = (1.0, 0.0);

@@ -190,7 +190,7 @@ fn a_truncated_path_returns_the_background() {
 }
 
 #[test]
-fn glass_casts_a_shadow_unless_it_is_transparent() {
+fn glass_casts_a_shadow_unless_shadows_are_transparent() {
     let floor_radiance = |shadows: &str, material: &str| {
         let text = format!(
             "image = {{ width = 8, height = 8 }}
@@ -277,7 +277,7 @@ fn branches_chosen_at_random_have_the_expected_mean() {
         )
     };
     let r = (9.0f64 / 11.0).powi(2);
-    let plate = (1.0 - r) / (1.0 + r); // after any number of internal reflections
+    let plate = (1.0 - r) / (1.0 + r); // the sum over all internal reflections
     let found = f64::from(cpu_picture(&scene(&text(64), Path::new(".")))[0][0]);
     assert!((found - plate).abs() < 4e-3, "{found} {plate}");
     // Negative control: 3 bounces are too few.

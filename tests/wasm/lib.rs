@@ -8,7 +8,7 @@ use std::mem::ManuallyDrop;
 use wgray::scene::{LoadOptions, MemoryFiles, SceneFormat};
 use wgray::{Device, Error, Options, Scene};
 
-/// Returns the linear RGB of a scene's pixels in row-major order, top row first.
+/// Returns the linear RGB values of a scene's pixels in row-major order, top row first.
 fn pixels(scene: &str) -> Result<Vec<f32>, Error> {
     let files = MemoryFiles::new()
         .with("meshes/knot.obj", &include_bytes!("../../scenes/meshes/knot.obj")[..])
@@ -56,7 +56,7 @@ pub unsafe extern "C" fn render(text: *mut u8, len: usize) -> *const u32 {
 mod tests {
     use super::*;
 
-    /// Compares with `pixels.f32`, or writes it if `WGRAY_TEST_RECORD` is set.
+    /// Compares the pixels with `pixels.f32`. If `WGRAY_TEST_RECORD` is set, writes this file first.
     #[test]
     fn a_native_build_renders_the_recorded_pixels() {
         let bytes: Vec<u8> = pixels(include_str!("scene.toml"))

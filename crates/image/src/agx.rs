@@ -32,7 +32,7 @@ const OUTSET_INVERSE: [[f64; 3]; 3] = [
     [0.111_420_988_957_48, 0.087_199_619_202_834_9, 0.801_379_391_839_686],
 ];
 
-/// Middle gray.
+/// Linear value of middle gray.
 const MIDDLE_GRAY: f64 = 0.18;
 /// Dynamic range of the curve, in stops below and above middle gray.
 const STOPS_BELOW: f64 = 10.0;
@@ -84,7 +84,7 @@ fn pivot() -> (f64, f64) {
 
 static GRAY: LazyLock<f64> = LazyLock::new(|| MIDDLE_GRAY.powf(1.0 / POWER));
 
-/// Returns the scales of the two branches of the curve, below and above middle gray.
+/// Scales of the two branches of the curve, below and above middle gray.
 struct BranchScales {
     below: f64,
     above: f64,

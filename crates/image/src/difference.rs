@@ -55,12 +55,12 @@ mod tests {
     #[test]
     fn differences_are_counted_and_measured() {
         let a = pixels(&[[0.0, 1.0, 2.0], [3.0, 4.0, 5.0], [0.0; 3]]);
-        let same = Difference {
+        let no_difference = Difference {
             unequal: 0,
             largest: 0.0,
             beyond: 0,
         };
-        assert_eq!(difference(&a, &a, 0.0), Some(same));
+        assert_eq!(difference(&a, &a, 0.0), Some(no_difference));
         let b = pixels(&[[0.0, 1.0, 2.5], [3.0, 4.0, 5.0], [-0.0, 0.0, 0.25]]);
         let expected = Difference {
             unequal: 2,
@@ -71,7 +71,7 @@ mod tests {
     }
 
     #[test]
-    fn nan_is_never_within_the_tolerance() {
+    fn nan_exceeds_every_tolerance_unless_the_bits_are_equal() {
         let (a, b) = (pixels(&[[0.0; 3]]), pixels(&[[f32::NAN, 0.0, 0.0]]));
         let result = difference(&a, &b, f32::MAX).unwrap();
         assert_eq!((result.unequal, result.beyond), (1, 1));

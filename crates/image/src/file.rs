@@ -21,9 +21,11 @@ pub struct Pending {
 
 #[derive(Debug)]
 enum Spool {
-    /// A temporary file in the folder of the target, the target, and the permissions of the replaced file.
+    /// A temporary file in the folder of the target, the path of the target, and the permissions of the file to
+    /// replace.
     Named(NamedTempFile, PathBuf, Option<Permissions>),
-    /// An anonymous file, which disappears with the process, and the pipe or device that receives its bytes.
+    /// An anonymous file, which disappears with the process, and the pipe or device that receives the bytes of this
+    /// file.
     Anonymous(File, File),
 }
 
@@ -80,7 +82,7 @@ impl Pending {
         &self.name
     }
 
-    /// Flushes all bytes to the disk. [`Pending::finish`] then only renames or copies the file.
+    /// Flushes all bytes to the disk, so that [`Pending::finish`] only has to rename or copy the file.
     pub fn complete(&mut self) -> io::Result<()> {
         self.flush()?;
         if let Some((kind, message)) = &self.failure {
@@ -155,7 +157,7 @@ fn spool_anonymously(target: File) -> io::Result<Spool> {
     Ok(Spool::Anonymous(spool?, target))
 }
 
-/// Maximum part of the target's name in a temporary name, in bytes.
+/// Maximum length in bytes of the target's name within a temporary name.
 const MAX_NAME_BYTES: usize = 120;
 
 /// Pattern of a temporary name: `.wgray-PID@HOST-RANDOM-NAME`.
@@ -208,7 +210,7 @@ pub fn create_beside(path: &Path) -> io::Result<NamedTempFile> {
     builder.prefix(&prefix).suffix(&name.suffix).rand_bytes(RANDOM_LEN);
     #[cfg(unix)]
     {
-        // The default mode of new files, before the umask.
+        // The default mode of new files, before the umask is applied.
         use std::os::unix::fs::PermissionsExt;
         builder.permissions(Permissions::from_mode(0o666));
     }

@@ -1,4 +1,4 @@
-//! Image handling that does not need a renderer: regions, colour and view transforms, atomic files, comparison. Also
+//! Image handling that does not need a renderer: regions, color and view transforms, atomic files, comparison. Also
 //! contains the handling of memory and paths that all crates of wgray share.
 
 mod agx;

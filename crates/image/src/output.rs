@@ -97,7 +97,7 @@ impl Output {
     }
 
     /// Opens a pipe or a device now instead of in [`Pending::start`](super::Pending::start). Opening a pipe blocks
-    /// until it has a reader.
+    /// until the pipe has a reader.
     ///
     /// # Errors
     ///

@@ -102,7 +102,7 @@ mod tests {
     }
 
     #[test]
-    fn a_panic_is_an_error_with_its_message() {
+    fn panics_become_errors_with_the_panic_message() {
         assert_eq!(catch_panic(|| 7), Ok(7));
         assert_eq!(catch_panic(|| panic!("text")), Err::<(), _>("text".to_string()));
         let causes = "Error in Device::poll: Validation Error\n\nCaused by:\n  Parent device is lost\n";

@@ -1,6 +1,6 @@
 //! Images in memory.
 
-/// An image in memory.
+/// An image with linear RGB pixels.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Pixels {
     /// Columns.

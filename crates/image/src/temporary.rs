@@ -10,7 +10,7 @@ type Name = std::path::PathBuf;
 
 static NAMES: Mutex<Vec<Name>> = Mutex::new(Vec::new());
 
-/// From this number of names on, the names of deleted files are removed from the list.
+/// Minimum length of the list at which the names of deleted files are removed from it.
 const MIN_PRUNED_NAMES: usize = 64;
 
 pub(super) fn register(path: &Path) {

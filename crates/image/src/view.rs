@@ -202,7 +202,7 @@ pub fn to_16_bits(value: f64) -> u16 {
 fn sanitized(value: f32) -> f64 {
     match value > 0.0 {
         true => f64::from(value.min(f32::MAX)),
-        false => 0.0, // NaN too
+        false => 0.0, // also for NaN
     }
 }
 
@@ -310,7 +310,7 @@ mod tests {
         let gamma = view(ViewTransform::Gamma22).display([0.5; 3]);
         assert!(
             max_difference(gamma, [0.735_356_98; 3]) > 1e-3,
-            "a different curve passes"
+            "gamma 2.2 passes as sRGB"
         );
     }
 
@@ -439,7 +439,7 @@ mod tests {
 
     /// All rendered values must map to 0 ... 1.
     #[test]
-    fn every_value_has_a_display_value() {
+    fn display_values_are_always_from_0_to_1() {
         let values = [
             f32::NAN,
             f32::INFINITY,

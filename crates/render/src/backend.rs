@@ -186,7 +186,7 @@ impl Rules {
         })
     }
 
-    /// Checks a dispatch and counts its pilot samples. Returns false if it is empty.
+    /// Checks a dispatch and counts its pilot samples. Returns false if the dispatch is empty.
     pub fn call(&self, film: &mut FilmState, tile: Region, samples: &Range<u32>) -> Result<bool, RenderError> {
         if tile.is_empty() || samples.is_empty() {
             return Ok(false);

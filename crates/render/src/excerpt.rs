@@ -9,16 +9,16 @@ const CONTEXT: usize = 60;
 
 /// Returns a line with its line number, which counts from 1. Truncates a long line.
 pub fn numbered(number: usize, line: &str) -> String {
-    let (part, _) = window(line, 0);
-    format!("{number:>5} | {part}").trim_end().to_string()
+    let (printed, _) = window(line, 0);
+    format!("{number:>5} | {printed}").trim_end().to_string()
 }
 
 /// Returns a numbered line with marks below `length` characters from `start`. Truncates a long line around the marks.
 pub fn marked(number: usize, line: &str, start: usize, length: usize) -> String {
-    let (part, mark) = window(line, start);
-    let available = part.chars().count().saturating_sub(mark).max(1);
+    let (printed, mark) = window(line, start);
+    let available = printed.chars().count().saturating_sub(mark).max(1);
     let (indent, marks) = (" ".repeat(mark), "^".repeat(length.clamp(1, available)));
-    format!("{number:>5} | {part}\n{NO_NUMBER} {indent}{marks}")
+    format!("{number:>5} | {printed}\n{NO_NUMBER} {indent}{marks}")
 }
 
 /// Returns the printed part of a line, and `position` relative to the start of this part.
@@ -27,14 +27,14 @@ fn window(line: &str, position: usize) -> (String, usize) {
     let position = position.min(count);
     let first = position.saturating_sub(CONTEXT).min(count.saturating_sub(WIDTH));
     let blank_control = |c: char| if c.is_control() { ' ' } else { c };
-    let mut part: Vec<char> = line.chars().skip(first).take(WIDTH).map(blank_control).collect();
+    let mut printed: Vec<char> = line.chars().skip(first).take(WIDTH).map(blank_control).collect();
     if first > 0 {
-        part[0] = '…';
+        printed[0] = '…';
     }
     if first + WIDTH < count {
-        part[WIDTH - 1] = '…';
+        printed[WIDTH - 1] = '…';
     }
-    (part.into_iter().collect(), position - first)
+    (printed.into_iter().collect(), position - first)
 }
 
 #[cfg(test)]

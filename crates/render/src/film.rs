@@ -162,7 +162,7 @@ impl Film {
 
     /// Returns the estimated variance of a pixel's mean per channel. Requires adaptive sampling. The estimate assumes
     /// independent samples; for stratified patterns it is, on average, an upper bound. A pixel's number of samples
-    /// depends on the variance of its neighbors, not on its own.
+    /// depends on the variance of its neighbors, not on the variance of the pixel itself.
     pub fn variance(&self, pixel: usize) -> [f32; 3] {
         variance_of_mean(self.sums[pixel], self.moments[pixel]).to_array()
     }

@@ -10,13 +10,13 @@ use super::texture::Image;
 use crate::file_system::{AssetSource, FileSystem, or_current};
 use crate::mesh::Mesh;
 
-/// Maximum size of a file in bytes.
+/// Maximum size of an image file in bytes.
 const MAX_FILE_BYTES: u64 = 512 << 20;
 
-/// The images and meshes of a scene: the folder or source of files, and those in memory.
+/// The images and meshes of a scene: images and meshes in memory, and the folder or source of files.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Assets {
-    /// Folder of the scene file; file names are relative to it.
+    /// Folder of the scene file; file names are relative to this folder.
     pub folder: PathBuf,
     /// Folder that must contain all files.
     pub root: PathBuf,
@@ -26,9 +26,9 @@ pub struct Assets {
     pub images: BTreeMap<String, Arc<Image>>,
     /// Encoded image files in memory, by name.
     pub encoded: BTreeMap<String, Arc<[u8]>>,
-    /// Maximum side in texels of images in `encoded`. Larger images are halved until they fit.
+    /// Maximum side in texels of images in `encoded`. Larger images are halved in size until they fit.
     pub longest_side: Option<u32>,
-    /// Reasons for missing image files, by the names that textures use.
+    /// The reasons why image files are missing, by the names that textures use.
     pub(super) absent: BTreeMap<String, String>,
     /// Meshes in memory, by name.
     pub meshes: BTreeMap<String, Arc<Mesh>>,
@@ -37,6 +37,7 @@ pub struct Assets {
     pub(super) file_system: FileSystem,
 }
 
+/// Location of an image or a mesh.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum AssetKey {
     /// A canonical path.
@@ -80,8 +81,8 @@ impl Assets {
         }
     }
 
-    /// Returns these assets with file names relative to another folder, which must also contain all files unless they
-    /// are in a source.
+    /// Returns these assets with file names relative to another folder. Unless the files are in a source, this folder
+    /// must contain all files.
     pub(super) fn in_folder(&self, folder: &Path) -> Assets {
         let mut assets = Assets {
             folder: folder.to_owned(),
@@ -94,15 +95,15 @@ impl Assets {
         assets
     }
 
-    /// Returns the warning about damage to a file, which names the placeholder.
+    /// Returns a warning about damage to a file. The warning ends with `placeholder`, which names the replacement.
     ///
     /// # Errors
     ///
     /// The damage itself if [`Assets::strict`] is set.
-    pub(super) fn tolerate(&self, damage: Problem, stand_in: &str) -> Result<String, Problem> {
+    pub(super) fn tolerate(&self, damage: Problem, placeholder: &str) -> Result<String, Problem> {
         match self.strict {
             true => Err(damage),
-            false => Ok(format!("{}; {stand_in}", damage.message)),
+            false => Ok(format!("{}; {placeholder}", damage.message)),
         }
     }
 
@@ -117,7 +118,7 @@ impl Assets {
         relative.unwrap_or(file)
     }
 
-    /// Returns the location of a file.
+    /// Returns the location of a file, or of an image in memory with this name.
     pub(super) fn find(&self, file: &str) -> Result<AssetKey, Problem> {
         if let Some(reason) = self.absent.get(file) {
             return Err(Problem::damage(reason));
@@ -166,7 +167,7 @@ impl Assets {
             io::ErrorKind::FileTooLarge => {
                 Problem::new(format!("{file:?} must not be larger than {} MiB", MAX_FILE_BYTES >> 20))
             }
-            // Not damage to the file, which a placeholder could replace.
+            // A lack of memory is not damage, so no placeholder replaces the file.
             io::ErrorKind::OutOfMemory => Problem::new(unreadable(file, &error)).with_file(file, error.kind()),
             _ => Problem::damage(unreadable(file, &error)).with_file(file, error.kind()),
         })

@@ -14,7 +14,7 @@ use crate::{
     ShapeDescription, TextureDescription,
 };
 
-/// Declares a handle: a unique name, which descriptions accept where they refer to the item by name.
+/// Declares a type of handles. A handle contains a unique name, and converts to the names in descriptions.
 macro_rules! handle {
     ($(#[$attribute:meta])* $name:ident) => {
         $(#[$attribute])*
@@ -22,7 +22,7 @@ macro_rules! handle {
         pub struct $name(Arc<str>);
 
         impl $name {
-            /// Returns the name in the description.
+            /// Returns the name of the item in the description.
             pub fn name(&self) -> &str {
                 &self.0
             }
@@ -88,7 +88,7 @@ pub struct SceneBuilder {
 }
 
 impl SceneBuilder {
-    /// Returns an empty scene with default render settings. The size is in pixels.
+    /// Creates a builder of an empty scene with default render settings. The width and height are in pixels.
     pub fn new(width: u32, height: u32, camera: impl Into<CameraDescription>) -> SceneBuilder {
         SceneBuilder {
             description: Description::new(width, height, camera),
@@ -136,7 +136,8 @@ impl SceneBuilder {
         TextureId(name)
     }
 
-    /// Adds a texture of an image with default settings. Other settings: [`ImageTextureDescription`].
+    /// Adds an image texture with default settings. For other settings, pass an [`ImageTextureDescription`] to
+    /// [`SceneBuilder::texture`].
     pub fn image_texture(&mut self, image: &ImageId) -> TextureId {
         self.texture(ImageTextureDescription::new(image))
     }
@@ -148,7 +149,7 @@ impl SceneBuilder {
         MaterialId(name)
     }
 
-    /// Adds a mesh, for instances.
+    /// Adds a mesh. [`SceneBuilder::instance`] places the mesh in the scene.
     pub fn mesh(&mut self, mesh: impl Into<Arc<Mesh>>) -> MeshId {
         let name = self.unique_name("mesh");
         self.assets.meshes.insert(name.to_string(), mesh.into());
@@ -157,7 +158,7 @@ impl SceneBuilder {
         MeshId(name)
     }
 
-    /// Adds an instance of a mesh, in which all groups have the same material.
+    /// Adds an instance of a mesh, with one material for all groups.
     pub fn instance(&mut self, mesh: &MeshId, material: &MaterialId, to_world: DAffine3) {
         self.instance_with(InstanceDescription {
             matrix: Some(rows(&to_world)),

@@ -47,7 +47,8 @@ impl CameraPath {
         })
     }
 
-    /// Returns the frames of the first and last key. Before and after these frames, the camera is constant.
+    /// Returns the frames of the first and last key. The camera does not move before the first or after the last of
+    /// these frames.
     pub fn frames(&self) -> (f64, f64) {
         self.frames
     }

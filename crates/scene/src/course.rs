@@ -20,7 +20,8 @@ use super::{
     SamplesDescription, Scale, Up, parse,
 };
 
-/// Maximum size of a file in bytes, small because the parsed values need many times as much memory.
+/// Maximum size of a file in bytes. The limit is small, because the parsed values need many times the memory of the
+/// text.
 const MAX_FILE_BYTES: usize = 4 << 20;
 
 #[derive(Deserialize)]
@@ -100,6 +101,7 @@ pub fn asset_root(folder: &Path) -> PathBuf {
     parent.map_or_else(|| folder.join(".."), Path::to_owned)
 }
 
+/// Parses a JSON scene, and converts it to +Z up.
 pub fn read(text: &str, origin: &str, defines: &mut Defines) -> Result<Description, SceneError> {
     let course = read_json(text, defines).map_err(|fault| match fault {
         ReadFault::Values(problems) => {
@@ -121,10 +123,11 @@ pub fn read(text: &str, origin: &str, defines: &mut Defines) -> Result<Descripti
     Ok(description(&course))
 }
 
+/// Converts problems of a description to an error with the keys and lines of the JSON file.
 pub fn invalid(text: &str, origin: &str, problems: Problems, defines: &Defines) -> SceneError {
     let problems = problems.map(|problem| Problem {
         key: key_in_file(text, &problem.key, defines),
-        // In the file, this type is named "specular".
+        // The JSON file names this type "specular".
         message: problem.message.replace("\"conductor\"", "\"specular\""),
         ..problem
     });
@@ -198,7 +201,7 @@ fn read_json(text: &str, defines: &mut Defines) -> Result<Course, ReadFault> {
         .apply(&[], &mut table, |_| false)
         .map_err(|problem| ReadFault::Values(problem.into()))?;
     let in_json_terms = |problem: Problem| {
-        // The message uses the terms of TOML.
+        // The messages of `parse` use the terms of TOML.
         let object = find(text, &problem.key).filter(|value| value.starts_with('{'));
         let message = match (problem.message.rsplit_once(" must be "), object) {
             (Some((_, rule)), Some(object)) => format!("{} must be {rule}", cut(&one_line(object))),
@@ -223,7 +226,7 @@ fn check(course: &Course) -> Result<(), Problems> {
         objects,
         ..
     } = course;
-    // Uses `validate_frame`, because a vertical view is only allowed for the default `up`, +Z.
+    // Not `validate`, which replaces an `up` of +Z in vertical views: +Z is not the default `up` of JSON scenes.
     let mut problems = Collector::default();
     problems.values(camera(cam_config).validate_frame().map_err(Problems::from).at("camera"));
     problems.value(light(&self::rectangle(light_config).into()).at(0).at("lights"));

@@ -1,4 +1,4 @@
-//! Decoder of image files, whose limits are checked against the header before any texel is decoded.
+//! Decodes image files. The size in the header is checked against limits before any texel is decoded.
 
 mod gray_exr;
 
@@ -19,12 +19,14 @@ pub(super) const MAX_IMAGE_SIDE: u32 = 16_384;
 const MAX_DECODER_BYTES: usize = 64 << 20;
 
 /// Limit on the decoded size in bytes: a constant, plus an allowance per byte of the file, because a small file may
-/// declare 16,384 x 16,384 texels. A decoder may need as much memory again.
+/// declare 16,384 x 16,384 texels. A decoder may use twice this limit in total.
 const DECODED_LIMIT: (u64, u64) = (256 << 20, 32);
 
-/// Limit in bytes on the texels that an EXR file does not store; increases with the file size like [`DECODED_LIMIT`].
+/// Limit in bytes on the texels that an EXR file does not store. The limit increases with the file size like
+/// [`DECODED_LIMIT`].
 const BLANK_LIMIT: u64 = 64 << 20;
 
+/// Format of an image file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Format {
     /// A format of the crate `image`.
@@ -69,6 +71,7 @@ impl Format {
     }
 }
 
+/// Size and precision of an image, which are known before its texels are decoded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Header {
     pub width: u32,
@@ -234,7 +237,8 @@ fn decode_ktx2(bytes: &[u8], fits: impl Fn(Header) -> Result<(), String>) -> Res
     file.decode().map_err(DecodeError::Damaged)
 }
 
-/// Uses the crate `png` directly to skip color profiles and text chunks, whose decompressed size is unknown.
+/// Decodes a PNG file with the crate `png`, which can skip color profiles and text chunks, whose decompressed size is
+/// unknown.
 fn decode_png(bytes: &[u8], fits: impl Fn(Header) -> Result<(), String>) -> Result<DynamicImage, DecodeError> {
     let mut options = png::DecodeOptions::default();
     options.set_ignore_text_chunk(true);
@@ -243,7 +247,7 @@ fn decode_png(bytes: &[u8], fits: impl Fn(Header) -> Result<(), String>) -> Resu
     decoder.set_limits(png::Limits {
         bytes: MAX_DECODER_BYTES,
     });
-    decoder.set_transformations(png::Transformations::EXPAND); // to colors instead of palettes, and to at least 8 bits
+    decoder.set_transformations(png::Transformations::EXPAND); // palettes to colors, values to at least 8 bits
     let info = decoder.read_header_info()?;
     let (width, height) = (info.width, info.height);
     let is_16_bit = info.bit_depth == png::BitDepth::Sixteen;

@@ -13,7 +13,7 @@ use super::problem::Problem;
 /// An override of the value of a key: `KEY=VALUE`.
 ///
 /// `KEY` is a path from the top of the file, such as `render.seed`, `materials."dark red".color`, `shapes[2].radius` or
-/// `shapes.2.radius`; list indices start at 0. `VALUE` is TOML; other text is a string without quotes.
+/// `shapes.2.radius`; list indices start at 0. `VALUE` is TOML; text that is not TOML is a string.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Define {
     pub(super) key: KeyPath,
@@ -136,14 +136,14 @@ fn read_key(text: &str, syntax_problem: fn(&str) -> Problem) -> Result<(KeyPath,
             TokenKind::LeftSquareBracket if expects_separator => {
                 let inner = tokens.next().zip(tokens.next());
                 let (number, _) = inner
-                    .filter(|(number, end)| {
-                        (number.kind(), end.kind()) == (TokenKind::Atom, TokenKind::RightSquareBracket)
+                    .filter(|(number, bracket)| {
+                        (number.kind(), bracket.kind()) == (TokenKind::Atom, TokenKind::RightSquareBracket)
                     })
                     .ok_or_else(|| syntax_problem(text))?;
-                let number = text
+                let index = text
                     .get(number.span().start()..number.span().end())
                     .and_then(parse_index);
-                path.push(Segment::Index(number.ok_or_else(|| syntax_problem(text))?));
+                path.push(Segment::Index(index.ok_or_else(|| syntax_problem(text))?));
             }
             _ => return Err(syntax_problem(text)),
         }
@@ -156,8 +156,8 @@ fn read_key(text: &str, syntax_problem: fn(&str) -> Problem) -> Result<(KeyPath,
 }
 
 pub(super) fn parse_index(text: &str) -> Option<usize> {
-    let digits = text.bytes().all(|byte| byte.is_ascii_digit());
-    text.parse().ok().filter(|_| digits)
+    let is_number = text.bytes().all(|byte| byte.is_ascii_digit());
+    text.parse().ok().filter(|_| is_number)
 }
 
 /// Parses a TOML value or an unquoted string. Text that starts like a list, table or quoted string must be
@@ -293,7 +293,7 @@ radius = 0.5
     }
 
     #[test]
-    fn invalid_values_name_the_define() {
+    fn errors_of_invalid_values_name_the_define() {
         for (define, message) in [
             ("camera.fov=x", "camera.fov: \"x\" must be a number"),
             ("camera.fov=180", "camera.fov: 180 must be from 0.001 to 179.999"),

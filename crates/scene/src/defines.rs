@@ -41,10 +41,12 @@ impl<'a> Defines<'a> {
         }
     }
 
+    /// Returns these overrides, none of which is recorded as applied.
     pub fn restarted(&self) -> Defines<'a> {
         Defines::new(self.overrides)
     }
 
+    /// Forgets which overrides were applied.
     pub fn restart(&mut self) {
         self.applied.clear();
     }
@@ -60,8 +62,8 @@ impl<'a> Defines<'a> {
         })
     }
 
-    /// Applies the overrides of the table at this path; with an empty path, all overrides whose first key is not
-    /// excluded.
+    /// Applies the overrides of the table at this path. With an empty path, applies all overrides whose first key is
+    /// not excluded.
     pub fn apply(
         &mut self,
         table_path: &[Segment],
@@ -134,7 +136,7 @@ fn is_samples(path: &[Segment]) -> bool {
 /// Sets a value in a tree of tables and lists. Creates missing tables, except named textures, materials and meshes.
 /// Appends the path of the value or failure to `path`. Returns the path length of the outermost table that was created,
 /// or of the value if no table was created.
-fn set_value(root: &mut Value, path: &mut Vec<Segment>, key: &[Segment], new: &Value) -> Result<usize, String> {
+fn set_value(root: &mut Value, path: &mut Vec<Segment>, key: &[Segment], new_value: &Value) -> Result<usize, String> {
     let mut replaced_len = None;
     let mut value = root;
     for (i, segment) in key.iter().enumerate() {
@@ -183,7 +185,7 @@ fn set_value(root: &mut Value, path: &mut Vec<Segment>, key: &[Segment], new: &V
                             "does not exist; the length of the list is {count}, and indices start at 0"
                         ));
                     }
-                    found => found,
+                    element => element,
                 }
             }
             _ => {
@@ -198,7 +200,7 @@ fn set_value(root: &mut Value, path: &mut Vec<Segment>, key: &[Segment], new: &V
             None => return Err("does not exist".to_owned()),
         }
     }
-    *value = new.clone();
+    *value = new_value.clone();
     Ok(replaced_len.unwrap_or(path.len()))
 }
 

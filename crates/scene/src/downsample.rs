@@ -1,4 +1,5 @@
-//! Downsampling by two in linear light, for mip levels and for images that exceed the memory limit.
+//! Downsampling by two in linear light, for mip levels and for images that exceed
+//! [`Assets::longest_side`](crate::Assets::longest_side).
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -64,7 +65,8 @@ fn half(width: usize, height: usize, texel: impl Fn(usize, usize) -> DVec3 + Syn
     let (new_width, new_height) = ((width / 2).max(1), (height / 2).max(1));
     let row_indices = (0..new_height).into_par_iter().with_min_len(16);
     let rows = if width.is_multiple_of(2) && height.is_multiple_of(2) {
-        // For even sizes: the same sum in the same order as for other sizes, but with constant weights.
+        // For even sizes, computes the sum of the general case, in the order of the general case, with constant
+        // weights.
         let color = |i: usize, j: usize| {
             let texel = |x: usize, y: usize| texel(2 * i + x, 2 * j + y) * 0.25;
             DVec3::ZERO + texel(0, 0) + texel(1, 0) + texel(0, 1) + texel(1, 1)
@@ -73,12 +75,12 @@ fn half(width: usize, height: usize, texel: impl Fn(usize, usize) -> DVec3 + Syn
             .map(|j| (0..new_width).map(|i| color(i, j)).collect())
             .collect()
     } else {
-        let (columns, rows) = (covers(width, new_width), covers(height, new_height));
+        let (columns, rows) = (covered_texels(width, new_width), covered_texels(height, new_height));
         let color = |column: &[(usize, f64)], row: &[(usize, f64)]| {
             let mut sum = DVec3::ZERO;
-            for (y, v) in row {
-                for (x, u) in column {
-                    sum += texel(*x, *y) * (u * v);
+            for (y, y_weight) in row {
+                for (x, x_weight) in column {
+                    sum += texel(*x, *y) * (x_weight * y_weight);
                 }
             }
             sum
@@ -92,7 +94,7 @@ fn half(width: usize, height: usize, texel: impl Fn(usize, usize) -> DVec3 + Syn
 
 /// For each of `new_count` texels, returns the indices and the weights of the old texels that the new texel covers.
 /// `new_count` is half of `old_count`, rounded down, and at least 1.
-fn covers(old_count: usize, new_count: usize) -> Vec<Vec<(usize, f64)>> {
+fn covered_texels(old_count: usize, new_count: usize) -> Vec<Vec<(usize, f64)>> {
     let size = old_count as f64 / new_count as f64;
     let cover = |i: usize| {
         let (start, end) = (i as f64 * size, (i + 1) as f64 * size);

@@ -23,7 +23,8 @@ pub enum Background {
     Display(DVec3),
 }
 
-/// Replaces the environment, except for its visibility to the camera.
+/// Replaces the environment. Keeps its visibility to the camera, and its background unless the new environment has a
+/// background.
 pub(super) fn replace_environment(description: &mut Description, environment: &EnvironmentDescription) {
     let before = description.environment.take();
     let (visible, background) = before.map_or((true, None), |before| (before.visible, before.background));
@@ -54,8 +55,8 @@ impl Background {
             return Ok(());
         }
         render.alpha = None;
-        let light = &mut render.background;
-        let constant = || EnvironmentDescription::new(std::mem::take(light));
+        let radiance = &mut render.background;
+        let constant = || EnvironmentDescription::new(std::mem::take(radiance));
         let environment = description.environment.get_or_insert_with(constant);
         environment.background = Some(visible_color);
         environment.visible = true;
@@ -69,7 +70,7 @@ fn transparent(description: &mut Description) -> Result<(), Problem> {
         .integrator
         .is_some_and(|integrator| !integrator.follows_paths())
     {
-        return Err(Problem::new("none needs integrator = \"path\""));
+        return Err(Problem::new("transparency needs integrator = \"path\""));
     }
     description.render.alpha = Some(true);
     if let Some(environment) = &mut description.environment {
@@ -252,16 +253,16 @@ camera = { position = [0, 1, 0], look_at = [1, 0, 0], fov = 40 }
         };
         let (light, red) = ([1.0, 2.0, 3.0], [1.0, 0.0, 0.0]);
         assert_eq!(loaded(path, &overrides(None, None)), (Some((light, true, None)), true));
-        let shown = Some(DVec3::from(red));
+        let red_background = Some(DVec3::from(red));
         assert_eq!(
             loaded(path, &overrides(None, color(red))),
-            (Some((light, true, shown)), false)
+            (Some((light, true, red_background)), false)
         );
         let gray = Some(([0.5; 3], true, None));
         assert_eq!(loaded(path, &overrides(Some("0.5,0.5,0.5"), None)), (gray, true));
         assert_eq!(
             loaded(path, &overrides(Some("0.5,0.5,0.5"), color(red))),
-            (Some(([0.5; 3], true, shown)), false)
+            (Some(([0.5; 3], true, red_background)), false)
         );
         let opaque = path.replace("alpha = true, ", "");
         let clear = overrides(None, Some(Background::Transparent));
@@ -270,7 +271,7 @@ camera = { position = [0, 1, 0], look_at = [1, 0, 0], fov = 40 }
         let dark = "render.integrator = 'path'\n";
         assert_eq!(
             loaded(dark, &overrides(None, color(red))),
-            (Some(([0.0; 3], true, shown)), false)
+            (Some(([0.0; 3], true, red_background)), false)
         );
         assert_eq!(loaded(dark, &overrides(None, color([0.0; 3]))), (None, false));
         let invisible = format!("{dark}environment = {{ color = [1, 2, 3], visible = false }}\n");
@@ -284,7 +285,7 @@ camera = { position = [0, 1, 0], look_at = [1, 0, 0], fov = 40 }
         );
         assert_eq!(
             loaded(&invisible, &overrides(None, color(red))),
-            (Some((light, true, shown)), false)
+            (Some((light, true, red_background)), false)
         );
         // Phong uses `render.background`.
         let scene = load("render.background = [1, 2, 3]\n", &overrides(None, color(red))).unwrap();
@@ -311,18 +312,18 @@ camera = { position = [0, 1, 0], look_at = [1, 0, 0], fov = 40 }
                     };
                     let text = format!("{text}render.integrator = '{integrator}'\n");
                     let scene = Scene::parse_with(&text, "s.toml", &overrides).unwrap();
-                    let shown = match &scene.environment {
+                    let background = match &scene.environment {
                         Some(environment) => environment.background.unwrap(),
                         None => scene.render.background,
                     };
-                    assert_eq!(scene.view.rgb8(shown.as_vec3().to_array()), expected, "{text}");
+                    assert_eq!(scene.view.rgb8(background.as_vec3().to_array()), expected, "{text}");
                 }
             }
         }
     }
 
     #[test]
-    fn invalid_environments_and_backgrounds_name_their_option() {
+    fn errors_name_the_environment_or_background_option() {
         let load_error = |extra: &str, environment: Option<&str>, background: Option<&str>| {
             let overrides = Overrides {
                 environment: environment.map(|text| text.parse().unwrap()),
@@ -338,7 +339,7 @@ camera = { position = [0, 1, 0], look_at = [1, 0, 0], fov = 40 }
                 phong,
                 None,
                 Some("none"),
-                "background: none needs integrator = \"path\"",
+                "background: transparency needs integrator = \"path\"",
             ),
             ("", None, Some("1,2,-1"), "background: -1 must be from 0 to 1e6"),
             (path, None, Some("nan,2,1"), "background: nan must be from 0 to 1e6"),

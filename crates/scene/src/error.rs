@@ -7,7 +7,8 @@ use crate::gltf::GltfError;
 use crate::mesh::MeshError;
 use crate::problem::{ErrorPlace, MAX_PROBLEMS, Problem, Problems};
 
-/// An error of loading a scene. Every message starts with the location of the error.
+/// The reason why a scene cannot be loaded. Every message starts with the location of the error or the name of the
+/// override.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SceneError {
@@ -20,7 +21,7 @@ pub enum SceneError {
         #[source]
         error: io::Error,
     },
-    /// The file is not valid TOML or JSON, or not in the form of a scene.
+    /// The file is too large or not valid TOML or JSON, or a JSON scene has invalid keys or types.
     #[error("{origin}:{line}:{column}: {message}")]
     Syntax {
         /// Name of the file.
@@ -42,7 +43,7 @@ pub enum SceneError {
         /// The problem.
         problem: Problem,
     },
-    /// Several values of the file are invalid. The errors are in file order; the message has a line for each.
+    /// Several values of the file are invalid. The errors are in file order; the message has a line for each error.
     #[error("{}", self.lines())]
     Several {
         /// The first errors.
@@ -64,7 +65,7 @@ pub enum SceneError {
         /// The format, and advice for the user.
         message: String,
     },
-    /// An override is invalid; the key is the field of [`Overrides`](super::Overrides).
+    /// An override is invalid; the key of the problem is the field of [`Overrides`](super::Overrides).
     #[error("{0}")]
     Override(Problem),
 }
@@ -113,7 +114,7 @@ impl SceneError {
         }
     }
 
-    /// Returns the individual errors (only this error if there is no other), and a message if further errors exist.
+    /// Returns the errors of [`SceneError::Several`], or else this error, and a message if further errors exist.
     pub fn each(&self) -> (&[SceneError], Option<String>) {
         match self {
             SceneError::Several { errors, more: 0 } => (errors, None),
@@ -137,13 +138,13 @@ impl Problems {
         offset_of: impl Fn(&Problem) -> usize,
         error: impl Fn(usize, Problem) -> SceneError,
     ) -> SceneError {
-        let mut all: Vec<(usize, Problem)> = (std::iter::once(self.first).chain(self.others))
+        let mut located: Vec<(usize, Problem)> = (std::iter::once(self.first).chain(self.others))
             .map(|problem| (offset_of(&problem), problem))
             .collect();
-        all.sort_by_key(|(offset, _)| *offset);
-        let more = self.more + all.len().saturating_sub(MAX_PROBLEMS);
-        all.truncate(MAX_PROBLEMS);
-        let mut errors: Vec<SceneError> = all
+        located.sort_by_key(|(offset, _)| *offset);
+        let more = self.more + located.len().saturating_sub(MAX_PROBLEMS);
+        located.truncate(MAX_PROBLEMS);
+        let mut errors: Vec<SceneError> = located
             .into_iter()
             .map(|(offset, problem)| error(offset, problem))
             .collect();

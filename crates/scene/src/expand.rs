@@ -28,7 +28,8 @@ impl Description {
         scene.map_err(|problems| problems.first)
     }
 
-    /// Like [`Description::validate_with`], but returns all problems. Lists the files even if there are problems.
+    /// Like [`Description::validate_with`], but returns all problems. Adds the files of the scene to `files`, even if
+    /// there are problems.
     pub(crate) fn validate_and_list(&self, assets: &Assets, files: &mut BTreeSet<PathBuf>) -> Result<Scene, Problems> {
         files.extend(self.files_on_disk(assets));
         let integrator = self.integrator();
@@ -48,7 +49,7 @@ impl Description {
                 validated.map_err(Problems::once_per_key)? // validation may report this problem again
             }
             Some(Ok(expanded)) => {
-                // The files may have added lights.
+                // The glTF files may have added lights.
                 let settings = expanded.description.settings(integrator);
                 let scene = expanded
                     .description

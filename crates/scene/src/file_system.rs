@@ -28,7 +28,7 @@ pub trait AssetSource: Send + Sync {
         self.read(name).is_ok()
     }
 
-    /// Returns the name of the file whose name matches, ignoring the case of letters. The default implementation
+    /// Returns the name of a file that differs from `name` at most in the case of letters. The default implementation
     /// returns `None`.
     fn find_ignoring_case(&self, name: &str) -> Option<String> {
         let _ = name;
@@ -71,7 +71,7 @@ impl MemoryFiles {
     /// Adds a file, or replaces the file with this name. Components `.` of the name are removed.
     pub fn insert(&mut self, name: &str, bytes: impl Into<Arc<[u8]>>) {
         let name = normalized(Path::new(name)).and_then(|path| source_name(&path));
-        // Other names cannot be requested.
+        // A file with an invalid name is dropped, because no scene can request it.
         if let Ok(name) = name {
             self.files.insert(name, bytes.into());
         }
@@ -90,7 +90,10 @@ impl AssetSource for MemoryFiles {
 
     fn find_ignoring_case(&self, name: &str) -> Option<String> {
         let name = name.to_lowercase();
-        self.files.keys().find(|other| other.to_lowercase() == name).cloned()
+        self.files
+            .keys()
+            .find(|file_name| file_name.to_lowercase() == name)
+            .cloned()
     }
 }
 
@@ -155,7 +158,7 @@ pub(crate) enum FileSystem {
     Source(Arc<SourceFiles>),
 }
 
-/// A source, and the file that is loaded from memory.
+/// A source, and the scene or model file whose bytes are loaded from memory.
 pub(crate) struct SourceFiles {
     source: Arc<dyn AssetSource>,
     loaded: Option<(String, Arc<[u8]>)>,
@@ -195,7 +198,7 @@ impl FileSystem {
         FileSystem::with_file(source, None)
     }
 
-    /// Returns the files of a source, with another file at this path.
+    /// Returns the files of a source, and a file at `path` with these bytes.
     pub fn with_loaded(source: Arc<dyn AssetSource>, path: &Path, bytes: Arc<[u8]>) -> io::Result<FileSystem> {
         let name = source_name(&normalized(path)?)?;
         Ok(FileSystem::with_file(source, Some((name, bytes))))
@@ -265,7 +268,7 @@ impl FileSystem {
         Ok(copy)
     }
 
-    /// Returns the stamp that changes with the file; `None` if the file does not exist. Files of a source do not
+    /// Returns a stamp that changes when the file changes; `None` if the file does not exist. Files of a source do not
     /// change.
     pub fn stamp(&self, path: &Path) -> FileStamp {
         match self {
@@ -281,17 +284,17 @@ impl FileSystem {
     /// machine), tries the last path component, and then a case-insensitive match.
     pub fn resolve(&self, folder: &Path, name: &str) -> PathBuf {
         let slashes = name.replace('\\', "/"); // Windows paths
-        let last = slashes.rsplit('/').next().unwrap_or(&slashes);
-        let candidates = [name, &slashes, last].map(|name| folder.join(name));
+        let file_name = slashes.rsplit('/').next().unwrap_or(&slashes);
+        let candidates = [name, &slashes, file_name].map(|name| folder.join(name));
         let [_, with_slashes, _] = &candidates;
         let found = candidates.iter().find(|path| self.is_file(path)).cloned();
         let found = found.or_else(|| self.in_other_case(folder, &slashes));
         found
-            .or_else(|| self.in_other_case(folder, last))
+            .or_else(|| self.in_other_case(folder, file_name))
             .unwrap_or_else(|| with_slashes.clone())
     }
 
-    /// Returns an existing file whose path matches, ignoring case.
+    /// Returns an existing file whose path differs from `path` at most in the case of letters.
     pub fn in_other_case(&self, folder: &Path, path: &str) -> Option<PathBuf> {
         match self {
             FileSystem::Disk => in_other_case(folder, path),
@@ -302,7 +305,7 @@ impl FileSystem {
         }
     }
 
-    /// Returns the path of a folder, which is `.` instead of empty for the file system of the operating system.
+    /// Returns the path of a folder. On disk, an empty path is replaced by `.`.
     pub fn folder<'p>(&self, path: &'p Path) -> &'p Path {
         if self.is_disk() { or_current(path) } else { path }
     }
@@ -329,7 +332,7 @@ pub(crate) fn or_current(path: &Path) -> &Path {
     }
 }
 
-/// Removes the components `.` and `..` from a path in a source.
+/// Resolves the components `.` and `..` of a path in a source.
 fn normalized(path: &Path) -> io::Result<PathBuf> {
     let refused = |rule: &str| io::Error::new(io::ErrorKind::InvalidInput, rule);
     let mut normalized = PathBuf::new();
@@ -361,7 +364,7 @@ fn too_large(max_bytes: u64) -> io::Error {
 }
 
 fn read_file(path: &Path, max_bytes: u64) -> io::Result<Vec<u8>> {
-    // Checked before opening, because opening a pipe blocks until it has a writer.
+    // Checked before opening, because opening a pipe blocks until the pipe has a writer.
     if !fs::metadata(path)?.is_file() {
         return Err(io::Error::new(io::ErrorKind::InvalidInput, "it must be a file"));
     }

@@ -8,21 +8,21 @@ use super::PerspectiveDescription;
 
 /// Vertical field of view in degrees, except in wide images.
 const FOV: f64 = 35.0;
-/// Aspect ratio up to which the horizontal field of view increases with the width. In wider views, perspective
-/// would stretch the sides.
+/// Maximum aspect ratio with a vertical field of view of [`FOV`]. Wider images have a constant horizontal field of
+/// view, because perspective would stretch the sides of wider views.
 const MAX_ASPECT: f64 = 2.0;
-/// Fraction of the image that the scene fills, with margins of 5 %.
+/// Fraction of the width or height that the scene fills: the margins are 5 % on each side.
 const FILL: f64 = 0.9;
 /// Minimum distance from the camera to the nearest point, relative to the scene's extent; only relevant for scenes that
 /// are elongated along the view direction.
 const MIN_DISTANCE: f64 = 0.1;
-/// Range of the diagonal of a framed scene's bounding box. The range keeps distances and coordinates within their
-/// limits.
+/// Range of the diagonal of a framed scene's bounding box, in scene units. The range keeps distances and coordinates
+/// within their limits.
 const EXTENTS: (f64, f64) = (1e-8, 4e8);
 /// Minimum elevation in degrees of a view that counts as vertical, where the vertical axis cannot be up in the image.
 const MIN_VERTICAL_ELEVATION: f64 = 89.9;
 
-/// The side from which a scene is seen. The front is towards -y and the top towards +z, as in upright glTF files.
+/// The side from which a scene is seen. The front is towards -y and the top towards +z, as in imported glTF files.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum View {
@@ -58,7 +58,7 @@ impl View {
         View::Iso,
     ];
 
-    /// Returns the name in options.
+    /// Returns the name in command-line options.
     pub const fn name(self) -> &'static str {
         match self {
             View::Corner => "corner",
@@ -76,7 +76,8 @@ impl View {
     fn direction(self) -> (DVec3, DVec3) {
         let upright = |x: f64, y: f64, z: f64| (DVec3::new(x, y, z), DVec3::Z);
         match self {
-            // 30 degrees to the right and 20 degrees upwards. At 15 degrees, the top of a cube would be seen edge-on.
+            // 30 degrees to the right and 20 degrees upwards. At 15 degrees upwards, the top of a cube would be
+            // edge-on.
             View::Corner => upright(0.5, -0.866_025_403_784, 0.363_970_234_266),
             View::Front => upright(0.0, -1.0, 0.0),
             View::Back => upright(0.0, 1.0, 0.0),
@@ -103,11 +104,11 @@ impl Orbit {
     fn direction(self) -> (DVec3, DVec3) {
         let (sin, cos) = self.azimuth.to_radians().sin_cos();
         let (elevation_sin, elevation_cos) = self.elevation.to_radians().sin_cos();
-        let towards = DVec3::new(sin * elevation_cos, -cos * elevation_cos, elevation_sin);
-        // Seen from straight above or below, up is towards the back or the front of the scene.
+        let to_camera = DVec3::new(sin * elevation_cos, -cos * elevation_cos, elevation_sin);
+        // From straight above or below, the top of the image is towards the back or the front of the scene.
         match self.elevation.abs() < MIN_VERTICAL_ELEVATION {
-            true => (towards, DVec3::Z),
-            false => (towards, DVec3::new(-sin, cos, 0.0) * elevation_sin.signum()),
+            true => (to_camera, DVec3::Z),
+            false => (to_camera, DVec3::new(-sin, cos, 0.0) * elevation_sin.signum()),
         }
     }
 }
@@ -119,10 +120,10 @@ impl FromStr for Orbit {
     fn from_str(text: &str) -> Result<Orbit, String> {
         let rule = "must be AZIMUTH,ELEVATION in degrees, such as 30,15";
         let (azimuth, elevation) = text.split_once(',').ok_or(rule)?;
-        let number = |text: &str| text.trim().parse::<f64>().map_err(|_| rule.to_owned());
+        let parse = |text: &str| text.trim().parse::<f64>().map_err(|_| rule.to_owned());
         let orbit = Orbit {
-            azimuth: number(azimuth)?,
-            elevation: number(elevation)?,
+            azimuth: parse(azimuth)?,
+            elevation: parse(elevation)?,
         };
         let is_within = |x: f64, limit: f64| (-limit..=limit).contains(&x);
         match (is_within(orbit.azimuth, 360.0), is_within(orbit.elevation, 90.0)) {
@@ -133,7 +134,7 @@ impl FromStr for Orbit {
     }
 }
 
-/// The framing of a scene.
+/// Settings of the automatic camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Framing {
     /// The view of the scene.
@@ -149,7 +150,7 @@ pub struct Framing {
 }
 
 impl Framing {
-    /// Frames a scene from a view.
+    /// Creates settings for a view, with the default field of view.
     pub fn new(view: View, aspect: f64) -> Framing {
         Framing {
             view,
@@ -180,11 +181,11 @@ pub fn check_extent(points: impl Iterator<Item = DVec3>) -> Result<(), String> {
     }
 }
 
-/// Returns the nearest camera that sees all points with equal margins on opposite sides, and looks at their center. If
-/// there are no points, the camera frames the origin.
+/// Returns the nearest camera that sees all points with equal margins on opposite sides. Without points, the camera
+/// frames the origin.
 pub fn framed(points: impl Iterator<Item = DVec3> + Clone, framing: Framing) -> PerspectiveDescription {
-    let (towards, up) = framing.direction();
-    let forward = -towards.normalize();
+    let (to_camera, up) = framing.direction();
+    let forward = -to_camera.normalize();
     let right = forward.cross(up).normalize();
     let upwards = right.cross(forward);
     let tan_y = match framing.fov {
@@ -207,23 +208,21 @@ pub fn framed(points: impl Iterator<Item = DVec3> + Clone, framing: Framing) -> 
         axis: framing.turns.then_some(up),
     };
     let support = |n: DVec3| extent.support(n, DVec3::ZERO).0;
-    // A point p is in the image if right . (p - camera) <= w forward . (p - camera), and likewise for the other sides.
+    // A point p does not exceed the right margin if right . (p - camera) <= w forward . (p - camera). The inequalities
+    // of the other margins have -right, upwards or -upwards in place of right.
     let (w, h) = (FILL * tan_x, FILL * tan_y);
     let width = support(right - w * forward) + support(-right - w * forward);
     let height = support(upwards - h * forward) + support(-upwards - h * forward);
-    let (depth_behind, depth_before) = (support(forward), support(-forward));
+    let (far_depth, near_depth) = (support(forward), support(-forward));
     let size = (high - low).length();
     let min_distance = if size > 0.0 { MIN_DISTANCE * size } else { 1.0 };
     let distance = (width / (2.0 * w))
         .max(height / (2.0 * h))
-        .max(depth_before + min_distance);
+        .max(near_depth + min_distance);
     let offset_up = extent.offset(upwards, forward, distance);
     let (offset_right, target_ahead) = match framing.turns {
         true => (0.0, offset_up * up.dot(forward) / up.dot(upwards)), // the target point lies on the axis
-        false => (
-            extent.offset(right, forward, distance),
-            (depth_behind - depth_before) / 2.0,
-        ),
+        false => (extent.offset(right, forward, distance), (far_depth - near_depth) / 2.0),
     };
     let offset = right * offset_right + upwards * offset_up;
     let fov = 2.0 * tan_y.atan().to_degrees();
@@ -237,7 +236,7 @@ pub fn framed(points: impl Iterator<Item = DVec3> + Clone, framing: Framing) -> 
     }
 }
 
-/// Maximum number of Newton steps of [`Extent::offset`], far more than needed.
+/// Maximum number of Newton steps of [`Extent::offset`], which needs far fewer.
 const MAX_STEPS: usize = 64;
 
 /// The extent of points relative to the center of their bounding box.
@@ -249,8 +248,8 @@ struct Extent<'a, I> {
 }
 
 impl<I: Iterator<Item = DVec3> + Clone> Extent<'_, I> {
-    /// Returns the value of the support function of the points (the maximum of `p . n`), and its derivative along
-    /// `step`.
+    /// Returns the support function of the points at `n` (the maximum of `p . n` over all points `p`), and the
+    /// derivative of the function along `step`.
     fn support(&self, n: DVec3, step: DVec3) -> (f64, f64) {
         let point_support = |point: DVec3| {
             let p = point - self.center;

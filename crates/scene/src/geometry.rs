@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::mesh::Mesh;
 
-/// The minimum and maximum corner of a box.
+/// The minimum and maximum corners of a box.
 pub type Bounds = (DVec3, DVec3);
 
 /// The points `center + x u + y v` for x, y in -1..=1.
@@ -115,12 +115,12 @@ impl Geometry {
     pub fn bounds(&self) -> Option<Bounds> {
         match self {
             Geometry::Rectangle(shape) => centered(shape.center, shape.u.abs() + shape.v.abs()),
-            Geometry::Disk(shape) => centered(shape.center, root_of_squares(&[shape.u, shape.v])),
-            Geometry::Ellipsoid { center, axes } => centered(*center, root_of_squares(axes)),
+            Geometry::Disk(shape) => centered(shape.center, half_extents(&[shape.u, shape.v])),
+            Geometry::Ellipsoid { center, axes } => centered(*center, half_extents(axes)),
             Geometry::Cylinder {
                 center,
                 axes: [a, b, c],
-            } => centered(*center, root_of_squares(&[*a, *b]) + c.abs()),
+            } => centered(*center, half_extents(&[*a, *b]) + c.abs()),
             Geometry::Triangles(triangles) => {
                 let points = triangles.iter().flatten().map(|point| (*point, *point));
                 points.reduce(join)
@@ -134,8 +134,8 @@ impl Geometry {
         }
     }
 
-    /// Calls `point` with points whose projections onto a unit vector bound the projection of the geometry. A plane has
-    /// a single such point. For a mesh, the points are the corners of the bounding box.
+    /// Calls `point` with points whose projections onto a unit vector bound the projection of the geometry. For a mesh,
+    /// the points are the corners of the bounding box. For a plane, which is infinite, the only point is its origin.
     pub fn each_extreme(&self, direction: DVec3, mut point: impl FnMut(DVec3)) {
         let mut both_ends = |center: DVec3, half_length: f64| {
             point(center + direction * half_length);
@@ -152,12 +152,12 @@ impl Geometry {
             } => {
                 both_ends(*center, half_extent(&[*a, *b]) + c.dot(direction).abs());
             }
-            Geometry::Triangles(triangles) => triangles.iter().flatten().for_each(|v| point(*v)),
+            Geometry::Triangles(triangles) => triangles.iter().flatten().for_each(|vertex| point(*vertex)),
             Geometry::Mesh { mesh, to_world, .. } => {
                 mesh.corners()
                     .for_each(|corner| point(to_world.transform_point3(corner)));
             }
-            Geometry::Plane { point: p, .. } => point(*p),
+            Geometry::Plane { point: origin, .. } => point(*origin),
         }
     }
 }
@@ -172,13 +172,13 @@ pub(crate) fn join((low, high): Bounds, (other_low, other_high): Bounds) -> Boun
     (low.min(other_low), high.max(other_high))
 }
 
-/// Returns a box by its center and half its size.
+/// Returns the box with this center and half extent.
 fn centered(center: DVec3, half_extent: DVec3) -> Option<Bounds> {
     Some((center - half_extent, center + half_extent))
 }
 
 /// Returns the half extents of the bounding box of a disk or ellipsoid: for each coordinate axis, the norm of the
 /// components of the semi-axes.
-fn root_of_squares(axes: &[DVec3]) -> DVec3 {
+fn half_extents(axes: &[DVec3]) -> DVec3 {
     axes.iter().map(|axis| axis * axis).sum::<DVec3>().map(f64::sqrt)
 }

@@ -19,8 +19,8 @@ use wgray_image::color::srgb_to_linear;
 const MAX_TEXEL: f32 = 1e6;
 
 impl Assets {
-    /// Returns an image in memory, which must have this `encoding` if given. `fits` checks the header first. The error
-    /// is the value with the violated rule.
+    /// Returns an image in memory. If `encoding` is set, the image must have this encoding. `fits` checks the size
+    /// before the texels are checked. The error contains the value and the violated rule.
     fn image_in_memory(
         &self,
         name: &str,
@@ -60,7 +60,8 @@ impl Assets {
         })
     }
 
-    /// Reads an image; `fits` checks the header first. The error is the value with the violated rule.
+    /// Reads an image. `fits` checks the header before the texels are decoded. The error contains the value and the
+    /// violated rule.
     pub(super) fn image(
         &self,
         file: &str,
@@ -79,14 +80,14 @@ impl Assets {
             AssetKey::File(path) => Cow::Owned(self.read(file, path)?),
             AssetKey::Encoded(name) => Cow::Borrowed(self.encoded.get(name).map_or(&[][..], |bytes| bytes)),
         };
-        let is_named = matches!(key, AssetKey::File(_));
+        let is_file = matches!(key, AssetKey::File(_));
         let format = Format::of(&bytes).ok_or_else(|| {
-            Problem::damage(match is_named {
+            Problem::damage(match is_file {
                 true => format!("{file:?} must be a PNG, JPEG, WebP, KTX2, EXR or HDR file"),
                 false => format!("{file:?} must be a PNG, JPEG, WebP or KTX2 file"),
             })
         })?;
-        if is_named {
+        if is_file {
             check_name(file, format)?;
         }
         let is_float = matches!(format, Format::Image(ImageFormat::OpenExr | ImageFormat::Hdr));
@@ -134,7 +135,7 @@ impl Assets {
         }
         Ok(File {
             image: Arc::new(image),
-            format: Some(format).filter(|_| is_named),
+            format: Some(format).filter(|_| is_file),
             default,
             encoding: encoding.unwrap_or(default),
             is_alpha: part == Part::Alpha,
@@ -144,8 +145,9 @@ impl Assets {
 }
 
 impl Image {
-    /// Decodes a PNG, JPEG, WebP, KTX2, OpenEXR or Radiance HDR file in memory. `None` is the usual encoding of the
-    /// format: linear for OpenEXR and HDR, otherwise sRGB. Invalid texels of floats are clamped to 0 to 1e6.
+    /// Decodes a PNG, JPEG, WebP, KTX2, OpenEXR or Radiance HDR file in memory. If `encoding` is `None`, the encoding
+    /// is linear for OpenEXR and HDR, otherwise sRGB. Invalid components of float images are clamped to the range 0 to
+    /// 1e6.
     ///
     /// # Errors
     ///
@@ -212,21 +214,24 @@ fn clamp(image: &mut Image) -> Option<String> {
     }
 }
 
+/// A validated image, and the part of the file that it contains.
 #[derive(Clone)]
 pub(super) struct File {
     pub image: Arc<Image>,
     /// `None` for images in memory, whose names do not determine the format.
     format: Option<Format>,
+    /// Default encoding of the format.
     default: Encoding,
     encoding: Encoding,
     is_alpha: bool,
+    /// Message about invalid texels, if any.
     pub damage: Option<String>,
 }
 
 /// The part of an image that a texture uses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Part {
-    /// Colors, decoded with this encoding if given.
+    /// Colors, decoded with this encoding; `None` is the default encoding of the file.
     Colors(Option<Encoding>),
     /// Alpha, as gray.
     Alpha,
@@ -242,7 +247,7 @@ impl Part {
 }
 
 impl File {
-    /// Returns true if the image is this part of its file, in the encoding that the part requests.
+    /// Returns true if the image is this part of its file, in the encoding that the part requires.
     pub fn contains(&self, part: Part) -> bool {
         self.is_alpha == (part == Part::Alpha) && part.encoding().unwrap_or(self.default) == self.encoding
     }
@@ -256,7 +261,7 @@ impl File {
 fn check_name(file: &str, format: Format) -> Result<(), String> {
     match Format::of_name(file) {
         Some(expected) if expected != format => Err(format!(
-            "{file:?} must match its extension; it is a file of type {}",
+            "{file:?} must have the extension of its format, {}",
             format.name()
         )),
         _ => Ok(()),
@@ -269,7 +274,7 @@ fn image_message(error: &ImageError) -> String {
         ImageError::Limits(limit) if matches!(limit.kind(), LimitErrorKind::DimensionError) => {
             format!("must have at most {MAX_IMAGE_SIDE} texels along a side")
         }
-        ImageError::Limits(_) => "requires more memory than its header declares".to_string(),
+        ImageError::Limits(_) => "needs too much memory to be decoded".to_string(),
         ImageError::Unsupported(_) => format!("must have a supported format: {error}"),
         _ => format!("is damaged or truncated: {error}"),
     }

@@ -6,7 +6,7 @@ use std::fmt::{self, Write as _};
 /// Maximum length of a value or key in a message, in characters.
 const MAX_VALUE_LEN: usize = 60;
 
-/// Returns a value or key for a message, with the middle elided if it is long.
+/// Returns a value or key for a message, with the middle elided if the text is long.
 pub fn cut(text: &str) -> Cow<'_, str> {
     cut_to(MAX_VALUE_LEN, text)
 }
@@ -23,7 +23,7 @@ pub fn cut_to(max_len: usize, text: &str) -> Cow<'_, str> {
     format!("{start}...{end}").into()
 }
 
-/// Formats names as `"a", "b", "c"`, up to a limit.
+/// Formats up to 24 names as `"a", "b", "c"`, and the number of the remaining names.
 pub fn list<S: AsRef<str>>(names: impl IntoIterator<Item = S>) -> String {
     listed(names, 24)
 }

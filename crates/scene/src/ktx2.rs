@@ -71,11 +71,11 @@ fn read_bytes<const N: usize>(bytes: &[u8], offset: usize) -> Result<[u8; N], St
     found.ok_or_else(|| damaged("the KTX2 header ends early"))
 }
 
-fn short(bytes: &[u8], offset: usize) -> Result<u32, String> {
+fn read_u32(bytes: &[u8], offset: usize) -> Result<u32, String> {
     Ok(u32::from_le_bytes(read_bytes(bytes, offset)?))
 }
 
-fn long(bytes: &[u8], offset: usize) -> Result<u64, String> {
+fn read_u64(bytes: &[u8], offset: usize) -> Result<u64, String> {
     Ok(u64::from_le_bytes(read_bytes(bytes, offset)?))
 }
 
@@ -96,12 +96,12 @@ pub(crate) fn has_alpha(bytes: &[u8]) -> Option<bool> {
 }
 
 impl<'a> Ktx2<'a> {
-    /// Checks the header. The error is the violated rule; in messages, it follows the file's name.
+    /// Checks the header. The error is the violated rule, which follows the file's name in messages.
     pub fn parse(bytes: &'a [u8]) -> Result<Ktx2<'a>, String> {
         let [format, _, width, height, depth, layers, faces, levels, supercompression] = {
             let mut fields = [0; 9];
             for (i, field) in fields.iter_mut().enumerate() {
-                *field = short(bytes, IDENTIFIER.len() + 4 * i)?;
+                *field = read_u32(bytes, IDENTIFIER.len() + 4 * i)?;
             }
             fields
         };
@@ -111,8 +111,8 @@ impl<'a> Ktx2<'a> {
         let descriptor = checked_range(
             bytes,
             "the data format descriptor",
-            short(bytes, 48)?.into(),
-            short(bytes, 52)?.into(),
+            read_u32(bytes, 48)?.into(),
+            read_u32(bytes, 52)?.into(),
         )?;
         let descriptor_bytes = &bytes[descriptor.clone()];
         let model = descriptor_bytes.get(12).copied().unwrap_or(0);
@@ -123,7 +123,7 @@ impl<'a> Ktx2<'a> {
                  format {format}, color model {model} and supercompression {supercompression}"
             ));
         }
-        // A header of 28 bytes, and 16 for each channel.
+        // The descriptor has a header of 28 bytes, and 16 bytes for each channel.
         let channels: Vec<u8> = match descriptor_bytes.len() {
             44 | 60 => (descriptor_bytes[28..].chunks(16))
                 .map(|channel| channel[3] & 15)
@@ -142,20 +142,20 @@ impl<'a> Ktx2<'a> {
         if !(1..=16).contains(&levels) {
             return Err(damaged(format!("it has {levels} levels")));
         }
-        let level = checked_range(bytes, "level 0", long(bytes, INDEX)?, long(bytes, INDEX + 8)?)?;
-        let decompressed_size = long(bytes, INDEX + 16)?;
+        let level = checked_range(bytes, "level 0", read_u64(bytes, INDEX)?, read_u64(bytes, INDEX + 8)?)?;
+        let decompressed_size = read_u64(bytes, INDEX + 16)?;
         let blocks = u64::from(width.div_ceil(4)) * u64::from(height.div_ceil(4));
-        let needed = blocks.saturating_mul(16);
+        let expected_length = blocks.saturating_mul(16);
         let length = match supercompression {
             NONE => level.len() as u64,
             ZSTANDARD => decompressed_size,
-            _ => needed,
+            _ => expected_length,
         };
-        if length != needed {
-            let rule = format!("{width} x {height} UASTC texels have {needed} bytes, not {length}");
+        if length != expected_length {
+            let rule = format!("{width} x {height} UASTC texels have {expected_length} bytes, not {length}");
             return Err(damaged(rule));
         }
-        checked_range(bytes, "the global data", long(bytes, 64)?, long(bytes, 72)?)?;
+        checked_range(bytes, "the global data", read_u64(bytes, 64)?, read_u64(bytes, 72)?)?;
         Ok(Ktx2 {
             bytes,
             width,
@@ -196,12 +196,12 @@ impl<'a> Ktx2<'a> {
     /// Returns the file with only the largest level, decompressed. The decompression of the crate `basisu` 0.1.0 is not
     /// used, because it depends on ruzstd 0.7, which does not limit the length of a block.
     fn decompressed(&self) -> Result<Vec<u8>, String> {
-        let error = |error: &dyn std::fmt::Display| format!("its Zstandard data cannot be decompressed: {error}");
+        let message = |cause: &dyn std::fmt::Display| format!("its Zstandard data cannot be decompressed: {cause}");
         let window = (self.decompressed_size as u64)
             .next_power_of_two()
             .max(MIN_WINDOW_LIMIT);
         let data = &self.bytes[self.level.clone()];
-        let mut data = StreamingDecoder::new_with_max_window_size(data, window).map_err(|cause| error(&cause))?;
+        let mut data = StreamingDecoder::new_with_max_window_size(data, window).map_err(|cause| message(&cause))?;
         let descriptor = &self.bytes[self.descriptor.clone()];
         let index_end = INDEX + ENTRY;
         let start = (index_end + descriptor.len()).next_multiple_of(16);
@@ -219,11 +219,11 @@ impl<'a> Ktx2<'a> {
             file[INDEX + offset..INDEX + offset + 8].copy_from_slice(&(value as u64).to_le_bytes());
         }
         file[index_end..index_end + descriptor.len()].copy_from_slice(descriptor);
-        data.read_exact(&mut file[start..]).map_err(|cause| error(&cause))?;
+        data.read_exact(&mut file[start..]).map_err(|cause| message(&cause))?;
         match data.read(&mut [0]) {
             Ok(0) => Ok(file),
-            Ok(_) => Err(error(&"it is longer than its header declares")),
-            Err(cause) => Err(error(&cause)),
+            Ok(_) => Err(message(&"it is longer than its header declares")),
+            Err(cause) => Err(message(&cause)),
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Scene files, mesh files and glTF files, loaded as validated scenes.
 //!
 //! Text is parsed into a [`Description`], field by field. [`Description::validate`] returns a [`Scene`] with resolved
-//! names and values in range, so that code that uses a scene need not validate it again.
+//! names and values in range, so that code that uses a scene need not validate the values again.
 
 mod assets;
 mod builder;

@@ -51,7 +51,7 @@ pub(super) const ABSORPTIONS: (f64, f64) = (0.0, 1e6);
 pub(super) const THICKNESSES: (f64, f64) = (0.0, 1e9);
 pub(super) const ATTENUATION_DISTANCES: (f64, f64) = (1e-6, 1e9);
 
-/// Absolute scale factors.
+/// Absolute values of scale factors.
 pub(super) const SCALES: (f64, f64) = (1e-6, 1e6);
 pub(super) const OFFSETS: (f64, f64) = (-1e6, 1e6);
 /// Line widths, both ends excluded.
@@ -60,6 +60,7 @@ pub(super) const LINE_WIDTHS: (f64, f64) = (0.0, 1.0);
 pub(super) const ANISOTROPIES: (f64, f64) = (1.0, 64.0);
 /// Factors of an image's values.
 pub(super) const FACTORS: (f64, f64) = (0.0, 1e6);
+/// Maximum number of sets of texture coordinates of a mesh.
 pub(super) const UV_SETS: u32 = 8;
 /// Factors of the slopes of normal maps.
 pub(super) const STRENGTHS: (f64, f64) = (-100.0, 100.0);

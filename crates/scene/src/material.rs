@@ -60,7 +60,7 @@ pub enum Reflection {
         color: Color,
         /// Complex index of refraction. If `None`, the reflectance does not depend on the angle.
         index: Option<MetalIndex>,
-        /// Roughness.
+        /// Roughness of the microfacets.
         facets: Facets,
     },
     /// Clear glass or liquid; reflection and transmission follow the Fresnel equations.
@@ -73,7 +73,7 @@ pub enum Reflection {
         absorption: DVec3,
         /// True for a thin sheet with the same medium on both sides.
         thin: bool,
-        /// Roughness.
+        /// Roughness of the microfacets.
         facets: Facets,
     },
     /// glTF's metallic-roughness material with its extensions.
@@ -185,7 +185,7 @@ impl Material {
 }
 
 impl Principled {
-    /// Returns all colors.
+    /// Returns all colors that may be textures.
     pub fn colors(&self) -> [&Color; 3] {
         [&self.base_color, &self.specular_color, &self.sheen_color]
     }

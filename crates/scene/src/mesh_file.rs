@@ -11,7 +11,7 @@ use crate::mesh::{Mesh, MeshError, Normals};
 /// A version of a file, and the options of the reader.
 #[derive(PartialEq, Eq, Hash)]
 struct Key {
-    /// [`FileSystem::id`].
+    /// The [`FileSystem::id`] of the file system.
     source: u64,
     path: PathBuf,
     length: u64,
@@ -31,23 +31,23 @@ static IN_USE: Mutex<Option<HashMap<Key, CachedMesh>>> = Mutex::new(None);
 /// Reads a mesh; returns the existing mesh if it is in use and its files have not changed.
 pub fn load(file_system: &FileSystem, path: &Path, normals: Option<Normals>) -> Result<Arc<Mesh>, MeshError> {
     let Some(key) = key(file_system, path, normals) else {
-        return Mesh::load_from(file_system, path, normals).map(Arc::new); // reports the error
+        return Mesh::load_from(file_system, path, normals).map(Arc::new); // returns the error
     };
     if let Some(mesh) = cached_mesh(file_system, &key) {
         return Ok(mesh);
     }
     // The lock is not held while reading, because a thread of the reader may call this function for another scene.
-    let read = Arc::new(Mesh::load_from(file_system, path, normals)?);
-    let libraries = libraries(file_system, &read);
+    let loaded = Arc::new(Mesh::load_from(file_system, path, normals)?);
+    let libraries = libraries(file_system, &loaded);
     if let Some(mesh) = cached_mesh(file_system, &key) {
         return Ok(mesh); // another thread was faster
     }
     let mut in_use = IN_USE.lock().unwrap_or_else(PoisonError::into_inner);
-    let mesh = Arc::downgrade(&read);
+    let mesh = Arc::downgrade(&loaded);
     in_use
         .get_or_insert_default()
         .insert(key, CachedMesh { mesh, libraries });
-    Ok(read)
+    Ok(loaded)
 }
 
 /// Returns the mesh if it is in use and its MTL files have not changed.
@@ -140,11 +140,11 @@ mod tests {
         let path = folder.path().join("a.obj");
         fs::write(&path, SMALL).unwrap();
         let first = load(&path, None).unwrap();
-        // A different length.
+        // The length of the file changes.
         fs::write(&path, format!("{SMALL}v 0 0 1\nf 1 2 4\n")).unwrap();
         let second = load(&path, None).unwrap();
         assert_eq!((first.triangles.len(), second.triangles.len()), (1, 2));
-        // Same length, different modification time.
+        // Only the content and the modification time change.
         fs::write(&path, format!("{SMALL}v 0 0 5\nf 1 2 4\n")).unwrap();
         let file = fs::File::options().write(true).open(&path).unwrap();
         file.set_modified(SystemTime::now() + std::time::Duration::from_secs(5))

@@ -11,7 +11,7 @@ pub struct MetalIndex {
     pub k: DVec3,
 }
 
-/// Name, and eta and k for linear sRGB.
+/// Name of a metal, and its eta and k for linear sRGB.
 type Entry = (&'static str, [f64; 3], [f64; 3]);
 
 /// The spectra in the tables of luxpop.com and of E. D. Palik, "Handbook of Optical Constants of Solids", 1985,
@@ -36,7 +36,7 @@ const METALS: &[Entry] = &[
 ];
 
 impl MetalIndex {
-    /// Returns the metal of this name.
+    /// Returns the index of refraction of the metal with this name.
     pub fn named(name: &str) -> Option<MetalIndex> {
         let (_, eta, k) = METALS.iter().find(|(entry_name, ..)| *entry_name == name)?;
         Some(MetalIndex {
@@ -45,7 +45,7 @@ impl MetalIndex {
         })
     }
 
-    /// Returns all names.
+    /// Returns the names of all metals.
     pub fn names() -> impl Iterator<Item = &'static str> {
         METALS.iter().map(|(name, ..)| *name)
     }

@@ -1,4 +1,4 @@
-//! Options for a model file that is rendered without a scene: the up axis, the automatic camera, and a ground.
+//! Options for a model file that is rendered without a scene file: the up axis, the automatic camera, and a ground.
 
 use std::fmt;
 use std::str::FromStr;
@@ -13,17 +13,18 @@ use super::{
 
 /// Range of the automatic camera's field of view, in degrees.
 const FOVS: (f64, f64) = (1.0, 170.0);
+/// Name of the material of the ground.
 const GROUND: &str = "ground";
 /// The albedo of the ground.
 const GRAY: [f64; 3] = [0.5; 3];
-/// The radius of the ground, relative to the diagonal of the model's bounds. Large enough for the shadows of low
-/// lights.
+/// The radius of the ground, relative to the diagonal of the model's bounds. The ground has to receive the long shadows
+/// of low lights.
 const RADIUS: f64 = 5.0;
 /// The gap between ground and model, relative to the diagonal of the model's bounds, so that no face coincides with the
 /// ground.
 const GAP: f64 = 1e-4;
 
-/// Options for a model file without a scene.
+/// Options for a model file that is rendered without a scene file.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Presentation {
     /// The vertical field of view of the automatic camera, from 1 to 170 degrees.
@@ -89,7 +90,7 @@ impl Presentation {
 }
 
 impl Presentation {
-    /// Returns a warning if the ground is between the model and the camera.
+    /// Returns a warning if the camera is below the ground.
     pub(super) fn ground_warning(&self, scene: &Scene) -> Option<String> {
         let ground = self.ground.then(|| scene.ground()).flatten()?;
         let (low, _) = scene.shapes[ground].geometry.bounds()?;
@@ -124,7 +125,7 @@ pub struct UpAxis {
 
 impl UpAxis {
     /// Returns the rotation that maps this axis to +z; `None` if the axis is +z. `to_scene` maps directions of the file
-    /// to the scene. If the axis is -z, the rotation is about the axis from front to back.
+    /// to the scene. If the axis is -z, the rotation is about the y axis, which points from front to back.
     pub(super) fn rotation(self, to_scene: impl Fn(DVec3) -> DVec3) -> Option<(Rotation, DMat3)> {
         let sign = if self.is_negative { -1.0 } else { 1.0 };
         let up = to_scene(DVec3::AXES[self.axis] * sign);
@@ -137,7 +138,7 @@ impl UpAxis {
             _ => return None,
         };
         let matrix = DMat3::from_axis_angle(axis, f64::to_radians(degrees));
-        // The exact elements are 0, 1 and -1.
+        // Removes rounding errors: the exact elements are 0, 1 and -1.
         let matrix = DMat3::from_cols(matrix.x_axis.round(), matrix.y_axis.round(), matrix.z_axis.round());
         Some((Rotation::About(RotationAbout { axis, degrees }), matrix))
     }

@@ -30,11 +30,11 @@ pub struct Problem {
     pub key: KeyPath,
     /// The value and the rule.
     pub message: String,
-    /// True for damage to a file of the scene that has a stand-in ([`Assets::strict`](super::Assets::strict)).
+    /// True for damage to a file that a placeholder replaces unless [`Assets::strict`](super::Assets::strict) is set.
     pub(crate) is_damage: bool,
     /// True if the key is unknown.
     pub is_unknown_key: bool,
-    /// The file that cannot be read, if that is the problem.
+    /// The file, if the problem is a file that cannot be read.
     pub file: Option<UnreadableFile>,
     /// True if the key is the subject of the message, as in `camera.fov is missing`.
     pub(super) is_predicate: bool,
@@ -44,7 +44,7 @@ pub struct Problem {
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct UnreadableFile {
-    /// The name in the scene.
+    /// The name of the file in the scene.
     pub name: String,
     /// The kind of the I/O error.
     pub kind: io::ErrorKind,
@@ -62,7 +62,7 @@ impl Problem {
         Self::new(message).at(key)
     }
 
-    /// Prepends a key to the path.
+    /// Prepends a key to the key path.
     pub fn inside(self, key: &str) -> Self {
         self.at(key)
     }
@@ -105,15 +105,17 @@ impl Problem {
     }
 }
 
-/// Maximum number of reported problems. The limit also applies to each section, because the order of the sections in
-/// the file is unknown.
+/// Maximum number of reported problems. Each section may collect this number, because [`Problems::into_error`] sorts
+/// the problems of all sections by their locations in the file.
 pub(crate) const MAX_PROBLEMS: usize = 20;
 
 /// The problems of a description: at least one.
 #[derive(Clone, Debug)]
 pub struct Problems {
     pub first: Problem,
+    /// Problems after the first.
     pub(crate) others: Vec<Problem>,
+    /// Number of further problems, which are only counted.
     pub(crate) more: usize,
 }
 
@@ -214,7 +216,7 @@ impl Collector {
     }
 }
 
-/// Returns both values, or the problems of both.
+/// Returns both values, or the problems of both results.
 pub fn both<A, B>(a: Result<A, impl Into<Problems>>, b: Result<B, impl Into<Problems>>) -> Result<(A, B), Problems> {
     match (a.map_err(Into::into), b.map_err(Into::into)) {
         (Ok(a), Ok(b)) => Ok((a, b)),

@@ -1,4 +1,4 @@
-//! Scene files as descriptions, in TOML or JSON.
+//! Parses scene files in TOML or JSON to descriptions.
 
 use std::path::Path;
 

@@ -14,9 +14,10 @@ use crate::note::Note;
 use crate::texture::{Image, Texture};
 use wgray_image::ViewSettings;
 
-/// A validated scene. Lengths have no unit, colors are linear RGB, and angles are in radians.
+/// A validated scene. Lengths have no unit, colors are linear RGB, and angles are in radians unless noted otherwise.
 ///
-/// Rendering an edited scene may panic: edit and validate the [`Description`](crate::Description) instead.
+/// Do not edit a scene: rendering values that are not validated may panic. Edit the [`Description`](crate::Description)
+/// and validate it again.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Scene {
@@ -40,17 +41,18 @@ pub struct Scene {
     pub materials: Vec<Material>,
     /// Names of the materials.
     pub material_names: Vec<String>,
-    /// The environment; `None` if it neither emits light nor has a background, and with [`Integrator::Phong`].
+    /// The environment; `None` with [`Integrator::Phong`], or if the environment neither emits light nor has a
+    /// background.
     pub environment: Option<Environment>,
     /// Lights, in file order.
     pub lights: Vec<Light>,
     /// Shapes in file order, then instances of meshes in file order.
     pub shapes: Vec<Shape>,
-    /// Number of instances, which are the last shapes.
+    /// Number of instances of meshes, which are the last elements of `shapes`.
     pub instances: usize,
     /// All files of the scene, sorted, including the files that meshes and glTF files refer to.
     pub files: Vec<PathBuf>,
-    /// Warnings: `rock.ply: 1 of 12 triangles is a duplicate and was removed`.
+    /// Warnings, such as `rock.ply: 1 of 12 triangles is a duplicate and was removed`.
     pub notes: Vec<Note>,
     /// Imported glTF files, kept alive by the scene.
     pub imported: Vec<Arc<Imported>>,
@@ -80,7 +82,7 @@ pub struct Camera {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Lens {
-    /// Radius of a round aperture, or distance of the corners from the center, in scene units.
+    /// Radius of a round aperture, or distance of the corners of a polygonal aperture from its center, in scene units.
     pub radius: f64,
     /// Distance of the plane in focus, along the view direction, in scene units.
     pub focus: f64,
@@ -103,7 +105,7 @@ pub enum Projection {
         /// Height of the image plane in scene units.
         height: f64,
     },
-    /// All directions: longitude from left to right, latitude from top to bottom.
+    /// Equirectangular projection of all directions: longitude from left to right, latitude from top to bottom.
     Panorama,
 }
 
@@ -206,8 +208,8 @@ pub struct EnvironmentImage {
 #[derive(Clone, Debug, PartialEq)]
 pub enum Light {
     /// An area light. With [`Integrator::Phong`], the light emits from both sides, does not cast shadows, and is
-    /// displayed in its plain color. With [`Integrator::Path`], the light emits along its normal, u x v, and occludes
-    /// other lights.
+    /// displayed in its unshaded color. With [`Integrator::Path`], the light emits along its normal, u x v, and
+    /// occludes other lights.
     Rectangle {
         /// Position and size.
         rectangle: Parallelogram,
@@ -247,9 +249,9 @@ pub enum Light {
 }
 
 impl Scene {
-    /// Returns the bounding box of all shapes except planes, if any.
+    /// Returns the bounding box of all shapes except planes, or `None` if there are no such shapes.
     pub fn bounds(&self) -> Option<Bounds> {
-        let all = self.shapes.iter().filter_map(|shape| shape.geometry.bounds());
-        all.reduce(join)
+        let bounds = self.shapes.iter().filter_map(|shape| shape.geometry.bounds());
+        bounds.reduce(join)
     }
 }

@@ -14,7 +14,7 @@ use super::{CameraDescription, Description};
 
 /// Returns a JSON Schema (draft 2020-12) of scene files in TOML, for completion and validation in editors.
 ///
-/// All files that the schema rejects are invalid. The schema does not include rules that involve several values, such
+/// Every file that the schema rejects is invalid. The schema does not include rules that involve several values, such
 /// as a camera whose `look_at` is its position, nor rules about references to names.
 pub fn schema() -> String {
     let mut schema = file_schema();
@@ -24,7 +24,7 @@ pub fn schema() -> String {
     format!("{schema:#}\n")
 }
 
-/// Returns the schema with titles.
+/// Returns the schema, with titles that contain the kinds of values.
 fn file_schema() -> Value {
     // Subschemas are inlined, because editors ignore descriptions next to a reference.
     let settings = SchemaSettings::draft2020_12().with(|settings| settings.inline_subschemas = true);
@@ -37,20 +37,20 @@ fn file_schema() -> Value {
     schema
 }
 
-/// Removes the titles, which contain the kinds; the descriptions contain the kinds too.
+/// Removes the titles. The kinds in the titles are also in the descriptions.
 fn remove_titles(schema: &mut Value) {
     match schema {
-        Value::Array(all) => all.iter_mut().for_each(remove_titles),
-        Value::Object(all) => {
-            all.retain(|key, value| key != "title" || !value.is_string());
-            all.values_mut().for_each(remove_titles);
+        Value::Array(list) => list.iter_mut().for_each(remove_titles),
+        Value::Object(object) => {
+            object.retain(|key, value| key != "title" || !value.is_string());
+            object.values_mut().for_each(remove_titles);
         }
         _ => {}
     }
 }
 
-/// Makes the key `type` of the camera optional, and the required keys of a camera with a path, whose keys may set the
-/// values.
+/// Makes the key `type` of the camera optional. Also makes the required keys of a camera optional if the camera has a
+/// path, because the keys of the path may set these values.
 fn make_camera_keys_optional(schema: &mut Value) {
     let camera = &mut schema["properties"]["camera"];
     camera["properties"]["type"]["default"] = json!(CameraDescription::DEFAULT);
@@ -79,7 +79,7 @@ fn make_camera_keys_optional(schema: &mut Value) {
 /// Rust's number types.
 fn finish(schema: &mut Value) {
     match schema {
-        Value::Array(all) => all.iter_mut().for_each(finish),
+        Value::Array(list) => list.iter_mut().for_each(finish),
         Value::Object(_) => {
             remove_null(schema);
             collect_names(schema);
@@ -90,9 +90,9 @@ fn finish(schema: &mut Value) {
                     append_default(property);
                 }
             }
-            let Some(all) = schema.as_object_mut() else { return };
-            all.remove("format");
-            for (key, value) in all.iter_mut() {
+            let Some(object) = schema.as_object_mut() else { return };
+            object.remove("format");
+            for (key, value) in object.iter_mut() {
                 if key != "properties" && key != "default" {
                     finish(value);
                 }
@@ -115,29 +115,29 @@ fn remove_null(schema: &mut Value) {
     if let Some(Value::Array(list)) = schema.get_mut("enum") {
         list.retain(|name| !name.is_null());
     }
-    let Some(all) = schema.as_object_mut() else { return };
+    let Some(object) = schema.as_object_mut() else { return };
     for keyword in ["anyOf", "oneOf"] {
-        let Some(Value::Array(list)) = all.get_mut(keyword) else {
+        let Some(Value::Array(list)) = object.get_mut(keyword) else {
             continue;
         };
         list.retain(|alternative| alternative.get("type") != Some(&null));
         if let [Value::Object(alternative)] = list.as_slice() {
             let alternative = alternative.clone();
-            all.remove(keyword);
+            object.remove(keyword);
             for (key, value) in alternative {
-                all.entry(key).or_insert(value);
+                object.entry(key).or_insert(value);
             }
         }
     }
-    if all.get("default") == Some(&Value::Null) {
-        all.remove("default");
+    if object.get("default") == Some(&Value::Null) {
+        object.remove("default");
     }
 }
 
 /// Converts alternatives with descriptions to a list of names, which all editors support.
 fn collect_names(schema: &mut Value) {
-    let Some(all) = schema.as_object_mut() else { return };
-    let Some(Value::Array(list)) = all.get("oneOf") else {
+    let Some(object) = schema.as_object_mut() else { return };
+    let Some(Value::Array(list)) = object.get("oneOf") else {
         return;
     };
     let pairs = list.iter().map(|alternative| {
@@ -150,20 +150,20 @@ fn collect_names(schema: &mut Value) {
         return;
     };
     let (names, descriptions): (Vec<Value>, Vec<Value>) = pairs.into_iter().unzip();
-    all.remove("oneOf");
-    all.insert("type".to_owned(), json!("string"));
-    all.insert("enum".to_owned(), Value::Array(names));
-    all.insert("enumDescriptions".to_owned(), Value::Array(descriptions));
+    object.remove("oneOf");
+    object.insert("type".to_owned(), json!("string"));
+    object.insert("enum".to_owned(), Value::Array(names));
+    object.insert("enumDescriptions".to_owned(), Value::Array(descriptions));
 }
 
 /// Appends the kind of a value to its description.
 fn append_kind(schema: &mut Value) {
-    let Some(all) = schema.as_object_mut() else { return };
-    let mut text = match all.get("description") {
+    let Some(object) = schema.as_object_mut() else { return };
+    let mut text = match object.get("description") {
         Some(Value::String(text)) => text.split_whitespace().collect::<Vec<_>>().join(" "),
         _ => String::new(),
     };
-    if let Some(Value::String(kind)) = all.get("title") {
+    if let Some(Value::String(kind)) = object.get("title") {
         let (label, range) = kind.split_once(TITLE_SEPARATOR).unwrap_or((kind, ""));
         let has_label = label.is_empty() || text.to_lowercase().contains(label);
         let addition = [label, range]
@@ -180,7 +180,7 @@ fn append_kind(schema: &mut Value) {
         }
     }
     if !text.is_empty() {
-        all.insert("description".to_owned(), Value::String(text.trim().to_owned()));
+        object.insert("description".to_owned(), Value::String(text.trim().to_owned()));
     }
 }
 
@@ -188,18 +188,18 @@ fn append_kind(schema: &mut Value) {
 const MAX_SHOWN_KEYS: usize = 3;
 
 fn append_default(property: &mut Value) {
-    let Some(all) = property.as_object_mut() else { return };
-    match (all.get("default"), all.get("description")) {
+    let Some(object) = property.as_object_mut() else { return };
+    match (object.get("default"), object.get("description")) {
         // The keys of a section have their own defaults.
         (Some(Value::Object(table)), _) if table.is_empty() || table.len() > MAX_SHOWN_KEYS => {
-            all.remove("default");
+            object.remove("default");
         }
         (Some(Value::Array(list)), _) if list.is_empty() => {
-            all.remove("default");
+            object.remove("default");
         }
         (Some(default), Some(Value::String(text))) => {
             let text = format!("{text} Default: {}.", to_toml(default));
-            all.insert("description".to_owned(), Value::String(text));
+            object.insert("description".to_owned(), Value::String(text));
         }
         _ => {}
     }
@@ -215,8 +215,8 @@ fn to_toml(value: &Value) -> String {
             format!("{{ {} }}", pairs.join(", "))
         }
         Value::Array(list) => {
-            let all: Vec<String> = list.iter().map(to_toml).collect();
-            format!("[{}]", all.join(", "))
+            let items: Vec<String> = list.iter().map(to_toml).collect();
+            format!("[{}]", items.join(", "))
         }
         Value::Number(number) => number.as_f64().map_or_else(|| number.to_string(), |x| x.to_string()),
         other => other.to_string(),

@@ -3,9 +3,9 @@
 //! Extinction is by molecules (Hansen and Travis, "Light Scattering in Planetary Atmospheres", Space Science Reviews
 //! 16, 1974, equation 2.30) and by haze (Ångström's formula, with the turbidity as in Preetham, Shirley and Smits, "A
 //! Practical Analytic Model for Daylight", SIGGRAPH 1999, appendix A.1). The air mass is by Kasten and Young, "Revised
-//! Optical Air Mass Tables and Approximation Formula", Applied Optics 28, 1989. A fixed fraction of the scattered
-//! sunlight reaches the ground. Single scattering yields less; the difference is added to the sky in proportion to the
-//! opacity of the air.
+//! Optical Air Mass Tables and Approximation Formula", Applied Optics 28, 1989. The model assumes that a fixed fraction
+//! of the scattered sunlight reaches the ground. Single scattering alone yields less light; the difference is added to
+//! the sky in proportion to the opacity of the air.
 
 use std::f64::consts::{PI, TAU};
 
@@ -22,7 +22,7 @@ const WAVELENGTHS: DVec3 = DVec3::new(0.68, 0.55, 0.44);
 const SOLAR_IRRADIANCE: f64 = 4.0;
 /// Angular radius of the sun.
 const SUN_RADIUS: f64 = 0.2666 * PI / 180.0;
-/// Single-scattering albedo of haze, and its asymmetry g (Henyey-Greenstein).
+/// Single-scattering albedo of haze, and the asymmetry parameter g of its Henyey-Greenstein phase function.
 const HAZE_ALBEDO: f64 = 0.9;
 const HAZE_FORWARD: f64 = 0.75;
 /// Fractions of the scattered light that reach the ground: for molecules, and for haze, which scatters forwards.
@@ -44,6 +44,7 @@ pub struct Sky {
     pub turbidity: f64,
 }
 
+/// Computes the environment map of a sky.
 pub fn sky(sky: &Sky) -> Image {
     let air = Air::of(sky);
     let mut texels = Vec::with_capacity(WIDTH * HEIGHT);
@@ -96,6 +97,7 @@ fn azimuth(column: f64) -> f64 {
     PI - column * TAU / WIDTH as f64
 }
 
+/// Optical properties of the atmosphere, and the position of the sun.
 struct Air {
     sun: DVec3,
     /// Air mass towards the sun, relative to the zenith.
@@ -110,6 +112,7 @@ struct Air {
     haze: DVec3,
 }
 
+/// A row of the environment map above the horizon.
 struct Row {
     /// Sine of the zenith angle.
     sine: f64,
@@ -270,16 +273,16 @@ mod tests {
                     azimuth: -2.0,
                     turbidity,
                 });
-                let all = texels(&image).iter().flatten();
+                let components = texels(&image).iter().flatten();
                 assert!(
-                    all.clone().all(|x| (0.0..1e6).contains(x)),
+                    components.clone().all(|x| (0.0..1e6).contains(x)),
                     "elevation {elevation}, turbidity {turbidity}"
                 );
-                // The ground receives at most the light of the sun.
-                let sun = f64::to_radians(elevation).sin() * SOLAR_IRRADIANCE;
-                let down = irradiance(&image, DVec3::Z);
-                assert!(down.max_element() <= sun + 0.1, "{down} of {sun}");
-                assert!(down.min_element() > 0.3 * sun, "{down} of {sun}");
+                // The irradiance on the ground is at most that of the sun outside of the atmosphere.
+                let sunlight = f64::to_radians(elevation).sin() * SOLAR_IRRADIANCE;
+                let ground = irradiance(&image, DVec3::Z);
+                assert!(ground.max_element() <= sunlight + 0.1, "{ground} of {sunlight}");
+                assert!(ground.min_element() > 0.3 * sunlight, "{ground} of {sunlight}");
             }
         }
     }
@@ -294,8 +297,8 @@ mod tests {
             };
             let air = Air::of(&requested);
             let image = sky(&requested);
-            // Irradiance at normal incidence from within twice the sun's radius.
-            let near: DVec3 = {
+            // At normal incidence, from directions within twice the sun's radius.
+            let sun_irradiance: DVec3 = {
                 let mut sum = DVec3::ZERO;
                 for (i, texel) in texels(&image).iter().enumerate() {
                     let (row, column) = (i / WIDTH, i % WIDTH);
@@ -312,7 +315,7 @@ mod tests {
                 sum
             };
             let expected = SOLAR_IRRADIANCE * air.transmittance;
-            let ratio = near / expected;
+            let ratio = sun_irradiance / expected;
             assert!((ratio - DVec3::ONE).abs().max_element() < 0.01, "{ratio}");
         }
     }

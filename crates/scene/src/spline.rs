@@ -28,21 +28,22 @@ pub fn value<T: Point>(keys: &[Key<T>], time: f64, interpolation: Interpolation)
     };
     let (span, step) = (b.0 - a.0, b.1 - a.1);
     if !(span > 0.0) || time <= a.0 {
-        return Some(a.1); // outside of the keys, or exactly at a key
+        return Some(a.1); // before the first key, after the last key, or exactly at a key
     }
     let s = (time - a.0) / span;
-    let (start, end) = match interpolation {
+    let (start_slope, end_slope) = match interpolation {
         Interpolation::Linear => return Some(a.1 + step * s),
         Interpolation::Smooth => (slope(keys, next - 1), slope(keys, next)),
     };
     // Cubic Hermite segment: smoothstep between the values, plus the contribution of the slopes.
     let remaining = 1.0 - s;
-    Some(a.1 + step * (s * s * (3.0 - 2.0 * s)) + (start * remaining - end * s) * (span * s * remaining))
+    Some(a.1 + step * (s * s * (3.0 - 2.0 * s)) + (start_slope * remaining - end_slope * s) * (span * s * remaining))
 }
 
 /// Returns the derivative of the smooth curve at a key: the secant of its neighbors (E. Catmull and R. Rom, "A Class of
-/// Local Interpolating Splines", 1974, generalized to non-uniform times). At the ends, the slope makes the segment a
-/// parabola. Next to a key with an equal value, the slope is 0, so that the value is constant between equal keys.
+/// Local Interpolating Splines", 1974, generalized to non-uniform times). At the first and last key, the slope makes
+/// the segment a parabola. Next to a key with an equal value, the slope is 0, so that the value is constant between
+/// equal keys.
 fn slope<T: Point>(keys: &[Key<T>], i: usize) -> T {
     let before = i.checked_sub(1).and_then(|i| keys.get(i));
     let after = keys.get(i + 1);
@@ -88,7 +89,7 @@ mod tests {
         (10.25, -6.5),
     ];
 
-    fn near(a: f64, b: f64) -> bool {
+    fn is_near(a: f64, b: f64) -> bool {
         (a - b).abs() <= 1e-12 * (1.0 + b.abs())
     }
 
@@ -142,8 +143,8 @@ mod tests {
         assert!(linear_error > 1.0, "linear interpolation must not reproduce free fall");
     }
 
-    /// Computed with SciPy 1.17: `CubicHermiteSpline(t, v, m)` with `m[1:-1] = (v[2:] - v[:-2]) / (t[2:] - t[:-2])`,
-    /// and, at the ends, `m` is twice the difference quotient minus the neighbor's `m`.
+    /// The expected values are computed with SciPy 1.17: `CubicHermiteSpline(t, v, m)` with `m[1:-1] = (v[2:] - v[:-2])
+    /// / (t[2:] - t[:-2])`, and, at the ends, `m` is twice the difference quotient minus the neighbor's `m`.
     #[test]
     fn smooth_interpolation_matches_scipy() {
         for (time, expected) in [
@@ -157,7 +158,7 @@ mod tests {
             (10.125, -6.96),
         ] {
             let found = value(&KEYS, time, Interpolation::Smooth).unwrap();
-            assert!(near(found, expected), "{time}: {found} {expected}");
+            assert!(is_near(found, expected), "{time}: {found}, expected {expected}");
         }
     }
 

@@ -20,9 +20,9 @@ const EDGE: f64 = 0.15;
 /// A rectangular emitter at a distance of 1.
 struct Emitter {
     /// Direction to the center, not normalized.
-    towards: DVec3,
+    direction_to_center: DVec3,
     /// Half of the width, and half of the height.
-    half: [f64; 2],
+    half_size: [f64; 2],
     radiance: f64,
 }
 
@@ -30,39 +30,42 @@ struct Emitter {
 /// light behind.
 const EMITTERS: [Emitter; 4] = [
     Emitter {
-        towards: DVec3::new(-0.75, -0.6, 0.65),
-        half: [0.5, 0.45],
+        direction_to_center: DVec3::new(-0.75, -0.6, 0.65),
+        half_size: [0.5, 0.45],
         radiance: 3.0,
     },
     Emitter {
-        towards: DVec3::new(0.95, -0.35, 0.35),
-        half: [0.3, 0.55],
+        direction_to_center: DVec3::new(0.95, -0.35, 0.35),
+        half_size: [0.3, 0.55],
         radiance: 1.1,
     },
     Emitter {
-        towards: DVec3::new(0.0, 0.0, 1.0),
-        half: [0.35, 0.6],
+        direction_to_center: DVec3::new(0.0, 0.0, 1.0),
+        half_size: [0.35, 0.6],
         radiance: 1.8,
     },
     Emitter {
-        towards: DVec3::new(0.35, 0.95, 0.5),
-        half: [0.12, 0.5],
+        direction_to_center: DVec3::new(0.35, 0.95, 0.5),
+        half_size: [0.12, 0.5],
         radiance: 2.2,
     },
 ];
 
+/// Computes the environment map of the studio.
 pub fn studio() -> Image {
     let emitters = EMITTERS.map(|emitter| emitter.oriented());
     let azimuths: Vec<(f64, f64)> = (0..WIDTH)
         .map(|column| (PI - (0.5 + column as f64) * TAU / WIDTH as f64).sin_cos())
         .collect();
-    let row = |row: usize| {
+    let texel_row = |row: usize| {
         let (sine, cosine) = ((0.5 + row as f64) * PI / HEIGHT as f64).sin_cos();
-        let direction = move |(y, x): &(f64, f64)| DVec3::new(sine * x, sine * y, cosine);
+        let direction = move |(azimuth_sine, azimuth_cosine): &(f64, f64)| {
+            DVec3::new(sine * azimuth_cosine, sine * azimuth_sine, cosine)
+        };
         let texel = |azimuth| Vec3::splat(radiance(&emitters, direction(azimuth)) as f32).into();
         azimuths.iter().map(texel).collect::<Vec<_>>()
     };
-    let rows: Vec<Vec<[f32; 3]>> = (0..HEIGHT).into_par_iter().map(row).collect();
+    let rows: Vec<Vec<[f32; 3]>> = (0..HEIGHT).into_par_iter().map(texel_row).collect();
     Image {
         width: WIDTH as u32,
         height: HEIGHT as u32,
@@ -72,7 +75,7 @@ pub fn studio() -> Image {
 
 fn radiance(emitters: &[OrientedEmitter], direction: DVec3) -> f64 {
     let z = direction.z;
-    // The floor blends smoothly into the walls.
+    // The floor and the ceiling blend smoothly into the walls.
     let room = match z < 0.0 {
         true => WALL + (FLOOR - WALL) * smooth(-3.0 * z),
         false => WALL + (CEILING - WALL) * smooth(z),
@@ -87,13 +90,13 @@ fn radiance(emitters: &[OrientedEmitter], direction: DVec3) -> f64 {
 struct OrientedEmitter {
     axis: DVec3,
     sides: [DVec3; 2],
-    half: [f64; 2],
+    half_size: [f64; 2],
     radiance: f64,
 }
 
 impl Emitter {
     fn oriented(&self) -> OrientedEmitter {
-        let axis = self.towards.normalize();
+        let axis = self.direction_to_center.normalize();
         let right = match axis.z.abs() < 0.99 {
             true => axis.cross(DVec3::Z).normalize(),
             false => DVec3::X,
@@ -101,7 +104,7 @@ impl Emitter {
         OrientedEmitter {
             axis,
             sides: [right, right.cross(axis)],
-            half: self.half,
+            half_size: self.half_size,
             radiance: self.radiance,
         }
     }
@@ -115,12 +118,12 @@ impl OrientedEmitter {
             return 0.0;
         }
         let offsets = self.sides.map(|side| direction.dot(side).abs() / ahead);
-        let edge_weight = |i: usize| smooth((1.0 + EDGE - offsets[i] / self.half[i]) / EDGE);
+        let edge_weight = |i: usize| smooth((1.0 + EDGE - offsets[i] / self.half_size[i]) / EDGE);
         edge_weight(0) * edge_weight(1)
     }
 }
 
-/// Smoothstep.
+/// Returns the smoothstep function of `x`, clamped to 0 ... 1.
 fn smooth(x: f64) -> f64 {
     let x = x.clamp(0.0, 1.0);
     x * x * (3.0 - 2.0 * x)

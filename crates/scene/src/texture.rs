@@ -92,7 +92,7 @@ pub enum TextureKind {
         image: Arc<Image>,
         /// Addressing outside of the square, along u and v.
         wrap: [Wrap; 2],
-        /// Filter.
+        /// Filter of texture lookups.
         filter: TextureFilter,
         /// Maximum ratio of the axes of a footprint for [`TextureFilter::Ewa`], at least 1.
         max_anisotropy: f64,
@@ -178,19 +178,19 @@ pub(super) fn levels(width: u32, height: u32) -> u32 {
     width.max(height).max(1).ilog2() + 1
 }
 
-/// Returns the size of the mip levels and of the table of their offsets, in 32-bit words: one word per texel, or three
-/// for floats.
+/// Returns the size of the mip levels and of the table of their offsets, in 32-bit words. A texel has one word, or
+/// three words if its components are floats.
 pub fn words(width: u32, height: u32, levels: u32, is_float: bool) -> u64 {
-    let texel = if is_float { 3 } else { 1 };
+    let words_per_texel = if is_float { 3 } else { 1 };
     let sizes = (0..levels).map(|i| u64::from((width >> i).max(1)) * u64::from((height >> i).max(1)));
-    u64::from(levels) + texel * sizes.sum::<u64>()
+    u64::from(levels) + words_per_texel * sizes.sum::<u64>()
 }
 
 /// Returns the maximum size of an environment map in 32-bit words: three words per texel (including two additional
 /// rows), two words per cell between texels, and the tables of blocks.
 pub(crate) fn environment_words(width: u32, height: u32) -> u64 {
-    // For each of at most 32 x 32 blocks, the reciprocal of its power. For each bin of normals (17 x 17, and one for
-    // all normals), 33 cumulative distributions of 33 words.
+    // The reciprocal of the power of each of at most 32 x 32 blocks, and 33 cumulative distributions of 33 words for
+    // each bin of normals (17 x 17 bins, and one bin for all normals).
     const MAX_BLOCK_TABLE_WORDS: u64 = 32 * 32 + (17 * 17 + 1) * 33 * 33;
     let (width, height) = (u64::from(width), u64::from(height));
     3 * width * (height + 2) + 2 * width * (height + 1) + MAX_BLOCK_TABLE_WORDS

@@ -7,11 +7,12 @@ use glam::{DQuat, DVec3};
 use super::problem::Problem;
 use super::{CameraDescription, CameraKeyDescription, CameraPathDescription, Interpolation};
 
+/// Maximum number of frames of an orbit.
 pub(super) const MAX_FRAMES: u32 = 100_000;
 
-/// Replaces a camera's path by an orbit around its target point, counter-clockwise as seen from `up`. Frame 1, and the
-/// frame after the last, have the original position. Each frame has its own key, so that the camera is exactly on the
-/// circle.
+/// Replaces a camera's path by an orbit around its target point, counter-clockwise as seen from `up`. The camera has
+/// the original position in frame 1, and would return to this position in the frame after the last. Each frame has its
+/// own key, so that the camera is exactly on the circle.
 pub(super) fn with_orbit(camera: &CameraDescription, frames: u32) -> Result<CameraDescription, Problem> {
     if !(1..=MAX_FRAMES).contains(&frames) {
         return Err(Problem::new(format!("{frames} must be from 1 to {MAX_FRAMES}")));

@@ -6,7 +6,7 @@ use super::{Bounds, Camera, Color, Geometry, Light, Projection, Reflection, Scen
 
 impl Scene {
     /// Returns warnings if the scene certainly has no light, or no geometry in view. Other scenes may still render
-    /// black, because occlusion and the range of lights are not considered.
+    /// black, for example because no light reaches the visible surfaces.
     pub fn visibility_warnings(&self) -> Vec<String> {
         let mut warnings = Vec::new();
         if !self.has_geometry_in_view() && !self.shows_environment_only() {
@@ -56,8 +56,8 @@ impl Scene {
         }
         let environment = self.environment.as_ref();
         let is_lit = environment.is_some_and(|environment| {
-            let image = environment.image.as_ref().is_some_and(|image| image.scale != 0.0);
-            image || environment.color != DVec3::ZERO
+            let has_light_map = environment.image.as_ref().is_some_and(|image| image.scale != 0.0);
+            has_light_map || environment.color != DVec3::ZERO
         });
         is_lit || self.has_emission()
     }
@@ -72,7 +72,7 @@ impl Scene {
     fn has_geometry_in_view(&self) -> bool {
         let is_visible = |shape: &&Shape| materials(shape).any(|i| self.materials[i].visible);
         let mut shapes = self.shapes.iter().filter(is_visible).peekable();
-        let mut areas = (self.lights.iter())
+        let mut area_lights = (self.lights.iter())
             .filter_map(|light| match light {
                 Light::Rectangle {
                     rectangle,
@@ -83,9 +83,9 @@ impl Scene {
             })
             .peekable();
         let Some(frustum) = Frustum::of(self).filter(|_| self.camera_path.is_none()) else {
-            return shapes.peek().is_some() || areas.peek().is_some();
+            return shapes.peek().is_some() || area_lights.peek().is_some();
         };
-        areas.any(|bounds| frustum.may_see(bounds))
+        area_lights.any(|bounds| frustum.may_see(bounds))
             || shapes.any(|shape| match shape.geometry.bounds() {
                 Some(bounds) => frustum.may_see(bounds),
                 None => matches!(shape.geometry, Geometry::Plane { .. }), // infinite
@@ -105,7 +105,7 @@ fn is_black(color: &Color) -> bool {
     *color == Color::Plain(DVec3::ZERO)
 }
 
-/// The points `p` with `normal . (p - position) + offset >= 0`.
+/// The points `p` with `normal . (p - position) + offset >= 0`, where `position` is the position of the [`Frustum`].
 struct HalfSpace {
     normal: DVec3,
     offset: f64,

@@ -1,5 +1,4 @@
-//! Writes scenes as TOML in the form of a handwritten file: defaults are omitted, and file names are relative to the
-//! new folder.
+//! Writes scenes as short TOML files: defaults are omitted, and file names are relative to the new folder.
 
 use std::io;
 use std::path::{Component, Path};
@@ -9,6 +8,7 @@ use toml::{Table, Value};
 
 use super::{Description, RenderDescription, ShapeDescription, TextureDescription, ViewTransform};
 
+/// Default values of keys, except for the keys of `[render]`.
 const DEFAULTS: &str = "up = [0.0, 0.0, 1.0]\nfocal_length = 1.0\nblades = 0\nblade_rotation = 0.0\nexposure = 0.0\n\
                         lights = true\nscale = 1.0\nvisible = true\n";
 
@@ -40,15 +40,15 @@ impl Description {
         if let Some(environment) = &self.environment {
             sections.push(section("environment", environment, &defaults)?);
         }
-        for (kind, all) in [
+        for (section_name, tables) in [
             ("textures", Table::try_from(&self.textures)?),
             ("materials", Table::try_from(&self.materials)?),
             ("meshes", Table::try_from(&self.meshes)?),
         ] {
-            if !all.is_empty() {
+            if !tables.is_empty() {
                 sections.push(toml::to_string(&Table::from_iter([(
-                    kind.to_owned(),
-                    Value::Table(all),
+                    section_name.to_owned(),
+                    Value::Table(tables),
                 )]))?);
             }
         }
@@ -117,7 +117,7 @@ impl Description {
 }
 
 /// Keys that are written first; other keys follow in alphabetical order.
-const FIRST: [&str; 5] = ["type", "file", "width", "position", "integrator"];
+const FIRST_KEYS: [&str; 5] = ["type", "file", "width", "position", "integrator"];
 
 /// Writes a section without values that equal the defaults.
 fn section(name: &str, value: &impl Serialize, defaults: &Table) -> Result<String, toml::ser::Error> {
@@ -130,7 +130,7 @@ fn element(name: &str, value: &impl Serialize, defaults: &Table) -> Result<Strin
 }
 
 fn format_table(
-    head: &str,
+    header: &str,
     name: &str,
     value: &impl Serialize,
     defaults: &Table,
@@ -138,18 +138,18 @@ fn format_table(
 ) -> Result<String, toml::ser::Error> {
     let mut table = Table::try_from(value)?;
     table.retain(|key, value| defaults.get(key) != Some(value));
-    let mut text = head.to_owned();
-    for key in FIRST {
+    let mut text = header.to_owned();
+    for key in FIRST_KEYS {
         if let Some(value) = table.remove(key) {
             text += &toml::to_string(&Table::from_iter([(key.to_owned(), value)]))?;
         }
     }
     let rest = toml::to_string(&Table::from_iter([(name.to_owned(), nested(table))]))?;
-    Ok(text + rest.strip_prefix(head).unwrap_or(&rest))
+    Ok(text + rest.strip_prefix(header).unwrap_or(&rest))
 }
 
-/// Returns the path of a file relative to a folder; both paths are canonical.
-/// Returns the path relative to the folder, with `/` as separator; `None` if there is no such path in UTF-8.
+/// Returns the path of a file relative to a folder, with `/` as separator; `None` if no such path exists, or if the
+/// path is not UTF-8. The paths `folder` and `path` are canonical.
 pub(super) fn relative_path(folder: &Path, path: &Path) -> Option<String> {
     let (folder, path): (Vec<_>, Vec<_>) = (folder.components().collect(), path.components().collect());
     let common = folder.iter().zip(&path).take_while(|(a, b)| a == b).count();
@@ -168,7 +168,7 @@ mod tests {
 
     /// Tests all scenes of the project.
     #[test]
-    fn texts_read_back_as_the_same_scene() {
+    fn written_scenes_parse_to_the_same_description() {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes");
         let mut count = 0;
         for entry in std::fs::read_dir(&folder).unwrap() {
@@ -186,7 +186,7 @@ mod tests {
     }
 
     #[test]
-    fn a_gltf_scene_is_written_in_a_few_lines() {
+    fn a_gltf_scene_is_written_without_defaults() {
         let camera = crate::PerspectiveDescription::new([0.1, -5.0, 1e-7], [0.0; 3], 35.0);
         let description = Description::new(1024, 512, camera)
             .with_environment(super::super::EnvironmentDescription::named(
@@ -207,7 +207,7 @@ mod tests {
     }
 
     #[test]
-    fn files_are_named_from_another_folder() {
+    fn file_names_become_relative_to_the_new_folder() {
         let root = tempfile::tempdir().unwrap();
         for folder in ["a/b", "c"] {
             std::fs::create_dir_all(root.path().join(folder)).unwrap();

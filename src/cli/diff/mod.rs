@@ -28,7 +28,7 @@ docs/golden-pictures.md defines the metrics.";
 /// Exit code if the images differ.
 const DIFFER: u8 = 5;
 /// Maximum number of pixels for which FLIP is computed by default. FLIP takes one microsecond per pixel of a display
-/// image, and several per pixel of a linear image.
+/// image, and several microseconds per pixel of a linear image.
 const MAX_FLIP_PIXELS: u64 = 1 << 24;
 
 #[derive(Debug, clap::Args)]
@@ -108,7 +108,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let mut report = Report::new([&args.a, &args.b].map(|path| name(path)), &a, &b);
     let (mut a, mut b) = to_same_kind(a, b, &mut report)?;
     select_layers(&args.layers, &mut a, &mut b)?;
-    let mut shown = None;
+    let mut shown_layer = None;
     if (a.width, a.height, a.position) == (b.width, b.height, b.position) {
         let (layers, only_a, only_b) = compare::layers(&a, &b);
         report.set_only(&only_a, &only_b);
@@ -129,20 +129,20 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         let ppd = args.ppd.unwrap_or(compare::PIXELS_PER_DEGREE);
         let metrics = select_metrics(&args, &b, &requested, &mut report);
         // The first layer that differs, or the first layer if none differs.
-        let mut displayed: Option<(usize, Option<Flip>)> = None;
+        let mut selected: Option<(usize, Option<Flip>)> = None;
         for (i, layer) in layers.iter().enumerate() {
             let step = out.is_some().then(|| compare::step(&b));
             let (found, flip) = measure(layer, &a, &b, &metrics, args.threshold, ppd, step);
-            if displayed.is_none() || found.is_different() && !report.is_different() {
-                displayed = Some((i, flip));
+            if selected.is_none() || found.is_different() && !report.is_different() {
+                selected = Some((i, flip));
             }
             report.layers.push(found);
         }
-        shown = displayed.and_then(|(i, flip)| Some((layers.get(i)?.clone(), flip)));
+        shown_layer = selected.and_then(|(i, flip)| Some((layers.get(i)?.clone(), flip)));
         report.metrics = metrics;
     }
     report.judge(&args.fail, args.threshold);
-    let shown = match (out, shown) {
+    let shown_layer = match (out, shown_layer) {
         (Some((output, _)), Some((layer, flip))) => Some((output, layer, flip)),
         (Some((_, path)), None) => {
             report.notes.push(format!(
@@ -153,7 +153,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         }
         (None, _) => None,
     };
-    if let Some((output, layer, _)) = &shown
+    if let Some((output, layer, _)) = &shown_layer
         && layer.name != COLOR
     {
         report
@@ -165,7 +165,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         false => escape_control_in_lines(&report.to_string()).into_owned(),
     };
     let printed = io::stdout().lock().write_all(text.as_bytes());
-    if let Some((output, layer, flip)) = shown {
+    if let Some((output, layer, flip)) = shown_layer {
         write(output, &a, &b, &layer, flip)?;
     }
     let code = match report.passes {

@@ -1,4 +1,4 @@
-//! The report of `wgray diff`, as text and as JSON with the same names.
+//! The report of `wgray diff`, as text or JSON. Metrics have the same names in both.
 
 use std::fmt;
 
@@ -241,8 +241,8 @@ impl Report {
         self.layers.iter().any(LayerReport::is_different)
     }
 
-    /// Collects the reasons for failing: different sizes, positions or channels, non-finite values, and values beyond a
-    /// limit. If there are no limits, any difference is a reason.
+    /// Collects the reasons why the comparison fails: different sizes, positions or channels, non-finite values, and
+    /// values beyond a limit. Without limits, any difference is a reason.
     pub fn judge(&mut self, limits: &[Limit], threshold: f64) {
         let mut fails = Vec::new();
         let (a, b) = (self.size_a, self.size_b);
@@ -255,9 +255,9 @@ impl Report {
                 a.0, a.1, b.0, b.1
             ));
         }
-        for (names, has, lacks) in [(&self.only_a, "A", "B"), (&self.only_b, "B", "A")] {
+        for (names, owner, other) in [(&self.only_a, "A", "B"), (&self.only_b, "B", "A")] {
             if !names.is_empty() {
-                fails.push(format!("{lacks} lacks {}, which {has} has", names.join(" ")));
+                fails.push(format!("{other} lacks {}, which {owner} has", names.join(" ")));
             }
         }
         for layer in &self.layers {
@@ -275,14 +275,14 @@ impl Report {
             }
             for limit in limits {
                 let value = layer.value(limit.metric);
-                if let Some((value, word)) = value.and_then(|value| Some((value, limit.exceeded(value)?))) {
+                if let Some((value, relation)) = value.and_then(|value| Some((value, limit.exceeded(value)?))) {
                     let (name, metric) = (&layer.name, limit.metric);
                     let condition = match metric {
                         Metric::Share if threshold > 0.0 => format!(" over {}", Number(threshold)),
                         _ => String::new(),
                     };
                     fails.push(format!(
-                        "{name}: {metric}{condition} {} is {word} {}",
+                        "{name}: {metric}{condition} {} is {relation} {}",
                         Number(value),
                         Number(limit.worst)
                     ));

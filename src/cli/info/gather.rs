@@ -1,4 +1,4 @@
-//! The JSON of `wgray info`.
+//! The data of `wgray info`, which `--json` prints.
 
 use std::collections::{BTreeMap, HashSet};
 use std::path::Path;
@@ -21,7 +21,7 @@ type Counts = BTreeMap<&'static str, u64>;
 #[derive(Debug, Serialize)]
 pub struct Info {
     pub scene: String,
-    pub picture: Picture,
+    pub picture: ImageInfo,
     pub camera: CameraInfo,
     /// Minimum and maximum corner of the bounds of all shapes except planes.
     pub bounds: Option<[[f64; 3]; 2]>,
@@ -40,17 +40,17 @@ pub struct Info {
 }
 
 #[derive(Debug, Serialize)]
-pub struct Picture {
+pub struct ImageInfo {
     pub width: u32,
     pub height: u32,
     pub integrator: &'static str,
     pub pixel_pattern: &'static str,
     pub pixel_samples: u32,
-    /// Differs from `pixel_samples` if sampling is adaptive.
+    /// Maximum samples per pixel; differs from `pixel_samples` if sampling is adaptive.
     pub max_samples: u32,
-    /// The former name of `max_samples`, until 0.3.
+    /// The former name of `max_samples`, kept until version 0.3.
     #[serde(rename = "most_samples")]
-    old_max_samples: u32,
+    former_max_samples: u32,
     /// Light samples per hit, summed over all lights.
     pub light_samples: u64,
     pub max_depth: u32,
@@ -101,9 +101,9 @@ pub struct Shapes {
     pub meshes: u64,
     pub mesh_triangles: u64,
     pub instanced_triangles: u64,
-    /// The former name of `instanced_triangles`, until 0.3.
+    /// The former name of `instanced_triangles`, kept until version 0.3.
     #[serde(rename = "placed_mesh_triangles")]
-    old_instanced_triangles: u64,
+    former_instanced_triangles: u64,
     /// Triangles of all mesh instances, triangle shapes and tetrahedra.
     pub triangles: u64,
     /// Primitives that are not part of meshes: shapes (a tetrahedron counts as four triangles) and area lights.
@@ -178,14 +178,14 @@ impl Info {
         let kernel = kernel(packed, plan);
         Info {
             scene: path.display().to_string(),
-            picture: Picture {
+            picture: ImageInfo {
                 width: scene.width,
                 height: scene.height,
                 integrator: scene.render.integrator.name(),
                 pixel_pattern: scene.render.pixel_samples.pattern.name(),
                 pixel_samples: scene.render.pixel_samples.count,
                 max_samples: packed.sampling.pixel_samples,
-                old_max_samples: packed.sampling.pixel_samples,
+                former_max_samples: packed.sampling.pixel_samples,
                 light_samples: packed.light_samples(),
                 max_depth: scene.render.max_depth,
                 seed: scene.render.seed,
@@ -223,7 +223,7 @@ impl Info {
                 name: plan.info.name.clone(),
                 driver: plan.info.driver.clone(),
                 backend: plan.info.interface.clone(),
-                why: plan.why.clone(),
+                why: plan.reason.clone(),
             },
             notes: (scene.notes.iter().map(ToString::to_string))
                 .chain(scene.visibility_warnings())
@@ -273,7 +273,7 @@ fn shapes(scene: &Scene, packed: &Packed) -> Shapes {
         meshes: meshes.len() as u64,
         mesh_triangles,
         instanced_triangles,
-        old_instanced_triangles: instanced_triangles,
+        former_instanced_triangles: instanced_triangles,
         triangles: instanced_triangles + other_triangles,
         primitives: packed.primitives.len() as u64,
     }

@@ -31,7 +31,7 @@ pub fn features(packed: &Packed) -> Vec<(&'static str, bool)> {
         ..
     } = packed.specialization;
     let is_path = packed.integrator.follows_paths();
-    let mut all = vec![
+    let mut feature_list = vec![
         ("BVH", tlas_kinds != 0),
         ("lens", lens != 0),
         ("panorama", panoramic != 0),
@@ -45,15 +45,15 @@ pub fn features(packed: &Packed) -> Vec<(&'static str, bool)> {
         ("vertex colors", vertex_colors != 0),
     ];
     if !is_path {
-        all.push(("mirrors and glass", bounces != 0));
-        return all;
+        feature_list.push(("mirrors and glass", bounces != 0));
+        return feature_list;
     }
-    all.push(("roughness", rough != 0));
-    all.extend(LOBES.iter().map(|lobe| {
-        let is_in_metal = lobe.bit == LOBE_ANISOTROPY && anisotropic != 0;
-        (lobe.name, lobes & lobe.bit != 0 || is_in_metal)
+    feature_list.push(("roughness", rough != 0));
+    feature_list.extend(LOBES.iter().map(|lobe| {
+        let is_anisotropic_metal = lobe.bit == LOBE_ANISOTROPY && anisotropic != 0;
+        (lobe.name, lobes & lobe.bit != 0 || is_anisotropic_metal)
     }));
-    all.extend([
+    feature_list.extend([
         ("alpha", alpha_surfaces != 0),
         ("absorption", absorption != 0),
         ("emissive surfaces", emissive != 0),
@@ -64,5 +64,5 @@ pub fn features(packed: &Packed) -> Vec<(&'static str, bool)> {
         ("clamp", max_indirect != 0),
         ("transparent background", alpha != 0),
     ]);
-    all
+    feature_list
 }

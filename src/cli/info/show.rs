@@ -112,8 +112,8 @@ fn shapes(table: &mut Table, info: &Info, verbose: bool) {
     table.row("shapes", &kinds(&shapes.kinds));
     if shapes.meshes > 0 {
         let instanced = match shapes.instanced_triangles {
-            all if all == shapes.mesh_triangles => String::new(),
-            all => format!("; {all} including instances"),
+            total if total == shapes.mesh_triangles => String::new(),
+            total => format!("; {total} including instances"),
         };
         let triangles = count(shapes.mesh_triangles, "triangle");
         table.row("meshes", &format!("{} with {triangles}{instanced}", shapes.meshes));
@@ -147,7 +147,7 @@ fn lights(table: &mut Table, info: &Info, verbose: bool) {
     }
 }
 
-/// Adds the parts of a glTF file, with the indices and names that options accept.
+/// Adds the contents of a glTF file, with the indices and names that options accept.
 fn contents(table: &mut Table, model: &ModelContents) {
     table.row("glTF file", &model.file);
     let ModelContents {
@@ -202,8 +202,8 @@ fn kernel(table: &mut Table, info: &Info) {
         "kernel",
         &match (kernel.entry, kernel.lines, kernel.baked) {
             (Some(entry), Some(lines), Some(baked)) => {
-                let form = if baked { "constants" } else { "buffers" };
-                format!("{entry}, {lines} lines of WGSL, scene in {form}")
+                let storage = if baked { "constants" } else { "buffers" };
+                format!("{entry}, {lines} lines of WGSL, scene in {storage}")
             }
             _ => "none (the CPU compiles no kernel)".to_owned(),
         },
@@ -212,7 +212,7 @@ fn kernel(table: &mut Table, info: &Info) {
     table.row("", &format!("unused: {}", features(&kernel.leaves_out)));
 }
 
-/// Lists the first names, with indices if options accept indices.
+/// Lists at most `MAX_LISTED` names, with indices if options accept indices.
 fn list<'a>(names: impl ExactSizeIterator<Item = Option<&'a str>>, indexed: bool) -> String {
     let more = names.len().saturating_sub(MAX_LISTED);
     let item = |(i, name): (usize, Option<&str>)| match (name, indexed) {

@@ -108,7 +108,7 @@ pub struct Args {
     pub skip_existing: bool,
 
     #[command(flatten)]
-    pub pictures: PictureOptions,
+    pub picture_options: PictureOptions,
 
     /// Also write layers, such as depth,normal, into an EXR or beside a PNG
     #[arg(long, help_heading = "Output images", value_name = "LAYERS", value_delimiter = ',', value_parser = name_parser(Aov::ALL, Aov::name), hide_possible_values = true)]
@@ -191,7 +191,7 @@ impl Args {
         Frame::all(self.frames.as_ref().or(turntable.as_ref()))
     }
 
-    /// Returns the frames per second if the frames play the animations of a glTF file.
+    /// Returns the frames per second of glTF animations; `None` if the frames do not play animations.
     pub fn fps(&self, scene: &Scene) -> Result<Option<f64>, Usage> {
         let error = |rule: &str| Err(Usage(format!("--fps: {rule}")));
         // A scene file that includes a model sets the animation time itself.
@@ -202,7 +202,7 @@ impl Args {
             Some(fps) => Ok(Some(fps)),
             None => {
                 let plays_frames = self.frames.is_some() && self.turntable.is_none() && !self.options.has_time();
-                Ok((plays_frames && is_animated).then_some(FPS))
+                Ok((plays_frames && is_animated).then_some(DEFAULT_FPS))
             }
         }
     }
@@ -210,9 +210,9 @@ impl Args {
     /// Returns the destinations of a frame: the images or the part, and the statistics.
     pub fn outputs(&self, frame: Frame) -> anyhow::Result<Outputs> {
         let output_name = |output: &PathBuf| frame.name("--output", output);
-        let pictures = PictureOptions {
-            output: self.pictures.output.iter().map(output_name).collect::<Result<_, _>>()?,
-            ..self.pictures.clone()
+        let picture_options = PictureOptions {
+            output: (self.picture_options.output.iter().map(output_name)).collect::<Result<_, _>>()?,
+            ..self.picture_options.clone()
         };
         let stats = match &self.stats {
             Some(path) if path.as_os_str() == "-" => Some(path.clone()),
@@ -220,9 +220,9 @@ impl Args {
             None => None,
         };
         match self.tile {
-            Some(_) => Outputs::find_part(&pictures, stats.as_deref()),
+            Some(_) => Outputs::find_part(&picture_options, stats.as_deref()),
             None => Outputs::find(
-                &pictures,
+                &picture_options,
                 &self.default_name(frame)?,
                 (&self.aovs(), LayerPolicy::Requested),
                 stats.as_deref(),
@@ -261,8 +261,8 @@ impl Args {
             integrator: self.integrator,
             max_depth: self.max_depth,
             asset_root: self.asset_root.clone(),
-            view_transform: self.pictures.view_transform,
-            exposure: self.pictures.exposure,
+            view_transform: self.picture_options.view_transform,
+            exposure: self.picture_options.exposure,
             turntable: self.turntable,
             define: self.define.clone(),
             ..Overrides::default()
@@ -287,18 +287,18 @@ pub fn parse_size(text: &str) -> Result<(u32, u32), String> {
     }
 }
 
-/// Default frames per second.
-const FPS: f64 = 24.0;
+/// Frames per second of `--frames` without `--fps`.
+const DEFAULT_FPS: f64 = 24.0;
 
 fn parse_fps(text: &str) -> Result<f64, String> {
     let fps = text.parse().ok().filter(|fps: &f64| (1e-3..=1e6).contains(fps));
     fps.ok_or("must be a number from 0.001 to 1e6, such as 24 or 29.97".to_owned())
 }
 
-/// Maximum duration: about thirty years.
+/// Maximum duration: 1e9 seconds, about thirty years.
 const MAX_TIME: Duration = Duration::from_secs(1_000_000_000);
 
-/// Parses a duration: a decimal number of seconds, or one with a unit.
+/// Parses a duration: a decimal number of seconds, or a decimal number with a unit.
 fn parse_duration(text: &str) -> Result<Duration, String> {
     const UNITS: [(&str, f64); 4] = [("ms", 1e-3), ("s", 1.0), ("m", 60.0), ("h", 3600.0)];
     let number = text.trim_end_matches(|c: char| c.is_ascii_alphabetic());
@@ -318,9 +318,11 @@ fn parse_duration(text: &str) -> Result<Duration, String> {
 }
 
 fn parse_tile(text: &str) -> Result<Tile, String> {
-    let numbers = text.split_once('/').map(|(number, of)| (number.parse(), of.parse()));
+    let numbers = text
+        .split_once('/')
+        .map(|(number, count)| (number.parse(), count.parse()));
     match numbers {
-        Some((Ok(number), Ok(of))) if 1 <= number && number <= of => Ok(Tile { number, of }),
+        Some((Ok(number), Ok(count))) if 1 <= number && number <= count => Ok(Tile { number, of: count }),
         _ => Err("must be i/n, two whole numbers with i from 1 to n, such as 2/8".to_owned()),
     }
 }

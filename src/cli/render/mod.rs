@@ -182,7 +182,8 @@ fn check<'a>(args: &Args, scene: &Scene, frames: impl Iterator<Item = (&'a Frame
     Ok(())
 }
 
-/// Renders an image or a part. From the first image on, signals are deferred: they end the command after cleanup.
+/// Renders an image or a part. During and after the first render, signals are deferred: they end the command after
+/// cleanup.
 fn render_image(
     plan: &Plan,
     session: &mut Session,
@@ -198,7 +199,7 @@ fn render_image(
         None => &mut no_checkpoint,
     };
     let files: Vec<String> = outputs.files().map(|(_, name, _)| name.to_owned()).collect();
-    let images = outputs.images();
+    let image_names = outputs.image_names();
     let previews = match plan.preview {
         true => Some(Previews::new(outputs.rewritable().map_err(RenderError::Output)?)),
         false => None,
@@ -229,8 +230,8 @@ fn render_image(
     let total = start.elapsed().as_secs_f64();
     let stats = stats(plan, renderer.info(), &totals, setup, total);
     let (requested, all) = (totals.requested_samples, plan.scene.sampling.pixel_samples);
-    let (images, files, done) = match totals.partial.is_empty() {
-        true => (images, files, "render done"),
+    let (image_names, files, message) = match totals.partial.is_empty() {
+        true => (image_names, files, "render done"),
         false => (totals.partial.clone(), totals.partial.clone(), "render interrupted"),
     };
     if stats.partial {
@@ -243,9 +244,9 @@ fn render_image(
     match log::is_json() {
         true => {
             let facts = facts_of([("files", files.into()), ("stats", serde_json::to_value(&stats)?)]);
-            plan.log.log_with(Level::Info, done, facts);
+            plan.log.log_with(Level::Info, message, facts);
         }
-        false => plan.log.log(Level::Info, &summary(&images, &stats, requested)),
+        false => plan.log.log(Level::Info, &summary(&image_names, &stats, requested)),
     }
     if let Some(file) = outputs.stats {
         stats.write(file).map_err(RenderError::Output)?;
@@ -257,7 +258,7 @@ fn render_image(
 }
 
 /// Returns the summary of a written image: `box.png: 1024 x 1024, 64 spp, 12.3 s`.
-fn summary(images: &[String], stats: &Stats, requested: u32) -> String {
+fn summary(image_names: &[String], stats: &Stats, requested: u32) -> String {
     let samples = match stats.min_samples {
         min if min < requested => format!("{min}-{requested}"), // adaptive sampling
         _ => requested.to_string(),
@@ -265,7 +266,7 @@ fn summary(images: &[String], stats: &Stats, requested: u32) -> String {
     let (width, height) = (stats.width, stats.height);
     format!(
         "{}: {width} x {height}, {samples} spp, {:.1} s",
-        images.join(", "),
+        image_names.join(", "),
         stats.total_s
     )
 }

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 
 use crate::cli::log::{Facts, Level, print, print_with};
 
-/// Prints messages, and remembers the lines of `log_once`.
+/// Prints messages, and remembers those of `log_once`.
 pub struct OnceLog {
     quiet: bool,
     lines: RefCell<BTreeSet<String>>,

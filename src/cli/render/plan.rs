@@ -30,7 +30,8 @@ use crate::cli::{Interrupted, Usage, cli_error, option_error};
 /// The settings of a render, except its destinations.
 pub struct Plan<'a> {
     pub scene: Arc<Packed>,
-    pub picture: Region,
+    /// The region of the image: the crop, or the full image.
+    pub image_region: Region,
     /// The part to render, and its rows.
     pub tile: Option<(Tile, Region)>,
     pub options: Options,
@@ -40,7 +41,7 @@ pub struct Plan<'a> {
     pub checkpoint: Option<PathBuf>,
     checkpoint_interval: Duration,
     resume: bool,
-    pub pictures: PictureOptions,
+    pub picture_options: PictureOptions,
     pub view: ViewSettings,
     pub metadata: RenderMetadata,
     pub progress: Mode,
@@ -60,20 +61,20 @@ impl<'a> Plan<'a> {
         let scene = &Arc::clone(session.scene());
         let early_stops = [("--time-limit", args.time_limit.is_some()), ("--preview", args.preview)];
         for (option, _) in early_stops.into_iter().filter(|(_, is_set)| *is_set) {
-            can_end_early(option, scene)?;
+            check_early_stop(option, scene)?;
         }
         let options = args.rendering();
-        let picture = options.region(scene).map_err(|problem| option_error(&problem))?;
+        let image_region = options.region(scene).map_err(|problem| option_error(&problem))?;
         let tile = match args.tile {
             None => None,
-            Some(tile) => Some((tile, rows(tile, picture)?)),
+            Some(tile) => Some((tile, rows(tile, image_region)?)),
         };
         let progress = args.progress_mode();
         let packed = progress::with_spinner(progress, "preparing geometry, textures and lights", || {
             session.packed(&options)
         });
         Ok(Plan {
-            picture,
+            image_region,
             tile,
             options,
             deadline: args.time_limit.and_then(|limit| start.checked_add(limit)),
@@ -81,8 +82,8 @@ impl<'a> Plan<'a> {
             checkpoint: args.checkpoint(frame)?,
             checkpoint_interval: args.checkpoint_interval,
             resume: args.resume,
-            view: args.pictures.view(scene.view),
-            pictures: args.pictures.clone(),
+            view: args.picture_options.view(scene.view),
+            picture_options: args.picture_options.clone(),
             metadata: RenderMetadata::of(scene, &packed, args.time_limit),
             scene: packed,
             progress,
@@ -91,8 +92,9 @@ impl<'a> Plan<'a> {
         })
     }
 
+    /// Returns the region to render: the rows of the part, or the region of the image.
     pub fn region(&self) -> Region {
-        self.tile.map_or(self.picture, |(_, rows)| rows)
+        self.tile.map_or(self.image_region, |(_, rows)| rows)
     }
 
     /// Returns the layout of the image. `middle_depth` is the depth at the image center.
@@ -117,8 +119,9 @@ impl<'a> Plan<'a> {
         identity == self.identity() && found == PartHeader::of(tile, &layout, self.metadata.without_device())
     }
 
+    /// Returns the identity of the image, which all of its parts share.
     pub fn identity(&self) -> Identity {
-        Identity::of(&self.scene, self.picture, self.options.exact_rounding)
+        Identity::of(&self.scene, self.image_region, self.options.exact_rounding)
     }
 
     /// Opens the checkpoint, if requested; waits while another process uses the file. A part has the same checkpoint as
@@ -152,43 +155,44 @@ impl<'a> Plan<'a> {
         }
     }
 
-    /// Opens the device for the scene, unless the session has done so for an earlier frame.
+    /// Opens the device for the scene, unless the session has opened it for an earlier frame.
     pub fn renderer<'b>(&'b self, session: &'b mut Session, stop: &'b Stop) -> anyhow::Result<Renderer<'b>> {
         let on_fault = FaultHandler {
-            tell: Box::new(|why, remedy| match remedy {
-                Recovery::Reopen => self.log.log(Level::Warning, &format!("{why}; re-opening it")),
+            report: Box::new(|error, recovery| match recovery {
+                Recovery::Reopen => self.log.log(Level::Warning, &format!("{error}; re-opening it")),
                 Recovery::Cpu => self
                     .log
-                    .log_once(Level::Warning, &format!("rendering on the CPU: {why}")),
+                    .log_once(Level::Warning, &format!("rendering on the CPU: {error}")),
             }),
-            stopped: Box::new(|| stop.signal().is_some()),
+            is_stopped: Box::new(|| stop.signal().is_some()),
         };
         let renderer = progress::with_spinner(self.progress, "opening the device and compiling kernels", || {
             session.renderer(&self.options, on_fault)
         });
         let renderer = renderer.map_err(cli_error)?;
-        if let Some(why) = renderer.why() {
-            info!("{why}");
+        if let Some(reason) = renderer.cpu_reason() {
+            info!("{reason}");
         }
         Ok(renderer)
     }
 }
 
-fn rows(tile: Tile, picture: Region) -> Result<Region, Usage> {
+/// Returns the rows of a part of the image.
+fn rows(tile: Tile, image_region: Region) -> Result<Region, Usage> {
     let rule = format!(
         "--tile: {tile}: the number of parts must not exceed the number of rows, {}",
-        picture.height()
+        image_region.height()
     );
-    tile.rows(picture).ok_or(Usage(rule))
+    tile.rows(image_region).ok_or(Usage(rule))
 }
 
-/// Checks that the pixel pattern allows rendering to stop early: the first samples of a pattern must cover the pixel.
-fn can_end_early(option: &str, scene: &Scene) -> Result<(), Usage> {
+/// Rejects an option that may stop the render early, unless the first samples of the pixel pattern cover the pixel.
+fn check_early_stop(option: &str, scene: &Scene) -> Result<(), Usage> {
     let pattern = scene.render.pixel_samples.pattern;
     match pattern.needs_square() {
         false => Ok(()),
         true => Err(Usage(format!(
-            "{option}: the first samples must cover the pixel, which those of --pixel-pattern {} do not; use sobol",
+            "{option}: the first samples must cover the pixel, but those of --pixel-pattern {} do not; use sobol",
             pattern.name()
         ))),
     }

@@ -9,22 +9,29 @@ use super::once_log::OnceLog;
 use crate::cli::log::Level;
 use crate::cli::metadata::samples_of;
 
-/// Minimum time between two writes.
+/// Minimum time between two writes of the image.
 const INTERVAL: Duration = Duration::from_secs(2);
 
 pub struct Previews {
     images: Vec<(Format, Vec<Output>)>,
-    last: Option<Instant>,
+    /// Time of the last write.
+    last_write: Option<Instant>,
 }
 
 impl Previews {
     pub fn new(images: Vec<(Format, Vec<Output>)>) -> Previews {
-        Previews { images, last: None }
+        Previews {
+            images,
+            last_write: None,
+        }
     }
 
     /// Returns true if the image should be written after this number of samples per pixel.
     pub fn is_due(&self, samples: u32) -> bool {
-        samples.is_power_of_two() && self.last.is_none_or(|last| last.elapsed() >= INTERVAL)
+        samples.is_power_of_two()
+            && self
+                .last_write
+                .is_none_or(|last_write| last_write.elapsed() >= INTERVAL)
     }
 
     /// Starts writing the files, except files that already have more samples.
@@ -45,11 +52,11 @@ impl Previews {
     }
 
     pub fn record_write(&mut self) {
-        self.last = Some(Instant::now());
+        self.last_write = Some(Instant::now());
     }
 }
 
-/// Returns a message if the existing file may have more samples.
+/// Returns a message if a preview must not replace the existing file.
 fn reason_to_keep(file: &Output, samples: u32) -> Option<String> {
     let path = file.path().filter(|path| path.exists())?;
     let reason = match samples_of(path) {

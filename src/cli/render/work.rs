@@ -1,4 +1,4 @@
-//! Renders one image, or a part of one, into its files.
+//! Renders an image, or a part of an image, and writes the files.
 
 use std::time::{Duration, Instant};
 
@@ -19,15 +19,17 @@ use crate::cli::signal::Stop;
 
 #[derive(Default)]
 pub struct RenderTotals {
-    /// Render time without the writing of files.
+    /// Render time, excluding the time to write files.
     pub time: Duration,
-    /// Camera rays of the image, and the fraction of these rays that this run traced, not read from a checkpoint.
+    /// Number of camera rays of the image.
     pub camera_rays: u64,
+    /// Fraction of the camera rays that this run traced; the samples of the other rays come from a checkpoint.
     pub fraction_rendered: f64,
     /// Number of pixels with non-finite values.
     invalid_pixels: usize,
+    /// Minimum samples per pixel.
     pub min_samples: u32,
-    /// Fewer than in the scene if the time limit was reached or the image is partial.
+    /// Requested samples per pixel: fewer than in the scene if the time limit was reached or the image is partial.
     pub requested_samples: u32,
     /// After a signal, the files that contain the last complete pass.
     pub partial: Vec<String>,
@@ -43,7 +45,7 @@ impl RenderTotals {
     }
 }
 
-/// Renders into files, band by band.
+/// Renders an image or a part, and writes the files band by band.
 pub fn write(
     plan: &Plan,
     renderer: &mut Renderer,
@@ -56,20 +58,22 @@ pub fn write(
     let layout = plan.layout(middle_depth);
     let mut totals = RenderTotals::new(plan.scene.sampling.pixel_samples);
     let name = files.name().unwrap_or_default().to_owned();
-    let metadata = plan.metadata.with_device(renderer.info(), plan.pictures.reproducible);
-    let mut fill = |sink: &mut Sink| {
+    let metadata = plan
+        .metadata
+        .with_device(renderer.info(), plan.picture_options.reproducible);
+    let mut render_to = |sink: &mut Sink| {
         let previews = previews.as_mut().map(|previews| (previews, &layout));
         render(plan, renderer, store, stop, &mut totals, previews, sink)
     };
     match files {
-        Files::Pictures(targets) => {
-            let options = plan.pictures.save_options(metadata);
-            match image::save(targets, &layout, &options, &mut fill) {
+        Files::Images(targets) => {
+            let options = plan.picture_options.save_options(metadata);
+            match image::save(targets, &layout, &options, &mut render_to) {
                 Err(RenderError::Cancelled) if !totals.partial.is_empty() => {} // these files have been written
-                saved => (plan.pictures).warn(&saved?, &mut |line| plan.log.log(Level::Warning, line)),
+                saved => (plan.picture_options).warn(&saved?, &mut |line| plan.log.log(Level::Warning, line)),
             }
         }
-        Files::Part(file) => write_part(plan, &layout, file, &mut fill)?,
+        Files::Part(file) => write_part(plan, &layout, file, &mut render_to)?,
     }
     if totals.invalid_pixels > 0 {
         let count = totals.invalid_pixels;
@@ -85,16 +89,16 @@ fn write_part(
     plan: &Plan,
     layout: &Layout,
     file: Pending,
-    fill: &mut dyn FnMut(&mut Sink) -> Result<(), RenderError>,
+    render_to: &mut dyn FnMut(&mut Sink) -> Result<(), RenderError>,
 ) -> Result<(), RenderError> {
     let Some((tile, _)) = plan.tile else {
         return Ok(());
     };
     let header = PartHeader::of(tile, layout, plan.metadata.without_device());
-    job::write_part(file, &plan.identity(), &header, fill)
+    job::write_part(file, &plan.identity(), &header, render_to)
 }
 
-/// Renders into a sink, band by band.
+/// Renders all bands, and passes each finished band to a sink.
 fn render(
     plan: &Plan,
     renderer: &mut Renderer,
@@ -134,8 +138,8 @@ fn render(
     if let Some((previews, layout)) = previews {
         loop {
             let start = Instant::now();
-            let attempt = renderer.progress();
-            let pass = renderer.work(|backend, _| bands.next_pass(backend, &mut watch, &mut || attempt.made()));
+            let counter = renderer.progress_counter();
+            let pass = renderer.work(|backend, _| bands.next_pass(backend, &mut watch, &mut || counter.increment()));
             totals.time += start.elapsed();
             match pass {
                 Ok(Some(count)) if count < samples => {
@@ -160,8 +164,8 @@ fn render(
     }
     loop {
         let start = Instant::now();
-        let attempt = renderer.progress();
-        let next = renderer.work(|backend, _| bands.render_next(backend, &mut watch, &mut || attempt.made()));
+        let counter = renderer.progress_counter();
+        let next = renderer.work(|backend, _| bands.render_next(backend, &mut watch, &mut || counter.increment()));
         totals.time += start.elapsed();
         let Some(band) = next? else {
             totals.fraction_rendered = bands.fraction_rendered();
@@ -198,7 +202,7 @@ fn write_band(
 }
 
 /// Writes the last complete pass to the images, except to files that already have more samples. Returns `None` if no
-/// file is written. Failures are only warnings, because writing the complete image may still succeed.
+/// file is written. A failure to write is only a warning, because writing the complete image may still succeed.
 fn save_pass(
     plan: &Plan,
     renderer: &mut Renderer,
@@ -207,8 +211,8 @@ fn save_pass(
     layout: &Layout,
 ) -> Result<Option<RenderTotals>, RenderError> {
     let (samples, all) = (bands.passed_samples(), plan.scene.sampling.pixel_samples);
-    let metadata = (plan.metadata).partial(renderer.info(), plan.pictures.reproducible, (samples, all));
-    let options = plan.pictures.save_options(metadata);
+    let metadata = (plan.metadata).partial(renderer.info(), plan.picture_options.reproducible, (samples, all));
+    let options = plan.picture_options.save_options(metadata);
     let mut totals = RenderTotals {
         fraction_rendered: 1.0,
         ..RenderTotals::new(all)

@@ -6,7 +6,7 @@ use std::sync::OnceLock;
 
 use glam::DVec3;
 
-use crate::meshes::forms::Form;
+use crate::meshes::forms::TriangleMesh;
 use crate::random::Random;
 use crate::textures::write_exr;
 
@@ -30,18 +30,22 @@ pub fn folder() -> &'static Path {
         let folder = Path::new(env!("CARGO_TARGET_TMPDIR"));
         let random = Random::new(21);
         for (name, has_uvs, has_normals) in MESHES {
-            let form = match *name {
-                "soup.obj" => Form::soup(60, &random),
-                "slivers.obj" => Form::slivers(40, &random),
-                "ball.obj" | "painted.ply" => Form::icosphere(1),
-                "cube.obj" => Form::cube(),
+            let triangle_mesh = match *name {
+                "soup.obj" => TriangleMesh::soup(60, &random),
+                "slivers.obj" => TriangleMesh::slivers(40, &random),
+                "ball.obj" | "painted.ply" => TriangleMesh::icosphere(1),
+                "cube.obj" => TriangleMesh::cube(),
                 _ => bumpy(&random),
             };
-            let uvs: Vec<[f64; 2]> = form.points.iter().map(|p| [p.x * 0.7 + p.z, p.y - 0.3 * p.x]).collect();
-            let normals: Vec<DVec3> = form.points.iter().map(|p| p.normalize()).collect();
+            let uvs: Vec<[f64; 2]> = triangle_mesh
+                .points
+                .iter()
+                .map(|p| [p.x * 0.7 + p.z, p.y - 0.3 * p.x])
+                .collect();
+            let normals: Vec<DVec3> = triangle_mesh.points.iter().map(|p| p.normalize()).collect();
             let text = match *name {
-                "painted.ply" => painted(&form, &normals, &uvs, &random),
-                _ => form.obj(has_normals.then_some(&normals), has_uvs.then_some(&uvs)),
+                "painted.ply" => painted(&triangle_mesh, &normals, &uvs, &random),
+                _ => triangle_mesh.obj(has_normals.then_some(&normals), has_uvs.then_some(&uvs)),
             };
             // Renaming is atomic: concurrent readers see a complete file.
             let temporary = folder.join(format!("{name}.{}", std::process::id()));
@@ -58,18 +62,18 @@ pub fn folder() -> &'static Path {
     })
 }
 
-/// Returns a PLY file with vertex colors, partly 0 or above 1.
-fn painted(form: &Form, normals: &[DVec3], uvs: &[[f64; 2]], random: &Random) -> String {
+/// Returns a PLY file with vertex colors, some of which are 0 or above 1.
+fn painted(triangle_mesh: &TriangleMesh, normals: &[DVec3], uvs: &[[f64; 2]], random: &Random) -> String {
     let names = [
         "x", "y", "z", "nx", "ny", "nz", "u", "v", "red", "green", "blue", "alpha",
     ];
     let properties: String = names.iter().map(|name| format!("property float {name}\n")).collect();
-    let (vertices, faces) = (form.points.len(), form.triangles.len());
+    let (vertices, faces) = (triangle_mesh.points.len(), triangle_mesh.triangles.len());
     let mut text = format!(
         "ply\nformat ascii 1.0\nelement vertex {vertices}\n{properties}element face {faces}\n\
          property list uchar int vertex_indices\nend_header\n"
     );
-    for ((p, n), [u, v]) in form.points.iter().zip(normals).zip(uvs) {
+    for ((p, n), [u, v]) in triangle_mesh.points.iter().zip(normals).zip(uvs) {
         let [r, g, b] = [0, 1, 2].map(|_| random.pick(&[0.0, 0.3, 1.0, 2.5]));
         let a = random.pick(&[0.0, 0.5, 0.9, 1.0]);
         text += &format!(
@@ -77,14 +81,17 @@ fn painted(form: &Form, normals: &[DVec3], uvs: &[[f64; 2]], random: &Random) ->
             p.x, p.y, p.z, n.x, n.y, n.z
         );
     }
-    for [a, b, c] in &form.triangles {
+    for [a, b, c] in &triangle_mesh.triangles {
         text += &format!("3 {a} {b} {c}\n");
     }
     text
 }
 
-fn bumpy(random: &Random) -> Form {
-    let mut form = Form::icosphere(2);
-    form.points.iter_mut().for_each(|p| *p *= random.between(0.4, 1.3));
-    form
+fn bumpy(random: &Random) -> TriangleMesh {
+    let mut triangle_mesh = TriangleMesh::icosphere(2);
+    triangle_mesh
+        .points
+        .iter_mut()
+        .for_each(|p| *p *= random.between(0.4, 1.3));
+    triangle_mesh
 }

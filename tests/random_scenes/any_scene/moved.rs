@@ -4,9 +4,9 @@ use glam::DVec3;
 use wgray::scene::*;
 
 /// Scales and translates all objects of a scene.
-pub fn moved(d: &mut Description, scale: f64, offset: DVec3) {
+pub fn moved(description: &mut Description, scale: f64, offset: DVec3) {
     let point = |p: &mut DVec3| *p = *p * scale + offset;
-    match &mut d.camera {
+    match &mut description.camera {
         CameraDescription::Perspective(c) => {
             for length in [&mut c.aperture, &mut c.focus_distance].into_iter().flatten() {
                 *length *= scale;
@@ -19,7 +19,7 @@ pub fn moved(d: &mut Description, scale: f64, offset: DVec3) {
             [&mut c.position, &mut c.look_at].map(point)
         }
     };
-    for light in &mut d.lights {
+    for light in &mut description.lights {
         match light {
             LightDescription::Rectangle(l) => {
                 point(&mut l.center);
@@ -30,7 +30,7 @@ pub fn moved(d: &mut Description, scale: f64, offset: DVec3) {
             _ => {}
         }
     }
-    for shape in &mut d.shapes {
+    for shape in &mut description.shapes {
         match shape {
             ShapeDescription::Rectangle(s) => {
                 point(&mut s.center);
@@ -61,7 +61,7 @@ pub fn moved(d: &mut Description, scale: f64, offset: DVec3) {
             other => panic!("no random scene has the shape {other:?}"),
         }
     }
-    for i in &mut d.instances {
+    for i in &mut description.instances {
         move_placement(&mut i.translate, &mut i.scale, &mut i.matrix, scale, offset);
     }
 }

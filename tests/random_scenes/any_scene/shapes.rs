@@ -107,10 +107,10 @@ pub fn placement() -> impl Strategy<Value = Placement> {
     let per_axis = [size(), size(), size()].prop_map(|s| Scale::Each(DVec3::from_array(s)));
     let scale =
         prop_oneof![2 => Just(None), 2 => size().prop_map(|s| Some(Scale::All(s))), 1 => per_axis.prop_map(Some)];
-    let parts = (prop::option::of(point()), rotation, scale).prop_map(|(t, r, s)| (t, r, s, None));
+    let components = (prop::option::of(point()), rotation, scale).prop_map(|(t, r, s)| (t, r, s, None));
     let row = || [coordinate(), coordinate(), coordinate(), coordinate()];
     let matrix = [row(), row(), row()].prop_map(|rows| (None, None, None, Some(rows.to_vec())));
-    prop_oneof![5 => parts, 1 => matrix]
+    prop_oneof![5 => components, 1 => matrix]
 }
 
 pub fn normals() -> impl Strategy<Value = Option<Normals>> {
@@ -164,7 +164,7 @@ pub fn instance() -> impl Strategy<Value = InstanceDescription> {
     )
 }
 
-/// Generates mesh files and instances, often empty.
+/// Generates mesh files and instances, often none.
 pub fn meshes() -> impl Strategy<Value = (BTreeMap<String, MeshFileDescription>, Vec<InstanceDescription>)> {
     let file = || {
         (select(MESHES), normals(), up()).prop_map(|((name, ..), normals, up)| {

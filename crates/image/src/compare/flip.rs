@@ -129,7 +129,7 @@ struct Filters {
     red_green: Vec<f32>,
     /// Two separable filters; their results are added.
     blue_yellow: [Vec<f32>; 2],
-    /// A Gaussian and its first and second derivatives.
+    /// A Gaussian; `edge` and `point` are its first and second derivatives.
     gauss: Vec<f32>,
     edge: Vec<f32>,
     point: Vec<f32>,
@@ -310,7 +310,7 @@ impl Tile {
         errors
     }
 
-    /// Raises `errors` to the errors between two opponent images.
+    /// Raises each of `errors` to at least the error between two tiles in opponent colors.
     fn raise_errors(&self, a: &PaddedTile, b: &PaddedTile, filters: &Filters, errors: &mut [f32]) {
         let (lines_a, lines_b) = (
             Lines::filter_horizontally(a, self.width, filters),
@@ -326,8 +326,8 @@ impl Tile {
                 let ((edge_a, point_a), (edge_b, point_b)) = (row_a.features(x), row_b.features(x));
                 let feature = (edge_a - edge_b).abs().max((point_a - point_b).abs());
                 let feature = (f64::from(feature) * std::f64::consts::FRAC_1_SQRT_2).powf(QF);
-                let new = if color > 0.0 { color.powf(1.0 - feature) } else { 0.0 };
-                *error = error.max(new as f32);
+                let pixel_error = if color > 0.0 { color.powf(1.0 - feature) } else { 0.0 };
+                *error = error.max(pixel_error as f32);
             }
         }
     }

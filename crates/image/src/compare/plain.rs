@@ -66,13 +66,13 @@ pub struct LargestDifference {
     pub b: f64,
 }
 
-/// Differences between two images in one layer. Values that are non-finite in either image count as 0 in both images,
-/// except for `different` and `beyond`.
+/// Differences between two images in one layer. For `largest`, `rmse`, `rel_mse` and `psnr`, values that are non-finite
+/// in either image count as 0 in both images.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Difference {
     /// Pixels with a value that is not bit-identical; signed zeros differ.
     pub different: u64,
-    /// The first of these pixels.
+    /// The first pixel counted in `different`, in row-major order.
     pub first: Option<PixelCoord>,
     /// Pixels with a value that differs by more than the threshold, or that is neither finite nor bit-identical.
     pub beyond: u64,
@@ -89,7 +89,7 @@ pub struct Difference {
     pub a: NonFiniteCounts,
     /// Non-finite values of the second image.
     pub b: NonFiniteCounts,
-    /// The first pixel with a non-finite value in either image.
+    /// The first pixel, in row-major order, with a non-finite value in either image.
     pub first_non_finite: Option<PixelCoord>,
 }
 

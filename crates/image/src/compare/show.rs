@@ -34,6 +34,7 @@ pub struct ErrorImage<'a> {
     /// Height in pixels.
     pub height: usize,
     source: Source<'a>,
+    /// Width of the compared images in pixels.
     columns: usize,
     error: Map,
     /// For each cell in row-major order, true if the cell contains a differing pixel.
@@ -46,6 +47,7 @@ pub struct ErrorImage<'a> {
     /// Width and height of a panel.
     panel: (usize, usize),
     is_stacked: bool,
+    /// Label of the error map, and label at the upper end of its color scale.
     names: [&'static str; 2],
 }
 
@@ -126,41 +128,43 @@ impl ErrorImage<'_> {
                 false => (GAP + panel * panel_width, GAP),
             };
             let Some(y) = y.checked_sub(top) else { continue };
-            let Some(to) = row.get_mut(left..) else { continue };
+            let Some(panel_row) = row.get_mut(left..) else { continue };
             if y < LABEL_HEIGHT {
                 let name = ["A", "B", self.names[0]][panel];
-                draw_text(to, name, y);
+                draw_text(panel_row, name, y);
             } else if y < LABEL_HEIGHT + self.panel.1 {
                 let pixels = match panel {
-                    2 => self.map(y - LABEL_HEIGHT),
-                    _ => self.picture(panel, y - LABEL_HEIGHT),
+                    2 => self.map_row(y - LABEL_HEIGHT),
+                    _ => self.image_row(panel, y - LABEL_HEIGHT),
                 };
-                for (to, pixel) in to.iter_mut().zip(pixels) {
-                    *to = pixel;
+                for (target, pixel) in panel_row.iter_mut().zip(pixels) {
+                    *target = pixel;
                 }
             } else if panel == 2 {
-                self.scale(to, y - LABEL_HEIGHT - self.panel.1);
+                self.draw_scale(panel_row, y - LABEL_HEIGHT - self.panel.1);
             }
         }
         row.into_flattened()
     }
 
-    fn scale(&self, to: &mut [[u8; 3]], y: usize) {
+    /// Draws row `y` of the color scale and its labels into a row of pixels.
+    fn draw_scale(&self, pixels: &mut [[u8; 3]], y: usize) {
         let width = self.panel.0;
         if (2..SCALE_HEIGHT).contains(&y) {
-            for (x, to) in to.iter_mut().take(width).enumerate() {
-                *to = color_map::color((x * 255 / (width - 1).max(1)).min(255) as u8);
+            for (x, pixel) in pixels.iter_mut().take(width).enumerate() {
+                *pixel = color_map::color((x * 255 / (width - 1).max(1)).min(255) as u8);
             }
         } else if let Some(y) = y.checked_sub(SCALE_HEIGHT + 2) {
-            draw_text(to, "0", y);
+            draw_text(pixels, "0", y);
             let end = self.names[1];
-            if let Some(to) = to.get_mut(width.saturating_sub(end.len() * 6 * DOT - DOT).max(6 * DOT)..) {
-                draw_text(to, end, y);
+            if let Some(label_pixels) = pixels.get_mut(width.saturating_sub(end.len() * 6 * DOT - DOT).max(6 * DOT)..) {
+                draw_text(label_pixels, end, y);
             }
         }
     }
 
-    fn map(&self, y: usize) -> Vec<[u8; 3]> {
+    /// Returns row `y` of the error map.
+    fn map_row(&self, y: usize) -> Vec<[u8; 3]> {
         let square_y = y / self.zoom.1;
         let width = self.error.width;
         let row = self
@@ -194,8 +198,8 @@ impl ErrorImage<'_> {
                 .any(|x| [top, y + thickness].iter().any(|y| is_marked(*x, *y)))
     }
 
-    /// Returns a row of the first (0) or the second image (1).
-    fn picture(&self, image: usize, y: usize) -> Vec<[u8; 3]> {
+    /// Returns row `y` of the first (0) or the second image (1).
+    fn image_row(&self, image: usize, y: usize) -> Vec<[u8; 3]> {
         let step = self.error.step;
         let y = y / self.zoom.1 * step;
         let byte = |value: f64| (value * 255.0 + 0.5) as u8; // saturates

@@ -38,8 +38,11 @@ pub fn ssim(a: &Picture, b: &Picture) -> Option<f64> {
 /// The windows along one axis.
 #[derive(Clone, Copy, Debug)]
 struct Axis {
+    /// Center of the first window.
     first: usize,
+    /// Number of windows.
     count: usize,
+    /// Length of the image along the axis in pixels.
     side: usize,
 }
 

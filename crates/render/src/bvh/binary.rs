@@ -11,13 +11,13 @@ use super::Aabb;
 use super::wide::{SLOTS, costs};
 
 /// Minimum number of items of a node that several threads split.
-const PARALLEL: usize = 1 << 16;
+const MIN_PARALLEL_ITEMS: usize = 1 << 16;
 /// Items per task of a parallel loop.
 const CHUNK: usize = 1 << 14;
 /// Minimum number of items of a node whose halves are built in parallel.
-const JOIN: usize = 1 << 11;
-/// Maximum number of items of a node that is split by exhaustive search.
-const SMALL: usize = 8;
+const MIN_JOIN_ITEMS: usize = 1 << 11;
+/// Maximum number of items of a node that is split by a sweep along each axis.
+const MAX_SMALL_ITEMS: usize = 8;
 /// Bins per axis, a power of two.
 const BINS: usize = 16;
 
@@ -72,7 +72,7 @@ pub struct Inner {
     pub low: Vec3,
     pub high: Vec3,
     /// Number of items in the first half.
-    pub first: u32,
+    pub first_size: u32,
     /// SAH cost in a wide BVH if the items may occupy up to 1, 2, .. 7 slots of the parent.
     pub costs: [f32; SLOTS - 1],
 }
@@ -101,12 +101,12 @@ fn build(items: &mut [BuildItem], inner: &mut [Inner], levels: u32, max_leaf_siz
     };
     let count = items.len();
     let bounds = Bounds::of(items);
-    let first = split(items, &bounds, levels);
-    let halves = items.split_at_mut(first);
-    let inner = below.split_at_mut(first - 1);
+    let first_size = split(items, &bounds, levels);
+    let halves = items.split_at_mut(first_size);
+    let inner = below.split_at_mut(first_size - 1);
     let mut build_first = || build(halves.0, inner.0, levels - 1, max_leaf_size);
     let mut build_second = || build(halves.1, inner.1, levels - 1, max_leaf_size);
-    if count >= JOIN {
+    if count >= MIN_JOIN_ITEMS {
         rayon::join(build_first, build_second);
     } else {
         build_first();
@@ -117,7 +117,7 @@ fn build(items: &mut [BuildItem], inner: &mut [Inner], levels: u32, max_leaf_siz
     *node = Inner {
         low,
         high,
-        first: first as u32,
+        first_size: first_size as u32,
         costs: costs(area(bounds.low, bounds.high), count, max_leaf_size, &sides),
     };
 }
@@ -155,7 +155,7 @@ impl Bounds {
     }
 
     fn of(items: &[BuildItem]) -> Bounds {
-        if items.len() < PARALLEL {
+        if items.len() < MIN_PARALLEL_ITEMS {
             return Bounds::of_chunk(items);
         }
         items.par_chunks(CHUNK).map(Bounds::of_chunk).reduce(
@@ -195,7 +195,7 @@ fn split(items: &mut [BuildItem], bounds: &Bounds, levels: u32) -> usize {
     let min_levels = usize::BITS - (count - 1).leading_zeros(); // levels of a balanced tree
     let first_size = match () {
         _ if levels <= min_levels || area(bounds.low, bounds.high) < 2.0 * MIN_AREA => None,
-        _ if count <= SMALL => split_small(items),
+        _ if count <= MAX_SMALL_ITEMS => split_small(items),
         _ => split_by_bins(items, bounds),
     };
     first_size.unwrap_or_else(|| split_in_half(items, bounds))
@@ -218,9 +218,9 @@ fn split_in_half(items: &mut [BuildItem], bounds: &Bounds) -> usize {
 /// Returns the split of lowest SAH cost, among splits of the items sorted by centroid along each axis.
 fn split_small(items: &mut [BuildItem]) -> Option<usize> {
     let count = items.len();
-    let mut best: Option<(f32, usize, [BuildItem; SMALL])> = None;
+    let mut best: Option<(f32, usize, [BuildItem; MAX_SMALL_ITEMS])> = None;
     for axis in 0..3 {
-        let mut sorted = [items[0]; SMALL];
+        let mut sorted = [items[0]; MAX_SMALL_ITEMS];
         sorted[..count].copy_from_slice(items);
         for i in 1..count {
             let mut j = i;
@@ -229,26 +229,26 @@ fn split_small(items: &mut [BuildItem]) -> Option<usize> {
                 j -= 1;
             }
         }
-        let mut first = [0.0; SMALL];
+        let mut first_costs = [0.0; MAX_SMALL_ITEMS];
         let (mut low, mut high) = (Vec4::INFINITY, Vec4::NEG_INFINITY);
         for i in 1..count {
             low = low.min(sorted[i - 1].low);
             high = high.max(sorted[i - 1].high);
-            first[i] = area(low, high) * i as f32;
+            first_costs[i] = area(low, high) * i as f32;
         }
         (low, high) = (Vec4::INFINITY, Vec4::NEG_INFINITY);
         for i in (1..count).rev() {
             low = low.min(sorted[i].low);
             high = high.max(sorted[i].high);
-            let cost = first[i] + area(low, high) * (count - i) as f32;
+            let cost = first_costs[i] + area(low, high) * (count - i) as f32;
             if best.as_ref().map_or(cost < f32::INFINITY, |best| cost < best.0) {
                 best = Some((cost, i, sorted));
             }
         }
     }
-    let (_, first, sorted) = best?;
+    let (_, first_size, sorted) = best?;
     items.copy_from_slice(&sorted[..count]);
-    Some(first)
+    Some(first_size)
 }
 
 #[derive(Clone, Copy)]
@@ -270,7 +270,7 @@ const EMPTY_BINS: Bins = [[Bin {
 fn split_by_bins(items: &mut [BuildItem], bounds: &Bounds) -> Option<usize> {
     let low = bounds.low_middle;
     let bins_per_unit = (BINS - 1) as f32 / (bounds.high_middle - low);
-    // Adding 2^23 rounds to an integer, which the low mantissa bits hold.
+    // Adding 2^23 rounds to an integer, which is then in the low bits of the mantissa.
     let bins_of = |item: &BuildItem| {
         let position = (item.middle() - low) * bins_per_unit + 8_388_608.0;
         [position.x, position.y, position.z].map(|x| x.to_bits() as usize % BINS)
@@ -287,28 +287,28 @@ fn split_by_bins(items: &mut [BuildItem], bounds: &Bounds) -> Option<usize> {
         }
         bins
     };
-    let bins = if items.len() < PARALLEL {
+    let bins = if items.len() < MIN_PARALLEL_ITEMS {
         bin_items(items)
     } else {
         items.par_chunks(CHUNK).map(bin_items).reduce(|| EMPTY_BINS, merge_bins)
     };
     let mut best: Option<(f32, usize, usize)> = None;
     for (axis, bins) in bins.iter().enumerate() {
-        let mut first = [(0.0, 0); BINS];
+        let mut first_sides = [(0.0, 0); BINS]; // cost and number of items
         let (mut low, mut high, mut count) = (Vec4::INFINITY, Vec4::NEG_INFINITY, 0);
         for i in 1..BINS {
             low = low.min(bins[i - 1].low);
             high = high.max(bins[i - 1].high);
             count += bins[i - 1].count;
-            first[i] = (area(low, high) * count as f32, count);
+            first_sides[i] = (area(low, high) * count as f32, count);
         }
         (low, high, count) = (Vec4::INFINITY, Vec4::NEG_INFINITY, 0);
         for i in (1..BINS).rev() {
             low = low.min(bins[i].low);
             high = high.max(bins[i].high);
             count += bins[i].count;
-            let cost = first[i].0 + area(low, high) * count as f32;
-            if count > 0 && first[i].1 > 0 && cost < best.map_or(f32::INFINITY, |best| best.0) {
+            let cost = first_sides[i].0 + area(low, high) * count as f32;
+            if count > 0 && first_sides[i].1 > 0 && cost < best.map_or(f32::INFINITY, |best| best.0) {
                 best = Some((cost, axis, i));
             }
         }
@@ -330,10 +330,10 @@ fn merge_bins(mut a: Bins, b: Bins) -> Bins {
 fn partition(items: &mut [BuildItem], is_first: impl Fn(&BuildItem) -> bool) -> usize {
     let mut end = 0;
     for i in 0..items.len() {
-        // Branchless: half the branches would be mispredicted.
-        let first = is_first(&items[i]);
+        // Without a branch, because half of the branches would be mispredicted.
+        let belongs_to_front = is_first(&items[i]);
         items.swap(end, i);
-        end += usize::from(first);
+        end += usize::from(belongs_to_front);
     }
     end
 }

@@ -1,4 +1,4 @@
-//! A BVH node with up to 8 children, with boxes quantized to its grid.
+//! A BVH node with up to 8 children, whose boxes are quantized to the grid of the node.
 
 use bytemuck::{Pod, Zeroable};
 use glam::{UVec3, Vec3};
@@ -89,13 +89,13 @@ impl Node {
         self.base() + UVec3::from_array(q.map(u32::from)).as_vec3() * self.scale()
     }
 
-    /// Returns a child's node index, or `None` if it is not an inner node.
+    /// Returns a child's node index, or `None` if the child is not an inner node.
     pub fn child(&self, child: usize) -> Option<u32> {
         let preceding = self.inner & ((1 << child) - 1);
         (self.inner >> child & 1 == 1).then(|| self.first_child + preceding.count_ones())
     }
 
-    /// Returns a child's items in [`Tree::order`](super::Tree::order), none if it is not a leaf.
+    /// Returns a child's items in [`Tree::order`](super::Tree::order); an empty range if the child is not a leaf.
     pub fn items(&self, child: usize) -> std::ops::Range<usize> {
         let leaf = self.leaves[child];
         let start = self.first_item as usize + usize::from(leaf & 31);

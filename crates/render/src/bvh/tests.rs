@@ -90,7 +90,7 @@ fn check_builds(boxes: &[Aabb]) -> u32 {
 }
 
 #[test]
-fn few_items() {
+fn few_items_give_valid_bvhs() {
     for count in [0, 1, 2, 3, 4, 5, 7, 8, 9, 10, 17] {
         check_builds(&random_boxes(count));
     }
@@ -104,7 +104,7 @@ fn few_items() {
 }
 
 #[test]
-fn many_items() {
+fn many_items_give_valid_shallow_bvhs() {
     let boxes = random_boxes(100_000);
     assert!(check_builds(&boxes) <= 9);
 }
@@ -141,7 +141,7 @@ fn the_bvh_does_not_depend_on_the_number_of_threads() {
 }
 
 #[test]
-fn zeros_of_both_signs() {
+fn grid_origins_contain_no_negative_zeros() {
     let boxes: Vec<Aabb> = (0..100_000)
         .map(|i| {
             let zero = if i % 3 == 0 { 0.0 } else { -0.0 };
@@ -161,7 +161,7 @@ fn zeros_of_both_signs() {
 }
 
 #[test]
-fn equal_boxes() {
+fn equal_boxes_give_valid_shallow_bvhs() {
     for extent in [0.0, 1.0, 1e30] {
         assert!(check_builds(&vec![box_around(Vec3::splat(0.3), Vec3::splat(extent)); 3000]) <= 12);
     }
@@ -170,7 +170,7 @@ fn equal_boxes() {
 }
 
 #[test]
-fn boxes_in_geometric_progression() {
+fn boxes_in_geometric_progression_give_valid_bvhs() {
     for axis in [Vec3::X, Vec3::new(1.0, 0.0, 1.0), Vec3::ONE] {
         // Equal, touching, nested and degenerate boxes, down to denormal numbers.
         let distance = |i: i32| 2f32.powi(-i);
@@ -194,7 +194,7 @@ fn boxes_in_geometric_progression() {
 
 fn binary_levels(inner: &[Inner]) -> u32 {
     inner.split_first().map_or(0, |(node, below)| {
-        let (first, second) = below.split_at(node.first as usize - 1);
+        let (first, second) = below.split_at(node.first_size as usize - 1);
         1 + binary_levels(first).max(binary_levels(second))
     })
 }
@@ -216,7 +216,7 @@ fn the_depth_is_limited() {
 }
 
 #[test]
-fn huge_tiny_and_infinite_boxes() {
+fn huge_tiny_and_infinite_boxes_give_valid_bvhs() {
     let mut random = Random(7);
     for scale in [1e-45, 1e-40, 1e-38, 1e-20, 1e9, 1e18, 1e25, 1e37, f32::MAX] {
         let boxes: Vec<Aabb> = (0..500)
@@ -245,7 +245,7 @@ fn huge_tiny_and_infinite_boxes() {
 }
 
 #[test]
-fn empty_and_nan_boxes_are_replaced() {
+fn empty_and_nan_boxes_are_replaced_by_the_origin() {
     let mut boxes = random_boxes(100);
     boxes.push(Aabb::EMPTY);
     boxes.push(box_around(Vec3::NAN, Vec3::ONE));
@@ -265,7 +265,7 @@ fn empty_and_nan_boxes_are_replaced() {
 }
 
 #[test]
-fn slots_lie_in_their_octants() {
+fn children_are_in_the_slots_of_their_octants() {
     let corners = (0..8).map(|c| Vec3::new((c & 1) as f32, (c >> 1 & 1) as f32, (c >> 2) as f32));
     let boxes: Vec<Aabb> = corners
         .rev()

@@ -1,5 +1,5 @@
-//! Collapse of a binary BVH into one of 8 children per node with the lowest SAH cost (Ylitie, Karras and Laine, HPG
-//! 2017, section 3.1).
+//! Collapse of a binary BVH into a BVH with up to 8 children per node, at the lowest SAH cost (Ylitie, Karras and
+//! Laine, HPG 2017, section 3.1).
 
 use bytemuck::Zeroable as _;
 use glam::Vec3;
@@ -15,7 +15,7 @@ const NODE_COST: f32 = 1.0;
 /// SAH cost of testing an item.
 const ITEM_COST: f32 = 0.3;
 /// Minimum number of items of a node whose children are built in parallel.
-const PARALLEL: usize = 1 << 14;
+const MIN_PARALLEL_ITEMS: usize = 1 << 14;
 
 pub fn leaf_cost(area: f32, count: usize) -> f32 {
     area * count as f32 * ITEM_COST
@@ -49,6 +49,7 @@ fn distribute(slots: usize, first: impl Fn(usize) -> f32, second: impl Fn(usize)
     best
 }
 
+/// A binary subtree: its items and its inner nodes.
 #[derive(Clone, Copy)]
 struct Part<'a> {
     items: &'a [BuildItem],
@@ -79,9 +80,9 @@ impl<'a> Part<'a> {
     }
 
     fn halves(&self) -> [Part<'a>; 2] {
-        let first = self.inner[0].first as usize;
-        let items = self.items.split_at(first);
-        let inner = self.inner[1..].split_at(first - 1);
+        let first_size = self.inner[0].first_size as usize;
+        let items = self.items.split_at(first_size);
+        let inner = self.inner[1..].split_at(first_size - 1);
         [
             Part {
                 items: items.0,
@@ -102,8 +103,8 @@ impl<'a> Part<'a> {
     /// Collects the parts that fill this number of slots of a wide node. This part must have at least two items.
     fn collect_children(&self, slots: usize, children: &mut Vec<Part<'a>>) {
         let halves = self.halves();
-        let (_, first) = distribute(slots, |k| halves[0].cost(k), |k| halves[1].cost(k));
-        for (half, mut slots) in halves.into_iter().zip([first, slots - first]) {
+        let (_, first_slots) = distribute(slots, |k| halves[0].cost(k), |k| halves[1].cost(k));
+        for (half, mut slots) in halves.into_iter().zip([first_slots, slots - first_slots]) {
             while slots > 1 && half.cost(slots) == half.cost(slots - 1) {
                 slots -= 1;
             }
@@ -171,7 +172,7 @@ impl Builder {
         }
         let first_child = self.tree.nodes.len();
         self.tree.nodes.resize(first_child + inner.len(), Node::zeroed());
-        if part.items.len() < PARALLEL {
+        if part.items.len() < MIN_PARALLEL_ITEMS {
             for (i, child) in inner.into_iter().enumerate() {
                 self.tree.nodes[first_child + i] = self.add(child);
             }

@@ -238,7 +238,7 @@ mod tests {
         assert_eq!(
             found("radeon rx 7900"),
             Ok(vec![0]),
-            "a part of a name was preferred to the whole name"
+            "a partial match was preferred to the exact name"
         );
         assert_eq!(found("XT"), Ok(vec![1]));
         assert_eq!(found("780m"), Ok(vec![2, 3]), "one card with two drivers was ambiguous");

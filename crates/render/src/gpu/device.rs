@@ -28,7 +28,7 @@ pub struct Device {
 /// # Errors
 ///
 /// [`RenderError::NoDevice`] if no adapter matches, or if the choice is ambiguous because adapters with different names
-/// match. If no matching adapter can be opened, the error of the last of them.
+/// match. If no matching adapter can be opened, the error of the last matching adapter.
 pub fn choose(choice: &AdapterChoice) -> Result<Device, RenderError> {
     choose_among(choice, &|_| true)
 }
@@ -99,7 +99,7 @@ impl Device {
         (&self.device, &self.queue)
     }
 
-    /// Makes wgpu calls and returns their first error.
+    /// Makes wgpu calls and returns their error, if any.
     pub(super) fn checked<T>(&self, calls: impl FnOnce() -> T) -> Result<T, RenderError> {
         let memory = self.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
         let internal = self.device.push_error_scope(wgpu::ErrorFilter::Internal);
@@ -107,12 +107,13 @@ impl Device {
         let value = catch_panic(calls);
         let errors = [validation.pop(), internal.pop(), memory.pop()].map(pollster::block_on);
         let [validation, internal, memory] = errors;
-        // A failed allocation also invalidates later uses of the buffer: report the cause.
+        // A failed allocation also causes validation errors for later uses of the buffer, so the memory error comes
+        // first.
         let first = [memory, validation, internal].into_iter().flatten().next();
         self.failure.check(&self.info.name, value, first.as_ref())
     }
 
-    /// Returns an error, or the device loss that caused it.
+    /// Returns the device loss if the device is lost, otherwise the error.
     pub(super) fn error(&self, error: impl std::fmt::Display) -> RenderError {
         self.failure.error(&self.info.name, &error)
     }

@@ -108,7 +108,7 @@ impl Failure {
         }
     }
 
-    /// Returns an error, or the device loss that caused it.
+    /// Returns the device loss if the device is lost, otherwise the error.
     pub fn error(&self, device: &str, message: &dyn Display) -> RenderError {
         let lost = self.with_state(|state| state.lost.clone());
         lost.unwrap_or_else(|| DeviceFault::Other(message.to_string()))
@@ -143,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn a_loss_is_reported_every_time_and_other_errors_once() {
+    fn a_device_loss_is_reported_every_time_and_other_errors_once() {
         let failure = Failure::default();
         let check = |value: Result<u8, &str>| error_of(failure.check("gpu", value.map_err(str::to_string), None));
         assert_eq!(check(Ok(7)), "7");

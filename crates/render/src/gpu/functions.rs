@@ -8,7 +8,7 @@ pub struct FunctionText<'a> {
     pub name: &'a str,
     /// Offset of `fn`.
     pub start: usize,
-    /// Return type as in the text, or empty.
+    /// Return type as written in the text; empty if the function returns nothing.
     pub result: &'a str,
     /// The body, including both braces.
     pub body: Range<usize>,

@@ -173,8 +173,8 @@ impl Comparison<'_> {
                 access: StorageAccess::LOAD | StorageAccess::STORE,
             };
             let is_bound = |variable: &GlobalVariable| {
-                let bound = variable.binding.is_some(); // a private variable may have the same name
-                variable.binding == expected.binding || (bound && variable.name == expected.name)
+                let has_binding = variable.binding.is_some(); // a private variable may have the same name
+                variable.binding == expected.binding || (has_binding && variable.name == expected.name)
             };
             if expected.space == stores && !module.global_variables.iter().any(|(_, variable)| is_bound(variable)) {
                 let file = self.file_with(reference.global_variables.get_span(handle));

@@ -21,7 +21,7 @@ const ALPHA_SKIPS: f64 = 4.0;
 const LOOKUP_ITERATIONS: f64 = 8.0;
 
 /// Returns the estimated maximum number of samples per dispatch. A wrong estimate only costs time: truncated dispatches
-/// are repeated with fewer samples, and more dispatches take longer.
+/// are repeated with fewer samples, and an estimate that is too low causes more dispatches.
 pub fn samples_per_dispatch(packed: &Packed, baked: bool) -> u32 {
     let samples = MAX_ITERATIONS / iterations_of_sample(packed, baked);
     (samples as u32).max(1)
@@ -29,7 +29,7 @@ pub fn samples_per_dispatch(packed: &Packed, baked: bool) -> u32 {
 
 /// Estimates a sample's loop iterations; at least 1.
 fn iterations_of_sample(packed: &Packed, baked: bool) -> f64 {
-    let s = &packed.specialization;
+    let features = &packed.specialization;
     let primitives = packed.kinds().map(|(_, range)| range.len()).sum::<usize>() as f64;
     let caster_counts = || packed.shadow_casters().map(|(_, range)| range.len());
     let blocks = caster_counts()
@@ -42,31 +42,42 @@ fn iterations_of_sample(packed: &Packed, baked: bool) -> f64 {
     } else {
         (primitives, blocks + casters)
     };
-    let per_traversal = if s.tlas_kinds == 0 { 0.0 } else { TRAVERSAL_ITERATIONS };
+    let per_traversal = if features.tlas_kinds == 0 {
+        0.0
+    } else {
+        TRAVERSAL_ITERATIONS
+    };
     let per_hit = per_hit + per_traversal;
     // Camera rays skip camera-invisible surfaces.
-    let per_start = 1.0 + f64::from(s.camera_invisible) * (1.0 + per_hit) * 2.0;
+    let per_start = 1.0 + f64::from(features.camera_invisible) * (1.0 + per_hit) * 2.0;
     if packed.integrator.follows_paths() {
         // Each bounce has a BSDF ray, a shadow ray and texture lookups.
         let per_shadow_ray = if baked { per_traversal } else { casters + per_traversal };
-        let alpha_skips = if s.alpha_surfaces == 0 { 1.0 } else { ALPHA_SKIPS };
-        let bounces = f64::from(s.bounces.min(s.rr_depth.saturating_add(MAX_ROULETTE_BOUNCES)));
+        let alpha_skips = if features.alpha_surfaces == 0 { 1.0 } else { ALPHA_SKIPS };
+        let bounces = f64::from(
+            features
+                .bounces
+                .min(features.rr_depth.saturating_add(MAX_ROULETTE_BOUNCES)),
+        );
         // Light tree: descent to select an emitter, ascent for the PDF of a hit emitter.
         let levels = 2.0 * f64::from(packed.lighting.nodes.len().max(1).ilog2());
-        let per_bounce = 1.0 + per_hit + per_shadow_ray + levels + f64::from(s.lookups) * LOOKUP_ITERATIONS;
+        let per_bounce = 1.0 + per_hit + per_shadow_ray + levels + f64::from(features.lookups) * LOOKUP_ITERATIONS;
         return per_start + (bounces + 1.0) * alpha_skips * per_bounce;
     }
     let block = |samples: u32| {
         let shadows = CANDIDATES.min(casters) * (1.0 + f64::from(samples)) + per_traversal * f64::from(samples);
-        let lobes = f64::from(samples) * (2.0 + f64::from(s.exponent_bits));
+        let lobes = f64::from(samples) * (2.0 + f64::from(features.exponent_bits));
         per_block + shadows + lobes
     };
-    let (blocks, remainder) = (s.light_samples / SAMPLE_BLOCK, s.light_samples % SAMPLE_BLOCK);
+    let (blocks, remainder) = (
+        features.light_samples / SAMPLE_BLOCK,
+        features.light_samples % SAMPLE_BLOCK,
+    );
     let area_light = f64::from(blocks) * block(SAMPLE_BLOCK) + if remainder > 0 { block(remainder) } else { 0.0 };
     let (area_lights, lights) = (f64::from(packed.counts.lights.x), f64::from(packed.counts.lights.y));
     let shading = area_lights * (1.0 + area_light) + (lights - area_lights) * (1.0 + block(1));
-    let paths = if s.bounces == 0 { 1 } else { MAX_PATH_LEAVES };
-    per_start + f64::from(paths) * (shading + (f64::from(s.bounces) + 1.0) * (1.0 + per_hit))
+    let paths = if features.bounces == 0 { 1 } else { MAX_PATH_LEAVES };
+    per_start + f64::from(paths) * (shading + (f64::from(features.bounces) + 1.0) * (1.0 + per_hit))
 }
 
 #[cfg(test)]

@@ -9,7 +9,7 @@ pub struct MemoryUse {
     pub scene: u64,
     /// The film.
     pub film: u64,
-    /// Copies of parts of the film.
+    /// Copies of film rows.
     pub copies: u64,
 }
 

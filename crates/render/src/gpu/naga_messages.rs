@@ -190,7 +190,7 @@ impl Names<'_> {
     }
 }
 
-/// Removes a type in Rust's form, ` (of type …)`, from the start.
+/// Removes a type in Rust's debug format, ` (of type …)`, from the start.
 fn without_type(message: &str) -> &str {
     if !message.starts_with(" (of type ") {
         return message;

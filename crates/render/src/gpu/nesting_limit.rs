@@ -5,9 +5,9 @@ use std::ops::Range;
 use super::functions::without_comments;
 
 /// Maximum depth of operators, brackets and member accesses.
-const OPERATORS: usize = 1000;
+const MAX_OPERATOR_DEPTH: usize = 1000;
 /// Maximum number of `else if` in all enclosing blocks.
-const ALTERNATIVES: usize = 400;
+const MAX_ELSE_IFS: usize = 400;
 
 /// Returns the location of code that is nested too deeply, and the violated rule.
 pub fn too_deep(text: &str) -> Option<(Range<usize>, String)> {
@@ -49,14 +49,14 @@ pub fn too_deep(text: &str) -> Option<(Range<usize>, String)> {
                 if let Some(count) = alternatives.last_mut() {
                     *count = if is_else_if { *count + 1 } else { 0 };
                 }
-                if alternatives.iter().sum::<usize>() > ALTERNATIVES {
-                    return violation(offset, "`else if`", ALTERNATIVES);
+                if alternatives.iter().sum::<usize>() > MAX_ELSE_IFS {
+                    return violation(offset, "`else if`", MAX_ELSE_IFS);
                 }
             }
             _ => {}
         }
-        if depth > OPERATORS {
-            return violation(offset, "operators", OPERATORS);
+        if depth > MAX_OPERATOR_DEPTH {
+            return violation(offset, "operators", MAX_OPERATOR_DEPTH);
         }
     }
     None

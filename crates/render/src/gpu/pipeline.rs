@@ -19,16 +19,16 @@ const UNIFORM: BufferBindingType = BufferBindingType::Uniform;
 const READ: BufferBindingType = BufferBindingType::Storage { read_only: true };
 const WRITE: BufferBindingType = BufferBindingType::Storage { read_only: false };
 
-/// Bind groups of `shaders/bindings.wgsl`: for the dispatch, for the scene, and for the shapes of the scene.
+/// Types of the bindings in `shaders/bindings.wgsl`, by bind group: dispatch, scene, and shapes of the scene.
 pub const GROUPS: [&[BufferBindingType]; 3] = [
     &[UNIFORM, WRITE, WRITE],
     &[UNIFORM, UNIFORM, UNIFORM, UNIFORM, READ, READ],
     &[READ, READ, READ, READ],
 ];
 
-/// Bind group of the dispatch. The last binding has the slider values, if any.
+/// Index of the bind group of the dispatch. The buffer of slider values, if any, follows the bindings in [`GROUPS`].
 pub const DISPATCH_GROUP: usize = 0;
-/// Bind group of the scene. The last bindings have the texels.
+/// Index of the bind group of the scene. Further texel buffers, if any, follow the bindings in [`GROUPS`].
 pub const SCENE_GROUP: usize = 1;
 
 /// Number of storage buffers, not counting further texel buffers.
@@ -50,7 +50,8 @@ pub const STORAGE_BUFFERS: usize = {
 /// WebGPU guarantees 8 storage buffers per shader stage by default.
 const _: () = assert!(STORAGE_BUFFERS <= 8);
 
-/// Returns every kernel's bind group layouts, with `more_texels` further texel buffers and slider values, if any.
+/// Returns the bind group layouts of all kernels, with `more_texels` further texel buffers and, if `sliders` is true, a
+/// buffer of slider values.
 pub fn bind_group_layouts(device: &Device, more_texels: usize, sliders: bool) -> Vec<wgpu::BindGroupLayout> {
     let layout = |(group, types): (usize, &&[BufferBindingType])| {
         let added = match group {
@@ -97,8 +98,8 @@ pub fn bind_group(device: &Device, layout: &wgpu::BindGroupLayout, buffers: &[&w
 }
 
 /// Compiles a kernel: with `exact` to SPIR-V that is executed as written, else from WGSL by wgpu. naga validates the
-/// source first in both cases, so that error messages are the same. Pipelines in the device's cache are returned
-/// immediately.
+/// source first in both cases, so that error messages do not depend on `exact`. Pipelines in the device's cache are
+/// returned immediately.
 pub fn pipeline(
     device: &Device,
     layouts: &[wgpu::BindGroupLayout],

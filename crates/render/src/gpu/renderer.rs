@@ -82,7 +82,7 @@ pub struct Dispatch {
     pub samples: u64,
 }
 
-/// A submitted tile and its samples; one dispatch is running.
+/// A submitted tile, of which one dispatch is running.
 struct Pending {
     tile: Region,
     /// Samples that are not yet complete in the film.
@@ -112,7 +112,7 @@ struct Target {
     group: wgpu::BindGroup,
 }
 
-/// Film rows that contain a tile: a range of bytes of each list.
+/// Film rows that contain a tile: a range of bytes in each list of the film.
 struct Rows {
     list_count: u64,
     list_bytes: u64,
@@ -137,15 +137,15 @@ impl Rows {
         self.list_count * self.size
     }
 
-    /// Returns each piece's offset in the film, and in a copy of all pieces.
-    fn pieces(&self) -> impl Iterator<Item = (u64, u64)> {
+    /// Returns the offset of the rows of each list, in the film and in a copy of the rows.
+    fn offsets(&self) -> impl Iterator<Item = (u64, u64)> {
         (0..self.list_count).map(|i| (i * self.list_bytes + self.start, i * self.size))
     }
 }
 
 const FIRST_HIT_BYTES: usize = size_of::<FirstHit>();
 
-/// Range of the loop that detects truncation. A truncated loop runs once.
+/// Range of the loop that detects truncation: a driver that truncates loops ends this loop after one iteration.
 const LOOP_PROBE: UVec2 = UVec2::new(0, 4);
 
 impl Gpu {
@@ -155,7 +155,7 @@ impl Gpu {
         Gpu::with_sliders(device, packed, shaders, options, Vec::new())
     }
 
-    /// Like [`Gpu::new`], with overrides read from a buffer: 0 until [`Gpu::set_sliders`].
+    /// Like [`Gpu::new`], with overrides that are read from a buffer. Their values are 0 until [`Gpu::set_sliders`].
     pub fn with_sliders(
         device: &Device,
         packed: &Packed,
@@ -312,12 +312,12 @@ impl Gpu {
         }
     }
 
-    /// Describes an out-of-memory error, and the failed allocation if known.
+    /// Adds the memory in use to an out-of-memory error, and the failed allocation if known.
     fn explain<T>(&self, result: Result<T, RenderError>, failed: Option<FailedAllocation>) -> Result<T, RenderError> {
         result.map_err(|error| self.memory_use().explain(error, failed.as_ref()))
     }
 
-    /// Dispatches a kernel over a tile after `copies`, and starts mapping its completion record.
+    /// Encodes `copies`, then dispatches a kernel over a tile, and starts mapping the completion record.
     fn dispatch(
         &self,
         pipeline: &wgpu::ComputePipeline,
@@ -411,7 +411,7 @@ impl Gpu {
         let max_samples = self.rules.end_of_part(&samples) - samples.start;
         let end = samples.start + self.samples_per_dispatch.min(max_samples);
         let save = |encoder: &mut wgpu::CommandEncoder| {
-            for (film_offset, copy_offset) in rows.pieces() {
+            for (film_offset, copy_offset) in rows.offsets() {
                 encoder.copy_buffer_to_buffer(&film.buffer, film_offset, &saved_rows, copy_offset, rows.size);
             }
         };
@@ -464,7 +464,7 @@ impl Gpu {
         let rows = Rows::of(film, tile);
         self.device.checked(|| {
             let mut encoder = self.device.device.create_command_encoder(&Default::default());
-            for (film_offset, copy_offset) in rows.pieces() {
+            for (film_offset, copy_offset) in rows.offsets() {
                 encoder.copy_buffer_to_buffer(saved_rows, copy_offset, &film.buffer, film_offset, rows.size);
             }
             self.device.queue.submit([encoder.finish()]);
@@ -552,7 +552,7 @@ impl Backend for Gpu {
     fn begin(&mut self, region: Region) -> Result<(), RenderError> {
         self.check_idle()?;
         let film_state = self.rules.begin(region)?;
-        self.film = None; // freed first, since both may not fit into memory
+        self.film = None; // frees the old film first, since two films may not fit into memory
         let film = self.target(self.rules.film_layout().bytes(), region)?;
         self.film = Some((film, film_state));
         Ok(())

@@ -18,7 +18,7 @@ pub enum Rounding {
     Software,
 }
 
-/// The call that replaces an expression: function and arguments.
+/// For each expression to replace, the function that is called and its arguments.
 type Calls = HashMap<Handle<Expression>, (Handle<Function>, Vec<Handle<Expression>>)>;
 
 const QUOTIENTS: [&str; 4] = ["quotient", "quotient2", "quotient3", "quotient4"];

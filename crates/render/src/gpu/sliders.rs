@@ -103,7 +103,8 @@ impl Slider {
     }
 }
 
-/// Returns the sliders of the rendering kernel: overrides with a default value, except those that compilation needs.
+/// Returns the sliders of the rendering kernel: overrides with a default value, except overrides whose value must be
+/// known at compile time.
 pub fn sliders(shaders: &Shaders, integrator: Integrator, adaptive: bool) -> Vec<Slider> {
     if !shaders.files().any(|(_, text)| text.contains("override")) {
         return Vec::new();
@@ -205,7 +206,8 @@ fn is_needed_to_compile(module: &Module, handle: Handle<Override>) -> bool {
     in_expressions || module.types.iter().any(|(_, ty)| is_size(&ty.inner))
 }
 
-/// Returns the range in a comment after a declaration, `// LOW..HIGH`; without a comment, a range around the value.
+/// Returns the range in a comment after a declaration, `// LOW..HIGH`; without a comment, a range that includes 0 and
+/// twice the value.
 fn range_of(kind: Kind, default: Value, line_end: &str) -> [f64; 2] {
     let Value::Number(value) = default else {
         return kind.limits();
@@ -251,7 +253,7 @@ mod tests {
         let lines = Shaders::built_in().text("phong.wgsl").lines().count();
         let found = sliders_of(
             "override gain: f32 = 0.1; // 0..4\n  override passes: i32 = -3; // slider -8..8 steps\n\
-             override many = 20u;\noverride on: bool = true; // whether\noverride wide: f32 = 2.0 * 1.5; // 0..1\n",
+             override copies = 20u;\noverride on: bool = true; // whether\noverride wide: f32 = 2.0 * 1.5; // 0..1\n",
         );
         let slider = |line, name: &str, kind, [min, max]: [f64; 2], default| Slider {
             file: "phong.wgsl".to_string(),
@@ -267,12 +269,12 @@ mod tests {
             [
                 slider(1, "gain", Kind::F32, [0.0, 4.0], Value::Number(0.1)),
                 slider(2, "passes", Kind::I32, [-8.0, 8.0], Value::Number(-3.0)),
-                slider(3, "many", Kind::U32, [0.0, 40.0], Value::Number(20.0)),
+                slider(3, "copies", Kind::U32, [0.0, 40.0], Value::Number(20.0)),
                 slider(4, "on", Kind::Bool, [0.0, 1.0], Value::Bool(true)),
                 slider(5, "wide", Kind::F32, [0.0, 3.0], Value::Number(3.0)),
             ]
         );
-        let [gain, steps, many, on, _] = found.as_slice() else {
+        let [gain, steps, copies, on, _] = found.as_slice() else {
             panic!("{found:?}")
         };
         assert_eq!(gain.clamped(Value::Number(7.0)), Some(Value::Number(4.0)));
@@ -280,7 +282,7 @@ mod tests {
         assert_eq!(gain.bits(Value::Number(0.1)), 0.1f32.to_bits());
         assert_eq!(steps.clamped(Value::Number(-2.6)), Some(Value::Number(-3.0)));
         assert_eq!(steps.bits(Value::Number(-3.0)), -3i32 as u32);
-        assert_eq!(many.clamped(Value::Number(-1.0)), Some(Value::Number(0.0)));
+        assert_eq!(copies.clamped(Value::Number(-1.0)), Some(Value::Number(0.0)));
         assert_eq!(on.clamped(Value::Number(1.0)), None);
         assert_eq!(on.bits(Value::Bool(true)), 1);
     }
@@ -290,10 +292,10 @@ mod tests {
         let free = "override free: f32 = 0.5; // 0..1\nfn half_of(x: f32) -> f32 { return x * free; }\n";
         assert_eq!(sliders_of(free).len(), 1);
         for bound in [
-            "override size: u32 = 3u;\nvar<workgroup> many: array<f32, size>;\n",
-            "override size: u32 = 3u;\nvar<workgroup> many: array<f32, size * 2u>;\n",
-            "override part: f32 = 0.5;\noverride whole: f32 = part * 2.0;\n",
-            "override part: f32 = 0.5;\nvar<private> whole: f32 = part;\n",
+            "override size: u32 = 3u;\nvar<workgroup> group_bins: array<f32, size>;\n",
+            "override size: u32 = 3u;\nvar<workgroup> group_bins: array<f32, size * 2u>;\n",
+            "override half_gain: f32 = 0.5;\noverride full_gain: f32 = half_gain * 2.0;\n",
+            "override half_gain: f32 = 0.5;\nvar<private> private_gain: f32 = half_gain;\n",
             "@id(7) override numbered: f32 = 0.5;\n",
             "const constant: f32 = 0.5; // slider 0..1\n",
         ] {

@@ -38,14 +38,15 @@ pub fn instructions(module: &[u32]) -> impl Iterator<Item = (u16, &[u32])> {
     })
 }
 
-/// Returns the offset after the first instructions, as long as `is_included` returns true for their opcodes.
+/// Returns the offset of the first instruction for whose opcode `is_included` returns false.
 fn end_of(module: &[u32], is_included: impl Fn(u16) -> bool) -> usize {
     let first = instructions(module).take_while(|(opcode, _)| is_included(*opcode));
     HEADER + first.map(|(_, words)| words.len()).sum::<usize>()
 }
 
-/// Decorates all float operations with `NoContraction` (SPIR-V 1.6, section 3.20), for separate rounding; conversions
-/// too, since Mesa would turn f32(i32(x)) into a truncation, which keeps the sign of -0.
+/// Decorates all float operations with `NoContraction` (SPIR-V 1.6, section 3.20), so that each operation is rounded
+/// separately. Conversions are decorated too, since Mesa would turn f32(i32(x)) into a truncation, which keeps the sign
+/// of -0.
 pub fn forbid_contraction(module: &[u32]) -> Vec<u32> {
     let decorations = instructions(module)
         .filter(|(opcode, _)| ARITHMETIC.contains(opcode) || CONVERSIONS.contains(opcode))

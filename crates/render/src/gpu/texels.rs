@@ -10,7 +10,7 @@ use super::pipeline::{GROUPS, SCENE_GROUP, STORAGE_BUFFERS};
 use crate::error::RenderError;
 use crate::records::Packed;
 
-/// Distribution of texels. All buffers except the last have 2^shift words.
+/// Distribution of texels over buffers. All buffers except the last have 2^shift words.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TexelParts {
     /// Number of buffers, at least 1.
@@ -46,12 +46,12 @@ impl TexelParts {
         let count = packed.textures.texels.len().div_ceil(1 << shift).max(1);
         let max_count = 1 + (info.storage_buffers as usize).saturating_sub(STORAGE_BUFFERS);
         if count > max_count {
-            let (size, part) = (
+            let (size, buffer_size) = (
                 mebibytes(4 * packed.textures.texels.len() as u64),
                 mebibytes(4 << shift),
             );
             return Err(too_large(format!(
-                "the scene's images need {size} MiB; the limit is {max_count} x {part} MiB"
+                "the scene's images need {size} MiB; the limit is {max_count} x {buffer_size} MiB"
             )));
         }
         Ok(TexelParts { count, shift })

@@ -57,9 +57,13 @@ impl Timer {
     /// Returns the duration between two timestamps, which take two words each.
     pub fn duration(&self, words: &[u32]) -> Option<Duration> {
         let clock = self.clock.as_ref()?;
-        let [a, b, c, d] = *words else { return None };
+        let [start_low, start_high, end_low, end_high] = *words else {
+            return None;
+        };
         let ticks = |low: u32, high: u32| u64::from(low) | u64::from(high) << 32;
-        let elapsed = ticks(c, d).checked_sub(ticks(a, b)).filter(|ticks| *ticks > 0)?;
+        let elapsed = ticks(end_low, end_high)
+            .checked_sub(ticks(start_low, start_high))
+            .filter(|ticks| *ticks > 0)?;
         let nanoseconds = elapsed as f64 * clock.period;
         (nanoseconds < 3.6e12).then(|| Duration::from_nanos(nanoseconds as u64)) // longer durations are invalid
     }

@@ -140,8 +140,8 @@ mod tests {
         shapes = [{ type = 'sphere', material = 'm', center = [0, 0, 0], radius = 1 }]
     ";
 
-    /// Returns the messages for built-in shaders with parts of files replaced; an empty part stands for the end of the
-    /// file.
+    /// Returns the error messages for the built-in shaders after edits: file, old text, new text. With an empty old
+    /// text, the new text is appended to the file.
     fn messages_of(edits: &[(&str, &str, &str)]) -> Vec<String> {
         let mut shaders = Shaders::built_in();
         for (name, old, new) in edits {
@@ -158,6 +158,8 @@ mod tests {
         errors.map_or(Vec::new(), |errors| errors.0.iter().map(ToString::to_string).collect())
     }
 
+    /// Asserts that the edits cause exactly the expected messages. An expected message is a location and, after a
+    /// space, parts of the message separated by ` .. `.
     #[track_caller]
     fn reports(edits: &[(&str, &str, &str)], expected: &[&str]) {
         let messages = messages_of(edits);
@@ -271,7 +273,7 @@ mod tests {
             &[("bindings.wgsl", "texels: array<u32>", "texels: array<u32, 16>")],
             &["bindings.wgsl: `texels` is `array<u32, 16>` and must be `array<u32>`"],
         );
-        // A read-only buffer that is not needed may be absent.
+        // A comment changes no binding.
         reports(&[("bindings.wgsl", "", "// nothing")], &[]);
     }
 
@@ -323,7 +325,7 @@ mod tests {
     }
 
     #[test]
-    fn constants_of_a_shader_must_have_values() {
+    fn overrides_must_have_values() {
         reports(
             &[("math.wgsl", "", "override MINE: f32;")],
             &["math.wgsl: `MINE` has no value"],
@@ -332,7 +334,7 @@ mod tests {
     }
 
     #[test]
-    fn results_must_be_written() {
+    fn buffers_that_are_read_back_must_be_written() {
         reports(
             &[(RENDER, "    report_completion(local);\n", "")],
             &[
@@ -394,19 +396,19 @@ mod tests {
             ("let x = camera == camera;", "Incompatible operands"),
         ] {
             let messages = messages_with(body);
-            // Only two of the three kernels have `film`; the third reports another error.
+            // Only two of the three kernels declare `film`; the third kernel reports another error.
             let line = messages
                 .iter()
                 .find(|line| line.contains(expected))
                 .unwrap_or_else(|| panic!("{body}: {messages:?}"));
             let message = line.split_once(' ').unwrap().1;
             assert!(line.starts_with("phong.wgsl:"), "{line}");
-            let numbered = message
+            let contains_index = message
                 .as_bytes()
                 .windows(2)
                 .any(|pair| pair[0] == b'[' && pair[1].is_ascii_digit());
             assert!(
-                (!numbered || message.contains("primitives[0]")) && !message.contains("Some("),
+                (!contains_index || message.contains("primitives[0]")) && !message.contains("Some("),
                 "{line}"
             );
         }

@@ -41,8 +41,8 @@ pub struct Bands<S> {
     store: S,
     bands: VecDeque<Band>,
     samples: u32,
-    /// True once joint rendering has ended, because it is complete or the time is up; `None` if bands are rendered one
-    /// after the other.
+    /// True once joint rendering has ended, because all samples are complete or the time is up; `None` if bands are
+    /// rendered one after the other.
     joint_rendering_ended: Option<bool>,
     /// Samples per pixel at the end of the current pass, if the bands are rendered in passes ([`Bands::in_passes`]).
     pass_end: Option<u32>,
@@ -55,9 +55,9 @@ pub struct Bands<S> {
     finished_samples: f64,
     /// Samples over all pixels of the region.
     total_samples: f64,
-    /// Time and duration of the last checkpoint.
+    /// End and duration of the last checkpoint.
     last_checkpoint: (Instant, Duration),
-    /// Samples over all pixels that were rendered, not loaded.
+    /// Samples over all pixels that were rendered, not loaded from a checkpoint.
     rendered_samples: f64,
 }
 
@@ -212,7 +212,7 @@ impl<S: CheckpointStore> Bands<S> {
         self.samples
     }
 
-    /// Passes copies of the films in memory to `output`, from top to bottom, with all samples that they have.
+    /// Passes copies of the films in memory to `output`, from top to bottom, with all samples rendered so far.
     pub fn films(&self, output: &mut dyn FnMut(Film)) {
         for band in &self.bands {
             if let State::InMemory(piece) = &band.state {
@@ -364,7 +364,7 @@ impl<S: CheckpointStore> Bands<S> {
             if self.render_all(target, backend, watch, on_progress)? == Outcome::TimeIsUp || target >= self.samples {
                 return Ok(());
             }
-            // Each round copies all films. Later rounds therefore add a quarter of the samples.
+            // Each round copies all films. Later rounds therefore add a quarter of the samples rendered so far.
             target = (target + (target / 4).max(1)).min(self.samples);
         }
     }

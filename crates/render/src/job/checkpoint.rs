@@ -1,5 +1,5 @@
-//! Checkpoints: a file that receives finished pieces of an image, and at intervals the unfinished one, to resume an
-//! interrupted job. One process writes the file at a time; others wait.
+//! Checkpoints: a file that receives finished pieces of an image and, at intervals, the unfinished piece, so that an
+//! interrupted job can be resumed. One process writes the file at a time; others wait.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File, TryLockError};
@@ -76,7 +76,7 @@ pub struct Checkpoint<'a> {
     key: Key,
     film_layout: FilmLayout,
     entries: Vec<Entry>,
-    /// Pieces not replaced by later pieces; the key is the first row.
+    /// Indices of the entries that no later entry replaces; the key is the first row of the piece.
     latest: BTreeMap<u32, usize>,
     /// End of the last complete piece.
     end: u64,
@@ -84,7 +84,7 @@ pub struct Checkpoint<'a> {
     report: Box<dyn FnMut(&str) + 'a>,
     /// Minimum length of the file at which rewriting is tried again after a failure.
     retry_length: u64,
-    /// Reported problems: a failed write, a lost file.
+    /// True for each problem that was already reported: a failed write (0), a lost file (1).
     reported: [bool; 2],
 }
 
@@ -121,7 +121,7 @@ impl<'a> Checkpoint<'a> {
             path: name.clone(),
             error,
         };
-        // Links are followed and stay in place.
+        // Symbolic links are followed, and the links themselves are not replaced.
         let output = Output::find(&name).map_err(io_error)?;
         let not_a_file = || CheckpointError::Unreadable {
             path: name.clone(),
@@ -273,7 +273,7 @@ impl<'a> Checkpoint<'a> {
         Ok(())
     }
 
-    /// Rewrites the file without replaced pieces if they take more than half of the file.
+    /// Rewrites the file without replaced pieces if they exceed the pieces in use by [`MAX_REPLACED_BYTES`].
     fn remove_replaced_pieces(&mut self) {
         let lengths = self
             .latest
@@ -283,7 +283,7 @@ impl<'a> Checkpoint<'a> {
         let limit = (2 * needed + MAX_REPLACED_BYTES).max(self.retry_length);
         if self.end > limit && self.rewrite(|temporary, path| temporary.persist(path)).is_err() {
             // The disk may be full, or the file cannot be replaced. The old file stays in use; the next attempt is made
-            // when it has doubled in length.
+            // when the file has doubled in length.
             self.retry_length = 2 * self.end;
         }
     }
@@ -346,7 +346,7 @@ impl<'a> Checkpoint<'a> {
     /// Reports the first piece that could not be written. The caller continues with later pieces.
     fn report_failure(&mut self, result: io::Result<()>) {
         if let Err(error) = result {
-            // Readers drop an incomplete piece, but it takes space.
+            // Readers drop an incomplete piece, but the piece takes space.
             let _ = self.file.set_len(self.end);
             self.report_once(
                 0,
@@ -414,7 +414,7 @@ fn temporary(path: &Path, header: &Header) -> io::Result<(NamedTempFile, Key, u6
     Ok((temporary, key, end))
 }
 
-/// Returns true if a path leads to an open file.
+/// Returns true if a path refers to this open file.
 fn is_file_at(file: &File, path: &Path) -> bool {
     #[cfg(unix)]
     {

@@ -1,4 +1,4 @@
-//! Identity of a job: jobs with the same identity produce the same bits, so that one can resume another.
+//! Identity of a job: jobs with the same identity produce the same bits, so that one job can resume another.
 
 use bytemuck::bytes_of;
 use serde::{Deserialize, Serialize};
@@ -9,7 +9,7 @@ use wgray_image::Region;
 /// Maximum image side in pixels, and maximum samples per pixel. Scenes have the same limits.
 const MAX_COUNT: u32 = 65_536;
 
-/// Everything that determines a film's bits. The device does not.
+/// Everything that determines a film's bits, which do not depend on the device.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Identity {

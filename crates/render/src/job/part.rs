@@ -24,7 +24,7 @@ use wgray_scene::{Integrator, ViewSettings, ViewTransform};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PartHeader {
-    /// Number of the part.
+    /// Number of the part, and number of parts.
     pub tile: Tile,
     /// Names of the layers.
     pub aovs: Vec<String>,
@@ -36,7 +36,7 @@ pub struct PartHeader {
     pub view_transform: String,
     /// Bits (f64) of the exposure in stops.
     pub exposure: u64,
-    /// Metadata of the image, except the renderer's.
+    /// Metadata of the image, without the device.
     pub metadata: Vec<(String, String)>,
 }
 
@@ -334,7 +334,7 @@ impl Parts {
     }
 }
 
-/// Describes missing rows, and lists the missing parts if all parts name the same number of parts.
+/// Describes missing rows, and lists the missing parts if all files agree on the number of parts.
 fn missing(first_row: u32, last_row: u32, tiles: &[Tile]) -> String {
     let rows = match first_row == last_row {
         true => format!("row {first_row} is missing"),

@@ -5,7 +5,7 @@
 //! | --- | --- |
 //! | file | [`MAGIC`], header, pieces |
 //! | header | length (u32), JSON of a [`Header`], BLAKE3 hash of both |
-//! | piece | 14 words (see `Head`), their hash, lists of the film, first hits, hash of all preceding bytes |
+//! | piece | 14 words (see `Head`), their hash, lists of the film, first hits, hash of the piece's preceding bytes |
 //!
 //! The hashes of pieces are keyed with the hash of the header, so that pieces of other files are rejected.
 
@@ -24,8 +24,8 @@ use crate::film::{Film, FilmLayout};
 use crate::records::FirstHit;
 use wgray_image::Region;
 
-/// First bytes of the file. As in PNG, a conversion of line ends or to 7 bits changes these bytes, so that the damaged
-/// file is recognized.
+/// First bytes of the file. As in PNG, a conversion of line endings or to 7-bit characters changes these bytes, so that
+/// such damage is detected.
 pub const MAGIC: &[u8; 16] = b"\x89wgray pieces\r\n\x1a";
 
 pub const FORMAT: u32 = 2;
@@ -159,7 +159,7 @@ impl<R: Read> HashingStream<R> {
         Ok(())
     }
 
-    /// Reads a hash. Returns true if it matches the bytes so far.
+    /// Reads a hash. Returns true if the hash matches the bytes so far.
     fn hash_matches(&mut self) -> io::Result<bool> {
         let (hash, mut found) = (self.hash(), [0; HASH]);
         self.read_and_hash(&mut found)?;
@@ -421,7 +421,8 @@ pub fn latest(entries: &[Entry]) -> Vec<usize> {
 
 /// Adds a piece to a map from first rows to piece numbers. Removes the pieces that share rows with the new piece.
 pub fn replace(rows: &mut std::collections::BTreeMap<u32, usize>, entries: &[Entry], number: usize, region: Region) {
-    // The pieces in the map are disjoint: of the pieces that start above the region, only the last can overlap it.
+    // The pieces in the map are disjoint: of the pieces that start above the region, only the last can overlap the
+    // region.
     let last_above = rows
         .range(..region.y0)
         .next_back()

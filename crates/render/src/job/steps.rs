@@ -28,11 +28,11 @@ const MIN_DISPATCH_ROWS: u32 = 16;
 pub struct SampleProgress {
     /// Samples in progress; all earlier samples are complete. Empty when all samples are complete.
     pub pass: Range<u32>,
-    /// Column and row of the first pixel that lacks these samples.
+    /// Column and row of the first pixel that lacks the samples of `pass`.
     pub next: [u32; 2],
 }
 
-/// The sequence of dispatches that render a film.
+/// Computes the dispatches of a film, one after the other, from the samples rendered so far and the measured speed.
 #[derive(Clone, Debug)]
 pub struct Steps {
     split: WorkSplit,
@@ -114,7 +114,7 @@ impl Steps {
         self.film
     }
 
-    /// Returns how many samples the film's pixels have, between dispatches.
+    /// Returns the samples that the film's pixels have so far; valid between dispatches.
     pub fn reached(&self) -> &SampleProgress {
         &self.reached
     }
@@ -218,12 +218,12 @@ impl Steps {
         self.reached.pass.is_empty()
     }
 
-    /// Returns the number of samples of every pixel.
+    /// Returns the number of samples that every pixel has.
     pub fn samples(&self) -> u32 {
         self.reached.pass.start
     }
 
-    /// Returns the number of samples of every pixel in a row.
+    /// Returns the number of samples that every pixel of a row has.
     pub fn samples_of_row(&self, y: u32) -> u32 {
         let SampleProgress { pass, next } = &self.reached;
         if y < next[1] { pass.end } else { pass.start }

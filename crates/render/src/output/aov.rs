@@ -17,7 +17,7 @@ pub enum Aov {
     /// Outward geometric normal.
     Normal,
     /// Outward shading normal of the first hit, without normal maps. With the path integrator: mean over samples, with
-    /// normal maps; shorter than 1 where the samples differ.
+    /// normal maps; the mean is shorter than 1 where the samples differ.
     ShadingNormal,
     /// Distance along the ray.
     Depth,
@@ -153,7 +153,7 @@ impl Aov {
         }
     }
 
-    /// Returns the reason why renders with these settings lack the variable; `None` if they have it.
+    /// Returns the reason why renders with these settings lack the variable; `None` if the renders have the variable.
     pub fn missing(self, integrator: Integrator, adaptive: bool) -> Option<&'static str> {
         match self.source(integrator) {
             AovSource::Adaptive if !adaptive => Some("needs adaptive sampling"),
@@ -162,7 +162,7 @@ impl Aov {
         }
     }
 
-    /// Returns the layer that the variable displays as a radiance image, if any.
+    /// Returns the film layer that contains the color of the variable, if any.
     pub fn light(self) -> Option<Layer> {
         self.channels().iter().find_map(|channel| match channel {
             Channel::Mean(_, layer, _) => Some(*layer),

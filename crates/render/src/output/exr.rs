@@ -1,4 +1,4 @@
-//! OpenEXR files: scan lines of 32-bit or 16-bit samples, lossless, written block by block.
+//! OpenEXR files: scan lines of 32-bit or 16-bit values, lossless, written block by block.
 
 use std::fs::File;
 use std::io::{self, BufReader, Seek, Write};
@@ -39,7 +39,7 @@ pub fn write(
             layout,
             meta,
             writer,
-            half: options.exr_type == ExrType::Half,
+            is_half: options.exr_type == ExrType::Half,
             block_rows: options.exr_compression.method().scan_lines_per_block(),
             lines: Vec::new(),
             next: 0,
@@ -65,7 +65,7 @@ enum Column {
     Aov(&'static Channel),
 }
 
-/// Returns the channels in the file's order, alphabetical.
+/// Returns the channels in alphabetical order, which the format requires.
 fn columns(layout: &Layout) -> Vec<(&'static str, Column)> {
     let mut columns: Vec<_> = ["R", "G", "B"].into_iter().zip((0..).map(Column::Radiance)).collect();
     if layout.alpha {
@@ -86,12 +86,12 @@ impl Column {
 
 fn header(layout: &Layout, options: &SaveOptions, columns: &[(&str, Column)]) -> Header {
     let channel = |(name, column): &(&str, Column)| {
-        let sample = match (column.is_integer(), options.exr_type) {
+        let sample_type = match (column.is_integer(), options.exr_type) {
             (true, _) => SampleType::U32,
             (false, ExrType::Float) => SampleType::F32,
             (false, ExrType::Half) => SampleType::F16,
         };
-        ChannelDescription::named(*name, sample)
+        ChannelDescription::named(*name, sample_type)
     };
     let channels = columns.iter().map(channel).collect();
     let (width, height) = layout.picture;
@@ -127,7 +127,8 @@ struct Rows<'a, W: Write + Seek> {
     layout: &'a Layout,
     meta: MetaData,
     writer: &'a mut ChunkWriter<W>,
-    half: bool,
+    /// True for 16-bit floats.
+    is_half: bool,
     /// Rows per compressed block.
     block_rows: usize,
     /// Rows of an incomplete block.
@@ -144,7 +145,7 @@ impl<W: Write + Seek> Rows<'_, W> {
         let rows = band.film.region.height() as usize;
         let lines = (0..rows)
             .into_par_iter()
-            .map(|y| encode_row(self.columns, band, y * width..(y + 1) * width, self.half));
+            .map(|y| encode_row(self.columns, band, y * width..(y + 1) * width, self.is_half));
         for (line, too_large) in lines.collect::<Vec<_>>() {
             self.lines.push(line);
             self.too_large += too_large;
@@ -179,23 +180,23 @@ impl<W: Write + Seek> Rows<'_, W> {
 }
 
 /// Returns a row's bytes, channel by channel, and the number of finite values that became infinite in 16 bits.
-fn encode_row(columns: &[(&str, Column)], band: Band, pixels: std::ops::Range<usize>, half: bool) -> (Vec<u8>, u64) {
+fn encode_row(columns: &[(&str, Column)], band: Band, pixels: std::ops::Range<usize>, is_half: bool) -> (Vec<u8>, u64) {
     let mut bytes = Vec::with_capacity(4 * columns.len() * pixels.len());
     let mut too_large = 0;
     for (_, column) in columns {
         for i in pixels.clone() {
-            let sample = match column {
+            let bytes_of_value = match column {
                 Column::Radiance(channel) => mean(band.film.sums[i])[*channel].to_ne_bytes(),
                 Column::Alpha => band.film.alpha(i).to_ne_bytes(),
                 Column::Aov(channel) => channel.bytes(band, i),
             };
-            if half && !column.is_integer() {
-                let value = f32::from_ne_bytes(sample);
+            if is_half && !column.is_integer() {
+                let value = f32::from_ne_bytes(bytes_of_value);
                 let rounded = f16::from_f32(value); // to nearest, ties to even
                 too_large += u64::from(value.is_finite() && rounded.is_infinite());
                 bytes.extend(rounded.to_ne_bytes());
             } else {
-                bytes.extend(sample);
+                bytes.extend(bytes_of_value);
             }
         }
     }

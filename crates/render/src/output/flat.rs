@@ -18,7 +18,7 @@ use wgray_image::memory::fallible;
 /// Bytes per pixel that the WebP encoder allocates: a copy of four channels, and the file in a growing buffer.
 const WEBP_ENCODER_BYTES: u64 = 12;
 
-/// Writes the radiance; in a JPEG, it is composited over black.
+/// Writes the radiance; in a JPEG, the radiance is composited over black.
 pub fn write(
     mut file: impl Write,
     format: Format,
@@ -39,7 +39,7 @@ pub fn write(
         _ => 0,
     };
     // Allocated before rendering, because a later failure would abort the process. The memory for the encoder is freed
-    // at once: the encoder allocates it again.
+    // at once, because the encoder allocates its own memory.
     let mut pixels: Vec<u8> = allocate(bytes).ok_or(RenderError::Memory(bytes + encoder_bytes))?;
     allocate(encoder_bytes).ok_or(RenderError::Memory(bytes + encoder_bytes))?;
     render(&mut |band| {

@@ -1,4 +1,4 @@
-//! PNG files.
+//! PNG files of the radiance and of AOVs, written row by row.
 
 use std::fs::File;
 use std::io::{self, BufReader, Write};

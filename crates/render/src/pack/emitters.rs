@@ -8,8 +8,8 @@ use rayon::prelude::*;
 use super::light_tree::{self, Cone, TreeEmitter};
 use super::primitive::{area, axes, bounding_box, bounding_sphere};
 use super::{
-    DIRECTIONAL, DISTANT, EMITTER, ENVIRONMENT, Emitter, Light, Material, NO_INDEX, NO_SHADOW, PLANE, POINT, Primitive,
-    SPOT, TRIANGLE, t_max,
+    DIRECTIONAL, DISTANT_T_MAX, EMITTER, ENVIRONMENT, Emitter, Light, Material, NO_INDEX, NO_SHADOW, PLANE, POINT,
+    Primitive, SPOT, TRIANGLE, t_max,
 };
 use crate::cpu::primitive::is_solid;
 use crate::records::{Lighting, PackedBvh};
@@ -153,8 +153,8 @@ pub fn emitters(
 }
 
 /// Defensive sampling of near emitters: scales the power of each group so that a quarter of the samples are uniform
-/// over all emitters. Otherwise, an occluded strong emitter would take the samples of the others. Returns the factors
-/// of the groups; no factors for a single group.
+/// over all emitters. Otherwise, an occluded strong emitter would take the samples of all other emitters. Returns the
+/// factors of the groups; no factors for a single group.
 fn mix_in_uniform(powers: &mut [f64], groups: &[usize], is_far: impl Fn(usize) -> bool) -> Vec<(usize, f64)> {
     let mut near: BTreeMap<usize, (f64, f64)> = BTreeMap::new();
     for (i, (power, group)) in powers.iter().zip(groups).enumerate() {
@@ -205,7 +205,7 @@ fn scale_far_powers(powers: &mut [f64], references: &[(u32, u32)], lights: &[Lig
 
 fn environment_light() -> Light {
     Light {
-        t_max: DISTANT,
+        t_max: DISTANT_T_MAX,
         primitive: NO_INDEX,
         number: NO_INDEX,
         kind: ENVIRONMENT,
@@ -219,7 +219,7 @@ fn is_far(lights: &[Light], &(instance, index): &(u32, u32)) -> bool {
 
 /// All emitters, and the strengths of materials.
 struct EmitterList {
-    /// Mesh instance (0 for a light), and index of the light or triangle.
+    /// 0 for a light, else 1 + mesh instance; and the index of the light or triangle.
     references: Vec<(u32, u32)>,
     /// Power of each emitter.
     powers: Vec<f64>,
@@ -408,13 +408,13 @@ fn tree_emitter(light: &Light, primitives: &[(Primitive, bool)], radiances: &[f6
 /// Given Distribution", IEEE TSE 17(9), 1991.
 fn table(weights: &[f64]) -> Vec<(f32, u32)> {
     let mean = weights.iter().sum::<f64>() / weights.len() as f64;
-    let mut rest: Vec<f64> = weights.iter().map(|weight| weight / mean).collect();
+    let mut scaled_weights: Vec<f64> = weights.iter().map(|weight| weight / mean).collect();
     let mut table: Vec<(f32, u32)> = (0..weights.len() as u32).map(|i| (1.0, i)).collect();
-    let (mut small, mut large): (Vec<usize>, Vec<usize>) = (0..weights.len()).partition(|i| rest[*i] < 1.0);
+    let (mut small, mut large): (Vec<usize>, Vec<usize>) = (0..weights.len()).partition(|i| scaled_weights[*i] < 1.0);
     while let (Some(i), Some(&j)) = (small.pop(), large.last()) {
-        table[i] = (rest[i] as f32, j as u32);
-        rest[j] -= 1.0 - rest[i];
-        if rest[j] < 1.0 {
+        table[i] = (scaled_weights[i] as f32, j as u32);
+        scaled_weights[j] -= 1.0 - scaled_weights[i];
+        if scaled_weights[j] < 1.0 {
             small.push(j);
             large.pop();
         }
@@ -422,7 +422,7 @@ fn table(weights: &[f64]) -> Vec<(f32, u32)> {
     table
 }
 
-/// Returns the power of a spot light of intensity 1. The falloff is a squared ramp, linear in the cosine.
+/// Returns the power of a spot light of intensity 1. The falloff is the square of a ramp that is linear in the cosine.
 fn spot_power(light: &Light) -> f64 {
     let (cone, ramp) = (f64::from(light.cone), 1.0 / f64::from(light.falloff));
     2.0 * std::f64::consts::PI * (cone - ramp + ramp / 3.0)
@@ -432,7 +432,7 @@ fn mean(color: Vec3) -> f64 {
     color.as_dvec3().element_sum() / 3.0
 }
 
-/// Returns a color's mean component, averaged over a texture.
+/// Returns the mean of a color's components; for a texture, averaged over the texture.
 fn mean_of(scene: &Scene, color: &Color) -> f64 {
     let mean = |color: DVec3| color.element_sum() / 3.0;
     match *color {

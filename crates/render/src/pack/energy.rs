@@ -11,11 +11,11 @@ use crate::cpu::sequence::sobol_sample;
 use crate::cpu::specular::{fresnel, refracted_cosine};
 
 /// Numbers of sampled normals per table entry, for constant and for textured roughness. The samples are Sobol' points,
-/// because few microfacets tilt enough for total internal reflection, and a grid would miss them.
+/// because few microfacets tilt enough for total internal reflection, and a grid would miss these microfacets.
 const NORMAL_SAMPLES: (u32, u32) = (4096, 1024);
 
 /// Returns the tables of both sides, outside first. Rows: sqrt(alpha), 0 to 1; columns: cosine, 0 to 1. If `alpha` is
-/// known, only the adjacent rows are computed, and the entries of other rows are 1.
+/// constant, only the adjacent rows are computed, and the entries of other rows are 1.
 pub fn energy_table(ior: f32, alpha: Option<f32>) -> Vec<f32> {
     let last = (ENERGY_SIZE - 1) as f32;
     let is_needed = |row: u32| alpha.is_none_or(|alpha| (row as f32 - alpha.sqrt() * last).abs() < 1.0);
@@ -107,8 +107,8 @@ const TEXTURED_ROWS: (u32, u32) = (10, 6);
 const KINK_CORRECTION: f32 = 1.004;
 
 /// Returns the table of anisotropic microfacets for `single_scatter_albedo_aniso`: first the numbers of rows for
-/// roughness and for anisotropy, 1 for a known value; then the rows of each lobe, as lines by azimuth of columns by
-/// cosine.
+/// roughness and for anisotropy, each 1 if the value is constant; then the rows of each lobe. A row has a line for each
+/// azimuth, and a line has a column for each cosine.
 pub fn aniso_table(lobes: TableLobes, roughness: Option<f32>, anisotropy: Option<f32>) -> Vec<u32> {
     let rows = [
         if roughness.is_none() { TEXTURED_ROWS.0 } else { 1 },

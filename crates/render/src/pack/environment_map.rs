@@ -15,8 +15,8 @@ use wgray_scene::{self as scene, EnvironmentImage, Scene};
 const MIN_INTEGRAL: f64 = 1e-25;
 /// Blocks with less than this fraction of the map's power get no light samples; only BSDF samples reach them.
 const MIN_BLOCK_FRACTION: f64 = 1e-12;
-/// Parts per side of a block, each with its own mean direction.
-const PARTS: usize = 4;
+/// Number of parts per side of a block; each part has its own mean direction.
+const PARTS_PER_SIDE: usize = 4;
 /// Approximate angular radius of a bin of normals.
 const BIN_RADIUS: f64 = 0.06;
 
@@ -31,7 +31,7 @@ struct PackedMap {
     cells: usize,
     blocks: usize,
     shifts: u32,
-    /// Integral of the mean component over all directions, summed over cells.
+    /// Integral of the radiance (mean of red, green and blue) over all directions.
     sum: f64,
 }
 
@@ -49,7 +49,7 @@ impl EnvironmentMap {
         self.0.as_ref().map(|map| map.sum)
     }
 
-    /// Returns the flags that kernels have as constants.
+    /// Returns the flags of [`Specialization::environment_flags`](crate::records::Specialization::environment_flags).
     pub fn bits(&self, scene: &Scene) -> u32 {
         let any = |test: fn(&scene::Environment) -> bool| scene.environment.as_ref().is_some_and(test);
         let bit = |is_set: bool, bit: u32| if is_set { bit } else { 0 };
@@ -132,11 +132,12 @@ struct Grid {
     row_shift: usize,
 }
 
-/// Radiance of a part of a block.
+/// Integrals over a part of a block.
 #[derive(Clone, Copy, Default)]
 struct Part {
     /// Integral of direction times radiance.
     vector: DVec3,
+    /// Integral of radiance.
     power: f64,
 }
 
@@ -203,8 +204,8 @@ impl Grid {
         }
     }
 
-    /// Writes the reciprocal of the power of each block, then the cumulative distributions over the blocks: one for each
-    /// bin of normals, weighted by the clamped cosine, and one without the cosine.
+    /// Writes the reciprocal of the power of each block, then the cumulative distributions over the blocks: one for
+    /// each bin of normals, weighted by the clamped cosine, and one without the cosine.
     fn write_distributions(&self, weights: &[f64], axes: [DVec3; 3], sum: f64, words: &mut Vec<u32>) {
         let side = ENVIRONMENT_BLOCKS as usize;
         let mut powers = vec![0.0; self.rows() * side];
@@ -220,13 +221,13 @@ impl Grid {
         });
         for (i, (columns, rows)) in self.blocks().enumerate() {
             let block = i / self.columns() * side + i % self.columns();
-            let mut block_parts = [Part::default(); PARTS * PARTS];
+            let mut block_parts = [Part::default(); PARTS_PER_SIDE * PARTS_PER_SIDE];
             for row in rows.clone() {
                 for column in columns.clone() {
                     let weight = weights[row * self.width + column];
                     let ((sine, cosine), (y, x)) = (polar[row], azimuths[column]);
-                    let part_index = |i: usize, range: &Range<usize>| (i - range.start) * PARTS / range.len();
-                    let part = &mut block_parts[part_index(row, &rows) * PARTS + part_index(column, &columns)];
+                    let part_index = |i: usize, range: &Range<usize>| (i - range.start) * PARTS_PER_SIDE / range.len();
+                    let part = &mut block_parts[part_index(row, &rows) * PARTS_PER_SIDE + part_index(column, &columns)];
                     part.power += weight;
                     part.vector += weight * DVec3::new(sine * x, sine * y, cosine);
                 }
@@ -244,11 +245,11 @@ impl Grid {
         }
         let inverse = |power: &f64| if *power > 0.0 { (1.0 / power) as f32 } else { 0.0 };
         words.extend(powers.iter().map(inverse).map(f32::to_bits));
-        let cell = ((PI / self.width as f64).powi(2) + (PI / 2.0 / image_rows).powi(2)).sqrt();
+        let cell_radius = ((PI / self.width as f64).powi(2) + (PI / 2.0 / image_rows).powi(2)).sqrt();
         let lobes: Vec<(usize, DVec3, f64, f64)> = (parts.iter())
             .map(|(block, Part { vector, power })| {
                 let mean = *vector / *power;
-                let spread = (1.0 - mean.length_squared()).max(0.0).sqrt() + cell.min(1.0) + BIN_RADIUS;
+                let spread = (1.0 - mean.length_squared()).max(0.0).sqrt() + cell_radius.min(1.0) + BIN_RADIUS;
                 let [x, y, z] = axes;
                 (*block, x * mean.x + y * mean.y + z * mean.z, *power, spread.min(1.0))
             })
@@ -259,7 +260,7 @@ impl Grid {
             for (block, mean, power, spread) in &lobes {
                 cosines[*block] += power * mean_cosine(normal.dot(*mean), *spread);
             }
-            // If no light is in front of the surface, no sample contributes, and any distribution will do.
+            // If no light is in front of the surface, no sample contributes, so the distribution does not matter.
             let has_light = cosines.iter().any(|weight| *weight > 0.0);
             let mut words = Vec::new();
             write_bin(if has_light { &cosines } else { &powers }, &mut words);
@@ -292,7 +293,8 @@ fn mean_cosine(m: f64, r: f64) -> f64 {
     }
 }
 
-/// Writes cumulative distributions of rows, and of blocks in each row.
+/// Writes the cumulative distribution of the rows of blocks, then the cumulative distributions of the blocks in each
+/// row.
 fn write_bin(weights: &[f64], words: &mut Vec<u32>) {
     let rows: Vec<&[f64]> = weights.chunks(ENVIRONMENT_BLOCKS as usize).collect();
     let sums: Vec<f64> = rows.iter().map(|row| row.iter().sum()).collect();
@@ -320,8 +322,8 @@ fn write_distribution(weights: &[f64], words: &mut Vec<u32>) {
 /// Returns the weights of cells: mean of the corners times the solid angle.
 fn weights(texels: &[u32], width: usize, height: usize) -> Vec<f64> {
     let value = |i: usize| {
-        let parts = &texels[3 * i..3 * i + 3];
-        parts.iter().map(|bits| f64::from(f32::from_bits(*bits))).sum::<f64>() / 3.0
+        let rgb = &texels[3 * i..3 * i + 3];
+        rgb.iter().map(|bits| f64::from(f32::from_bits(*bits))).sum::<f64>() / 3.0
     };
     let mut weights = Vec::with_capacity(width * (height + 1));
     let mut upper: Vec<f64> = (0..width).map(value).collect();
@@ -355,8 +357,8 @@ fn write_table(mut weights: Vec<f64>, words: &mut Vec<u32>) {
     let mut large = next_large(&weights, 0);
     for i in 0..weights.len() {
         let mut small = i;
-        // A large weight before `i` that becomes small is filled at once. The loop fills later weights when it reaches
-        // them.
+        // A large weight before `i` that becomes small is filled at once. Later weights are filled when the loop
+        // reaches their indices.
         while let Some(donor) = large
             && weights[small] < 1.0
         {
@@ -500,7 +502,7 @@ mod tests {
             let cells = std::mem::take(&mut words);
             grid.write_distributions(&weights, [DVec3::X, DVec3::Y, DVec3::Z], sum, &mut words);
             assert_eq!(words.len(), grid.words(), "{width} x {height}");
-            let mut first = 0;
+            let mut first_cell = 0;
             for (i, (columns, rows)) in grid.blocks().enumerate() {
                 let block_cells: Vec<usize> = rows
                     .flat_map(|row| columns.clone().map(move |column| row * width + column))
@@ -510,7 +512,7 @@ mod tests {
                 let inverse = f64::from(f32::from_bits(words[block]));
                 assert!((inverse * power - 1.0).abs() < 1e-6, "{width} x {height}, block {i}");
                 // Aliases are stored as row and column.
-                let table: Vec<u32> = cells[2 * first..2 * (first + block_cells.len())]
+                let table: Vec<u32> = cells[2 * first_cell..2 * (first_cell + block_cells.len())]
                     .chunks(2)
                     .flat_map(|pair| {
                         let alias = (pair[1] >> 16) as usize * width + (pair[1] & 0xffff) as usize;
@@ -524,22 +526,22 @@ mod tests {
                         "{width} x {height}, block {i}"
                     );
                 }
-                first += block_cells.len();
+                first_cell += block_cells.len();
             }
             // For the upward normal, light comes only from the upper hemisphere, so lower rows have probability 0.
             let stride = (grid.rows() + 1) * 33;
-            let up = normal_bin(Vec3::new(0.01, 0.01, 1.0)) as usize;
+            let up_bin = normal_bin(Vec3::new(0.01, 0.01, 1.0)) as usize;
             let distribution = |bin: usize| widths(&words[grid.rows() * 32 + bin * stride..][..33]);
-            let lower_probability: f64 = distribution(up)[grid.rows().div_ceil(2) + 2..].iter().sum();
-            let lower_probability_for_all: f64 = distribution((NORMAL_BINS * NORMAL_BINS) as usize)
+            let lower_probability: f64 = distribution(up_bin)[grid.rows().div_ceil(2) + 2..].iter().sum();
+            let lower_probability_without_cosine: f64 = distribution((NORMAL_BINS * NORMAL_BINS) as usize)
                 [grid.rows().div_ceil(2) + 2..]
                 .iter()
                 .sum();
             if height >= 32 {
                 assert_eq!(lower_probability, 0.0, "{width} x {height}: light from behind");
                 assert!(
-                    lower_probability_for_all > 0.2,
-                    "for all directions: {lower_probability_for_all}"
+                    lower_probability_without_cosine > 0.2,
+                    "without the cosine: {lower_probability_without_cosine}"
                 );
             }
         }

@@ -42,21 +42,21 @@ fn mitchell(x: f64) -> f64 {
 }
 
 /// Returns the [`FILTER_BINS_MAX`] equally likely bins of a filter: inner edge, outer edge, weight, 0. The bins of a
-/// lobe have equal integrals. Their weight corrects for the rounding to whole bins: it is close to 1, or to -1 in a
-/// negative lobe.
+/// lobe have equal integrals. The weight of the bins corrects for rounding to whole bins, and is close to 1, or to -1
+/// in a negative lobe.
 pub fn table(filter: PixelFilter) -> Vec<Vec4> {
     let lobes = lobes(filter);
     let total: f64 = lobes.iter().map(|lobe| lobe.integral().abs()).sum();
     let mut table = Vec::new();
     let mut remaining = FILTER_BINS_MAX;
     for (i, lobe) in lobes.iter().enumerate() {
-        let share = f64::from(FILTER_BINS_MAX) * lobe.integral().abs() / total;
+        let exact_count = f64::from(FILTER_BINS_MAX) * lobe.integral().abs() / total;
         let bins = match i + 1 == lobes.len() {
             true => remaining,
-            false => share.round() as u32,
+            false => exact_count.round() as u32,
         };
         remaining -= bins;
-        let weight = lobe.integral().signum() * share / f64::from(bins);
+        let weight = lobe.integral().signum() * exact_count / f64::from(bins);
         let edge = |bin: u32| lobe.quantile(f64::from(bin) / f64::from(bins));
         for bin in 0..bins {
             table.push(DVec4::new(edge(bin), 0.0, weight, 0.0).as_vec4());

@@ -16,8 +16,8 @@ use wgray_scene::{Geometry, Scene, Shape};
 /// Maximum number of bounded primitives without a BVH: a few primitives are faster without one.
 pub const MAX_LINEAR_PRIMITIVES: usize = 64;
 
-/// Builds the BVH over mesh instances and primitives. Each primitive has an index, and a flag that is true if the
-/// primitive casts a shadow. `casts` returns true if a material casts shadows. Also returns
+/// Builds the BVH over mesh instances and primitives. Each entry of `primitives` has an index, a primitive, and a flag
+/// that is true if the primitive casts a shadow. `casts` returns true if a material casts shadows. Also returns
 /// [`Counts::item_padding`](super::Counts::item_padding).
 pub fn build_bvh(
     scene: &Scene,

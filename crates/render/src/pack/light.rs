@@ -9,12 +9,12 @@ use super::{DIRECTIONAL, EMITTER, Light, Material, NO_INDEX, POINT, Primitive, R
 use wgray_scene::{self as scene, Scene};
 
 /// `t_max` of shadow rays to directional lights: beyond any scene, but with a finite square.
-pub(super) const DISTANT: f32 = 1e10;
+pub(super) const DISTANT_T_MAX: f32 = 1e10;
 
 /// Minimum relative distance from the end of a shadow ray to the light sample, because lights may lie on surfaces.
 const MIN_LIGHT_DISTANCE: f64 = 1e-5;
 
-/// Minimum range of the cosine of a spot light's falloff.
+/// Minimum difference of the cosines between which a spot light falls off.
 const MIN_FALLOFF: f64 = 1e-12;
 
 /// Returns `t_max` of shadow rays, relative to the vector to the light sample.
@@ -79,7 +79,7 @@ fn pack_light(light: &scene::Light, number: u32, shadow_epsilon: f64) -> Light {
         scene::Light::Directional { direction, color } => Light {
             center: -direction.as_vec3(),
             finite: 0.0,
-            t_max: DISTANT,
+            t_max: DISTANT_T_MAX,
             color: color.as_vec3(),
             kind: DIRECTIONAL,
             ..base

@@ -13,7 +13,8 @@ const BUCKETS: usize = 12;
 /// Binary splits after which nodes are split at the median, to bound the depth.
 const LIGHT_TREE_MAX_DEPTH: u32 = 48;
 
-/// Bounds of emission: normals within `spread` of the axis, emission within `edge` of a normal.
+/// Bounds of emission: normals lie within the angle `spread` of the axis, and emission lies within the angle `edge` of
+/// a normal.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cone {
     /// Unit length.
@@ -45,7 +46,7 @@ impl Cone {
         }
     }
 
-    /// Returns the union of two cones, algorithm 1.
+    /// Returns a cone that contains two cones, algorithm 1.
     pub fn with(&self, other: &Cone) -> Cone {
         let (mut a, mut b) = (*self, *other);
         if b.spread > a.spread {
@@ -90,8 +91,8 @@ impl Cone {
     /// Orientation measure, equation 1.
     fn measure(&self) -> f64 {
         let (o, w) = (self.spread, (self.spread + self.edge).min(PI));
-        let part = 2.0 * w * o.sin() - (o - 2.0 * w).cos() - 2.0 * o * o.sin() + o.cos();
-        2.0 * PI * (1.0 - o.cos()) + FRAC_PI_2 * part
+        let edge_term = 2.0 * w * o.sin() - (o - 2.0 * w).cos() - 2.0 * o * o.sin() + o.cos();
+        2.0 * PI * (1.0 - o.cos()) + FRAC_PI_2 * edge_term
     }
 }
 
@@ -106,7 +107,7 @@ pub struct TreeEmitter {
     pub cone: Cone,
     /// Maximum intensity.
     pub intensity: f64,
-    /// PDF of samples by area, times the probability of selecting the tree.
+    /// PDF of samples per area, times the probability of selecting the tree.
     pub density: f64,
     /// 0 for a light, else 1 + the index of the mesh instance.
     pub instance: u32,
@@ -152,7 +153,7 @@ impl Bounds {
         bounds.reduce(|a, b| a.with(&b))
     }
 
-    /// Returns the numerator of equation 2. `padding` enlarges the box, so that boxes without extent have a cost, too.
+    /// Returns the numerator of equation 2. `padding` enlarges the box, so that boxes without extent also have a cost.
     fn cost(&self, padding: f64) -> f64 {
         let size = self.high - self.low + padding;
         let area = 2.0 * (size.x * size.y + size.y * size.z + size.z * size.x);
@@ -164,11 +165,11 @@ impl Bounds {
 const WIDTH: usize = 4;
 
 /// Minimum number of emitters of a node whose children are built in parallel.
-const PARALLEL: usize = 2048;
+const MIN_PARALLEL_EMITTERS: usize = 2048;
 
 /// Builds the tree, root first.
 pub fn build(emitters: &[TreeEmitter]) -> Vec<LightNode> {
-    build_with(emitters, PARALLEL)
+    build_with(emitters, MIN_PARALLEL_EMITTERS)
 }
 
 fn build_with(emitters: &[TreeEmitter], parallel: usize) -> Vec<LightNode> {
@@ -191,7 +192,9 @@ struct Builder<'a> {
     parallel: usize,
 }
 
+/// The emitters of a node or of a child.
 struct Part<'a> {
+    /// Indices of the emitters.
     order: &'a mut [u32],
     bounds: Bounds,
     /// Number of binary splits above.
@@ -241,7 +244,7 @@ impl Builder<'_> {
         node_index as u32
     }
 
-    /// Returns a node without child indices, and the emitters of each child.
+    /// Returns a node, whose child indices the caller sets, and the emitters of each child.
     fn node<'a>(&self, parent: u32, part: Part<'a>) -> (LightNode, Vec<Part<'a>>) {
         let size = (part.bounds.high - part.bounds.low).max_element();
         let padding = if size > 0.0 { 1e-3 * size } else { 1.0 };
@@ -281,7 +284,7 @@ impl Builder<'_> {
 
     fn set_child(&self, node: &mut LightNode, i: usize, bounds: &Bounds) {
         let center = (0.5 * (bounds.low + bounds.high)).as_vec3();
-        // Relative to the rounded center.
+        // The extent is measured from the rounded center, so that the sphere contains the box.
         let half_extent = (bounds.high - center.as_dvec3()).max(center.as_dvec3() - bounds.low);
         let radius = half_extent.length() * (1.0 + 1e-6);
         let axis = bounds.cone.axis.as_vec3();
@@ -333,17 +336,16 @@ impl Builder<'_> {
             }
             let padding = 1e-3 * size[longest];
             let stretch = size[longest] / size[axis]; // K_r
-            let mut first: Option<Bounds> = None;
+            let mut lower_bounds: Option<Bounds> = None;
             for split in 1..BUCKETS {
-                // A split after an empty bucket equals the previous split.
+                // A split after an empty bucket gives the same parts as the previous split.
                 let Some(added) = buckets[split - 1] else { continue };
-                let lower = first.map_or(added, |bounds| bounds.with(&added));
-                first = Some(lower);
+                let lower = lower_bounds.map_or(added, |bounds| bounds.with(&added));
+                lower_bounds = Some(lower);
                 let Some(upper) = Bounds::union(buckets[split..].iter().copied().flatten()) else {
                     break;
                 };
-                let (first, second) = (lower.cost(padding), upper.cost(padding));
-                let cost = stretch * (first + second);
+                let cost = stretch * (lower.cost(padding) + upper.cost(padding));
                 if best.is_none_or(|(min_cost, _, _)| cost < min_cost) {
                     best = Some((cost, axis, split));
                 }
@@ -352,14 +354,14 @@ impl Builder<'_> {
         let Some((_, axis, split)) = best else {
             return half;
         };
-        let mut first = 0;
+        let mut first_size = 0;
         for i in 0..order.len() {
             if bucket(center(&order[i])[axis], low[axis], size[axis]) < split {
-                order.swap(first, i);
-                first += 1;
+                order.swap(first_size, i);
+                first_size += 1;
             }
         }
-        first
+        first_size
     }
 }
 

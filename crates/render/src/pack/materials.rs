@@ -14,6 +14,7 @@ use wgray_scene::{
     TextureFilter, TextureKind, Value, VertexColors, Wrap,
 };
 
+/// Packed materials, texture lookups, textures and texels.
 #[derive(Default)]
 pub struct Appearances {
     pub materials: Vec<Material>,
@@ -25,7 +26,7 @@ pub struct Appearances {
     pyramids: BTreeMap<usize, u32>,
     /// Number of levels that each image needs; the key is the address of the image.
     levels: BTreeMap<usize, u32>,
-    /// Record of each texture; a normal map has one record per strength.
+    /// Index of each texture's record; a normal map has one record per strength.
     records: BTreeMap<(usize, Option<u64>), u32>,
     /// Tables of rough glass; the key is the index of refraction and alpha (`None` if textured).
     albedo_tables: BTreeMap<(u32, Option<u32>), u32>,
@@ -90,7 +91,7 @@ impl Appearances {
     }
 
     /// Returns the maximum number of lookups of materials that are neither mirror nor glass, and of mirrors and glass.
-    /// With `path`, both are the overall maximum, because `path` evaluates all materials with the same code.
+    /// With `path`, both numbers are the overall maximum, because `path` evaluates all materials with the same code.
     pub fn lookups(&self, integrator: Integrator) -> (u32, u32) {
         let max = |specular: bool| {
             let materials = self
@@ -100,19 +101,19 @@ impl Appearances {
             let lookups = materials.map(|material| material.lookups.y);
             lookups.max().unwrap_or(0)
         };
-        let (others, specular) = (max(false), max(true));
+        let (non_specular, specular) = (max(false), max(true));
         match integrator.follows_paths() {
-            true => (others.max(specular), others.max(specular)),
-            false => (others, specular),
+            true => (non_specular.max(specular), non_specular.max(specular)),
+            false => (non_specular, specular),
         }
     }
 
     pub fn has_normal_maps(&self) -> bool {
-        self.have_lookup(FOR_NORMAL | FOR_COAT_NORMAL)
+        self.any_material_has_lookup(FOR_NORMAL | FOR_COAT_NORMAL)
     }
 
     /// Returns true if any lookup has any of the purposes.
-    pub fn have_lookup(&self, purposes: u32) -> bool {
+    pub fn any_material_has_lookup(&self, purposes: u32) -> bool {
         self.lookups.iter().any(|lookup| lookup.purposes & purposes != 0)
     }
 

@@ -25,7 +25,7 @@ pub use self::camera::pack_camera;
 use self::emitters::PackedEmitters;
 use self::environment_map::EnvironmentMap;
 pub use self::geometry::MAX_LINEAR_PRIMITIVES;
-use self::light::{DISTANT, connect_lights, pack_lights, t_max};
+use self::light::{DISTANT_T_MAX, connect_lights, pack_lights, t_max};
 use self::materials::Appearances;
 use self::order::SortedPrimitives;
 pub use self::origin::origin;
@@ -183,16 +183,16 @@ fn counts(
     appearances: &Appearances,
     (emitters, light_nodes): (usize, usize),
 ) -> Counts {
-    let mut first = 0;
+    let mut first_index = 0;
     let primitives = std::array::from_fn(|kind| {
-        let of_kind = linear_primitives[first as usize..]
+        let primitives_of_kind = linear_primitives[first_index as usize..]
             .iter()
             .take_while(|(p, _)| p.kind == kind as u32);
-        let (count, casters) = of_kind.fold((0, 0), |(count, casters), (_, casts)| {
+        let (count, casters) = primitives_of_kind.fold((0, 0), |(count, casters), (_, casts)| {
             (count + 1, casters + u32::from(*casts))
         });
-        let range = UVec4::new(first, first + casters, first + count, 0);
-        first += count;
+        let range = UVec4::new(first_index, first_index + casters, first_index + count, 0);
+        first_index += count;
         range
     });
     let rows = |count: usize, size: usize| (count * size / size_of::<UVec4>()) as u32;

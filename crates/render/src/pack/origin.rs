@@ -8,8 +8,8 @@ use glam::DVec3;
 use wgray_scene::{Camera, Light, Scene};
 
 /// Returns a point near the camera's look-at point, on a grid whose spacing is a power of 2, at least the distance from
-/// the camera to the look-at point. Scenes near the file's origin keep their coordinates, and no coordinate gains
-/// digits.
+/// the camera to the look-at point. Scenes near the file's origin keep their coordinates, and the translation adds no
+/// significant digits to coordinates.
 pub fn origin(camera: &Camera) -> DVec3 {
     let cell = camera.position.distance(camera.look_at).log2().ceil().exp2();
     (camera.look_at / cell).round() * cell

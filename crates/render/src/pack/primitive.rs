@@ -61,8 +61,9 @@ pub(super) fn parallelogram(kind: u32, p: &Parallelogram, material: u32, shape: 
     )
 }
 
-/// Returns the primitive with these columns and this translation to world space. The anchor of a solid is a surface
-/// point towards the origin, so that coordinates near the origin keep their precision for any size.
+/// Returns the primitive whose object-to-world transform has these columns and the translation `center`. The anchor of
+/// a solid is a surface point towards the origin, so that coordinates near the origin keep their precision for any
+/// size.
 pub(crate) fn primitive(kind: u32, center: DVec3, columns: DMat3, material: u32, shape: u32) -> Primitive {
     let to_local = columns.inverse();
     let rows = to_local.transpose();

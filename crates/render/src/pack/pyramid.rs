@@ -15,12 +15,12 @@ pub fn pyramid(image: &Image, levels: u32, texels: &mut Vec<u32>) -> u32 {
     let is_float = matches!(image.texels, Texels::Floats(_));
     let word_count = words(image.width, image.height, levels, is_float) as usize;
     match word_count > 1 << 20 {
-        true => texels.reserve_exact(word_count), // large images are few: no spare capacity
+        true => texels.reserve_exact(word_count), // large images are few, so spare capacity would be wasted
         false => texels.reserve(word_count),
     }
     texels.resize(table + levels as usize, 0);
     let height = image.height as usize;
-    // The image is not decoded as a whole, because linear colors use six times the memory of the texels.
+    // The image is not decoded at once, because linear colors take six times the memory of the texels.
     let mut level = None;
     for i in 0..levels as usize {
         texels[table + i] = texels.len() as u32;

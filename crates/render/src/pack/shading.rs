@@ -1,4 +1,4 @@
-//! The part of a packed scene that depends on neither shapes, lights nor the camera.
+//! The part of a packed scene that is independent of shapes, lights and camera.
 
 use super::environment_map::EnvironmentMap;
 use super::materials::Appearances;

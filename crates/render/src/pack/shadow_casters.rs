@@ -1,5 +1,5 @@
-//! Selection of primitives that can cast shadows. A flat primitive with all shapes and lights on one side casts no
-//! shadow, such as a wall of a room.
+//! Selection of primitives that can cast shadows. A flat primitive, such as a wall of a room, casts no shadow if all
+//! shapes and lights are on one side.
 
 use glam::DVec3;
 
@@ -7,7 +7,8 @@ use super::{MAX_LINEAR_PRIMITIVES, Primitive};
 use crate::cpu::primitive::is_solid;
 use wgray_scene::{Geometry, Light, Reflection, Scene, Shadows};
 
-/// Maximum distance of points on a plane, relative to the coordinates: the rounding of the plane's record.
+/// Maximum distance at which a point counts as on a plane, relative to the coordinates, because the record of the plane
+/// is rounded.
 const TOLERANCE: f64 = 1e-6;
 
 /// Returns a flag for each primitive outside of the BVH: true if the primitive can occlude a surface from a light. With
@@ -64,7 +65,7 @@ fn has_both_sides(scene: &Scene, primitive: &Primitive) -> bool {
             shape.geometry.each_extreme(normal, |p| found |= add_point(p));
             found
         });
-    // Directional lights and planes are infinite, so the direction decides.
+    // Directional lights and planes extend to infinity, so only their directions are tested.
     let found_by_directions = found_by_shapes
         || scene.lights.iter().any(|light| match light {
             Light::Directional { direction, .. } => add_height(-direction.dot(normal), 1.0),

@@ -183,7 +183,7 @@ fn path_constants(
     lights: &[Light],
 ) -> Specialization {
     let any = |test: fn(&Material) -> bool| u32::from(materials.iter().any(test));
-    let has_lookup = |purpose: u32| u32::from(appearances.have_lookup(purpose));
+    let has_lookup = |purpose: u32| u32::from(appearances.any_material_has_lookup(purpose));
     let emitters = &packed.lighting.emitters;
     let meshes_emit = emitters.iter().any(|emitter| emitter.instance != 0)
         || packed.lighting.nodes.iter().any(|node| node.instance != UVec4::ZERO);
@@ -219,8 +219,8 @@ fn lobes(materials: &[Material], appearances: &Appearances) -> u32 {
         return 0;
     }
     let principled: Vec<&Material> = principled.collect();
-    let has = |lobe: &&Lobe| {
-        principled.iter().any(|material| (lobe.is_in)(material)) || appearances.have_lookup(lobe.purposes)
+    let has_lobe = |lobe: &&Lobe| {
+        principled.iter().any(|material| (lobe.is_in)(material)) || appearances.any_material_has_lookup(lobe.purposes)
     };
-    LOBES.iter().filter(has).fold(0, |bits, lobe| bits | lobe.bit)
+    LOBES.iter().filter(has_lobe).fold(0, |bits, lobe| bits | lobe.bit)
 }

@@ -26,7 +26,7 @@ constants! {
     pub const NO_SHADOW: u32 = 0x8000_0000;
     /// [`Instance::shadows`]: some groups cast no shadow.
     pub const SOME_SHADOWS: u32 = 1;
-    /// Maximum levels of a BVH.
+    /// Maximum number of levels of a BVH.
     pub const BVH_MAX_DEPTH: u32 = 32;
     /// Padding of mesh boxes, relative to coordinates: 32 unit roundoffs, more than the error of a triangle test.
     pub const BOX_PAD: f32 = 32.0 / 16_777_216.0;
@@ -51,7 +51,7 @@ constants! {
     pub const MICROFACET_KINDS: u32 = 1 << METAL | 1 << ROUGH_GLASS | 1 << THIN;
     /// Bits of transmissive microfacet kinds.
     pub const TRANSMISSIVE_KINDS: u32 = 1 << ROUGH_GLASS | 1 << THIN;
-    /// Rows and columns, per side, of the table at [`Material::energy`].
+    /// Number of rows and of columns of the table at [`Material::energy`]; each side of the surface has a table.
     pub const ENERGY_SIZE: u32 = 32;
     /// Number of rows of the table at [`Material::aniso_table`]; rows correspond to the azimuth.
     pub const ANISO_LINES: u32 = 49;
@@ -221,6 +221,6 @@ constants! {
     /// Number of shadow rays per block; each ray has one bit of a mask.
     pub const SAMPLE_BLOCK: u32 = 32;
 
-    /// Effective sample size of the variance estimate that each further multiple of the pilot samples requires.
+    /// Minimum effective sample size of the variance estimate for each multiple of the pilot samples after the first.
     pub const EFFECTIVE_SAMPLES_PER_DOUBLING: f32 = 2.0;
 }

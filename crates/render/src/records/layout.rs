@@ -67,10 +67,12 @@ records! {
         /// Offset of the cells' alias tables in the texels, block by block. A cell has two words: its own probability
         /// times 2^32, and the row (bits 16 to 31) and column of its alias.
         pub cells: u32,
-        /// A twelfth of the probability of sampling the map.
+        /// Probability of sampling the map, divided by 12: kernels multiply by the sum of three components at four
+        /// corners.
         pub density: f32,
         /// Offset of 1 / (integrated radiance) of the blocks, [`ENVIRONMENT_BLOCKS`] per row. The cumulative
-        /// distributions of each bin of normals follow: of the rows, then of the blocks in each row.
+        /// distributions of each bin of normals follow: the distribution of the block rows, then the distributions of
+        /// the blocks in each row.
         pub blocks: u32,
         /// log2 of a block's columns (bits 0 to 7) and rows (from bit 8).
         pub shifts: u32,
@@ -96,7 +98,7 @@ records! {
         pub determinant: f32,
         /// Solids: object-space vector from the anchor to the center. Else 0.
         pub middle: Vec3,
-        /// Solids: constant term of the implicit equation, `|middle|² - 1`; for cylinders, of x and y of `middle` only.
+        /// Solids: constant term of the implicit equation, `|middle|² - 1`; cylinders ignore z of `middle`.
         pub level: f32,
     }
 
@@ -131,7 +133,7 @@ records! {
         /// Emitters with `path`: pdf of light samples per area (for ellipsoids, `ellipsoid_area`), or 1 with a light
         /// tree. Otherwise 0.
         pub density: f32,
-        /// [`GLASS`], [`ROUGH_GLASS`], [`PRINCIPLED`]: absorption coefficient behind the surface, per length.
+        /// [`GLASS`], [`ROUGH_GLASS`], [`PRINCIPLED`]: absorption coefficient behind the surface, per unit length.
         pub absorption: Vec3,
         /// Kinds except [`PHONG`], [`EMITTER`], [`MIRROR`] and [`GLASS`]: roughness, 0 to 1.
         pub roughness: f32,
@@ -142,11 +144,11 @@ records! {
         pub energy: u32,
         /// Multiple-scattering loss relative to single-scattering albedo at a hit; 0 in the packed record.
         pub loss: f32,
-        /// [`METAL`]: real part of the index of refraction, or 0.
+        /// [`METAL`]: real part of the complex index of refraction; 0 without an index.
         pub eta: Vec3,
         /// Microfacet kinds: additional roughness along the first tangent, 0 to 1.
         pub anisotropy: f32,
-        /// [`METAL`]: imaginary part of the index of refraction.
+        /// [`METAL`]: imaginary part of the complex index of refraction.
         pub k: Vec3,
         /// Rotation of the first tangent from u towards v, in half turns.
         pub rotation: f32,
@@ -220,7 +222,8 @@ records! {
         pub levels: u32,
     }
 
-    /// A light: the points center + a u + b v, with a and b in -1..=1 or, with `path`, in the range of the kind.
+    /// A light: the points center + a u + b v. a and b are in -1..=1 or, with `path`, in the range of local coordinates
+    /// of the primitive's kind.
     pub struct Light {
         /// Center, or direction of a directional light.
         pub center: Vec3,
@@ -242,7 +245,8 @@ records! {
         pub normal: Vec3,
         /// Kind of the primitive (for `path`), or [`POINT`], [`DIRECTIONAL`], [`SPOT`] or [`ENVIRONMENT`].
         pub kind: u32,
-        /// For `path`: [`Material::density`], or the probability of a delta light or the environment; 0 in light trees.
+        /// For `path`: [`Material::density`], or the probability of a delta light or the environment; 0 for lights in a
+        /// light tree.
         pub density: f32,
         /// Emitting sides: 1 (front) or 2.
         pub sides: u32,
@@ -385,7 +389,8 @@ records! {
         pub shape: u32,
         /// Third column.
         pub w: Vec3,
-        /// First row of vertex normals and v, or [`NO_INDEX`] if the mesh has neither.
+        /// First row of the vertex normals and of the texture coordinate v; [`NO_INDEX`] if the mesh has neither
+        /// normals nor texture coordinates.
         pub attributes: u32,
         /// Largest absolute object-space coordinate.
         pub size: f32,

@@ -12,9 +12,10 @@ pub struct PackedMesh {
     pub nodes: Vec<Node>,
     /// Vertex indices and triangle index, in leaf order.
     pub triangles: Vec<UVec4>,
-    /// Position and u of each vertex.
+    /// Position and texture coordinate u of each vertex.
     pub vertices: Vec<Vec4>,
-    /// Normal (0 if the mesh has no normals) and v of each vertex; empty without normals and texture coordinates.
+    /// Normal (0 if the mesh has no normals) and texture coordinate v of each vertex; empty if the mesh has neither
+    /// normals nor texture coordinates.
     pub attributes: Vec<Vec4>,
     /// Tangents along u and v of each vertex, or empty.
     pub tangents: Vec<[Vec4; 2]>,

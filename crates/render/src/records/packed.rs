@@ -1,4 +1,4 @@
-//! A packed scene.
+//! The records of a scene, grouped by purpose.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -80,7 +80,8 @@ pub struct PackedTextures {
     pub lookups: Vec<Lookup>,
     /// Textures that the lookups sample.
     pub records: Vec<Texture>,
-    /// Words of images: tables of level offsets, and texels. Also sampling tables and albedo tables.
+    /// Words of images: tables of level offsets, and texels. Also the sampling tables of the environment map and the
+    /// albedo tables of materials.
     pub texels: Vec<u32>,
 }
 
@@ -134,7 +135,7 @@ impl Packed {
         (scene_bvh + mesh_bvhs.sum::<usize>()) as u64
     }
 
-    /// Returns the size of texels and environment sampling tables in bytes.
+    /// Returns the size of texels, sampling tables and albedo tables in bytes.
     pub fn texel_bytes(&self) -> u64 {
         size_of_val(self.textures.texels.as_slice()) as u64
     }

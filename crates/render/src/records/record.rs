@@ -42,7 +42,7 @@ fields! {
     UVec4: "vec4u", |v| format!("vec4u({}u, {}u, {}u, {}u)", v.x, v.y, v.z, v.w), |words| words.to_string();
 }
 
-/// A record that the shaders declare by the same name.
+/// A record that the shaders declare under [`Record::NAME`].
 pub trait Record: bytemuck::Pod {
     /// Name of the record.
     const NAME: &'static str;
@@ -54,7 +54,7 @@ pub trait Record: bytemuck::Pod {
     fn from_rows() -> String;
 }
 
-/// Returns the WGSL expression of a field's words in its record's rows; `offset` and `size` are in bytes.
+/// Returns the WGSL expression of a field's words in the rows of the record; `offset` and `size` are in bytes.
 pub fn words_of_row(offset: usize, size: usize) -> String {
     let (row, first, count) = (offset / 16, offset % 16 / 4, size / 4);
     match count {

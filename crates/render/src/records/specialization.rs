@@ -3,7 +3,7 @@
 /// Declares [`Specialization`] and the shaders' overrides.
 macro_rules! specialization {
     ($($(#[$doc:meta])* $field:ident = $name:literal),* $(,)?) => {
-        /// The override constants of a kernel. Each distinct value needs its own compilation.
+        /// The override constants of a kernel. Each distinct set of values needs its own compilation.
         #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
         pub struct Specialization { $($(#[$doc])* pub $field: u32,)* }
 
@@ -95,9 +95,9 @@ specialization! {
     absorption = "ABSORPTION",
     /// 1 if emissive surfaces exist, else 0.
     emissive = "EMISSIVE",
-    /// 0 if no lights are sampled, 1 if there is a single emitter, else 2.
+    /// 0 if no lights are sampled, 1 if exactly one emitter exists, else 2.
     emitters = "EMITTERS",
-    /// 1 if there is a light tree, else 0.
+    /// 1 if a light tree exists, else 0.
     light_tree = "LIGHT_TREE",
     /// Bit i: lights of kind i exist; [`INSTANCE`](super::INSTANCE) for emissive meshes.
     emitter_kinds = "EMITTER_KINDS",

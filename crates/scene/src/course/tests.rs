@@ -1,4 +1,4 @@
-//! Tests of the conversion of JSON scenes of the course, and of their error messages.
+//! Tests of scenes in the JSON format of the course: their conversion, and error messages.
 
 use std::fs;
 
@@ -49,7 +49,7 @@ const VALID: &str = r#"{
 const FLOOR: &str = "v -1 0 -1\nv -1 0 1\nv 1 0 1\nv 1 0 -1\nf 1 2 3 4\n";
 const LEFT_WALL: &str = "v -1 0 -1\nv -1 2 -1\nv -1 2 1\nv -1 0 1\nf 1 2 3 4\n";
 
-/// The mesh of a tall box, whose top corners have the x and z coordinates of the course's scene.
+/// The mesh of a tall box, whose corners have the x and z coordinates of a box in the course's scene.
 fn tall_box() -> String {
     let corners = [
         (-0.720444, 0.473882),
@@ -77,7 +77,7 @@ fn folder() -> TempDir {
     folder
 }
 
-/// Loads a text as a file in the folder `configs`.
+/// Writes a text to a file in the folder `configs`, and loads the file.
 fn load(name: &str, text: &str, overrides: &Overrides) -> Result<Scene, SceneError> {
     let folder = folder();
     let path = folder.path().join("configs").join(name);
@@ -129,7 +129,7 @@ fn a_course_file_is_loaded_as_a_scene_with_z_up() {
     assert!(near(u.cross(*v).normalize(), DVec3::NEG_Z));
     assert_eq!(*color, DVec3::new(17.0, 12.0, 5.0));
 
-    // In the order of the names: a mirror, gray, red.
+    // The materials are sorted by name: a mirror, grey, red.
     let plain = |r, g, b| Color::Plain(DVec3::new(r, g, b));
     let material = |reflection| Material {
         reflection,
@@ -166,9 +166,9 @@ fn a_course_file_is_loaded_as_a_scene_with_z_up() {
     );
 }
 
-/// Tests both ends of the ranges of `spp` and `max_depth`.
 #[test]
-fn sample_counts_need_not_be_square_numbers() {
+fn spp_and_max_depth_may_have_any_value_in_range() {
+    // The limits of both ranges, and a number of samples that is not a square number.
     for (spp, max_depth) in [(1, 0), (200, 12), (65_536, 1024)] {
         let text = VALID
             .replace("\"spp\": 256", &format!("\"spp\": {spp}"))
@@ -180,7 +180,7 @@ fn sample_counts_need_not_be_square_numbers() {
 
 #[test]
 fn a_camera_has_the_same_view_in_both_coordinate_systems() {
-    // The axes of the camera must be converted like vectors.
+    // The axes of the loaded camera must equal the converted axes of the camera in the file.
     let in_file = camera(&Camera {
         position: DVec3::new(1.0, 2.0, 3.0),
         look_at: DVec3::new(-1.0, 0.5, 0.25),
@@ -443,7 +443,7 @@ const INVALID: &[(&str, &str, &str)] = &[
          \"scale\", \"has_bvh\"",
     ),
     ("\"has_bvh\": true", "\"has_bvh\": 1", "30:18: objects[2].has_bvh: "),
-    // Values.
+    // Values out of range, repeated names, and references to missing materials and files.
     ("\"spp\": 256", "\"spp\": 0", "2: spp: 0 must be from 1 to 65536"),
     (
         "\"max_depth\": 10",
@@ -542,7 +542,7 @@ fn invalid_files_are_reported_with_location_key_value_and_rule() {
 const PAGE: &str = include_str!("../../../../docs/scene-format.md");
 
 #[test]
-fn the_page_has_every_key_and_a_valid_example() {
+fn the_documentation_has_every_key_and_a_valid_example() {
     let (_, section) = PAGE.split_once("\n## Scenes in JSON\n").unwrap();
     let example = section.split("```json\n").nth(1).unwrap().split("```").next().unwrap();
     Description::parse(example, "page.json").unwrap();

@@ -1,5 +1,5 @@
-//! EXR files with one channel of any name, decoded as gray, because the crate `image` requires R, G and B. Files with
-//! other channels are rejected here.
+//! EXR files with one channel of any name, decoded as gray, because the crate `image` requires R, G and B. Files that
+//! have neither R, G and B nor exactly one channel are rejected here.
 
 use std::io::Cursor;
 
@@ -12,9 +12,9 @@ use super::{Channels, DecodeError, Header};
 
 const COLORS: [&str; 3] = ["R", "G", "B"];
 
-/// Returns the image if the file has one layer with one channel and an optional, ignored `A`; `None` if it is a color
-/// image. Before decoding, calls `check_layer` with the size and the bytes per pixel of each layer, and `check_header`
-/// with the header of the image.
+/// Returns the image if the file has one layer with one channel and an optional, ignored `A`; `None` if a layer has R,
+/// G and B. Before decoding, the function calls `check_layer` with the size and the bytes per pixel of each layer, and
+/// `check_header` with the header of the image.
 pub(super) fn gray_exr(
     bytes: &[u8],
     check_layer: impl Fn((u32, u32), u64) -> Result<(), DecodeError>,

@@ -11,13 +11,13 @@ use super::{CameraPathDescription, one};
 use crate::description::kinds::{Aperture, Blades, Degrees, FNumber, Fov, Length, Point, Vector};
 
 tagged! {
-    /// The camera, by `type`.
+    /// The camera. The key `type` selects the variant.
     CameraDescription {
         /// Perspective projection.
         "perspective" => Perspective(PerspectiveDescription),
         /// Orthographic projection.
         "orthographic" => Orthographic(OrthographicDescription),
-        /// All directions from the camera's position.
+        /// Equirectangular projection of all directions.
         "panorama" => Panorama(PanoramaDescription),
     }
 }
@@ -43,7 +43,7 @@ pub struct PerspectiveDescription {
     #[serde(default = "one")]
     #[schemars(with = "Length")]
     pub focal_length: f64,
-    /// Diameter of the lens in scene units; 0, or absent, for a pinhole.
+    /// Diameter of the lens in scene units; 0, or absent without `f_number`, for a pinhole camera.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Aperture>")]
     pub aperture: Option<f64>,
@@ -122,7 +122,7 @@ impl OrthographicDescription {
     }
 }
 
-/// A camera for all directions.
+/// A camera with an equirectangular projection of all directions.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PanoramaDescription {

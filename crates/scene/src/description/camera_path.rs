@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::description::kinds::{Aperture, Fov, FrameNumber, Length, Point, Vector};
 
-/// A camera animation by keys. The camera is constant before the first key and after the last.
+/// A camera animation by keys. The camera does not move before the first key and after the last key.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CameraPathDescription {

@@ -27,8 +27,8 @@ pub struct EnvironmentDescription {
     #[serde(default = "one")]
     #[schemars(with = "EnvironmentScale")]
     pub scale: f64,
-    /// Rotation: an angle about the z axis in degrees, counter-clockwise as seen from above, or a rotation as for a
-    /// mesh; each angle from -360 to 360 degrees. None if absent.
+    /// Rotation: an angle about the z axis in degrees, counter-clockwise as seen from above, or any rotation that a
+    /// mesh accepts; each angle from -360 to 360 degrees. If absent, no rotation.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rotate: Option<EnvironmentRotation>,
     /// Visible to the camera.
@@ -125,7 +125,7 @@ impl EnvironmentName {
 pub enum EnvironmentRotation {
     /// About the z axis, in degrees.
     Degrees(#[schemars(with = "Degrees")] f64),
-    /// Any rotation of a mesh.
+    /// Any rotation that a mesh accepts.
     Any(Rotation),
 }
 

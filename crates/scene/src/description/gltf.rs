@@ -28,7 +28,7 @@ pub struct GltfDescription {
     /// Animation of the file. If absent, the first animation if `time` is set.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub animation: Option<Selection>,
-    /// Material variant of the file. None if absent.
+    /// Material variant of the file. If absent, the default materials of the file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub variant: Option<Selection>,
     /// Use the lights of the file.
@@ -42,14 +42,14 @@ pub struct GltfDescription {
     #[schemars(with = "Option<Point>", extend("default" = [0, 0, 0]))]
     pub translate: Option<DVec3>,
     /// Rotation, applied after the scale: three angles about x, y and z, or one angle about an axis, each from -360 to
-    /// 360 degrees. None if absent.
+    /// 360 degrees. If absent, no rotation.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rotate: Option<Rotation>,
     /// Scale: one factor or three factors, each from 1e-6 to 1e6, or from -1e6 to -1e-6.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("default" = 1))]
     pub scale: Option<Scale>,
-    /// Rows of an affine transform, which replaces `scale`, `rotate` and `translate`. None if absent.
+    /// Rows of an affine transform, which replaces `scale`, `rotate` and `translate`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Matrix>")]
     pub matrix: Option<Vec<[f64; 4]>>,

@@ -10,14 +10,15 @@ use crate::limits::MAX_DEPTH;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Integrator {
-    /// Direct light with the Phong reflection model, as defined in the documentation of the scene format.
+    /// Direct light with the Phong reflection model, mirrors and glass, as defined in the documentation of the scene
+    /// format.
     Phong,
     /// Path tracing: global illumination.
     Path,
 }
 
 /// The properties of an integrator.
-struct Row {
+struct Properties {
     name: &'static str,
     /// Minimum and maximum number of bounces that `max_depth` accepts.
     depths: (u32, u32),
@@ -34,9 +35,9 @@ impl Integrator {
     /// All integrators.
     pub const ALL: [Integrator; 2] = [Integrator::Phong, Integrator::Path];
 
-    const fn row(self) -> Row {
+    const fn properties(self) -> Properties {
         match self {
-            Integrator::Phong => Row {
+            Integrator::Phong => Properties {
                 name: "phong",
                 depths: (1, 64),
                 pattern: Pattern::Grid,
@@ -45,8 +46,9 @@ impl Integrator {
                 needs_emitters: false,
                 has_layers: false,
             },
-            // More pilot samples, because a few samples may miss rare paths and underestimate the error.
-            Integrator::Path => Row {
+            // More pilot samples than for `phong`, because a few samples may miss rare paths and underestimate the
+            // error.
+            Integrator::Path => Properties {
                 name: "path",
                 depths: (0, MAX_DEPTH),
                 pattern: Pattern::Sobol,
@@ -60,37 +62,38 @@ impl Integrator {
 
     /// Returns the name in files and options.
     pub const fn name(self) -> &'static str {
-        self.row().name
+        self.properties().name
     }
 
     /// Returns the minimum and maximum number of bounces that `max_depth` accepts.
     pub const fn depths(self) -> (u32, u32) {
-        self.row().depths
+        self.properties().depths
     }
 
     /// Returns the default sampling pattern.
     pub const fn pattern(self) -> Pattern {
-        self.row().pattern
+        self.properties().pattern
     }
 
     /// Returns the minimum number of pilot samples per pixel, after which adaptive sampling estimates the error.
     pub const fn pilot_samples(self) -> u32 {
-        self.row().pilot_samples
+        self.properties().pilot_samples
     }
 
-    /// Returns true for path tracing, which supports the keys of paths but not ambient light and transparent shadows.
+    /// Returns true for path tracing, which supports scene keys that need `"path"`, but not ambient light and
+    /// transparent shadows.
     pub const fn follows_paths(self) -> bool {
-        self.row().follows_paths
+        self.properties().follows_paths
     }
 
     /// Returns true if lights are selected from a table of emitters: emissive surfaces, the environment and lights.
     /// Otherwise the contributions of all lights are summed, and nothing else emits.
     pub const fn needs_emitters(self) -> bool {
-        self.row().needs_emitters
+        self.properties().needs_emitters
     }
 
     /// Returns true if the film can have layers, such as the albedo.
     pub const fn has_layers(self) -> bool {
-        self.row().has_layers
+        self.properties().has_layers
     }
 }

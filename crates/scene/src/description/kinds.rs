@@ -1,5 +1,5 @@
-//! Kinds of values of scene files: JSON schemas independent of the Rust types. Fields of descriptions refer to kinds:
-//! `#[schemars(with = "Length")]`.
+//! Kinds of values of scene files: JSON schemas independent of the Rust types. Fields of descriptions refer to kinds,
+//! as in `#[schemars(with = "Length")]`.
 
 use std::borrow::Cow;
 
@@ -118,7 +118,8 @@ impl JsonSchema for FractionColor {
     }
 }
 
-/// Sets the title of a key that accepts a plain value or a texture to that of the plain value, with ", or a texture".
+/// Sets the title of a key that accepts a plain value or a texture: the label of the plain value, followed by ", or a
+/// texture", and the range of the plain value.
 pub(crate) fn copy_plain_title(schema: &mut Schema) {
     let plain = schema
         .get("anyOf")
@@ -129,6 +130,7 @@ pub(crate) fn copy_plain_title(schema: &mut Schema) {
     }
 }
 
+/// Adds a title with the label and the range of the numbers to a schema.
 fn kind(label: &str, schema: Value) -> Schema {
     let mut schema: Schema = schema.try_into().unwrap_or_default();
     let mut inner = schema.as_value();
@@ -147,13 +149,13 @@ fn kind(label: &str, schema: Value) -> Schema {
 /// Returns the range of a schema, such as `1e-9 to 1e9`; several ranges are joined by "or".
 fn range(schema: &Value) -> Option<String> {
     if let Some(alternatives) = schema.get("anyOf").and_then(Value::as_array) {
-        let all: Option<Vec<String>> = alternatives.iter().map(range).collect();
-        return Some(all?.join(" or "));
+        let ranges: Option<Vec<String>> = alternatives.iter().map(range).collect();
+        return Some(ranges?.join(" or "));
     }
     if let Some(constant) = schema.get("const") {
         return Some(constant.to_string());
     }
-    let [low, high] = ["minimum", "maximum"].map(|end| schema.get(end).and_then(Value::as_f64));
+    let [low, high] = ["minimum", "maximum"].map(|keyword| schema.get(keyword).and_then(Value::as_f64));
     Some(format!("{} to {}", short_number(low?), short_number(high?)))
 }
 

@@ -10,7 +10,7 @@ use super::tagged::{Tagged, tagged};
 use crate::description::kinds::{ConeAngle, InnerAngle, Point, Rgb, Size, Vector};
 
 tagged! {
-    /// A light, by `type`.
+    /// A light. The key `type` selects the variant.
     LightDescription {
         /// An area light.
         "rectangle" => Rectangle(RectangleLightDescription),
@@ -128,7 +128,7 @@ pub struct SpotLightDescription {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Vector>")]
     pub direction: Option<DVec3>,
-    /// Target point of the axis.
+    /// A point on the axis, in front of the light.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Point>")]
     pub look_at: Option<DVec3>,

@@ -11,7 +11,7 @@ use super::{ColorDescription, NormalMapDescription, PrincipledDescription, Value
 use crate::description::kinds::{Absorption, Degrees, Etas, Fraction, FractionColor, Ior, Ks, Metal, Shininess};
 
 tagged! {
-    /// A material, by `type`.
+    /// A material. The key `type` selects the variant.
     MaterialDescription {
         /// Phong reflection model.
         "phong" => Phong(PhongDescription),
@@ -66,7 +66,7 @@ pub struct PhongDescription {
     /// Factor of the specular term: linear red, green and blue, or a texture. If absent, `color`.
     pub specular: Option<ColorDescription>,
     /// Exponent of the specular term.
-    #[serde(default = "sixteen")]
+    #[serde(default = "default_shininess")]
     #[schemars(with = "Shininess")]
     pub shininess: f64,
     /// Normal map.
@@ -85,7 +85,7 @@ impl PhongDescription {
             ambient: None,
             diffuse: None,
             specular: None,
-            shininess: sixteen(),
+            shininess: default_shininess(),
             normal_map: None,
             emission: None,
             visible: None,
@@ -210,13 +210,13 @@ microfacet_material! {
         /// Reflectance; 1 if no key sets it.
         #[schemars(with = "Option<FractionColor>")]
         color: Option<ColorDescription>,
-        /// A metal's name.
+        /// A metal's name, such as `"gold"`.
         #[schemars(with = "Option<Metal>")]
         metal: Option<String>,
-        /// Real part of the index of refraction.
+        /// Real part of the index of refraction for red, green and blue.
         #[schemars(with = "Option<Etas>")]
         eta: Option<DVec3>,
-        /// Imaginary part of the index of refraction.
+        /// Imaginary part of the index of refraction for red, green and blue.
         #[schemars(with = "Option<Ks>")]
         k: Option<DVec3>,
     }
@@ -294,6 +294,6 @@ fn default_true() -> bool {
     true
 }
 
-fn sixteen() -> f64 {
+fn default_shininess() -> f64 {
     16.0
 }

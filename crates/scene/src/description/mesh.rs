@@ -62,14 +62,14 @@ pub struct MeshDescription {
     #[schemars(with = "Option<Point>", extend("default" = [0, 0, 0]))]
     pub translate: Option<DVec3>,
     /// Rotation, applied after the scale: three angles about x, y and z, or one angle about an axis, each from -360 to
-    /// 360 degrees. None if absent.
+    /// 360 degrees. If absent, no rotation.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rotate: Option<Rotation>,
     /// Scale: one factor or three factors, each from 1e-6 to 1e6, or from -1e6 to -1e-6.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("default" = 1))]
     pub scale: Option<Scale>,
-    /// Rows of an affine transform, which replaces `scale`, `rotate` and `translate`. None if absent.
+    /// Rows of an affine transform, which replaces `scale`, `rotate` and `translate`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Matrix>")]
     pub matrix: Option<Vec<[f64; 4]>>,
@@ -110,14 +110,14 @@ pub struct InstanceDescription {
     #[schemars(with = "Option<Point>", extend("default" = [0, 0, 0]))]
     pub translate: Option<DVec3>,
     /// Rotation, applied after the scale: three angles about x, y and z, or one angle about an axis, each from -360 to
-    /// 360 degrees. None if absent.
+    /// 360 degrees. If absent, no rotation.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rotate: Option<Rotation>,
     /// Scale: one factor or three factors, each from 1e-6 to 1e6, or from -1e6 to -1e-6.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("default" = 1))]
     pub scale: Option<Scale>,
-    /// Rows of an affine transform, which replaces `scale`, `rotate` and `translate`. None if absent.
+    /// Rows of an affine transform, which replaces `scale`, `rotate` and `translate`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Matrix>")]
     pub matrix: Option<Vec<[f64; 4]>>,

@@ -1,8 +1,8 @@
 //! Scene files as Rust values, with a field for each key; `docs/scene-format.md` describes the keys.
 //!
-//! Only types are checked here: [`Description::validate`] creates a [`Scene`](super::Scene). A `Description` is parsed
-//! from a file, or created by [`Description::new`] and the constructors of its parts. The `toml` crate serializes a
-//! `Description` to a file that parses to the same `Description`.
+//! Parsing checks only types; [`Description::validate`] checks the values and creates a [`Scene`](super::Scene). A
+//! `Description` is parsed from a file, or created by [`Description::new`] and the constructors of its parts. The
+//! `toml` crate serializes a `Description` to a file that parses to the same `Description`.
 
 mod camera;
 mod camera_path;
@@ -80,7 +80,7 @@ pub struct Description {
 }
 
 impl Description {
-    /// Creates an empty scene with default render settings. The size is in pixels.
+    /// Creates the description of an empty scene with default render settings. The width and height are in pixels.
     pub fn new(width: u32, height: u32, camera: impl Into<CameraDescription>) -> Self {
         Self {
             image: ImageDescription::new(width, height),
@@ -108,13 +108,13 @@ impl Description {
         self
     }
 
-    /// Adds a texture, or replaces the texture of this name.
+    /// Adds a texture, or replaces the texture with this name.
     pub fn with_texture(mut self, name: impl Into<String>, texture: impl Into<TextureDescription>) -> Self {
         self.textures.insert(name.into(), texture.into());
         self
     }
 
-    /// Adds a material, or replaces the material of this name.
+    /// Adds a material, or replaces the material with this name.
     pub fn with_material(mut self, name: impl Into<String>, material: impl Into<MaterialDescription>) -> Self {
         self.materials.insert(name.into(), material.into());
         self
@@ -132,7 +132,7 @@ impl Description {
         self
     }
 
-    /// Adds a mesh for instances, or replaces the mesh of this name.
+    /// Adds a mesh for instances, or replaces the mesh with this name.
     pub fn with_mesh(mut self, name: impl Into<String>, mesh: MeshFileDescription) -> Self {
         self.meshes.insert(name.into(), mesh);
         self

@@ -65,7 +65,7 @@ pub struct PrincipledDescription {
     pub alpha_cutoff: f64,
     /// Use of a mesh's vertex colors.
     pub vertex_colors: VertexColors,
-    /// Back faces are visible to the camera.
+    /// True if back faces are visible to the camera.
     pub double_sided: bool,
     /// Normal map.
     pub normal_map: Option<NormalMapDescription>,

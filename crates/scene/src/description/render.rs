@@ -113,7 +113,7 @@ pub struct SamplesDescription {
     pub count: u32,
 }
 
-/// The table form of [`SamplesDescription`].
+/// A [`SamplesDescription`] that is a table in the scene file.
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct SamplesTable {
@@ -170,7 +170,7 @@ impl JsonSchema for SamplesDescription {
 }
 
 impl SamplesDescription {
-    /// Creates a number of samples in the default pattern of the integrator.
+    /// Creates settings for `count` samples in the default pattern of the integrator.
     pub fn new(count: u32) -> Self {
         Self { pattern: None, count }
     }

@@ -12,7 +12,7 @@ use super::tagged::{Tagged, tagged};
 use crate::description::kinds::{Length, Point, Points3, Points4, Size, Vector};
 
 tagged! {
-    /// A shape, by `type`.
+    /// A shape. The key `type` selects the variant.
     ShapeDescription {
         /// A rectangle.
         "rectangle" => Rectangle(RectangleDescription),
@@ -112,7 +112,7 @@ impl DiskDescription {
     }
 }
 
-/// An ellipsoid: the unit sphere transformed by the matrix with the columns a, b and c.
+/// An ellipsoid: the unit sphere, transformed by the matrix with the columns a, b and c, then moved to the center.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct EllipsoidDescription {

@@ -1,5 +1,5 @@
-//! Deserializer of descriptions from tables of a scene file. Unlike serde's deserializer, it does not accept a list of
-//! values instead of a table.
+//! Deserializer of descriptions from tables of a scene file. Unlike the deserializer of the crate `toml`, this
+//! deserializer does not accept a list of values instead of a table.
 
 use serde::de::value::{MapDeserializer, SeqDeserializer};
 use serde::de::{DeserializeOwned, Deserializer, Error as _, IntoDeserializer, Unexpected, Visitor};

@@ -9,7 +9,7 @@ pub(crate) fn tagged(generator: &mut SchemaGenerator, section: &str, types: Vec<
     let tags: Vec<&str> = types.iter().map(|(tag, ..)| *tag).collect();
     let descriptions: Vec<&str> = types.iter().map(|(_, description, _)| description.trim()).collect();
     let key = json!({ "description": "The type.", "type": "string", "enum": tags, "enumDescriptions": descriptions });
-    // A condition for each type, so that an error is reported at the invalid key. `anyOf` is for the completion of
+    // A condition for each type, so that editors report an error at the invalid key. `anyOf` serves completion in
     // editors that ignore conditions.
     let mut alternatives = vec![json!({})];
     let mut conditions = Vec::new();
@@ -43,8 +43,8 @@ pub(crate) fn tagged(generator: &mut SchemaGenerator, section: &str, types: Vec<
     schema.try_into().unwrap_or_default()
 }
 
-/// Returns the name of the definition of a type: `camera-perspective`. `section` is a section or the Rust type of a
-/// section.
+/// Returns the name of the definition of a type, such as `camera-perspective`. `section` is the name of a section or of
+/// its Rust type.
 pub(crate) fn definition(section: &str, tag: &str) -> String {
     format!("{}-{tag}", section.trim_end_matches("Description").to_lowercase())
 }

@@ -143,7 +143,7 @@ impl<'de> Deserialize<'de> for ValueDescription {
     }
 }
 
-/// `{ texture = "NAME" }`
+/// A reference to a texture: `{ texture = "NAME" }`.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, expecting = "a table, such as { texture = \"NAME\" }")]
 pub struct TextureReference {
@@ -151,7 +151,7 @@ pub struct TextureReference {
     pub texture: String,
 }
 
-/// `{ texture = "NAME", channel = "r" }`
+/// A reference to a channel of a texture: `{ texture = "NAME", channel = "r" }`.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(
     deny_unknown_fields,
@@ -165,7 +165,7 @@ pub struct ChannelReference {
     pub channel: Channel,
 }
 
-/// `{ texture = "NAME", strength = 1 }`
+/// A tangent-space normal map: `{ texture = "NAME", strength = 1 }`.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, expecting = "a table, such as { texture = \"NAME\" }")]
 pub struct NormalMapDescription {
@@ -178,7 +178,7 @@ pub struct NormalMapDescription {
 }
 
 tagged! {
-    /// A texture, by `type`.
+    /// A texture. The key `type` selects the variant.
     TextureDescription {
         /// One color.
         "constant" => Constant(ConstantDescription),
@@ -272,7 +272,7 @@ pub struct LinesDescription {
 }
 
 impl LinesDescription {
-    /// Creates lines around cells. The colors are linear RGB.
+    /// Creates grid lines. The colors are linear RGB.
     pub fn new(cell: impl Into<DVec3>, line: impl Into<DVec3>, line_width: f64) -> Self {
         Self {
             cell: cell.into(),
@@ -300,8 +300,8 @@ pub struct ImageTextureDescription {
     /// Filter.
     #[serde(default)]
     pub filter: TextureFilter,
-    /// Maximum anisotropy: ratio of the axes of a footprint.
-    #[serde(default = "sixteen")]
+    /// Maximum ratio of the axes of a footprint, for the filter `"ewa"`.
+    #[serde(default = "default_max_anisotropy")]
     #[schemars(with = "Anisotropy")]
     pub max_anisotropy: f64,
     /// Factors of u and v.
@@ -334,7 +334,7 @@ impl ImageTextureDescription {
             encoding: None,
             wrap: WrapDescription::default(),
             filter: TextureFilter::default(),
-            max_anisotropy: sixteen(),
+            max_anisotropy: default_max_anisotropy(),
             scale: ones(),
             rotate: 0.0,
             offset: [0.0; 2],
@@ -371,7 +371,7 @@ impl WrapDescription {
     pub fn each(self) -> [Wrap; 2] {
         match self {
             Self::Both(wrap) => [wrap; 2],
-            Self::Each(each) => each,
+            Self::Each(wraps) => wraps,
         }
     }
 }
@@ -405,7 +405,7 @@ fn one() -> f64 {
     1.0
 }
 
-fn sixteen() -> f64 {
+fn default_max_anisotropy() -> f64 {
     16.0
 }
 

@@ -88,7 +88,7 @@ fn all_points_are_in_the_image_and_fill_it() {
                         *ends = [ends[0].min(x), ends[1].max(x)];
                     }
                 }
-                // In an image of 2000 x 2000 pixels, the side of a pixel is 1e-3.
+                // The tolerance is 0.001 pixels in an image of 2000 x 2000 pixels.
                 let [x, y] = ends.map(|[low, high]| (low + high).abs());
                 assert!(x.max(y) < 1e-6, "{framing:?}: off center by {x}, {y}");
                 // The points reach the margins, unless the camera would be too close.
@@ -166,10 +166,10 @@ fn views_look_at_the_side_that_they_are_named_after() {
         assert!((camera.right - right).length() < 1e-12, "{view:?}: {camera:?}");
     }
     for view in [View::Corner, View::Iso] {
-        let towards = -camera_of(view).forward;
+        let to_camera = -camera_of(view).forward;
         assert!(
-            towards.x > 0.0 && towards.y < 0.0 && towards.z > 0.0,
-            "{view:?}: {towards}"
+            to_camera.x > 0.0 && to_camera.y < 0.0 && to_camera.z > 0.0,
+            "{view:?}: {to_camera}"
         );
         assert!(camera_of(view).up.z > 0.0);
     }
@@ -196,7 +196,7 @@ fn the_margins_of_a_leaning_triangle_are_equal() {
 }
 
 #[test]
-fn a_turning_model_keeps_equal_margins() {
+fn a_turning_model_has_equal_vertical_margins() {
     for points in clouds() {
         for (view, aspect) in [
             (View::Corner, 0.5),

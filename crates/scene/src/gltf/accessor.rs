@@ -14,7 +14,7 @@ use super::json::out_of_range;
 const MAX_ZEROS: u64 = 1 << 22;
 /// Maximum decoded size of an accessor without a buffer view, in bytes.
 const MAX_ZEROS_BYTES: u64 = 64 << 20;
-/// Bytes charged per read in addition to the data, which limits the number of small reads.
+/// Bytes charged to the budget per read in addition to the data, which limits the number of small reads.
 const READ_OVERHEAD: u64 = 64;
 
 /// Element type and memory layout of an accessor.
@@ -176,7 +176,7 @@ impl Elements<'_> {
 }
 
 impl Document {
-    /// Returns the components per element: 3 for VEC3, 16 for MAT4.
+    /// Returns the number of components per element: 3 for VEC3, 16 for MAT4.
     pub fn components(&self, accessor: usize) -> Result<usize, GltfError> {
         let layout = self
             .accessor(accessor)
@@ -186,8 +186,8 @@ impl Document {
             .map_err(|fault| fault.of(&self.path))
     }
 
-    /// Returns the elements of an accessor with `N` components, matrices column-major. Normalized integers become -1
-    /// ... 1 or 0 ... 1; floats may be NaN or infinite.
+    /// Returns the elements of an accessor with `N` components per element. Matrices are column-major. Normalized
+    /// integers are mapped to -1 ... 1 or 0 ... 1; floats may be NaN or infinite.
     pub fn vectors<const N: usize>(&self, accessor: usize) -> Result<Vec<[f32; N]>, GltfError> {
         self.floats(accessor).map_err(|fault| fault.of(&self.path))
     }
@@ -198,10 +198,10 @@ impl Document {
     }
 
     fn accessor(&self, index: usize) -> Result<(String, &Accessor), GltfFault> {
-        let all = &self.json.accessors;
-        let accessor = all
+        let accessors = &self.json.accessors;
+        let accessor = accessors
             .get(index)
-            .ok_or_else(|| out_of_range("accessors", index, "accessors", all.len()))?;
+            .ok_or_else(|| out_of_range("accessors", index, "accessors", accessors.len()))?;
         Ok((format!("accessors[{index}]"), accessor))
     }
 
@@ -266,7 +266,7 @@ impl Document {
         }
     }
 
-    /// Charges elements of `size` bytes to the budget.
+    /// Charges the elements of an accessor, decoded to `size` bytes each, to the budget.
     fn charge_read(&self, key: &str, accessor: &Accessor, size: usize) -> Result<(), GltfFault> {
         let bytes = accessor
             .count
@@ -277,7 +277,7 @@ impl Document {
         charge.map_err(|rule| GltfFault::key(format!("{key}.count"), rule))
     }
 
-    /// Returns the elements of the buffer view; `None` if there is no view, so that all elements are zero.
+    /// Returns the elements of an accessor; `None` if the accessor has no buffer view: then all elements are zero.
     fn elements(&self, key: &str, accessor: &Accessor, layout: Layout) -> Result<Option<Elements<'_>>, GltfFault> {
         let count = accessor.count.0;
         let Some(view) = accessor.buffer_view else {

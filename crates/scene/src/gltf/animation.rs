@@ -17,8 +17,7 @@ const MAX_WEIGHTS: usize = 1 << 24;
 const MAX_NAMED: usize = 5;
 
 impl Document {
-    /// Returns the animations that do not drive a property of an earlier animation. A note lists the skipped
-    /// animations.
+    /// Returns the animations whose properties no earlier animation drives. A note lists the skipped animations.
     pub(super) fn compatible(&self, animations: Vec<usize>, notes: &mut Vec<String>) -> Vec<usize> {
         let mut driven = HashSet::new();
         let (mut playing, mut skipped) = (Vec::new(), Vec::new());
@@ -69,7 +68,7 @@ impl Document {
     ) -> Result<(), GltfError> {
         let location = |channel: usize| format!("animations[{animation}].channels[{channel}]");
         let animation = &self.json.animations[animation];
-        let mut weights = 0;
+        let mut weight_count = 0;
         let mut driven = HashSet::new();
         let (mut equal_times, mut repeated_target) = (None, None);
         for (i, channel) in animation.channels.iter().enumerate() {
@@ -138,8 +137,8 @@ impl Document {
                     let node_weights = interval
                         .weights(&values, times.len())
                         .ok_or_else(|| wrong_count(values.len()))?;
-                    weights += node_weights.len();
-                    if weights > MAX_WEIGHTS {
+                    weight_count += node_weights.len();
+                    if weight_count > MAX_WEIGHTS {
                         let rule = format!("all nodes together must have at most {MAX_WEIGHTS} weights");
                         return Err(self.fault(location(i), rule));
                     }
@@ -165,7 +164,8 @@ impl Document {
 }
 
 impl Pose {
-    /// Decomposes the matrix. The specification does not allow matrices on animated nodes.
+    /// Replaces a matrix by scale, rotation and translation. Only invalid files need this: the specification does not
+    /// allow matrices on animated nodes.
     fn decompose(&mut self) {
         if let Some(matrix) = self.matrix.take() {
             (self.scale, self.rotation, self.translation) = matrix.to_scale_rotation_translation();
@@ -246,7 +246,7 @@ impl KeyInterval {
         Some(weights.collect())
     }
 
-    /// Interpolates a scalar. A cubic spline has three output values per key.
+    /// Interpolates a scalar; `value` returns the output value with an index. A cubic spline has three values per key.
     fn interpolate(&self, value: impl Fn(usize) -> f64) -> f64 {
         let ([a, b], t) = (self.keys, self.fraction);
         match self.interpolation {

@@ -1,5 +1,5 @@
-//! Resource limits of a glTF file, relative to its size. Small files could request unbounded time or memory by
-//! referring to the same bytes repeatedly.
+//! Resource limits of a glTF file, relative to its size. Without limits, a small file could request unbounded time or
+//! memory by referring to the same bytes repeatedly.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -28,11 +28,11 @@ impl Resource {
     fn rates(self) -> (u64, (u64, u64), u64) {
         match self {
             Resource::Read => (1 << 30, (16, 1), u64::MAX),
-            // A triangle has at least three bytes of indices, unless its mesh is shared.
+            // A triangle of a triangle list has at least three bytes of indices.
             Resource::Triangles => (1 << 22, (1, 3), 1 << 28),
-            // An instance takes more than 1 KiB in a scene.
+            // An instance uses more than 1 KiB of memory.
             Resource::Instances => (1 << 16, (1, 4), super::MAX_INSTANCES as u64),
-            // Real meshes compress by less than 20:1, zeros by up to 1000:1.
+            // Meshes usually compress by less than 20:1, zeros by up to 1000:1.
             Resource::Decompressed => (256 << 20, (64, 1), 4 << 30),
         }
     }
@@ -42,6 +42,7 @@ impl Resource {
 pub(super) struct Budget {
     /// Total size of the JSON and of the referenced buffers.
     bytes: u64,
+    /// Charged amount of each [`Resource`].
     used: [AtomicU64; 4],
 }
 
@@ -63,7 +64,7 @@ impl Budget {
     pub fn take(&self, resource: Resource, count: u64) -> Result<(), String> {
         let limit = self.limit(resource);
         let used = &self.used[resource as usize];
-        // Rejected requests cannot overflow the counter.
+        // A rejected charge does not change the counter, so the counter cannot overflow.
         let result = used.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |used| {
             used.checked_add(count).filter(|sum| *sum <= limit)
         });

@@ -17,11 +17,11 @@ use super::uri::{self, Folder};
 pub(super) const MAX_BUFFER_BYTES: u64 = 8 << 30;
 
 enum Bytes {
-    /// Unreferenced.
+    /// No buffer view refers to the buffer.
     Unused,
     /// A range of the GLB file.
     Chunk(Range<usize>),
-    /// From a file or data URI.
+    /// Bytes of a file or a data URI.
     Read(Vec<u8>),
 }
 
@@ -147,7 +147,7 @@ impl Buffers {
             .ok_or_else(|| GltfFault::key(key(), "has no data"))
     }
 
-    /// Returns a buffer view, decompressed.
+    /// Returns the bytes of a buffer view, decompressed if the view is compressed.
     pub fn view(&self, root: &Root, index: usize) -> Result<&[u8], GltfFault> {
         let view = (root.buffer_views.get(index))
             .ok_or_else(|| out_of_range("bufferViews", index, "buffer views", root.buffer_views.len()))?;
@@ -156,12 +156,12 @@ impl Buffers {
                 return Ok(bytes);
             }
             let key = format!("bufferViews[{index}].extensions.{}", compression.name);
-            let stream = self.part(root, &key, compression.buffer, compression.offset, compression.length)?;
+            let stream = self.byte_range(root, &key, compression.buffer, compression.offset, compression.length)?;
             let bytes = compression.decode(stream).map_err(|rule| GltfFault::key(key, rule))?;
             return Ok(decoded.get_or_init(|| bytes));
         }
         let offset = view.byte_offset.unwrap_or_default().0;
-        self.part(
+        self.byte_range(
             root,
             &format!("bufferViews[{index}]"),
             view.buffer.value(),
@@ -170,8 +170,8 @@ impl Buffers {
         )
     }
 
-    /// Returns a part of a buffer. `key` is the location for errors.
-    fn part(&self, root: &Root, key: &str, buffer: usize, offset: u64, length: u64) -> Result<&[u8], GltfFault> {
+    /// Returns a range of the bytes of a buffer. `key` is the location for errors.
+    fn byte_range(&self, root: &Root, key: &str, buffer: usize, offset: u64, length: u64) -> Result<&[u8], GltfFault> {
         let bytes = self.buffer(root, buffer)?;
         let end = offset.checked_add(length).filter(|end| *end <= bytes.len() as u64);
         let end = end.ok_or_else(|| {

@@ -1,4 +1,4 @@
-//! glTF cameras (section 3.10), which look along their -Z with +Y up.
+//! glTF cameras (section 3.10). A camera looks along its -Z axis; its +Y axis is up.
 
 use glam::{DAffine3, DVec3};
 
@@ -9,7 +9,8 @@ use super::{ImportedCamera, UPRIGHT};
 use crate::{OrthographicDescription, PerspectiveDescription};
 
 impl Document {
-    /// Returns the camera of a node. The look-at point has the depth of the center of the scene bounds.
+    /// Returns the camera of a node. The look-at point has the depth of the center of the scene bounds, if the center
+    /// is in front of the camera.
     pub(super) fn camera(
         &self,
         node: usize,

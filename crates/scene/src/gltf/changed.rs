@@ -21,8 +21,8 @@ fn collect_pointers(value: &Value, pointer: &mut String, pointers: &mut Vec<Stri
     }
 }
 
-/// Replaces or removes one value, or repeats the last element of its list. `below(n)` returns a random number less than
-/// `n`.
+/// Replaces a random value, removes a key of an object, or removes or repeats the last element of a list. `below(n)`
+/// returns a random number less than `n`.
 pub fn changed(json: &mut Value, below: &mut dyn FnMut(usize) -> usize) {
     let mut pointers = Vec::new();
     collect_pointers(json, &mut String::new(), &mut pointers);
@@ -75,7 +75,7 @@ pub fn changed(json: &mut Value, below: &mut dyn FnMut(usize) -> usize) {
     } else if let Some(value) = json.pointer_mut(pointer) {
         *value = match (choice, replacement) {
             (2, Some(replacement)) => replacement,
-            // In most cases, numbers are replaced by numbers.
+            // A number is usually replaced by a number: the first 21 elements of `values`.
             (3..7, _) if value.is_number() => values[below(21)].clone(),
             _ => values[below(values.len())].clone(),
         };

@@ -1,4 +1,4 @@
-//! Names of the parts of a glTF file.
+//! Names of the scenes, cameras, animations, variants, materials and images of a glTF file.
 
 use serde::Serialize;
 use serde_json::Value;
@@ -6,7 +6,7 @@ use serde_json::Value;
 use super::document::Document;
 use super::uri;
 
-/// The names in a glTF file, in the order of the indices that options accept; `None` for parts without a name.
+/// The names in a glTF file, in the order of the indices that options accept; `None` for entries without a name.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 #[non_exhaustive]
 pub struct ModelContents {
@@ -22,12 +22,12 @@ pub struct ModelContents {
     pub variants: Vec<Option<String>>,
     /// Materials.
     pub materials: Vec<Option<String>>,
-    /// Images; the file name if an image has no name.
+    /// Images; the URI of the file if an image has no name.
     pub images: Vec<Option<String>>,
 }
 
 impl ModelContents {
-    /// Lists the names in a file. The import adds the cameras of one scene.
+    /// Lists the names in a file, except for those of cameras: `import` adds the cameras of the selected scene.
     pub(super) fn of(document: &Document) -> ModelContents {
         let json = &document.json;
         let file = document.path.file_name().unwrap_or_default();

@@ -38,9 +38,9 @@ pub(super) struct Document {
 }
 
 enum ImageFault {
-    /// Missing or unreadable.
+    /// The image is missing or unreadable.
     Missing(String),
-    /// Violates a rule.
+    /// The image violates a rule.
     Invalid(GltfFault),
 }
 
@@ -51,7 +51,8 @@ impl From<GltfFault> for ImageFault {
 }
 
 impl Document {
-    /// Opens a file. Other files must be inside `root`. Adds all paths to `files`, even on errors.
+    /// Opens a file. Referenced files must be inside `root`. Adds the paths of the file and of the referenced files to
+    /// `files`, even on errors.
     ///
     /// # Errors
     ///
@@ -126,7 +127,7 @@ impl Document {
         GltfFault::key(key, message).of(&self.path)
     }
 
-    /// Returns a buffer view, decompressed.
+    /// Returns the bytes of a buffer view, decompressed if the view is compressed.
     #[cfg(test)]
     pub fn view(&self, view: usize) -> Result<&[u8], GltfError> {
         self.view_bytes(view).map_err(|fault| fault.of(&self.path))
@@ -159,7 +160,7 @@ impl Document {
                 GltfFault::key(format!("{key}.extensions.{name}.source"), rule)
             });
         }
-        // A missing source has an index that is out of range.
+        // The crate `gltf-json` represents a missing source by an index that is out of range.
         match self.json.get(texture.source) {
             Some(_) => Ok(texture.source.value()),
             None => Err(match extensions.and_then(extension::unsupported) {
@@ -173,7 +174,7 @@ impl Document {
     ///
     /// # Errors
     ///
-    /// The file is outside of the asset root, or the image is too large.
+    /// The image is invalid, too large, or outside of the asset root.
     pub fn image_bytes(&self, image: usize) -> Result<Result<Arc<[u8]>, String>, GltfError> {
         match self.encoded(image) {
             Ok(bytes) => Ok(Ok(bytes)),
@@ -224,7 +225,7 @@ impl Document {
         Ok(bytes.into())
     }
 
-    /// Limits the size of an image, and the total size of all reads, because an image may be referenced repeatedly.
+    /// Checks the size of an image, and the total size of all reads, because several textures may reference an image.
     fn charge_image(&self, index: usize, bytes: u64) -> Result<(), GltfFault> {
         let total = self
             .image_bytes_read

@@ -36,9 +36,9 @@ pub enum GltfError {
     Byte {
         /// The file.
         path: PathBuf,
-        /// Offset from 0.
+        /// Offset of the byte, from 0.
         offset: u64,
-        /// The value and the rule.
+        /// The invalid value and the violated rule.
         message: String,
     },
     /// Invalid value of the JSON, or invalid data that the JSON refers to.
@@ -48,7 +48,7 @@ pub enum GltfError {
         path: PathBuf,
         /// Key path: `accessors[3].count`.
         key: String,
-        /// The value and the rule.
+        /// The invalid value and the violated rule.
         message: String,
     },
     /// Missing scene, animation or variant.
@@ -63,12 +63,12 @@ pub enum GltfError {
         /// The selection and the available entries.
         message: String,
     },
-    /// Invalid file.
+    /// Error without a location in the file.
     #[error("{}: {message}", path.display())]
     File {
         /// The file.
         path: PathBuf,
-        /// The value and the rule.
+        /// The violated rule.
         message: String,
     },
 }
@@ -179,10 +179,10 @@ pub(super) fn json_message(message: &dyn std::fmt::Display) -> String {
     {
         return format!("{} is required", quoted(name));
     }
-    let starts = ["invalid type: ", "invalid value: ", "invalid length "];
-    let Some((start, rest)) = starts
+    let prefixes = ["invalid type: ", "invalid value: ", "invalid length "];
+    let Some((prefix, rest)) = prefixes
         .iter()
-        .find_map(|start| Some((*start, message.strip_prefix(start)?)))
+        .find_map(|prefix| Some((*prefix, message.strip_prefix(prefix)?)))
     else {
         return message.replace('`', "\"");
     };
@@ -194,9 +194,9 @@ pub(super) fn json_message(message: &dyn std::fmt::Display) -> String {
         "map" => "an object".to_owned(),
         "sequence" => "a list".to_owned(),
         "null" | "unit value" => "null".to_owned(),
-        count if start == "invalid length " => format!("a list of {count}"),
+        count if prefix == "invalid length " => format!("a list of {count}"),
         _ => match (found.strip_prefix("string "), found.split_once('`')) {
-            // Already quoted.
+            // `serde_json` has quoted the text.
             (Some(text), _) if text.chars().count() <= 60 => text.to_owned(),
             (Some(text), _) => quoted(text.trim_matches('"')),
             (None, Some((_, number))) => number.trim_end_matches('`').to_owned(),

@@ -1,4 +1,4 @@
-//! A glTF file with every feature that the importer reads, for tests and fuzz targets.
+//! A glTF file with most of the features that the importer supports, for tests and fuzz targets.
 
 use std::io::Cursor;
 

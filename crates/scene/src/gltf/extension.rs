@@ -30,7 +30,7 @@ pub(super) const KNOWN: &[&str] = &[
     "KHR_meshopt_compression",
     "KHR_texture_basisu",
     "KHR_texture_transform",
-    // Metadata only.
+    // Contains only metadata, which does not affect the import.
     "KHR_xmp_json_ld",
 ];
 
@@ -77,7 +77,7 @@ pub(super) fn check(root: &Root, notes: &mut Vec<String>) -> Result<(), GltfFaul
     if ignored.len() > MAX_NOTES {
         let remaining = ignored.len() - MAX_NOTES;
         notes.push(format!(
-            "further extensions are not supported and are ignored (number of these: {remaining})"
+            "number of further extensions that are not supported and are ignored: {remaining}"
         ));
     }
     Ok(())

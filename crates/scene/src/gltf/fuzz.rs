@@ -1,4 +1,4 @@
-//! Random mutation of glTF files: imports fail cleanly or satisfy the invariants.
+//! Random mutation of glTF files: an import must return an error or satisfy the invariants of `check`.
 
 use std::collections::BTreeSet;
 
@@ -9,7 +9,7 @@ use crate::Selection;
 use crate::file_system::FileSystem;
 use crate::gltf::made::container;
 
-/// 64-bit xorshift, upper half (Marsaglia, "Xorshift RNGs", 2003).
+/// The upper half of a 64-bit xorshift generator (Marsaglia, "Xorshift RNGs", 2003).
 struct Random(u64);
 
 impl Random {
@@ -117,6 +117,6 @@ fn mutated_files_are_imported_or_rejected() {
     }
     assert!(
         accepted * 5 > rounds && rejected * 10 > rounds && scenes * 50 > rounds,
-        "{accepted} {rejected} {scenes}"
+        "accepted: {accepted}, rejected: {rejected}, loaded scenes: {scenes}"
     );
 }

@@ -21,7 +21,8 @@ pub(super) fn is_container(bytes: &[u8]) -> bool {
     bytes.starts_with(MAGIC)
 }
 
-/// Finds the chunks. Chunks of other types, repeated chunks, and bytes beyond the declared length are skipped.
+/// Finds the JSON and binary chunks. Chunks of other types, repeated chunks, and bytes beyond the declared length are
+/// skipped.
 pub(super) fn chunks(bytes: &[u8]) -> Result<Chunks, GltfFault> {
     if bytes.len() < HEADER {
         let rule = format!(
@@ -72,7 +73,7 @@ pub(super) fn chunks(bytes: &[u8]) -> Result<Chunks, GltfFault> {
     Ok(Chunks { json, binary })
 }
 
-/// Returns a little-endian word; the caller checks the bounds.
+/// Returns a little-endian 32-bit word; the caller checks the bounds.
 fn word(bytes: &[u8], offset: usize) -> u32 {
     u32::from_le_bytes([bytes[offset], bytes[offset + 1], bytes[offset + 2], bytes[offset + 3]])
 }
@@ -119,7 +120,7 @@ mod tests {
     }
 
     #[test]
-    fn every_length_is_checked() {
+    fn invalid_headers_and_chunks_are_rejected() {
         let byte = |offset: u64, rule: &str| (Location::Byte(offset), rule.to_owned());
         assert_eq!(
             error_of(b"glTF"),

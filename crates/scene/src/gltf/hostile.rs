@@ -13,14 +13,14 @@ fn read(json: &Value, binary: &[u8]) -> Result<Imported, String> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.glb");
     std::fs::write(&path, container(json, binary)).unwrap();
-    let read = import(
+    let result = import(
         &path,
         folder.path(),
         &FileSystem::Disk,
         &ImportOptions::default(),
         &mut BTreeSet::new(),
     );
-    read.map_err(|error| error.to_string().replace(&format!("{}: ", path.display()), ""))
+    result.map_err(|error| error.to_string().replace(&format!("{}: ", path.display()), ""))
 }
 
 /// Returns a triangle. Accessor 0 contains positions, 1 texture coordinates, 2 normals, and 3 zeros.
@@ -52,7 +52,7 @@ const CORNERS: [f32; 9] = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0];
 const UVS: [f32; 6] = [0.0, 0.0, 1.0, 0.0, 0.0, 1.0];
 
 #[test]
-fn weights_are_not_multiplied_by_nodes() {
+fn morph_weights_are_not_copied_for_each_node() {
     // If each node had a copy of the weights, the copies would take 40 GB.
     let (mut json, binary) = triangle(CORNERS, UVS);
     json["meshes"][0]["weights"] = json!(vec![0; 1_000_000]);
@@ -62,8 +62,32 @@ fn weights_are_not_multiplied_by_nodes() {
 }
 
 #[test]
+fn attributes_of_other_counts_are_rejected_with_their_key() {
+    let (json, binary) = triangle(CORNERS, UVS);
+    // Accessor 3 contains 100,000 zeros.
+    let rule = |count: u32| format!("count {count} must equal 3, the count of POSITION");
+    let mut attribute = json.clone();
+    attribute["meshes"][0]["primitives"][0]["attributes"]["TEXCOORD_0"] = json!(3);
+    attribute["meshes"][0]["primitives"][0]["material"] = json!(0);
+    attribute["materials"] = json!([{ "pbrMetallicRoughness": { "baseColorTexture": { "index": 0 } } }]);
+    assert_eq!(
+        read(&attribute, &binary).unwrap_err(),
+        format!("meshes[0].primitives[0].attributes.TEXCOORD_0: {}", rule(100_000))
+    );
+    let mut target = json;
+    target["accessors"][3]["type"] = json!("VEC3");
+    target["accessors"][3]["count"] = json!(4);
+    target["meshes"][0]["weights"] = json!([1, 1]);
+    target["meshes"][0]["primitives"][0]["targets"] = json!([{ "POSITION": 0 }, { "POSITION": 0, "NORMAL": 3 }]);
+    assert_eq!(
+        read(&target, &binary).unwrap_err(),
+        format!("meshes[0].primitives[0].targets[1].NORMAL: {}", rule(4))
+    );
+}
+
+#[test]
 fn unused_texture_coordinate_sets_take_no_memory() {
-    // All sets would take 8 GB.
+    // The texture coordinates of all sets would take 8 GB.
     let (mut json, binary) = triangle(CORNERS, UVS);
     json["accessors"][3]["type"] = json!("VEC3");
     json["accessors"]

@@ -10,7 +10,7 @@ use super::{ImportOptions, NO_ANIMATIONS, unknown};
 use crate::Selection;
 
 impl Document {
-    /// Returns the selected or default scene; `None` if the file has no scenes and all nodes are shown.
+    /// Returns the selected or default scene; `None` if the file has no scenes: then all nodes are shown.
     pub(super) fn scene(&self, options: &ImportOptions) -> Result<Option<usize>, GltfError> {
         let scenes = &self.json.scenes;
         let Some(selection) = &options.scene else {
@@ -26,7 +26,7 @@ impl Document {
             .map(Some)
     }
 
-    /// Returns the selected animations; all animations if only a time is given.
+    /// Returns the selected animation. Without a selection, all animations play if a time is set, otherwise none.
     pub(super) fn animations(&self, options: &ImportOptions) -> Result<Vec<usize>, GltfError> {
         let animations = &self.json.animations;
         let names: Vec<Option<&str>> = animations.iter().map(|animation| animation.name.as_deref()).collect();
@@ -57,7 +57,8 @@ impl Document {
             .map(Some)
     }
 
-    /// Returns the index of the selected entry. `location` consists of the list in the file and the option.
+    /// Returns the index of the selected entry. `location` is the key of the list in the file, and the name of the
+    /// option.
     fn selected_index(
         &self,
         kind: &str,

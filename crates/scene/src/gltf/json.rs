@@ -93,7 +93,7 @@ impl TrimZeros for [u8] {
     }
 }
 
-/// Rejects texts that would take far more memory after parsing.
+/// Limits the number of objects and values, because parsed JSON can need far more memory than its text.
 fn check_size(text: &[u8]) -> Result<(), GltfFault> {
     let (mut objects, mut values) = (0usize, 0usize);
     let mut bytes = text.iter();
@@ -125,7 +125,8 @@ fn check_size(text: &[u8]) -> Result<(), GltfFault> {
     }
 }
 
-/// Checks the version first (specification, section 3.2), because everything else depends on it.
+/// Checks the version (specification, section 3.2). The caller checks it first, because the meaning of all other keys
+/// depends on the version.
 fn check_version(top: &Map<String, Value>) -> Result<(), GltfFault> {
     let asset = top.get("asset").and_then(Value::as_object);
     let asset = asset.ok_or_else(|| GltfFault::key("asset", "must be an object with the version"))?;
@@ -175,7 +176,7 @@ fn normalize(value: &mut Value, index: Option<&str>) -> Result<(), (String, Stri
         Value::Object(map) => {
             map.remove("extras");
             for (key, value) in map {
-                // The elements of `attributes` and `targets` are indices as well.
+                // All numbers inside `attributes` and `targets` are indices.
                 let is_index = INDEX_KEYS.contains(&key.as_str());
                 let inherited = index.filter(|outer| ["attributes", "targets"].contains(outer));
                 let index = if is_index { Some(key.as_str()) } else { inherited };
@@ -238,7 +239,8 @@ fn repair(top: &mut Value, notes: &mut Vec<String>) {
     }
 }
 
-/// Returns true for channels of extensions such as `KHR_animation_pointer` (specification, section 3.11).
+/// Returns true for channels that do not animate a core property of a node, but belong to an extension such as
+/// `KHR_animation_pointer` (specification, section 3.11).
 fn targets_extension(channel: &Value) -> bool {
     let Some(Value::Object(target)) = channel.get("target") else {
         return false;
@@ -327,7 +329,7 @@ fn check(root: &Root) -> Result<(), GltfFault> {
     }
 }
 
-/// Returns the error for an index beyond a list of `count` entries. `list_name` is for example `accessors`.
+/// Returns the error for an index beyond the end of a list of `count` entries. `list_name` is for example `accessors`.
 pub(super) fn out_of_range(key: impl Into<String>, index: usize, list_name: &str, count: usize) -> GltfFault {
     GltfFault::key(key, format!("{index} is out of range; number of {list_name}: {count}"))
 }
@@ -338,12 +340,13 @@ fn is_allowed(path: &str, error: Error) -> bool {
     match error {
         // `extension::check` checks required extensions.
         Error::Unsupported => starts_with("extensionsRequired["),
-        // Accessors without data are zero, bounds are not used, and primitives without positions are skipped.
+        // The elements of accessors without a buffer view are zero. The importer does not use the bounds of positions,
+        // and skips primitives without positions.
         Error::Missing => {
             starts_with("accessors[") && path.ends_with("].bufferView")
                 || starts_with("meshes[") && path.contains("attributes[\"POSITION\"]")
         }
-        // Application-specific attributes are ignored, and some strides are only invalid for GPUs.
+        // The importer ignores application-specific attributes. The limits of `byteStride` only matter to GPUs.
         Error::Invalid => {
             starts_with("meshes[") && path.contains(".attributes[")
                 || starts_with("bufferViews[") && path.ends_with("].byteStride")

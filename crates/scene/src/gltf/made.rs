@@ -41,7 +41,7 @@ pub fn read(bytes: Vec<u8>) -> Result<Document, GltfFault> {
     )
 }
 
-/// Returns JSON with one buffer, which is in the GLB container.
+/// Returns JSON with one buffer, the binary chunk of a GLB container.
 pub fn json_of(binary: &[u8], views: Value, accessors: Value) -> Value {
     json!({
         "asset": { "version": "2.0" },

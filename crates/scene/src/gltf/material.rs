@@ -20,13 +20,13 @@ use crate::{
 #[derive(Default)]
 pub struct Images {
     pub read: BTreeMap<String, Arc<[u8]>>,
-    /// Reasons for missing images, by name.
+    /// Reasons why images are missing, by the name of the image.
     pub absent: BTreeMap<String, String>,
 }
 
 pub(super) type Textures = BTreeMap<String, TextureDescription>;
 
-/// Maximum component of a radiance or of a color factor that may exceed 1.
+/// Maximum component of an emitted radiance, and of a color factor that may exceed 1.
 const MAX_COLOR: f64 = 1e6;
 const IORS: (f64, f64) = (1.0, 100.0);
 
@@ -107,9 +107,9 @@ impl Converter<'_> {
             let message = "occlusion textures are ignored: the path tracer computes occlusion";
             note(self.notes, message.to_owned());
         }
-        let strength =
+        let emissive_strength =
             extension("KHR_materials_emissive_strength").and_then(|values| values.get("emissiveStrength")?.as_f64());
-        let emission = json.emissive_factor.0.map(|x| f64::from(x) * strength.unwrap_or(1.0));
+        let emission = (json.emissive_factor.0).map(|x| f64::from(x) * emissive_strength.unwrap_or(1.0));
         if emission != [0.0; 3] {
             let slot = (json.emissive_texture.as_ref())
                 .map(|info| {
@@ -179,7 +179,7 @@ impl Converter<'_> {
             _ => AlphaMode::Opaque,
         };
         if principled.alpha_mode == AlphaMode::Blend && a == 1.0 && !has_alpha && !is_colored {
-            principled.alpha_mode = AlphaMode::Opaque; // exporters write opaque materials as BLEND
+            principled.alpha_mode = AlphaMode::Opaque; // some exporters write opaque materials as BLEND
         }
         if principled.alpha_mode != AlphaMode::Opaque {
             principled.alpha = match name {
@@ -221,7 +221,8 @@ impl Converter<'_> {
 
     fn ior(&mut self, ior: f64, principled: &mut PrincipledDescription) -> Result<(), GltfError> {
         if ior == 0.0 {
-            // In KHR_materials_ior, 0 means total reflection.
+            // In KHR_materials_ior, 0 means total reflection. With the maximum IOR of 100, this `specular_color` makes
+            // the reflectance at normal incidence 1.
             principled.ior = IORS.1;
             principled.specular_color = [(101.0_f64 / 99.0).powi(2); 3].into();
             return Ok(());
@@ -292,7 +293,7 @@ impl Converter<'_> {
         let gloss = self.fraction("glossinessFactor", self.number(values, "glossinessFactor", 1.0)?)?;
         principled.metallic = 0.0.into();
         principled.roughness = (1.0 - gloss).into();
-        // An ior of 1.5 has a reflectance of 0.04.
+        // `specular_color` scales the reflectance at normal incidence, which is 0.04 for the default IOR of 1.5.
         principled.specular_color = specular.map(|x| x / 0.04).into();
         if let Some(texture) = values.get("specularGlossinessTexture") {
             let (slot, _) = Slot::of_value(self.document, &self.location, texture)?;

@@ -12,25 +12,25 @@ use super::material::{Converter, Images, Textures};
 use super::texture::Slot;
 use crate::{PrincipledDescription, VertexColors};
 
-/// Maximum length of a name in characters; limited because every instance stores the name.
+/// Maximum length of a name in characters. The length is limited because every instance stores the name.
 const MAX_NAME_LEN: usize = 200;
 
 pub struct Materials<'a> {
     document: &'a Document,
     variant: Option<usize>,
-    /// For each material of the file, the index into `used`; `None` is the default material.
+    /// Maps the index of a material in the file to its index in `used`; the key `None` is the default material.
     use_indices: BTreeMap<Option<usize>, usize>,
     used: Vec<MaterialUse>,
 }
 
 pub struct MaterialUse {
-    /// Material index of the file.
+    /// Index of the material in the file; `None` is the default material.
     index: Option<usize>,
     /// True if a primitive with vertex colors uses the material.
     is_colored: bool,
     /// Required texture coordinate sets.
     pub sets: BTreeSet<u32>,
-    /// The normal or anisotropy map that requires tangents.
+    /// The texture whose coordinates define the tangents; `None` if the material needs no tangents.
     pub tangents: Option<Slot>,
 }
 
@@ -44,7 +44,7 @@ impl<'a> Materials<'a> {
         }
     }
 
-    /// Returns the index of a primitive's material, and marks the material as used.
+    /// Returns the index of a primitive's material in `used`, and adds the material if it is new.
     pub fn mark_used(&mut self, primitive: &Primitive, location: &str, is_colored: bool) -> Result<usize, GltfError> {
         let index = self.material_index(primitive);
         let count = self.document.json.materials.len();
@@ -186,9 +186,9 @@ impl MaterialUse {
                 }
             }
         }
-        let strength =
+        let anisotropy =
             extension("KHR_materials_anisotropy").and_then(|values| values.get("anisotropyStrength")?.as_f64());
-        if used.tangents.is_none() && strength.is_some_and(|strength| strength != 0.0) {
+        if used.tangents.is_none() && anisotropy.is_some_and(|strength| strength != 0.0) {
             used.sets.insert(0);
             used.tangents = Some(Slot {
                 texture: 0,

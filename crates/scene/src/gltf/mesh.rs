@@ -26,7 +26,7 @@ pub struct Key {
     pub skin: Option<usize>,
     /// Bits of the morph weights of the node, which override the weights of the mesh.
     weights: Option<Vec<u32>>,
-    /// Bits of a transform that is applied to the vertices, because an axis is too short or too long for an instance.
+    /// Bits of a transform that is applied to the vertices, because an instance cannot have the transform.
     baked: Option<[u64; 12]>,
 }
 
@@ -48,12 +48,12 @@ impl Key {
         }
     }
 
-    /// Returns true if the vertices are transformed because an axis is too short, not because an axis is too long.
+    /// Returns true if the transform is baked because it flattens the mesh, not because an axis is too long.
     pub fn is_flat(&self) -> bool {
-        let is_small = |axis: DVec3| axis.length() <= MAX_AXIS_LENGTH;
+        let is_short_enough = |axis: DVec3| axis.length() <= MAX_AXIS_LENGTH;
         self.baked_transform().is_some_and(|transform| {
             let DMat3 { x_axis, y_axis, z_axis } = transform.matrix3;
-            [x_axis, y_axis, z_axis].into_iter().all(is_small)
+            [x_axis, y_axis, z_axis].into_iter().all(is_short_enough)
         })
     }
 
@@ -92,6 +92,7 @@ pub struct Meshes<'a> {
     invalid_positions: Mutex<Option<(String, usize)>>,
 }
 
+/// A primitive with triangles.
 struct Part<'a> {
     primitive: &'a Primitive,
     location: String,
@@ -249,7 +250,7 @@ impl<'a> Meshes<'a> {
         }
     }
 
-    /// Builds a mesh; `None` if it has no triangles.
+    /// Builds a mesh; `None` if the mesh has no triangles.
     pub fn build(&self, key: &Key, nodes: &Nodes, materials: &Materials) -> Result<Option<BuiltMesh>, GltfError> {
         let parts = self.parts.get(&key.mesh).map_or(&[][..], Vec::as_slice);
         let skin = key.skin.map(|skin| Skin::of(self.document, skin, nodes)).transpose()?;
@@ -350,7 +351,7 @@ struct MeshBuilder {
     raw: RawMesh,
     /// Texture coordinate sets. A list ends at the last primitive that has the set.
     uvs: Vec<Vec<Vec2>>,
-    /// The first vertex for each set of accessors, because primitives may share accessors.
+    /// The first vertex by the key of [`accessors`], because primitives with equal keys share vertices.
     first_vertices: HashMap<Vec<usize>, usize>,
     /// The number of vertices for each first vertex.
     counts: HashMap<usize, usize>,
@@ -370,7 +371,7 @@ impl MeshBuilder {
     ) -> Result<usize, GltfError> {
         let mut accessors = accessors(part.primitive);
         accessors.push(usize::from(material_use.tangents.is_some()));
-        // Vertices with rotated tangents cannot be shared.
+        // Vertices with rotated tangents cannot be shared, because the rotation depends on the material.
         let is_plain = material_use
             .tangents
             .as_ref()
@@ -451,7 +452,7 @@ impl MeshBuilder {
         Ok(())
     }
 
-    /// Generates missing tangents. The triangles get separate vertices, which are split where tangents differ.
+    /// Generates missing tangents. The returned triangles use copies of the vertices, split where tangents differ.
     fn with_tangents(
         &mut self,
         part: &Part,
@@ -505,7 +506,7 @@ impl MeshBuilder {
         (first_copy, generated.triangles)
     }
 
-    /// Builds the mesh; `None` if it has zero area. `max_set` is the last required texture coordinate set.
+    /// Builds the mesh; `None` if all triangles have zero area. `max_set` is the last required texture coordinate set.
     fn finish(mut self, max_set: Option<u32>) -> Result<Option<Mesh>, String> {
         let count = self.raw.positions.len();
         let fill = |list: &mut Vec<Vec2>| list.resize(count, Vec2::ZERO);
@@ -530,16 +531,17 @@ impl MeshBuilder {
     }
 }
 
+/// Returns a key that is equal for primitives with equal vertices: the indices of all accessors and their attributes.
 fn accessors(primitive: &Primitive) -> Vec<usize> {
     let none = usize::MAX;
     let attributes = primitive.attributes.iter();
-    let mut all: Vec<usize> = attributes.map(|(_, accessor)| accessor.value()).collect();
+    let mut key: Vec<usize> = attributes.map(|(_, accessor)| accessor.value()).collect();
     for target in primitive.targets.iter().flatten() {
         let displacements = [target.positions, target.normals, target.tangents];
-        all.extend(displacements.map(|accessor| accessor.map_or(none, |accessor| accessor.value())));
+        key.extend(displacements.map(|accessor| accessor.map_or(none, |accessor| accessor.value())));
     }
     // Primitives may use the same accessors for different attributes.
-    let names = primitive.attributes.keys().map(|name| match name {
+    let semantics = primitive.attributes.keys().map(|name| match name {
         Checked::Valid(Semantic::Positions) => 0,
         Checked::Valid(Semantic::Normals) => 1,
         Checked::Valid(Semantic::Tangents) => 2,
@@ -549,7 +551,7 @@ fn accessors(primitive: &Primitive) -> Vec<usize> {
         Checked::Valid(Semantic::Weights(i)) => 19 + 8 * *i as usize,
         _ => none,
     });
-    let names: Vec<usize> = names.collect();
-    all.extend(names);
-    all
+    let semantics: Vec<usize> = semantics.collect();
+    key.extend(semantics);
+    key
 }

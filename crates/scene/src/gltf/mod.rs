@@ -57,7 +57,7 @@ use crate::{
 pub use self::contents::ModelContents;
 pub use self::error::GltfError;
 
-/// Maximum number of instances, and of all their groups together. An instance takes more than 1 KiB in a scene.
+/// Maximum number of instances, and maximum total number of their groups. An instance uses more than 1 KiB of memory.
 const MAX_INSTANCES: usize = 1 << 20;
 
 /// Maximum axis length of an instance's transform.
@@ -71,7 +71,7 @@ pub const UPRIGHT: DAffine3 = DAffine3 {
     translation: DVec3::ZERO,
 };
 
-/// The parts of a file to import.
+/// The selected scene, time, animation and material variant.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ImportOptions {
     scene: Option<Selection>,
@@ -106,7 +106,7 @@ pub struct Imported {
     pub instances: Vec<MeshInstance>,
     /// Encoded images, by name.
     pub images: BTreeMap<String, Arc<[u8]>>,
-    /// Reasons for missing images, by name.
+    /// Reasons why images are missing, by the name of the image.
     pub absent: BTreeMap<String, String>,
     /// The materials.
     pub materials: Vec<ImportedMaterial>,
@@ -120,17 +120,17 @@ pub struct Imported {
     pub animations: usize,
     /// Warnings for the user.
     pub notes: Vec<String>,
-    /// Damaged parts.
+    /// Damage that does not prevent rendering.
     pub damage: Vec<Damage>,
     files: BTreeSet<PathBuf>,
 }
 
-/// A damaged part of the file that was replaced by a stand-in.
+/// Damage in a file that does not prevent rendering.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Damage {
-    /// Message: the location and the damage.
+    /// Location and description of the damage, for a message.
     pub what: String,
-    /// Message: what is used instead.
+    /// Treatment of the damaged values, for a message.
     pub stand_in: &'static str,
 }
 
@@ -139,7 +139,7 @@ pub struct Damage {
 pub struct MeshInstance {
     /// Index of the mesh.
     pub mesh: usize,
-    /// Object to world transform.
+    /// Object-to-world transform.
     pub to_world: DAffine3,
     /// Material of each group.
     pub materials: Vec<usize>,
@@ -216,7 +216,7 @@ pub fn unknown(kind: &str, selection: &Selection, names: &[Option<&str>]) -> Str
     format!("the file has no {kind} {selection}; available: {available}")
 }
 
-/// Imports a file. Returns the existing import if it is in use and its files have not changed.
+/// Imports a file. Returns the cached import if it is still in use and its files have not changed.
 pub(crate) fn load(
     path: &Path,
     root: &Path,
@@ -241,7 +241,7 @@ pub(crate) fn load(
         }
     }
     let _span = tracing::debug_span!("gltf", path = %path.display()).entered();
-    // The stamp is taken before reading, so that a change of the file during the import is noticed.
+    // The stamp is taken before reading, so that a change of the file during the import is detected.
     let old_stamp = file_system.stamp(path);
     let mut imported_files = BTreeSet::new();
     let result = import(path, root, file_system, options, &mut imported_files);
@@ -267,7 +267,7 @@ pub(crate) fn load(
 }
 
 struct CachedImport {
-    /// [`FileSystem::id`].
+    /// Identifier of the file system: [`FileSystem::id`].
     source: u64,
     path: PathBuf,
     root: PathBuf,
@@ -357,16 +357,17 @@ fn import(
             *mesh_index = Some(imported.meshes.len());
             let mut mesh = built.mesh;
             for note in mesh.notes.drain(..) {
-                tracing::debug!(mesh = key.mesh, "{note}"); // debug level: exported meshes often have degenerate triangles
+                // Debug level, because exported meshes often have degenerate triangles.
+                tracing::debug!(mesh = key.mesh, "{note}");
             }
             imported.meshes.push(Arc::new(mesh));
             mesh_materials.push(built.materials);
         }
     }
     let mut group_count = 0;
-    for (key, to_world) in placements {
-        zero_scale_count += usize::from(mesh_indices[key].is_none() && keys[key].is_flat());
-        if let Some(mesh) = mesh_indices[key] {
+    for (key_index, to_world) in placements {
+        zero_scale_count += usize::from(mesh_indices[key_index].is_none() && keys[key_index].is_flat());
+        if let Some(mesh) = mesh_indices[key_index] {
             let materials: Vec<usize> = mesh_materials[mesh].clone();
             group_count += materials.len();
             if group_count > MAX_INSTANCES {
@@ -387,7 +388,7 @@ fn import(
     }
     notes.extend(meshes.notes());
     imported.damage = meshes.damage();
-    // A zero scale is accepted, because an animation may change it.
+    // A scene in which all instances have zero scale is accepted, because an animation may change the scale.
     if imported.instances.is_empty() && zero_scale_count == 0 {
         return Err(document.fault("scene", meshes.no_triangles_reason()));
     }

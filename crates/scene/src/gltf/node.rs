@@ -40,7 +40,7 @@ impl Pose {
     }
 }
 
-/// Converts a quaternion; a zero quaternion becomes the identity.
+/// Normalizes a quaternion. A zero or non-finite quaternion becomes the identity.
 pub fn quaternion(components: [f32; 4]) -> DQuat {
     let quaternion = DQuat::from_array(components.map(f64::from));
     let length = quaternion.length();

@@ -1,4 +1,4 @@
-//! Skins (section 3.7.3). The transform of the node of a skinned mesh has no effect on its vertices.
+//! Skins (section 3.7.3). The transform of a node does not affect the skinned mesh of the node.
 
 use glam::{DAffine3, DMat4};
 use gltf_json::mesh::{Primitive, Semantic};
@@ -103,7 +103,7 @@ impl Skin {
             }
         }
         let mean = |(sum, weight): (DAffine3, f64)| match weight > 0.0 {
-            // Normalized, because rounded weights do not sum to 1.
+            // Divided by the sum of the weights, because rounded weights do not sum to exactly 1.
             true => DAffine3 {
                 matrix3: sum.matrix3 * (1.0 / weight),
                 translation: sum.translation / weight,

@@ -8,9 +8,10 @@ use rayon::prelude::*;
 
 use super::texture::Slot;
 
+/// Triangles whose vertices are split where tangents differ.
 pub struct TangentVertices {
     pub triangles: Vec<[u32; 3]>,
-    /// Original index of each vertex.
+    /// For each new vertex, the index of the original vertex.
     pub origins: Vec<u32>,
     pub tangents: Vec<Vec4>,
 }
@@ -110,17 +111,18 @@ pub fn generate(
     Some(result)
 }
 
-/// The triangles of a part and the triangles that touch them, in the original order, so that sums are reproducible.
+/// A chunk of the triangles, and all triangles that touch the chunk, in the original order, so that MikkTSpace adds up
+/// tangents in the order of the full mesh.
 struct Part {
-    /// The triangles of the part, without the triangles that touch them.
+    /// Range of the chunk in `triangles`.
     range: Range<usize>,
     triangles: Vec<[u32; 3]>,
 }
 
-/// Partitions the triangles so that threads can process the parts: the tangents of a vertex only depend on its
-/// triangles.
+/// Splits the triangles into parts that threads process independently: the tangents of a vertex only depend on the
+/// triangles around the vertex.
 fn parts(positions: &[DVec3], normals: &[Vec3], uvs: &[Vec2], triangles: &[[u32; 3]]) -> Vec<Part> {
-    /// Maximum number of triangles of a part.
+    /// Maximum number of triangles of a chunk.
     const MAX_TRIANGLES: usize = 1 << 16;
     if triangles.len() <= MAX_TRIANGLES {
         return vec![Part {
@@ -128,8 +130,8 @@ fn parts(positions: &[DVec3], normals: &[Vec3], uvs: &[Vec2], triangles: &[[u32;
             triangles: triangles.to_vec(),
         }];
     }
-    // MikkTSpace merges vertices with equal attributes.
-    let bits = |i: u32| {
+    // MikkTSpace merges vertices with equal attributes, so these get equal indices in `merged_indices`.
+    let attribute_bits = |i: u32| {
         let i = i as usize;
         let position = positions[i].as_vec3().to_array().map(f32::to_bits);
         (
@@ -139,29 +141,32 @@ fn parts(positions: &[DVec3], normals: &[Vec3], uvs: &[Vec2], triangles: &[[u32;
         )
     };
     let mut order: Vec<u32> = (0..positions.len() as u32).collect();
-    order.par_sort_unstable_by_key(|i| bits(*i));
-    let mut point_of = vec![0; positions.len()];
-    let mut point = 0;
+    order.par_sort_unstable_by_key(|i| attribute_bits(*i));
+    let mut merged_indices = vec![0; positions.len()];
+    let mut merged_index = 0;
     for pair in order.windows(2) {
-        point += u32::from(bits(pair[0]) != bits(pair[1]));
-        point_of[pair[1] as usize] = point;
+        merged_index += u32::from(attribute_bits(pair[0]) != attribute_bits(pair[1]));
+        merged_indices[pair[1] as usize] = merged_index;
     }
     let chunks: Vec<(usize, &[[u32; 3]])> = triangles.chunks(MAX_TRIANGLES).enumerate().collect();
     let part = |(chunk_index, chunk): (usize, &[[u32; 3]])| {
         let mut is_touched = vec![false; positions.len()];
         for vertex in chunk.iter().flatten() {
-            is_touched[point_of[*vertex as usize] as usize] = true;
+            is_touched[merged_indices[*vertex as usize] as usize] = true;
         }
         let start = chunk_index * MAX_TRIANGLES;
         let touches = |triangle: &&[u32; 3]| {
-            let mut points = triangle.iter().map(|vertex| point_of[*vertex as usize]);
-            points.any(|point| is_touched[point as usize])
+            let mut merged_vertices = triangle.iter().map(|vertex| merged_indices[*vertex as usize]);
+            merged_vertices.any(|vertex| is_touched[vertex as usize])
         };
-        let mut part: Vec<[u32; 3]> = triangles[..start].iter().filter(touches).copied().collect();
-        let range = part.len()..part.len() + chunk.len();
-        part.extend(chunk);
-        part.extend(triangles[start + chunk.len()..].iter().filter(touches));
-        Part { range, triangles: part }
+        let mut selected: Vec<[u32; 3]> = triangles[..start].iter().filter(touches).copied().collect();
+        let range = selected.len()..selected.len() + chunk.len();
+        selected.extend(chunk);
+        selected.extend(triangles[start + chunk.len()..].iter().filter(touches));
+        Part {
+            range,
+            triangles: selected,
+        }
     };
     chunks.into_par_iter().map(part).collect()
 }
@@ -189,7 +194,7 @@ mod tests {
 
     #[test]
     fn parts_have_the_tangents_of_the_full_mesh() {
-        // A curved sheet with a half-mirrored texture; squares have their own vertices.
+        // A curved sheet with a texture that is mirrored at the middle; each square has its own vertices.
         const SIDE: usize = 190;
         let mut positions = Vec::new();
         let (mut normals, mut uvs, mut triangles) = (Vec::new(), Vec::new(), Vec::new());

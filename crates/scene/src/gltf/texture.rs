@@ -13,10 +13,10 @@ use super::error::{GltfError, json_message};
 use crate::ktx2;
 use crate::{Encoding, ImageTextureDescription, TextureFilter, Wrap};
 
-/// Minimum scale, and maximum scale and offset, of texture coordinates.
+/// Minimum magnitude of the scale of texture coordinates, and maximum magnitude of their scale and offset.
 const SCALE_LIMITS: (f64, f64) = (1e-6, 1e6);
 
-/// Maximum texture coordinate set.
+/// Maximum index of a texture coordinate set.
 pub(super) const MAX_SET: u32 = 7;
 
 /// A texture reference of a material.

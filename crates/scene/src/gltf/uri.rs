@@ -43,9 +43,9 @@ pub(super) fn data(uri: &str) -> Result<Vec<u8>, String> {
 /// The reason why a file is not read: the value and the violated rule.
 #[derive(Debug)]
 pub(super) enum UriError {
-    /// Missing or unreadable.
+    /// The file is missing or unreadable.
     Absent(String),
-    /// Violates a rule.
+    /// The URI or the file violates a rule.
     Invalid(String),
 }
 

@@ -1,4 +1,4 @@
-//! The vertices of a primitive, from its accessors: morphed, skinned and checked.
+//! The vertices of a primitive: reads accessors, and applies morph targets, skins and transforms.
 
 use glam::{DAffine3, DMat3, DVec3, Vec3, Vec4};
 use gltf_json::mesh::{Primitive, Semantic};
@@ -24,7 +24,7 @@ const TEXCOORDS: [&str; MAX_SET as usize + 1] = [
     "TEXCOORD_7",
 ];
 
-/// The accessors of a primitive's vertices.
+/// Reads the vertex attributes of a primitive.
 pub struct Source<'a> {
     document: &'a Document,
     primitive: &'a Primitive,
@@ -81,7 +81,7 @@ impl<'a> Source<'a> {
         self.read(TEXCOORDS[set as usize], Semantic::TexCoords(set))
     }
 
-    /// Reads colors, from 0 to 1.
+    /// Reads the vertex colors, clamped to 0 ... 1.
     pub fn colors(&self) -> Result<Option<Vec<Vec4>>, GltfError> {
         let Some(accessor) = attribute(self.primitive, Semantic::Colors(0)) else {
             return Ok(None);
@@ -108,25 +108,30 @@ impl<'a> Source<'a> {
             return Ok(None);
         };
         let vectors = self.document.vectors::<N>(accessor)?;
-        self.check_count(name, vectors.len())?;
+        self.check_count(&format!("attributes.{name}"), vectors.len())?;
         if !vectors.as_flattened().iter().all(|x| x.is_finite()) {
             (self.report)(name);
         }
         Ok(Some(vectors))
     }
 
-    fn displacements(&self, accessor: Option<usize>) -> Result<Option<Vec<Vec3>>, GltfError> {
+    /// Reads the displacements of an attribute by the morph target with this index.
+    fn displacements(
+        &self,
+        (target, name): (usize, &str),
+        accessor: Option<usize>,
+    ) -> Result<Option<Vec<Vec3>>, GltfError> {
         let Some(accessor) = accessor else { return Ok(None) };
         let vectors = vectors(self.document, accessor)?;
-        self.check_count("targets", vectors.len())?;
+        self.check_count(&format!("targets[{target}].{name}"), vectors.len())?;
         Ok(Some(vectors))
     }
 
-    fn check_count(&self, name: &str, count: usize) -> Result<(), GltfError> {
+    fn check_count(&self, key: &str, count: usize) -> Result<(), GltfError> {
         match count == self.count() {
             true => Ok(()),
             false => Err(self.fault(
-                &format!("attributes.{name}"),
+                key,
                 format!("count {count} must equal {}, the count of POSITION", self.count()),
             )),
         }
@@ -148,14 +153,14 @@ pub struct Frames {
 impl Frames {
     /// Adds the weighted displacements of morph targets.
     pub fn morph(&mut self, source: &Source, weights: &[f32]) -> Result<(), GltfError> {
-        for (target, weight) in source.primitive.targets.iter().flatten().zip(weights) {
+        for (i, (target, weight)) in source.primitive.targets.iter().flatten().zip(weights).enumerate() {
             if *weight == 0.0 {
                 continue;
             }
-            let displacements = |accessor: Option<usize>| source.displacements(accessor);
-            let positions = displacements(target.positions.map(|accessor| accessor.value()))?;
-            let normals = displacements(target.normals.map(|accessor| accessor.value()))?;
-            let tangents = displacements(target.tangents.map(|accessor| accessor.value()))?;
+            let displacements = |name, accessor| source.displacements((i, name), accessor);
+            let positions = displacements("POSITION", target.positions.map(|accessor| accessor.value()))?;
+            let normals = displacements("NORMAL", target.normals.map(|accessor| accessor.value()))?;
+            let tangents = displacements("TANGENT", target.tangents.map(|accessor| accessor.value()))?;
             for (p, d) in self.positions.iter_mut().zip(positions.into_iter().flatten()) {
                 *p += d * *weight;
             }

@@ -8,17 +8,19 @@ use super::super::texture::{levels, words};
 use super::super::validate::TEXEL_MEMORY;
 use super::super::{Assets, Channel, Description, Encoding, MaterialDescription, TextureDescription, ValueDescription};
 
-/// Limit on the number of decoded texels, and thereby on the time: a constant, plus an allowance per byte of the files.
+/// Limit on the number of decoded texels, which limits the loading time: a constant, and an allowance per byte of the
+/// image files.
 const TEXEL_LIMIT: (u64, u64) = (1 << 28, 64);
 /// Memory reserved for other textures and the environment, in bytes.
 const RESERVED_BYTES: u64 = 128 << 20;
 
-/// An image file and the number of its copies, which contain sRGB colors, linear data or alpha.
 struct ImportedImage {
     header: Header,
     /// Encoded size in bytes.
     length: u64,
+    /// Number of decoded copies: up to one each of sRGB colors, linear data and alpha.
     copies: u64,
+    /// True if the image has mip levels.
     has_levels: bool,
 }
 
@@ -37,8 +39,8 @@ impl ImportedImage {
     }
 }
 
-/// Returns the maximum side at which all images fit, and the full size of all images in bytes; `None` if the images fit
-/// at full size. The error is the violated rule.
+/// Returns the maximum image side with which all images fit into the texture memory, and the memory use of the images
+/// at full size in bytes; `None` if the images fit at full size. The error is the violated rule.
 pub fn longest_side(description: &Description, assets: &Assets) -> Result<Option<(u32, u64)>, String> {
     let images = imported_images(description, assets);
     let texels = |image: &ImportedImage| u64::from(image.header.width) * u64::from(image.header.height) * image.copies;
@@ -72,7 +74,7 @@ fn imported_images(description: &Description, assets: &Assets) -> Vec<ImportedIm
             _ => None,
         })
         .collect();
-    // For each file, the encodings in use (`None`: alpha), and whether the image is filtered.
+    // For each file, the required copies (`Some(is_linear)`, or `None` for alpha), and whether mip levels are required.
     let mut files: BTreeMap<&str, (BTreeSet<Option<bool>>, bool)> = BTreeMap::new();
     for (name, texture) in &description.textures {
         if let TextureDescription::Image(image) = texture {
@@ -99,12 +101,12 @@ fn imported_images(description: &Description, assets: &Assets) -> Vec<ImportedIm
 /// Returns the header; `None` for unreadable images, which the decoder reports.
 fn header(bytes: &[u8]) -> Option<Header> {
     let format = Format::of(bytes)?;
-    let read = Cell::new(None);
+    let found = Cell::new(None);
     let _ = decode(bytes, format, |header| {
-        read.set(Some(header));
+        found.set(Some(header));
         Err(String::new())
     });
-    read.take()
+    found.take()
 }
 
 #[cfg(test)]

@@ -28,23 +28,24 @@ pub struct ExpandedScene {
     pub description: Description,
     pub assets: Assets,
     pub notes: Vec<Note>,
-    /// The imported files, which must outlive the scene.
+    /// The imported files. The scene keeps the imports alive, so that later loads of the files can reuse them.
     pub imported: Vec<Arc<Imported>>,
     origins: Vec<Origin>,
-    /// The last number in a prefix, by file.
+    /// For each file name, the number of its last prefix.
     prefix_numbers: BTreeMap<String, usize>,
     prefixes: BTreeSet<String>,
-    /// Number of imported parts, plus [`SHAPE_COST`] per shape: for all files, and for repeated files only.
-    part_counts: [usize; 2],
+    /// Number of imported objects, plus [`SHAPE_COST`] per shape: for all shapes, and for shapes that repeat a file.
+    object_counts: [usize; 2],
 }
 
-/// Maximum number of parts: the instances, meshes, materials and lights of all shapes.
-const MAX_IMPORTED_INSTANCES: usize = 1 << 21;
-/// Maximum number of parts of repeated files. Each part takes at least 1 KiB.
-const MAX_REPEATED_IMPORTS: usize = 1 << 18;
-/// Amount that a shape adds to the number of parts.
+/// Maximum number of imported objects: the instances, meshes, materials and lights of all `gltf` shapes.
+const MAX_OBJECTS: usize = 1 << 21;
+/// Maximum number of objects of shapes that repeat a file. An object takes at least 1 KiB of memory.
+const MAX_REPEATED_OBJECTS: usize = 1 << 18;
+/// Amount that a shape adds to the number of objects.
 const SHAPE_COST: usize = 16;
 
+/// The `gltf` shape that expanded objects come from.
 struct Origin {
     shape: usize,
     /// Prefix of the names of meshes, materials and textures.
@@ -67,7 +68,7 @@ impl ExpandedScene {
             origins: Vec::new(),
             prefix_numbers: BTreeMap::new(),
             prefixes: BTreeSet::new(),
-            part_counts: [0; 2],
+            object_counts: [0; 2],
         };
         for (i, shape) in description.shapes.iter().enumerate() {
             if let ShapeDescription::Gltf(gltf) = shape {
@@ -132,28 +133,27 @@ impl ExpandedScene {
                 format!("{:?} is an image in memory, not a glTF file", gltf.file),
             ));
         };
-        let choice = ImportOptions::of(gltf)?;
-        let read = load(&path, &self.assets.root, &self.assets.file_system, &choice, files);
-        let imported = read.map_err(|error| Problem::new(error.to_string())).at("file")?;
+        let options = ImportOptions::of(gltf)?;
+        let result = load(&path, &self.assets.root, &self.assets.file_system, &options, files);
+        let imported = result.map_err(|error| Problem::new(error.to_string())).at("file")?;
         let counts = [
             imported.instances.len(),
             imported.meshes.len(),
             imported.materials.len(),
             imported.lights.len(),
         ];
-        let part_count = SHAPE_COST + counts.iter().sum::<usize>();
+        let object_count = SHAPE_COST + counts.iter().sum::<usize>();
         let is_repeated = self.prefix_numbers.contains_key(&gltf.file);
-        let parts = "instances, meshes, materials and lights";
-        self.part_counts[0] += part_count;
-        self.part_counts[1] += if is_repeated { part_count } else { 0 };
-        if self.part_counts[0] > MAX_IMPORTED_INSTANCES {
-            let rule =
-                format!("all shapes of type \"gltf\" together must import at most {MAX_IMPORTED_INSTANCES} {parts}");
+        let objects = "instances, meshes, materials and lights";
+        self.object_counts[0] += object_count;
+        self.object_counts[1] += if is_repeated { object_count } else { 0 };
+        if self.object_counts[0] > MAX_OBJECTS {
+            let rule = format!("all shapes of type \"gltf\" together must import at most {MAX_OBJECTS} {objects}");
             return Err(Problem::of("file", rule));
         }
-        if self.part_counts[1] > MAX_REPEATED_IMPORTS {
+        if self.object_counts[1] > MAX_REPEATED_OBJECTS {
             let rule =
-                format!("shapes that repeat a glTF file together must import at most {MAX_REPEATED_IMPORTS} {parts}");
+                format!("shapes that repeat a glTF file together must import at most {MAX_REPEATED_OBJECTS} {objects}");
             return Err(Problem::of("file", rule));
         }
         let prefix = self.prefix(&gltf.file);
@@ -213,7 +213,7 @@ impl ExpandedScene {
         Ok(())
     }
 
-    /// Returns a unique prefix for a file's names.
+    /// Returns a unique prefix for the names in a file.
     fn prefix(&mut self, file: &str) -> String {
         let number = self.prefix_numbers.entry(file.to_owned()).or_default();
         loop {
@@ -222,14 +222,14 @@ impl ExpandedScene {
                 1 => format!("{file}/"),
                 i => format!("{file} ({i})/"),
             };
-            // A different file may have the same name.
+            // The prefix may exist already: another file may be named "FILE (2)".
             if self.prefixes.insert(prefix.clone()) {
                 return prefix;
             }
         }
     }
 
-    /// Returns the names of a file's materials after the shape's overrides.
+    /// Adds the materials of a file that the shape does not override. Returns the material names, in file order.
     fn materials(&mut self, gltf: &GltfDescription, imported: &Imported, prefix: &str) -> Result<Vec<String>, Problem> {
         let names_in_file: BTreeSet<&str> = imported.materials.iter().map(|material| &*material.name).collect();
         for (name, replacement) in &gltf.materials {
@@ -267,7 +267,7 @@ impl ExpandedScene {
     }
 }
 
-/// Returns the rows of a transform's matrix, without the last row.
+/// Returns the first three rows of the 4 x 4 matrix of a transform.
 pub fn rows(transform: &DAffine3) -> Vec<[f64; 4]> {
     let rows = transform.matrix3.transpose();
     let row = |i: usize| rows.col(i).extend(transform.translation[i]).to_array();

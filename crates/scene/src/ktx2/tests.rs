@@ -1,4 +1,4 @@
-//! Tests that files written by the Basis Universal encoder decode to the same texels as with its transcoder, and that
+//! Tests that files of the Basis Universal encoder decode to the texels of the Basis Universal transcoder, and that
 //! damaged files are rejected or decoded without a panic.
 
 use std::fs;
@@ -40,7 +40,7 @@ fn write_at<const N: usize>(bytes: &mut [u8], offset: usize, value: [u8; N]) {
 /// Replaces the Zstandard frame of a file; the declared size of the texels does not change.
 fn with_frame(frame: &[u8]) -> Vec<u8> {
     let mut bytes = file("zstandard-48x20");
-    let level = long(&bytes, INDEX).unwrap() as usize;
+    let level = read_u64(&bytes, INDEX).unwrap() as usize;
     bytes.truncate(level);
     bytes.extend(frame);
     write_at(&mut bytes, INDEX + 8, (frame.len() as u64).to_le_bytes());
@@ -59,7 +59,7 @@ fn files_decode_to_the_images_of_the_reference_transcoder() {
         assert_eq!(image.color().has_alpha(), has_alpha, "{name}");
         assert!(image.into_rgba8() == reference(name), "{name}");
     }
-    // Checks that different images are not equal.
+    // Checks that the comparison distinguishes different images.
     for [a, b] in [["etc1s-48x20", "zstandard-48x20"], ["etc1s-48x20", "etc1s-48x20-alpha"]] {
         assert!(decoded(&file(a)).unwrap().into_rgba8() != reference(b), "{a} {b}");
     }
@@ -67,7 +67,7 @@ fn files_decode_to_the_images_of_the_reference_transcoder() {
 }
 
 #[test]
-fn prefixes_are_errors() {
+fn truncated_files_are_rejected() {
     for name in names() {
         let bytes = file(&name);
         for length in 0..bytes.len() {
@@ -81,7 +81,7 @@ fn prefixes_are_errors() {
 }
 
 #[test]
-fn headers_are_checked() {
+fn invalid_headers_are_rejected() {
     let format_rule =
         "must contain ETC1S texels with BasisLZ, or UASTC texels with or without Zstandard; it has format ";
     let shape_rule = "must contain one 2D image, not an array, a cube map or a volume";
@@ -133,7 +133,7 @@ fn headers_are_checked() {
     }
     // A file whose only channel is RRR.
     let mut bytes = file("etc1s-48x20");
-    let descriptor = short(&bytes, 48).unwrap() as usize;
+    let descriptor = read_u32(&bytes, 48).unwrap() as usize;
     bytes[descriptor + 31] = 3;
     assert_eq!(
         decoded(&bytes).unwrap_err(),
@@ -143,7 +143,7 @@ fn headers_are_checked() {
 
 #[test]
 fn zstandard_frames_must_have_the_declared_length() {
-    let texels = 48 * 20;
+    let texels = 48 * 20; // also the size in bytes: UASTC has one byte per texel
     // A frame of blocks that repeat a byte (RFC 8878, section 3.1.1).
     let frame = |window: u8, lengths: &[u32]| {
         let mut frame = vec![0x28, 0xb5, 0x2f, 0xfd, 0, window];
@@ -155,7 +155,7 @@ fn zstandard_frames_must_have_the_declared_length() {
         frame
     };
     let error = |frame: &[u8]| decoded(&with_frame(frame)).unwrap_err();
-    // Windows of 1 KiB and 8 MiB are accepted; a window of 16 MiB is rejected below. Zeros are blocks of black texels.
+    // Windows of 1 KiB and 8 MiB are accepted; a window of 16 MiB is rejected below. Blocks of zeros decode to black.
     for frame in [
         frame(0, &[texels]),
         frame(13 << 3, &[texels]),
@@ -179,7 +179,7 @@ fn zstandard_frames_must_have_the_declared_length() {
 }
 
 #[test]
-fn changed_files_are_errors_or_images() {
+fn randomly_changed_files_do_not_panic() {
     let random = |state: &mut u64| {
         *state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
         (*state >> 33) as usize
@@ -207,5 +207,5 @@ fn changed_files_are_errors_or_images() {
             }
         }
     }
-    assert!(images > 500 && errors > 500, "{images} {errors}");
+    assert!(images > 500 && errors > 500, "images: {images}, errors: {errors}");
 }

@@ -8,7 +8,7 @@ use crate::error::SceneError;
 use crate::parse::{NOT_UTF8, encoding, syntax_error};
 use wgray_image::blocking_path;
 
-/// Maximum size of a scene file in bytes: far larger than handwritten files, far smaller than the available memory.
+/// Maximum size of a scene file in bytes, far above the size of handwritten files.
 pub(super) const MAX_FILE_BYTES: u64 = 64 << 20;
 
 /// Returns the folder of a file.

@@ -32,8 +32,8 @@ pub enum SceneFormat {
 }
 
 impl SceneFormat {
-    /// Returns the format that the extension of a file name selects: `.json`, `.gltf`, `.glb`, `.obj`, `.ply` or `.stl`;
-    /// all others are TOML.
+    /// Returns the format that the extension of a file name selects: `.json`, `.gltf`, `.glb`, `.obj`, `.ply` or
+    /// `.stl`. All other extensions select TOML.
     pub fn of(name: &Path) -> SceneFormat {
         match MeshFormat::of(name) {
             Some(format) => SceneFormat::Mesh(format),
@@ -65,7 +65,7 @@ pub struct LoadOptions {
 }
 
 impl Default for LoadOptions {
-    /// Returns options with the name `scene`, without overrides, files, images and meshes.
+    /// Returns options with the name `scene`, without overrides, files, images or meshes.
     fn default() -> LoadOptions {
         LoadOptions {
             name: "scene".to_owned(),
@@ -78,13 +78,13 @@ impl Default for LoadOptions {
 }
 
 impl LoadOptions {
-    /// Returns options with the name `scene`, without overrides, files, images and meshes.
+    /// Returns options with the name `scene`, without overrides, files, images or meshes.
     pub fn new() -> LoadOptions {
         LoadOptions::default()
     }
 
     /// Sets the name of the scene in messages, a relative path. File names in the scene are relative to the folder of
-    /// this path. The extension of the format is appended if the name does not end in it.
+    /// this path. The extension of the format is appended to a name without this extension.
     #[must_use]
     pub fn with_name(self, name: impl Into<String>) -> LoadOptions {
         LoadOptions {
@@ -108,14 +108,14 @@ impl LoadOptions {
         }
     }
 
-    /// Adds an image. Textures of this file name use the image instead of a file.
+    /// Adds an image. Textures with this file name use the image instead of a file.
     #[must_use]
     pub fn with_image(mut self, name: impl Into<String>, image: impl Into<Arc<Image>>) -> LoadOptions {
         self.images.insert(name.into(), image.into());
         self
     }
 
-    /// Adds a mesh. Shapes of this file name use the mesh instead of a file.
+    /// Adds a mesh. Shapes with this file name use the mesh instead of a file.
     #[must_use]
     pub fn with_mesh(mut self, name: impl Into<String>, mesh: impl Into<Arc<Mesh>>) -> LoadOptions {
         self.meshes.insert(name.into(), mesh.into());
@@ -203,11 +203,11 @@ impl Scene {
 /// Returns the path of a scene with the extension of its format.
 fn path_of(name: &str, format: SceneFormat) -> PathBuf {
     let path = Path::new(name);
-    let is_named = match format {
+    let has_extension = match format {
         SceneFormat::Toml => path.extension().is_some_and(|extension| extension == "toml"),
         _ => SceneFormat::of(path) == format,
     };
-    match is_named {
+    match has_extension {
         true => path.to_owned(),
         false => PathBuf::from(format!("{name}.{}", format.extension())),
     }

@@ -12,7 +12,8 @@ pub struct GltfChoice {
     pub scene: Option<Selection>,
     /// The camera; `None` selects the first camera, if the file has cameras.
     pub camera: Option<Selection>,
-    /// A view of the entire model instead of a camera of the file; [`View::Corner`] if the file has no camera.
+    /// A view of the entire model instead of a camera of the file. If `None` and the file has no camera, the view is
+    /// [`View::Corner`].
     pub view: Option<View>,
     /// The time of the animation in seconds.
     pub time: Option<f64>,
@@ -23,7 +24,7 @@ pub struct GltfChoice {
 }
 
 impl GltfChoice {
-    /// Returns the name of the first option that is set, as on the command line.
+    /// Returns the name of the first option that is set.
     pub(crate) fn first_option(&self) -> Option<&'static str> {
         let options = [
             (self.scene.is_some(), "gltf_scene"),

@@ -15,7 +15,7 @@ use crate::gltf::{GltfError, ImportOptions, Imported, ImportedCamera, ModelConte
 use crate::problem::Problem;
 use crate::{Assets, CameraDescription, Description, Framing, GltfDescription, Scene, Selection, framed};
 
-/// Sine of the minimum angle to +z; views at smaller angles count as vertical.
+/// Sine of the minimum angle between a view direction and +z. Views at smaller angles count as vertical.
 const VERTICAL: f64 = 1e-6;
 
 /// Returns true if a file name ends in `.gltf` or `.glb`.
@@ -123,8 +123,8 @@ pub(crate) fn describe(
     Ok((description, imported))
 }
 
-/// Makes orbits horizontal: sets `up` to +z unless the view is vertical. In glTF, `up` is perpendicular to the view
-/// direction.
+/// Makes orbits horizontal: sets `up` to +z unless the view is vertical. The `up` of a glTF camera is perpendicular to
+/// the view direction, so an orbit around this `up` would be tilted.
 fn with_horizontal_orbit(mut camera: CameraDescription) -> CameraDescription {
     let (position, look_at, up) = match &mut camera {
         CameraDescription::Perspective(camera) => (camera.position, camera.look_at, &mut camera.up),
@@ -152,6 +152,7 @@ fn select_camera<'a>(
     found.map(Some).ok_or_else(unknown)
 }
 
+/// Returns the default size of an image with this aspect ratio.
 fn size(aspect: Option<f64>) -> (u32, u32) {
     let side = |ratio: f64| (f64::from(SIDE) * ratio).round().clamp(1.0, f64::from(SIDE)) as u32;
     match aspect {

@@ -1,4 +1,4 @@
-//! Scene files and model files, loaded with overrides and validated to a [`Scene`].
+//! Loads scene files and model files with overrides, and validates them to a [`Scene`].
 
 mod file;
 mod from_slice;
@@ -29,7 +29,7 @@ use crate::{Assets, Description, Scene};
 
 impl Scene {
     /// Loads and validates a scene file. The file name determines the format: `.json` is JSON, `.gltf` and `.glb` are
-    /// glTF, `.obj`, `.ply` and `.stl` are meshes, and everything else is TOML.
+    /// glTF, `.obj`, `.ply` and `.stl` are meshes, and all other files are TOML.
     ///
     /// # Errors
     ///
@@ -47,8 +47,9 @@ impl Scene {
         Scene::load_described(path, overrides).map(|(scene, _)| scene)
     }
 
-    /// Returns the scene of [`Scene::load_with`], and its description with the overrides applied; file names are
-    /// relative to the file's folder. A model file is described as one shape with a camera and lighting.
+    /// Returns the scene of [`Scene::load_with`], and its description with the overrides applied. File names in the
+    /// description are relative to the file's folder. A model file is described as one shape with a camera and
+    /// lighting.
     ///
     /// # Errors
     ///
@@ -180,7 +181,7 @@ fn parse_in_folder(
     PendingScene::read(text, origin, folder, overrides)?.check(files)
 }
 
-/// A parsed scene file that is not validated.
+/// A parsed scene file that is not yet validated.
 pub struct PendingScene<'a> {
     text: &'a str,
     origin: &'a str,
@@ -194,7 +195,7 @@ pub struct PendingScene<'a> {
 }
 
 impl<'a> PendingScene<'a> {
-    /// Parses the text of a file `origin`; file names are relative to `folder`.
+    /// Parses the text of the file `origin`. File names are relative to `folder`.
     pub fn read(
         text: &'a str,
         origin: &'a str,
@@ -216,7 +217,8 @@ impl<'a> PendingScene<'a> {
     }
 
     /// Parses a text that differs from the text of `before` only in the table at the first two segments of `path`.
-    /// Parses only this table if it has its own header. Also returns the locations of the parts if they were found.
+    /// Parses only this table if it has its own header. Also returns the locations of the parts, unless the full text
+    /// is parsed.
     pub fn change(
         text: &'a str,
         origin: &'a str,
@@ -237,7 +239,8 @@ impl<'a> PendingScene<'a> {
             assets: Assets::default(),
             description: change.description,
         };
-        // Overrides outside of the parts are still in effect, unless the rest of the file was parsed again.
+        // Values outside of the parts come from `before`, which contains the overrides, unless their text is parsed
+        // again.
         if change.parsed_rest {
             pending = pending.with_overrides()?;
         }

@@ -1,4 +1,4 @@
-//! Mesh files as scenes: a mesh is described as one shape in a neutral studio, with a camera that frames it.
+//! Mesh files as scenes: a mesh is described as one shape in a neutral studio, with a camera that frames the mesh.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -18,14 +18,15 @@ use crate::{
     is_gltf,
 };
 
-/// Default of the longer side of the image in pixels.
+/// Default length of the longer side of the image in pixels.
 pub(super) const SIDE: u32 = 720;
-/// Default of the samples per pixel.
+/// Default number of samples per pixel.
 const SAMPLES: u32 = 32;
 /// Radiance of the background: middle gray.
 const BACKGROUND: DVec3 = DVec3::splat(0.18);
 
-/// Maximum number of vertices for which the camera frames the vertices; for larger meshes it frames the bounding box.
+/// Maximum number of vertices of a mesh whose vertices the camera frames. For larger meshes, the camera frames the
+/// bounding box.
 const MAX_POINTS: usize = 1 << 20;
 
 /// Extensions of unsupported file types, with advice for the user.
@@ -73,8 +74,8 @@ fn up_axis(format: MeshFormat) -> Up {
 
 /// Rejects files whose extension belongs to a format that cannot be a scene.
 pub(super) fn check_format(path: &Path) -> Result<(), SceneError> {
-    let is_any = |extensions: &[&str]| extensions.iter().any(|extension| has_extension(path, extension));
-    let Some((_, advice)) = UNSUPPORTED.into_iter().find(|(extensions, _)| is_any(extensions)) else {
+    let has_any = |extensions: &[&str]| extensions.iter().any(|extension| has_extension(path, extension));
+    let Some((_, advice)) = UNSUPPORTED.into_iter().find(|(extensions, _)| has_any(extensions)) else {
         return Ok(());
     };
     let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
@@ -169,7 +170,8 @@ pub(super) fn scene(
     description
 }
 
-/// Returns the environment for models that have no lights. The camera sees gray, unless an environment is selected.
+/// Returns the environment for models that have no lights. The camera sees gray, unless the overrides set an
+/// environment.
 pub(super) fn studio(overrides: &Overrides) -> Result<EnvironmentDescription, SceneError> {
     if overrides
         .integrator
@@ -184,7 +186,8 @@ pub(super) fn studio(overrides: &Overrides) -> Result<EnvironmentDescription, Sc
     })
 }
 
-/// Returns the vertices in file coordinates, or the corners of their bounding box if there are many.
+/// Returns the vertices in file coordinates, or the corners of their bounding box if there are more than [`MAX_POINTS`]
+/// vertices.
 fn points(mesh: &Arc<Mesh>) -> Vec<DVec3> {
     match mesh.positions.len() <= MAX_POINTS {
         true => (mesh.positions.iter())

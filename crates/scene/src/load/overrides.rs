@@ -40,7 +40,7 @@ pub struct Overrides {
     /// Frame of an animated camera; `None` uses `[camera]`, and the first key for values that `[camera]` does not set.
     pub frame: Option<f64>,
     /// The environment, for [`Integrator::Path`]; the visibility to the camera is not changed. A file with an absolute
-    /// path may be anywhere.
+    /// path may be outside of the folder of the scene.
     pub environment: Option<EnvironmentDescription>,
     /// The background.
     pub background: Option<Background>,
@@ -53,7 +53,7 @@ pub struct Overrides {
     pub turntable: Option<u32>,
     /// True to report damage to a file as an error, instead of using a placeholder with a warning.
     pub strict: bool,
-    /// Presentation of a model file without a scene.
+    /// Presentation of a model file that is loaded without a scene file.
     pub presentation: Presentation,
     /// The parts of a glTF file to render.
     pub gltf: GltfChoice,
@@ -75,7 +75,7 @@ impl Overrides {
         if self.integrator.is_some() {
             description.render.integrator = self.integrator;
         }
-        // Applied first, because the environment and the background may determine the integrator.
+        // The environment and the background may determine the integrator, on which the following overrides depend.
         if let Some(environment) = &self.environment {
             replace_environment(description, environment);
         }
@@ -199,7 +199,7 @@ impl Overrides {
         if let Some(frame) = self.frame {
             scene.camera = scene.camera_at(frame)?;
         }
-        // A count that equals the default looks like an absent count to the validation.
+        // Validation adds no note for a count that equals the default, because it treats such a count as absent.
         let is_ignored = self.light_samples.is_some() && scene.render.integrator.follows_paths();
         if is_ignored && !scene.notes.iter().any(|note| note.message == LIGHT_SAMPLES) {
             scene.notes.push(LIGHT_SAMPLES.into());

@@ -1,4 +1,4 @@
-//! Meshes built in code, and validated.
+//! Builder of meshes in code, with validation.
 
 use std::sync::Arc;
 
@@ -7,7 +7,7 @@ use glam::{DVec3, Vec2, Vec3, Vec4};
 use super::{Group, Mesh};
 use crate::problem::Problem;
 
-/// Builds a mesh; [`Mesh::builder`] returns it. Lists replace earlier lists of the same kind.
+/// A builder of a mesh; [`Mesh::builder`] creates it. A second call of a method replaces the list of the first call.
 #[derive(Clone, Debug, Default)]
 pub struct MeshBuilder {
     mesh: Mesh,
@@ -28,7 +28,8 @@ impl MeshBuilder {
         self
     }
 
-    /// Sets the origin of the positions, which are precise around it. The default is (0, 0, 0).
+    /// Sets the center, which positions are relative to: rounding errors are smallest near the center. The default is
+    /// (0, 0, 0).
     #[must_use]
     pub fn center(mut self, center: impl Into<DVec3>) -> MeshBuilder {
         self.mesh.center = center.into();
@@ -63,7 +64,7 @@ impl MeshBuilder {
         self
     }
 
-    /// Sets the names of the groups, which can have different materials, and the index of the group of each triangle.
+    /// Sets the names of the groups, which can have different materials, and for each triangle the index of its group.
     #[must_use]
     pub fn groups(mut self, names: &[&str], group_of: &[u32]) -> MeshBuilder {
         let group = |name: &&str| Group {
@@ -75,12 +76,12 @@ impl MeshBuilder {
         self
     }
 
-    /// Validates the mesh. A mesh without groups gets one.
+    /// Validates the mesh. A mesh without groups gets one group.
     ///
     /// # Errors
     ///
-    /// The first violation: there are no triangles, an index does not exist, the length of a list is not the number of
-    /// vertices, or a value is out of range.
+    /// The first violated rule: there are no triangles, an index is out of range, the length of a list is not the
+    /// number of vertices, or a value is out of range.
     pub fn build(self) -> Result<Arc<Mesh>, Problem> {
         let mut mesh = self.mesh;
         if mesh.groups.is_empty() {

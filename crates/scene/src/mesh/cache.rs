@@ -6,15 +6,15 @@ use std::sync::{Arc, PoisonError, RwLock, Weak};
 
 use super::Mesh;
 
-/// Values computed from the mesh that contains the cache, one per type. Comparisons ignore the cache, and clones of it
-/// are empty.
+/// Values computed from the mesh that contains the cache, one per type. Comparisons ignore the cache, and a clone of
+/// the cache is empty.
 #[derive(Debug, Default)]
 pub(super) struct Cache(RwLock<Values>);
 
 #[derive(Debug, Default)]
 struct Values {
-    /// The mesh of the values. While this weak reference exists, `Arc::get_mut` fails, and a mesh that is moved out of
-    /// its `Arc` gets a new address. The values remain valid while the address matches.
+    /// The mesh that the values belong to. While this weak reference exists, `Arc::get_mut` fails, and a mesh that is
+    /// moved out of its `Arc` gets a new address. The values remain valid while the address matches.
     mesh: Weak<Mesh>,
     by_type: HashMap<TypeId, Arc<dyn Any + Send + Sync>>,
 }
@@ -30,7 +30,7 @@ impl Values {
 
 impl Cache {
     /// Returns the value of type `T`, computed on the first call. `mesh` is the mesh that contains the cache. No lock
-    /// is held during the computation, because its threads may use the cache as well.
+    /// is held during the computation, because threads that `compute` starts may use the cache.
     pub fn get_or_init<T: Any + Send + Sync>(&self, mesh: &Arc<Mesh>, compute: impl FnOnce() -> T) -> Arc<T> {
         if let Some(value) = self.0.read().unwrap_or_else(PoisonError::into_inner).get(mesh) {
             return value;

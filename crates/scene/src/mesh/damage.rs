@@ -1,4 +1,4 @@
-//! Defects of mesh files that do not prevent reading: each has a remedy, and a note reports both.
+//! Defects of mesh files that do not prevent reading. A note reports the defect and its remedy.
 
 use super::error::{Location, MeshFault};
 use crate::note::Note;
@@ -15,6 +15,7 @@ pub(super) const EXTRA_VALUES: &str = "the extra values were ignored";
 #[derive(Default)]
 pub(super) struct Defects(Vec<Defect>);
 
+/// Faults with equal remedies.
 struct Defect {
     remedy: &'static str,
     first: MeshFault,
@@ -22,7 +23,7 @@ struct Defect {
 }
 
 impl Defects {
-    /// Records a fault. `fault` is only called for the first fault of each kind.
+    /// Records a fault. `fault` is only called for the first fault with each remedy.
     #[cold]
     pub fn add(&mut self, remedy: &'static str, fault: impl FnOnce() -> MeshFault) {
         match self.0.iter_mut().find(|defect| defect.remedy == remedy) {
@@ -35,7 +36,7 @@ impl Defects {
         }
     }
 
-    /// Returns the first fault of each kind, and one note per kind that counts its faults.
+    /// Returns, for each remedy, the first fault and a note with the number of faults.
     pub fn into_parts(self) -> (Vec<MeshFault>, Vec<Note>) {
         let notes = self.0.iter().map(Defect::note).collect();
         (self.0.into_iter().map(|defect| defect.first).collect(), notes)

@@ -24,7 +24,7 @@ pub enum MeshError {
         path: PathBuf,
         /// Line from 1.
         line: usize,
-        /// The value and the rule.
+        /// The invalid value and the violated rule.
         message: String,
     },
     /// Invalid byte of a binary file.
@@ -32,17 +32,17 @@ pub enum MeshError {
     Byte {
         /// The file.
         path: PathBuf,
-        /// Offset from 0.
+        /// Offset of the byte, from 0.
         offset: usize,
-        /// The value and the rule.
+        /// The invalid value and the violated rule.
         message: String,
     },
-    /// Invalid file.
+    /// Error without a location in the file.
     #[error("{}: {message}", path.display())]
     File {
         /// The file.
         path: PathBuf,
-        /// The value and the rule.
+        /// The violated rule.
         message: String,
     },
 }
@@ -82,7 +82,7 @@ impl MeshError {
 pub(crate) struct MeshFault {
     pub location: Location,
     pub message: String,
-    /// True if the file has no triangles to render.
+    /// True if the fault is that no triangles remain.
     pub is_empty: bool,
 }
 

@@ -68,11 +68,11 @@ pub struct Mesh {
     /// Linear RGB (0 to 1e6) and opacity (0 to 1), or empty.
     pub colors: Vec<Vec4>,
     /// Unit tangents in the direction of u, or empty. `w` is 1 or -1: v increases along w (normal × tangent). A tangent
-    /// of zero is replaced by a tangent from the texture coordinates.
+    /// of zero is replaced by a tangent that is computed from the texture coordinates.
     pub tangents: Vec<Vec4>,
     /// Vertices of the triangles, counter-clockwise as seen from outside.
     pub triangles: Vec<[u32; 3]>,
-    /// Parts with separate materials; at least one part.
+    /// Groups of triangles with separate materials; at least one group.
     pub groups: Vec<Group>,
     /// Group of each triangle; empty for a single group.
     pub group_of: Vec<u32>,
@@ -86,7 +86,7 @@ pub struct Mesh {
     cache: Cache,
 }
 
-/// A part of a mesh.
+/// A group of triangles of a mesh.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub struct Group {
@@ -104,7 +104,7 @@ pub struct Library {
     pub file: PathBuf,
     /// Materials in file order.
     pub materials: Vec<MtlMaterial>,
-    /// The reason if the file was not read.
+    /// The reason why the file was not read; `None` if the file was read.
     pub problem: Option<String>,
 }
 
@@ -170,7 +170,7 @@ impl MtlMaterial {
     }
 }
 
-/// Shading normals of a mesh.
+/// Source of the shading normals of a mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
@@ -179,7 +179,7 @@ pub enum Normals {
     Smooth,
     /// Triangle normals; [`Mesh::normals`] is empty.
     Flat,
-    /// Normals of the file, which must have some.
+    /// Normals of the file. A file without normals is an error.
     File,
 }
 
@@ -193,11 +193,13 @@ impl Mesh {
     ///   each combination of the last `g` or `o` with `usemtl`. Files of `mtllib` are read if they are in the folder
     ///   of the mesh or below. Vertex colors are sRGB. Smoothing groups (`s`), fourth coordinates, lines and curves
     ///   are ignored.
-    /// - The vertices of PLY files are not merged. Vertex colors are sRGB if they are integers, and linear if they are floats.
+    /// - The vertices of PLY files are not merged. Vertex colors are sRGB if they are integers, and linear if they are
+    ///   floats.
     /// - STL files have a vertex for each position, and a group for each `solid`. Facet normals are only used for
     ///   [`Normals::File`]; facets with different normals then have separate vertices.
     ///
-    /// Damaged parts are skipped. [`Mesh::notes`] has warnings about them and about other defects.
+    /// Damaged elements of the file are skipped or replaced. [`Mesh::notes`] contains warnings about damage and other
+    /// defects.
     pub fn load(path: &Path, normals: Option<Normals>) -> Result<Mesh, MeshError> {
         Mesh::load_from(&FileSystem::Disk, path, normals)
     }
@@ -272,8 +274,8 @@ impl Mesh {
         if is_known || self.libraries.len() >= obj::MAX_LIBRARIES {
             return;
         }
-        let read = read_library(file_system, folder, &library.file).and_then(|bytes| mtl::read(&bytes));
-        match read {
+        let result = read_library(file_system, folder, &library.file).and_then(|bytes| mtl::read(&bytes));
+        match result {
             Ok(mtl::Mtl {
                 materials,
                 problems,
@@ -396,8 +398,8 @@ fn read_library(file_system: &FileSystem, folder: &Path, file: &Path) -> Result<
     if !path.starts_with(file_system.canonical_folder(folder).map_err(message)?) {
         return Err("it must be in the folder of the mesh".to_string());
     }
-    let read = file_system.read(&path, MAX_LIBRARY_BYTES);
-    read.map_err(|error| match error.kind() {
+    let result = file_system.read(&path, MAX_LIBRARY_BYTES);
+    result.map_err(|error| match error.kind() {
         io::ErrorKind::FileTooLarge => format!("it must not be larger than {} MiB", MAX_LIBRARY_BYTES >> 20),
         _ => message(error),
     })

@@ -1,5 +1,5 @@
 //! Parser of MTL files, the materials of OBJ files (Wavefront Technologies, "Advanced Visualizer Manual", 1995).
-//! Invalid lines are reported and ignored. Keywords are case-insensitive, as exporters differ.
+//! Invalid lines are reported and ignored. Keywords are case-insensitive, because exporters spell them differently.
 
 use super::MtlMaterial;
 use super::error::{MeshFault, quoted};
@@ -16,7 +16,7 @@ const MAX_IGNORED: usize = 16;
 #[derive(Debug, Default)]
 pub(super) struct Mtl {
     pub materials: Vec<MtlMaterial>,
-    /// The first invalid lines, with the rules.
+    /// Messages about the first invalid lines.
     pub problems: Vec<String>,
     /// Number of invalid lines.
     pub problem_count: usize,
@@ -83,7 +83,7 @@ const KEYWORDS: [(&str, &str); 24] = [
     ("tr", "Tr"),
 ];
 
-/// Applies a line. The error contains the line, the keyword and the rule.
+/// Applies a line. The error contains the line number, the keyword and the rule.
 fn set(material: &mut MtlMaterial, keyword: &[u8], words: &mut Tokens) -> Result<(), String> {
     let is_keyword = |(lower, _): &&(&str, &str)| lower.as_bytes().eq_ignore_ascii_case(keyword);
     let Some((_, keyword)) = KEYWORDS.iter().find(is_keyword) else {
@@ -117,7 +117,7 @@ fn set(material: &mut MtlMaterial, keyword: &[u8], words: &mut Tokens) -> Result
         "Ni" => material.index_of_refraction = Some(finite(words)?),
         "d" => material.opacity = Some(finite(words)?),
         "Tr" => {
-            // A value of 1 counts as opaque: MeshLab writes 1 for opaque materials, and invisible materials would be
+            // `Tr 1` counts as opaque: MeshLab writes 1 for opaque materials, and a fully transparent material would be
             // useless.
             let opacity = 1.0 - finite(words)?;
             if opacity != 0.0 {
@@ -175,7 +175,7 @@ fn map_file(line: &str) -> (String, Vec<String>) {
             _ => 1,
         };
         for i in 0..numbers {
-            // Only the first number is required.
+            // Only the first argument of an option is required.
             if i == 0 || words.peek().is_some_and(|word| word.parse::<f64>().is_ok()) {
                 words.next();
             }

@@ -8,7 +8,7 @@ use hashbrown::{DefaultHashBuilder, HashTable};
 use rayon::prelude::*;
 
 pub(super) struct Adjacency {
-    /// Point of each vertex.
+    /// Index of the point of each vertex.
     pub points: Vec<u32>,
     /// For each point, the start of its triangles in `triangles`.
     starts: Vec<u32>,
@@ -17,7 +17,7 @@ pub(super) struct Adjacency {
 }
 
 impl Adjacency {
-    /// Groups vertices into points. Positions must not contain -0.
+    /// Groups vertices into points. Positions must not contain -0, because their bits are compared.
     pub fn of(positions: &[Vec3], triangles: &[[u32; 3]]) -> Adjacency {
         let (points, count) = points(positions);
         // Stable counting sort of corners by point.
@@ -158,10 +158,10 @@ impl Adjacency {
 pub(super) struct Edges {
     /// Number of edges with more than two triangles.
     pub non_manifold: usize,
-    /// Number of edges that have the same direction in both triangles.
+    /// Number of edges with two triangles in which the edge has the same direction.
     pub inconsistent: usize,
-    /// Triangles with the same points, winding and group as an earlier triangle, unsorted. They do not count as
-    /// triangles of edges.
+    /// Triangles with the same points, winding and group as an earlier triangle, unsorted. The numbers of edges ignore
+    /// these triangles.
     pub duplicates: Vec<u32>,
 }
 
@@ -227,7 +227,8 @@ mod tests {
         // Vertex 4 has the position of vertex 0.
         let triangles = [[0, 1, 2], [0, 2, 3], [1, 2, 4], [2, 0, 1], [3, 0, 2]];
         assert_eq!(irregularities(&triangles, &[]), (0, 0, vec![2, 3, 4]));
-        // Triangles in different groups are not duplicates: two edges with three triangles, and one with four.
+        // Triangles 0 and 2 are not duplicates, because their groups differ. Two of their edges have inconsistent
+        // winding; the third edge, which triangle 1 shares, is not manifold.
         assert_eq!(irregularities(&triangles, &[0, 1, 1, 0, 1]), (1, 2, vec![3, 4]));
         // Triangles with opposite winding are not duplicates.
         assert_eq!(irregularities(&[[0, 1, 2], [2, 1, 0], [1, 2, 0]], &[]), (0, 0, vec![2]));

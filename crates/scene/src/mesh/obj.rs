@@ -1,8 +1,8 @@
 //! Wavefront OBJ files (Wavefront Technologies, "Advanced Visualizer Manual", appendix B, 1995), without smoothing
 //! groups (`s`).
 //!
-//! wgray has its own reader because the crate `tobj` 4 does not join lines at backslashes, reports no lines, and takes
-//! 0.6 s for a million triangles. With this reader, a mesh of this size loads in 0.25 s.
+//! wgray has its own reader because the crate `tobj` 4 does not join lines at backslashes, reports no line numbers, and
+//! takes 0.6 s for a million triangles. With this reader, a mesh of this size loads in 0.25 s.
 
 use std::collections::{BTreeMap, HashMap};
 use std::hash::BuildHasher;
@@ -51,8 +51,9 @@ struct Reader {
     /// The color of each position, or empty.
     colors: Vec<Vec4>,
     vertices: Vertices,
-    /// Corners of the current face.
+    /// Corners of the current face: indices of the position, the texture coordinates and the normal.
     corners: Vec<[u32; 3]>,
+    /// Vertices of the current face.
     face: Vec<u32>,
     raw: RawMesh,
     group_indices: HashMap<Group, u32>,
@@ -195,17 +196,17 @@ impl Reader {
     /// Returns the position, texture coordinate and normal indices of a corner. The error is the value and the rule.
     #[inline]
     fn corner(&mut self, word: &[u8], location: Location) -> Result<[u32; 3], String> {
-        let mut parts = [&word[..0]; 3];
-        for (i, part) in word.split(|byte| *byte == b'/').enumerate() {
-            match parts.get_mut(i) {
-                Some(slot) => *slot = part,
+        let mut fields = [&word[..0]; 3];
+        for (i, field) in word.split(|byte| *byte == b'/').enumerate() {
+            match fields.get_mut(i) {
+                Some(slot) => *slot = field,
                 None => return Err(invalid_corner(word)),
             }
         }
-        let [position, uv, normal] = parts;
-        let index = |part: &[u8], count: usize, kind: &str| match part {
+        let [position, uv, normal] = fields;
+        let index = |field: &[u8], count: usize, kind: &str| match field {
             [] => Ok(NONE),
-            _ => index(part, count, kind).unwrap_or_else(|| Err(invalid_corner(word))),
+            _ => index(field, count, kind).unwrap_or_else(|| Err(invalid_corner(word))),
         };
         if position.is_empty() {
             return Err(invalid_corner(word));
@@ -298,10 +299,10 @@ fn check_count(count: usize, words: &Tokens) -> Result<(), MeshFault> {
     }
 }
 
-/// Parses an index into `count` elements and returns it counted from 0; `None` if the text is not an integer.
+/// Parses an index into `count` elements, and returns the index counted from 0; `None` if the text is not an integer.
 #[inline]
-fn index(part: &[u8], count: usize, kind: &str) -> Option<Result<u32, String>> {
-    let (is_negative, digits) = match part {
+fn index(text: &[u8], count: usize, kind: &str) -> Option<Result<u32, String>> {
+    let (is_negative, digits) = match text {
         [b'-', digits @ ..] => (true, digits),
         digits => (false, digits),
     };
@@ -324,7 +325,7 @@ fn index(part: &[u8], count: usize, kind: &str) -> Option<Result<u32, String>> {
             "{kind} 0 of the face does not exist; indices count from 1, or from -1 backwards"
         )),
         (false, _) => {
-            let number = String::from_utf8_lossy(&part[..part.len().min(30)]);
+            let number = String::from_utf8_lossy(&text[..text.len().min(30)]);
             Err(format!(
                 "{kind} {number} of the face does not exist; defined so far: {count}"
             ))
@@ -339,8 +340,9 @@ fn invalid_corner(word: &[u8]) -> String {
 
 #[derive(Default)]
 struct Vertices {
+    /// For each vertex, the indices of the position, the texture coordinates and the normal.
     corners: Vec<[u32; 3]>,
-    /// The first vertex of each position; [`NONE`] if it has no vertices.
+    /// The first vertex of each position; [`NONE`] if the position has no vertices.
     first: Vec<u32>,
     vertices_by_corner: HashTable<u32>,
     hasher: DefaultHashBuilder,

@@ -158,8 +158,8 @@ const COLUMNS: [&[&str]; 12] = [
     &["alpha"],
 ];
 
-/// Converts a color component to linear RGB, or an opacity. Integers are normalized, and color components are then
-/// decoded from sRGB (IEC 61966-2-1). Floats are not changed.
+/// Converts a component of a vertex color. Integers are normalized; then red, green and blue are decoded from sRGB
+/// (IEC 61966-2-1). Floats are linear, and are not changed.
 fn color_value(value: f64, scalar: Scalar, is_opacity: bool) -> f32 {
     let Some(max_value) = scalar.max_value() else {
         return value as f32;

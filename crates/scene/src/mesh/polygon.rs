@@ -1,8 +1,9 @@
 //! Triangulation of polygons.
 //!
-//! Readers store each polygon as a fan from its first corner. A fan that extends outside of the polygon is replaced by
-//! ear clipping in the polygon's plane. The normal of the plane is Newell's normal, the sum of the fan's cross products
-//! (Tampieri, "Newell's Method for Computing the Plane Equation of a Polygon", Graphics Gems III, 1992).
+//! Readers store each polygon as a fan of triangles from its first corner. If the fan extends outside of the polygon,
+//! ear clipping in the polygon's plane replaces the triangles. The normal of the plane is Newell's normal, the sum of
+//! the fan's cross products (Tampieri, "Newell's Method for Computing the Plane Equation of a Polygon", Graphics Gems
+//! III, 1992).
 
 use earcut::Earcut;
 use glam::DVec3;
@@ -14,7 +15,8 @@ use super::raw_mesh::{RawMesh, counted};
 const AREA_TOLERANCE: f64 = 1e-6;
 /// Maximum deviation of a planar polygon's corners from the plane, relative to the distance of the farthest corner.
 const PLANE_TOLERANCE: f64 = 0.05;
-/// Maximum length of Newell's normal, relative to the fan's cross products, of a polygon whose parts cancel.
+/// Maximum length of Newell's normal of a polygon whose signed areas cancel, relative to the root of the sum of the
+/// squared cross products of the fan.
 const CANCELLATION: f64 = 1e-6;
 /// Maximum number of corners for ear clipping, which takes quadratic time at worst.
 const MAX_CORNERS: usize = 1 << 14;
@@ -24,39 +26,40 @@ const MAX_CORNERS: usize = 1 << 14;
 pub(super) struct Polygon {
     /// The fan's first triangle.
     pub first: u32,
+    /// Number of triangles of the fan.
     pub count: u32,
 }
 
 /// Properties of a polygon that determine the triangulation.
-struct Form {
+struct PolygonTraits {
     normal: DVec3,
-    /// A corner has no position.
+    /// A corner has a non-finite position.
     is_damaged: bool,
     /// The fan extends outside of the polygon.
     is_concave: bool,
-    /// The areas of the polygon's parts cancel, so the polygon has no plane.
+    /// The signed areas of the fan's triangles cancel, so the polygon has no plane.
     cancels: bool,
     is_planar: bool,
 }
 
 /// Replaces the fans of concave polygons, and adds notes about polygons without a unique triangulation.
 pub(super) fn triangulate(raw: &mut RawMesh) {
-    let forms: Vec<Form> = (raw.polygons.par_iter())
-        .map(|polygon| form(fan(&raw.triangles, polygon), &raw.positions))
+    let all_traits: Vec<PolygonTraits> = (raw.polygons.par_iter())
+        .map(|polygon| polygon_traits(fan(&raw.triangles, polygon), &raw.positions))
         .collect();
     let mut clipper = Clipper::default();
     let (mut non_planar, mut self_intersecting, mut too_large) = (0, 0, 0);
-    for (polygon, form) in raw.polygons.iter().zip(&forms) {
+    for (polygon, traits) in raw.polygons.iter().zip(&all_traits) {
         let (first, count) = (polygon.first as usize, polygon.count as usize);
         let fan = &mut raw.triangles[first..first + count];
-        non_planar += usize::from(!form.is_planar);
-        if form.is_damaged {
+        non_planar += usize::from(!traits.is_planar);
+        if traits.is_damaged {
             mark_damaged(fan, &raw.positions);
-        } else if form.cancels {
+        } else if traits.cancels {
             self_intersecting += 1;
-        } else if form.is_concave && count + 2 > MAX_CORNERS {
+        } else if traits.is_concave && count + 2 > MAX_CORNERS {
             too_large += 1;
-        } else if form.is_concave && !clipper.clip(fan, form.normal, &raw.positions) {
+        } else if traits.is_concave && !clipper.clip(fan, traits.normal, &raw.positions) {
             self_intersecting += 1;
         }
     }
@@ -86,7 +89,7 @@ fn fan<'a>(triangles: &'a [[u32; 3]], polygon: &Polygon) -> &'a [[u32; 3]] {
     &triangles[polygon.first as usize..][..polygon.count as usize]
 }
 
-fn form(fan: &[[u32; 3]], positions: &[DVec3]) -> Form {
+fn polygon_traits(fan: &[[u32; 3]], positions: &[DVec3]) -> PolygonTraits {
     let first = positions[fan[0][0] as usize];
     let from_first = |vertex: u32| positions[vertex as usize] - first;
     let cross = |[_, a, b]: &[u32; 3]| from_first(*a).cross(from_first(*b));
@@ -101,7 +104,7 @@ fn form(fan: &[[u32; 3]], positions: &[DVec3]) -> Form {
         .fold((0.0_f64, 0.0_f64), |(low, high), height| {
             (low.min(height), high.max(height))
         });
-    Form {
+    PolygonTraits {
         normal,
         is_damaged: !first.is_finite() || corners().any(|corner| !corner.is_finite()),
         is_concave: outside < -AREA_TOLERANCE * square,
@@ -110,7 +113,7 @@ fn form(fan: &[[u32; 3]], positions: &[DVec3]) -> Form {
     }
 }
 
-/// Makes all triangles of a fan refer to the corner without a position, so that the entire face is removed.
+/// Makes all triangles of a fan refer to a corner with a non-finite position, so that the entire face is removed.
 fn mark_damaged(fan: &mut [[u32; 3]], positions: &[DVec3]) {
     let is_invalid = |vertex: &u32| !positions[*vertex as usize].is_finite();
     if let Some(invalid) = fan.iter().flatten().copied().find(is_invalid) {
@@ -127,8 +130,8 @@ struct Clipper {
 }
 
 impl Clipper {
-    /// Replaces a fan by the triangles of the polygon. Returns false if the polygon intersects itself; the triangles
-    /// then do not cover its area exactly.
+    /// Replaces a fan by the result of ear clipping. Returns false if the polygon intersects itself: then the triangles
+    /// do not cover the area of the polygon exactly.
     fn clip(&mut self, fan: &mut [[u32; 3]], normal: DVec3, positions: &[DVec3]) -> bool {
         self.corners.clear();
         self.corners.extend([fan[0][0], fan[0][1]]);
@@ -152,7 +155,7 @@ impl Clipper {
             let [a, b, c] = [triangle[0], triangle[1], triangle[2]];
             let area = area(point(a), point(b), point(c));
             covered += area.abs();
-            // Counter-clockwise, like the polygon.
+            // Reorders the corners to counter-clockwise, the winding of the polygon.
             let ordered = if area < 0.0 { [a, c, b] } else { [a, b, c] };
             ordered.map(|i| self.corners[i as usize])
         });

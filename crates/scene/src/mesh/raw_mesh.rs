@@ -1,4 +1,4 @@
-//! Mesh data as read from a file of any format, before it is checked and triangulated.
+//! Mesh data of a file of any format, before triangulation and the removal of degenerate triangles.
 
 use crate::note::Note;
 use glam::{DVec3, Vec2, Vec3, Vec4};
@@ -41,8 +41,7 @@ impl RawMesh {
         }
     }
 
-    /// Builds the mesh with its normals; `None` if the mesh has zero area. The error is the message of the violated
-    /// constraint.
+    /// Builds the mesh with its normals; `None` if all triangles have zero area. The error is the violated rule.
     pub(crate) fn finish(self) -> Result<Option<Mesh>, String> {
         match build::build_mesh(self, None) {
             Ok(mesh) => Ok(Some(mesh)),
@@ -102,6 +101,6 @@ pub(crate) fn unit(normal: DVec3) -> Vec3 {
     if !(largest > 0.0 && normal.is_finite()) {
         return Vec3::ZERO;
     }
-    // Scaled first, because squares can overflow or underflow.
+    // Scaled before normalization, because the squares of the components can overflow or underflow.
     (normal / largest).normalize().as_vec3()
 }

@@ -1,8 +1,8 @@
 //! STL files (3D Systems, "StereoLithography Interface Specification", 1989), with merged vertices.
 //!
 //! wgray has its own reader because the crate `stl_io` 0.11 reads only one solid of a text file, reports no line
-//! numbers, and treats every file that begins with `solid` as text. It is not much faster: for a million triangles, the
-//! crate takes 0.3 s without merging, and loading with this reader takes 0.4 s.
+//! numbers, and treats every file that begins with `solid` as text. The crate is not much faster: for a million
+//! triangles, it takes 0.3 s without merging vertices; loading with this reader takes 0.4 s.
 
 use std::hash::BuildHasher;
 
@@ -15,8 +15,9 @@ use super::error::{Location, MeshFault, quoted};
 use super::raw_mesh::{RawMesh, coordinate, counted, unit};
 use super::tokens::Tokens;
 
-/// Sizes in bytes: the binary header, which ends with the triangle count, and a triangle.
+/// Size in bytes of the header of a binary file. The header ends with the triangle count.
 const HEADER: usize = 84;
+/// Size in bytes of a triangle of a binary file.
 const TRIANGLE: usize = 50;
 
 pub(super) fn read(bytes: &[u8], with_normals: bool) -> Result<RawMesh, MeshFault> {
@@ -32,7 +33,7 @@ pub(super) fn read(bytes: &[u8], with_normals: bool) -> Result<RawMesh, MeshFaul
         ..Facets::default()
     };
     match size {
-        // Detected by size, because binary files may also begin with "solid".
+        // Binary files are detected by their size, because they may also begin with "solid".
         Some(size) if size == bytes.len() as u64 || (!is_text && size < bytes.len() as u64) => {
             binary(&bytes[HEADER..size as usize], &mut facets)?;
             let extra = bytes.len() as u64 - size;
@@ -144,7 +145,7 @@ fn expect(words: &mut Tokens, keyword: &str) -> Result<(), MeshFault> {
     }
 }
 
-/// Triangles, in which bitwise equal vertices are shared.
+/// The mesh under construction; triangles share bitwise equal vertices.
 #[derive(Default)]
 struct Facets {
     with_normals: bool,

@@ -21,10 +21,10 @@ const MIN_TANGENT_COSINE: f64 = 0.5;
 /// Tolerance for integer offsets between texture coordinates, because files contain rounded coordinates.
 const INTEGER_TOLERANCE: f64 = 1e-4;
 
-/// Tangents of a mesh; vertices that are shared by plain and mirrored triangles are split.
+/// Tangents of a mesh. Vertices that triangles with a mirrored texture share with unmirrored triangles are split.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct VertexTangents {
-    /// Triangles; mirrored triangles use the copies.
+    /// Triangles of the mesh; mirrored triangles use the copies of split vertices.
     pub triangles: Vec<[u32; 3]>,
     /// The original vertex of each copy; copies are numbered after all vertices.
     pub copies: Vec<u32>,
@@ -42,7 +42,7 @@ pub struct Tangents {
 }
 
 impl VertexTangents {
-    /// Returns the tangents; `None` if the mesh is flat or lacks texture coordinates.
+    /// Returns the tangents; `None` if the mesh has no normals or no texture coordinates.
     pub fn of(mesh: &Mesh) -> Option<VertexTangents> {
         if mesh.uvs.is_empty() || mesh.normals.is_empty() {
             return None;
@@ -86,19 +86,19 @@ fn from_gltf(tangent: Vec4, normal: Vec3) -> Option<Tangents> {
     })
 }
 
-/// Returns twice the area in texture space, negative if mirrored.
+/// Returns twice the area of a triangle in texture space; negative if the texture is mirrored.
 fn texture_area([a, b, c]: [DVec2; 3]) -> f64 {
     (b - a).perp_dot(c - a)
 }
 
-/// Splits vertices that are shared by plain and mirrored triangles. Returns the triangles, and the original vertex of
-/// each copy.
+/// Splits vertices that mirrored triangles share with unmirrored triangles. Returns the triangles, and the original
+/// vertex of each copy.
 fn split_mirrored(mesh: &Mesh) -> (Vec<[u32; 3]>, Vec<u32>) {
-    const PLAIN: u8 = 1;
+    const UNMIRRORED: u8 = 1;
     const MIRRORED: u8 = 2;
     let handedness =
         |triangle: &[u32; 3]| match texture_area(triangle.map(|vertex| mesh.uvs[vertex as usize].as_dvec2())) {
-            area if area > 0.0 => PLAIN,
+            area if area > 0.0 => UNMIRRORED,
             area if area < 0.0 => MIRRORED,
             _ => 0,
         };
@@ -113,7 +113,7 @@ fn split_mirrored(mesh: &Mesh) -> (Vec<[u32; 3]>, Vec<u32>) {
     let mut copy_of = vec![0; vertex_handedness.len()];
     for (vertex, handedness) in vertex_handedness.iter().enumerate() {
         let has_tangent = (mesh.tangents.get(vertex)).is_some_and(|t| from_gltf(*t, mesh.normals[vertex]).is_some());
-        if *handedness == PLAIN | MIRRORED && !has_tangent {
+        if *handedness == UNMIRRORED | MIRRORED && !has_tangent {
             copy_of[vertex] = (vertex_handedness.len() + copies.len()) as u32;
             copies.push(vertex as u32);
         }
@@ -177,7 +177,7 @@ impl Sum {
     }
 }
 
-/// Returns the contribution of corner k; `None` if the triangle has no area in texture space.
+/// Returns the contribution of corner `k` of a triangle; `None` if the triangle has no area in texture space.
 fn corner_contribution(mesh: &Mesh, triangle: [u32; 3], k: usize, vertex: u32) -> Option<Sum> {
     let corners = [0, 1, 2].map(|i| triangle[(k + i) % 3] as usize);
     let [p, next, previous] = corners.map(|corner| mesh.positions[corner].as_dvec3());

@@ -1,4 +1,4 @@
-//! Tokenizer of text formats: words and their lines.
+//! Tokenizer of text formats: words with their line numbers.
 
 use std::borrow::Cow;
 
@@ -17,8 +17,8 @@ pub(super) fn utf8(bytes: &[u8]) -> Cow<'_, [u8]> {
     Cow::Owned(text.into_bytes())
 }
 
-/// A text of words between blanks. `#` at the start of a word begins a comment. A backslash at the end of a line joins
-/// the next line.
+/// A text, which is split into words at blanks. `#` at the start of a word begins a comment. A backslash at the end of
+/// a line joins the next line to the line.
 pub(super) struct Tokens<'a> {
     bytes: &'a [u8],
     offset: usize,
@@ -45,7 +45,7 @@ impl<'a> Tokens<'a> {
         self.find_on_line().then(|| self.take_word())
     }
 
-    /// Advances to the next word of the line; false if none.
+    /// Advances to the next word of the line. Returns false if the line has no further word.
     #[inline]
     fn find_on_line(&mut self) -> bool {
         loop {
@@ -95,7 +95,7 @@ impl<'a> Tokens<'a> {
         self.find_next_word().then(|| self.take_word())
     }
 
-    /// Advances to the next word; false at the end.
+    /// Advances to the next word. Returns false at the end of the text.
     #[inline]
     pub fn find_next_word(&mut self) -> bool {
         while !self.find_on_line() {
@@ -122,7 +122,7 @@ impl<'a> Tokens<'a> {
         }
     }
 
-    /// Advances to the next line; false at the end of the file.
+    /// Advances to the next line. Returns false at the end of the text.
     #[inline]
     pub fn next_line(&mut self) -> bool {
         while self.next_on_line().is_some() {}

@@ -62,6 +62,7 @@ impl Description {
     }
 }
 
+/// The description of a changed text, and the locations of its parts.
 pub struct Change {
     pub description: Description,
     /// True if the text outside of the parts was parsed again.

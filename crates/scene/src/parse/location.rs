@@ -29,6 +29,7 @@ pub fn line_of_path(text: &str) -> usize {
     line_number(text, Keys::of(text).offset(&path))
 }
 
+/// A parsed text with the locations of its keys.
 enum Keys<'a> {
     Document(DeValue<'a>),
     /// The parts of a text that is too large to parse as a whole.
@@ -43,7 +44,7 @@ impl<'a> Keys<'a> {
         }
     }
 
-    /// Returns the byte offset of the key at a path, or of the innermost existing table that would contain it.
+    /// Returns the byte offset of the key at a path, or of the innermost existing table that would contain the key.
     fn offset(&self, path: &KeyPath) -> usize {
         let parts = match self {
             Keys::Document(document) => return offset_in(document, path),

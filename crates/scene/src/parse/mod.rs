@@ -69,6 +69,7 @@ pub fn is_json_scene(name: &Path) -> bool {
     extension.is_some_and(|extension| extension.eq_ignore_ascii_case("json"))
 }
 
+/// The sections of a scene file, whose keys are not yet parsed.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Sections {
@@ -152,7 +153,7 @@ fn with_section(problem: Problem) -> Problem {
     let [Segment::Key(key)] = problem.key.0.as_slice() else {
         return problem;
     };
-    // Names of options, and names that other renderers use.
+    // Replaces names of options, and names that other renderers use.
     let name = match key.as_str() {
         "spp" | "samples" => "pixel_samples",
         "bounces" | "depth" => "max_depth",
@@ -185,23 +186,23 @@ fn read_camera(mut camera: Table) -> Read<CameraDescription> {
     if let Some(Value::Table(path)) = camera.get("path") {
         // The path is parsed first, so that errors in keys are reported at the keys.
         let path: CameraPathDescription = read(path.clone()).at("path")?;
-        let point = |point: DVec3| Value::from(point.to_array().to_vec());
-        let first =
-            |value_of: fn(&CameraKeyDescription) -> Option<DVec3>| path.keys.iter().find_map(value_of).map(point);
+        let to_value = |point: DVec3| Value::from(point.to_array().to_vec());
+        let first_point =
+            |value_of: fn(&CameraKeyDescription) -> Option<DVec3>| path.keys.iter().find_map(value_of).map(to_value);
         let points = [
-            ("position", first(|key| key.position)),
-            ("look_at", first(|key| key.look_at)),
-            ("up", first(|key| key.up)),
+            ("position", first_point(|key| key.position)),
+            ("look_at", first_point(|key| key.look_at)),
+            ("up", first_point(|key| key.up)),
         ];
-        let number =
+        let first_number =
             |value_of: fn(&CameraKeyDescription) -> Option<f64>| path.keys.iter().find_map(value_of).map(Value::from);
         let mut numbers = match camera.get("type").and_then(Value::as_str) {
-            Some("orthographic") => vec![("height", number(|key| key.height))],
+            Some("orthographic") => vec![("height", first_number(|key| key.height))],
             Some("panorama") => vec![],
             _ => vec![
-                ("fov", number(|key| key.fov)),
-                ("focus_distance", number(|key| key.focus_distance)),
-                ("aperture", number(|key| key.aperture)),
+                ("fov", first_number(|key| key.fov)),
+                ("focus_distance", first_number(|key| key.focus_distance)),
+                ("aperture", first_number(|key| key.aperture)),
             ],
         };
         if camera.contains_key("f_number") {
@@ -262,9 +263,9 @@ fn read_parts(parts: &Parts, defines: &mut Defines) -> Result<Option<Result<Desc
         let [kind, name_or_index] = path;
         problems.values(read.at(name_or_index).at(kind));
     }
-    let has = |kind: Kind| parts.parts.iter().any(|part| part.kind == kind);
+    let has_parts = |kind: Kind| parts.parts.iter().any(|part| part.kind == kind);
     let mut rest = rest?;
-    let is_in_parts = |key: &str| Kind::ALL.into_iter().any(|kind| kind.name() == key && has(kind));
+    let is_in_parts = |key: &str| Kind::ALL.into_iter().any(|kind| kind.name() == key && has_parts(kind));
     if let Err(problem) = defines.apply(&[], &mut rest, is_in_parts) {
         return Ok(Some(Err(problem.into())));
     }
@@ -274,22 +275,22 @@ fn read_parts(parts: &Parts, defines: &mut Defines) -> Result<Option<Result<Desc
     let part_problems = problems.end(());
     let read = both(part_problems, read_file(rest)).map(|((), mut description)| {
         // The elements of a section are either all in the parts or all in the rest.
-        if has(Kind::Textures) {
+        if has_parts(Kind::Textures) {
             description.textures = textures;
         }
-        if has(Kind::Materials) {
+        if has_parts(Kind::Materials) {
             description.materials = materials;
         }
-        if has(Kind::Lights) {
+        if has_parts(Kind::Lights) {
             description.lights = lights;
         }
-        if has(Kind::Shapes) {
+        if has_parts(Kind::Shapes) {
             description.shapes = shapes;
         }
-        if has(Kind::Meshes) {
+        if has_parts(Kind::Meshes) {
             description.meshes = meshes;
         }
-        if has(Kind::Instances) {
+        if has_parts(Kind::Instances) {
             description.instances = instances;
         }
         description
@@ -303,17 +304,17 @@ fn read_map<T>(tables: BTreeMap<String, Table>, read: fn(Table) -> Read<T>) -> R
         let value = problems.values(read(table).at(name.as_str()))?;
         Some((name, value))
     };
-    let all = tables.into_iter().filter_map(read).collect();
-    problems.end(all)
+    let values = tables.into_iter().filter_map(read).collect();
+    problems.end(values)
 }
 
 fn read_list<T>(tables: Vec<Table>, read: fn(Table) -> Read<T>) -> Result<Vec<T>, Problems> {
     let mut problems = Collector::default();
     let tables = tables.into_iter().enumerate();
-    let all = tables
+    let values = tables
         .filter_map(|(i, table)| problems.values(read(table).at(i)))
         .collect();
-    problems.end(all)
+    problems.end(values)
 }
 
 #[cfg(test)]

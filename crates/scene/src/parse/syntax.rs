@@ -16,6 +16,7 @@ pub fn encoding(bytes: &[u8]) -> Option<String> {
     Some(format!("the file is encoded in {name}; save it as UTF-8"))
 }
 
+/// Returns a syntax error at a byte offset in a text.
 pub fn syntax_error(text: &str, origin: &str, offset: usize, message: &str) -> SceneError {
     let offset = text.floor_char_boundary(offset);
     SceneError::Syntax {
@@ -141,7 +142,7 @@ fov = 45
     }
 
     #[test]
-    fn any_text_is_explained_without_panic() {
+    fn arbitrary_text_causes_no_panic() {
         let texts = [
             "=", "[", "]", "é", "'", "\"", ",", ".", "#", "\n", "\r", "0", "a", " ", "{", "}", "\u{feff}", "\0",
         ];

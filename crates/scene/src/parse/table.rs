@@ -120,10 +120,10 @@ pub(super) fn remove(table: &mut Table, path: &[Segment]) -> bool {
     inner.is_some_and(|inner| inner.remove(key).is_some())
 }
 
-/// Maximum number of keys in a message; no table has more.
+/// Maximum number of keys in a message; no table has more keys.
 const MAX_KEYS: usize = 64;
 
-/// Formats a value as TOML on one line, truncated if it is long.
+/// Formats a value as TOML on one line, truncated if the text is long.
 fn show(value: &Value) -> String {
     cut(&value.to_string().replace('\n', " ")).into_owned()
 }
@@ -149,8 +149,8 @@ fn list_names(error: ReadError, table: &Table, read: impl Fn(Table) -> Option<Re
         Value::Table(table) => read(table),
         _ => None,
     };
-    let is_same = |listing: &ReadError| listing.path().to_string() == error.path().to_string();
-    listing.filter(is_same).unwrap_or(error)
+    let has_same_path = |listing: &ReadError| listing.path().to_string() == error.path().to_string();
+    listing.filter(has_same_path).unwrap_or(error)
 }
 
 /// End of serde's message about a value that must name a variant.
@@ -171,12 +171,12 @@ fn explain(error: ReadError, table: &Table, is_tagged: bool, integrator: Integra
     };
     let is_unknown_key = message.starts_with("unknown field");
     let message = if is_unknown_key {
-        // The first name is the key.
+        // The first quoted name is the unknown key.
         let names = quoted(message).into_iter().skip(1);
         let type_key = (is_tagged && path.len() == 1).then(|| "type".to_owned());
         let names: Vec<String> = type_key.into_iter().chain(names).collect();
         let hint = match path.last() {
-            Some(Segment::Key(wrong)) => suggest::hint(wrong, names.iter().map(String::as_str)),
+            Some(Segment::Key(unknown)) => suggest::hint(unknown, names.iter().map(String::as_str)),
             _ => String::new(),
         };
         match hint.is_empty() {

@@ -301,7 +301,7 @@ fn truncated_scenes_do_not_panic() {
 }
 
 #[test]
-fn a_scene_written_and_read_back_is_the_same() {
+fn a_serialized_scene_parses_to_the_same_description() {
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenes");
     let mut count = 0;
     for entry in std::fs::read_dir(folder).unwrap() {
@@ -336,7 +336,7 @@ fn the_example_of_the_page_is_a_scene() {
     assert_eq!(scene.shapes.len(), 1);
 }
 
-/// A section of the page, without subsections.
+/// Returns a section of the page, without its subsections.
 fn section(heading: &str) -> &'static str {
     let (_, rest) = PAGE
         .split_once(&format!("\n{heading}\n"))
@@ -344,7 +344,7 @@ fn section(heading: &str) -> &'static str {
     rest.split("\n#").next().unwrap()
 }
 
-/// Names, with quotes, in the first column of a section's tables.
+/// Returns the names in the first column of a section's tables, with their quotes.
 fn rows(heading: &str) -> Vec<&'static str> {
     let lines = section(heading).lines();
     let names = lines.filter_map(|line| Some(line.strip_prefix("| `")?.split_once('`')?.0));
@@ -392,7 +392,7 @@ fn the_page_has_every_key() {
 }
 
 #[test]
-fn the_page_has_the_defaults_of_a_render() {
+fn the_page_has_the_defaults_of_the_render_settings() {
     let lines = section("## `[render]`").lines();
     let cells = lines.filter_map(|line| Some(line.strip_prefix("| `")?.split('|')));
     let text: String = cells
@@ -482,7 +482,7 @@ fn sample_counts_can_be_numbers_or_tables() {
         let message = scene(line).unwrap_err();
         assert!(message.starts_with(rule), "{message}\n{rule}");
     }
-    let define = |define: &str| {
+    let samples_with = |define: &str| {
         let overrides = Overrides {
             define: vec![define.parse().unwrap()],
             ..Overrides::default()
@@ -495,9 +495,12 @@ fn sample_counts_can_be_numbers_or_tables() {
             .pixel_samples;
         (samples.pattern, samples.count)
     };
-    assert_eq!(define("render.pixel_samples.count=4"), (Pattern::Grid, 4));
-    assert_eq!(define("render.pixel_samples.pattern=halton"), (Pattern::Halton, 36));
-    assert_eq!(define("render.pixel_samples=9"), (Pattern::Grid, 9));
+    assert_eq!(samples_with("render.pixel_samples.count=4"), (Pattern::Grid, 4));
+    assert_eq!(
+        samples_with("render.pixel_samples.pattern=halton"),
+        (Pattern::Halton, 36)
+    );
+    assert_eq!(samples_with("render.pixel_samples=9"), (Pattern::Grid, 9));
 }
 
 #[test]

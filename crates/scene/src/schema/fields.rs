@@ -34,7 +34,7 @@ pub struct Field {
     /// Minimum and maximum of the numbers.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub range: Option<(f64, f64)>,
-    /// Range of invalid values, both ends excluded.
+    /// Open interval of invalid values within `range`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gap: Option<(f64, f64)>,
     /// True if the value must be a square number.
@@ -50,7 +50,7 @@ pub struct Field {
     pub about: String,
     /// True if the key must not be removed.
     pub required: bool,
-    /// The reason if the value cannot be edited.
+    /// The reason why the value cannot be edited, if any.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fixed: Option<String>,
 }
@@ -88,7 +88,7 @@ pub struct Names {
 
 /// Maximum number of names in [`Field::choices`].
 const MAX_CHOICES: usize = 200;
-/// Maximum number of elements with fields in a list of lists or tables.
+/// Maximum number of elements of a list of lists or tables for which fields are created.
 const MAX_ELEMENTS: usize = 32;
 
 impl Names {
@@ -123,7 +123,8 @@ impl Names {
     }
 }
 
-/// Returns the fields of an object (`[shapes, 3]`, `[camera]`) with this table; no fields for other values.
+/// Returns the fields of an object, such as `[shapes, 3]` or `[camera]`, whose value is `table`. An object without a
+/// schema has no fields.
 pub fn fields(object: &KeyPath, table: &Value, names: &Names) -> Vec<Field> {
     static SCHEMA: OnceLock<Json> = OnceLock::new();
     let root = SCHEMA.get_or_init(file_schema);
@@ -205,10 +206,11 @@ impl FieldList<'_> {
             Some("string") => self.add_field(Kind::Text, chosen, path, &context),
             _ => {}
         }
-        // A number that may also be arbitrary text has no slider.
-        let is_free = |branch: &&Json| branch.get("type") == Some(&json!("string")) && branch.get("enum").is_none();
+        // A value that may also be arbitrary text cannot be edited.
+        let is_free_text =
+            |branch: &&Json| branch.get("type") == Some(&json!("string")) && branch.get("enum").is_none();
         if branches.len() > 1
-            && branches.iter().any(is_free)
+            && branches.iter().any(is_free_text)
             && let Some(field) = self.fields.last_mut()
             && field.path == KeyPath(path.clone()).exact()
         {
@@ -223,7 +225,7 @@ impl FieldList<'_> {
             if key_schema.get("const").is_some() {
                 continue; // `type`
             }
-            // A missing table can only be created if a single key suffices.
+            // Setting a key of a missing table creates the table, so no other key may be required.
             if table.is_none() && required.iter().any(|name| name != key) {
                 continue;
             }
@@ -350,7 +352,8 @@ impl FieldList<'_> {
     }
 }
 
-/// Returns the keys that must not be removed from a table: the keys that all satisfied alternatives require.
+/// Returns the keys that must not be removed from a table: the keys that the schema requires, and the keys that all
+/// satisfied alternatives of `anyOf` require.
 fn required_keys<'a>(schema: &'a Json, table: Option<&Table>) -> Vec<&'a str> {
     let keys_of = |schema: &'a Json| -> Vec<&'a str> {
         let list = schema.get("required").and_then(Json::as_array).into_iter().flatten();
@@ -387,9 +390,9 @@ impl Field {
         if let Some(reason) = &self.fixed {
             return Err(reason.clone());
         }
-        let number = |edited: &Json| edited.as_f64().filter(|x| x.is_finite()).map(Value::from);
-        let found = match self.kind {
-            Kind::Number => number(edited).ok_or("a number".to_owned()),
+        let parse_number = |edited: &Json| edited.as_f64().filter(|x| x.is_finite()).map(Value::from);
+        let converted = match self.kind {
+            Kind::Number => parse_number(edited).ok_or("a number".to_owned()),
             Kind::Whole => {
                 let integer = edited.as_i64().or(edited
                     .as_f64()
@@ -399,7 +402,7 @@ impl Field {
             }
             Kind::Color | Kind::Vector => {
                 let list = edited.as_array().filter(|list| list.len() == self.length);
-                let list = list.and_then(|list| list.iter().map(number).collect::<Option<Vec<Value>>>());
+                let list = list.and_then(|list| list.iter().map(parse_number).collect::<Option<Vec<Value>>>());
                 list.map(Value::from)
                     .ok_or(format!("a list of {} numbers", self.length))
             }
@@ -416,10 +419,11 @@ impl Field {
                 text.map(Value::from).ok_or("one of the allowed names".to_owned())
             }
         };
-        found.map_err(|rule| format!("{} must be {rule}", cut(&edited.to_string())))
+        converted.map_err(|rule| format!("{} must be {rule}", cut(&edited.to_string())))
     }
 }
 
+/// Appends the schemas of nested `anyOf` lists, or the schema if it has no such list.
 fn alternatives<'a>(schema: &'a Json, found: &mut Vec<&'a Json>) {
     match (schema.get("type"), schema.get("anyOf").and_then(Json::as_array)) {
         (None, Some(all)) => all.iter().for_each(|alternative| alternatives(alternative, found)),
@@ -453,7 +457,7 @@ fn choose<'a>(branches: &[&'a Json], context: &FieldContext) -> Option<&'a Json>
 /// Start of the label of a color kind.
 const COLOR_LABEL: &str = "linear red";
 
-/// Returns the label and the range of a kind.
+/// Returns the label and the range in the title of a kind's schema.
 fn kind_of(schema: &Json) -> (&str, &str) {
     let title = schema.get("title").and_then(Json::as_str).unwrap_or_default();
     title.split_once(TITLE_SEPARATOR).unwrap_or((title, ""))
@@ -478,11 +482,11 @@ fn unit_of(schema: &Json) -> Option<&'static str> {
 
 /// Returns true for colors of emitters, whose components may exceed 1.
 fn is_emitter_color(path: &[Segment]) -> bool {
-    let is_any = |segment: Option<&Segment>, names: &[&str]| match segment {
+    let is_key_in = |segment: Option<&Segment>, names: &[&str]| match segment {
         Some(Segment::Key(key)) => names.contains(&key.as_str()),
         _ => false,
     };
-    is_any(path.first(), &["lights", "environment", "render"]) || is_any(path.last(), &["emission"])
+    is_key_in(path.first(), &["lights", "environment", "render"]) || is_key_in(path.last(), &["emission"])
 }
 
 fn json_of(value: &Value) -> Json {

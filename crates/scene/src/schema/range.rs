@@ -3,6 +3,7 @@
 use serde::Serialize;
 use serde_json::Value as Json;
 
+/// A slider that edits a number, with the values at its ends.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Slider {
     pub from: f64,
@@ -16,6 +17,7 @@ pub struct Slider {
 /// Distance between the excluded end and the displayed end of a range, relative to the width of the range.
 const END_GAP: f64 = 1e-3;
 
+/// Returns the ends of the range of a schema without alternatives.
 fn ends(schema: &Json) -> Option<(f64, f64)> {
     if let Some(constant) = schema.get("const").and_then(Json::as_f64) {
         return Some((constant, constant));
@@ -27,19 +29,22 @@ fn ends(schema: &Json) -> Option<(f64, f64)> {
     }
 }
 
+/// Returns the range of each alternative of a schema.
 pub(super) fn ranges(schema: &Json) -> Vec<(f64, f64)> {
     match schema.get("anyOf").and_then(Json::as_array) {
-        Some(all) => all.iter().filter_map(ends).collect(),
+        Some(alternatives) => alternatives.iter().filter_map(ends).collect(),
         None => ends(schema).into_iter().collect(),
     }
 }
 
+/// Returns the smallest range that contains the ranges of all alternatives.
 pub(super) fn range_of(schema: &Json) -> Option<(f64, f64)> {
-    let all = ranges(schema);
-    let ends = all.iter().copied().reduce(|(a, b), (c, d)| (a.min(c), b.max(d)));
+    let ranges = ranges(schema);
+    let ends = ranges.iter().copied().reduce(|(a, b), (c, d)| (a.min(c), b.max(d)));
     ends.filter(|(low, high)| low < high)
 }
 
+/// Returns the gap between the ranges of two alternatives.
 pub(super) fn gap_of(schema: &Json) -> Option<(f64, f64)> {
     let [a, b] = ranges(schema).try_into().ok()?;
     Some(if a.0 < b.0 { (a.1, b.0) } else { (b.1, a.0) })
@@ -49,9 +54,10 @@ pub(super) fn gap_of(schema: &Json) -> Option<(f64, f64)> {
 const MAX_LINEAR_WIDTH: f64 = 1000.0;
 /// Minimum ratio of the ends of a range for a logarithmic slider.
 const MIN_LOGARITHMIC_RATIO: f64 = 50.0;
-/// Maximum factor between the value and an end of the range.
+/// Maximum factor between the value and an end of a logarithmic slider.
 const MAX_FACTOR: f64 = 100.0;
 
+/// Returns a slider for the range that contains the current value, or for a part of a range that is too wide.
 pub(super) fn slider(schema: &Json, is_integer: bool, unit: Option<&str>, current: Option<f64>) -> Option<Slider> {
     let value = current.unwrap_or(0.0);
     let ranges = ranges(schema);

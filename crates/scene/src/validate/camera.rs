@@ -114,7 +114,7 @@ fn aperture(diameter: f64) -> Checked<f64> {
     between(diameter, APERTURES)
 }
 
-/// Validates each key, the camera without the path, and the camera at all keys.
+/// Validates the keys of the path, the camera itself, and the camera at the frame of each key.
 pub(super) fn with_path(description: &CameraDescription) -> Result<(Camera, Option<CameraPath>), Problems> {
     let Some(path) = description.path() else {
         return Ok((camera(description, VERTICAL_UP)?, None));
@@ -123,12 +123,12 @@ pub(super) fn with_path(description: &CameraDescription) -> Result<(Camera, Opti
     problems.value(check(!path.keys.is_empty(), || {
         "[] must have at least one key".to_owned()
     }));
-    let mut frame_before = None;
+    let mut previous_frame = None;
     for (i, key) in path.keys.iter().enumerate() {
-        problems.value(check_key(key, description, frame_before).at(i));
-        frame_before = Some(key.frame);
+        problems.value(check_key(key, description, previous_frame).at(i));
+        previous_frame = Some(key.frame);
     }
-    // Errors in keys are returned first, because the camera may use the values of keys.
+    // The camera may take values from the first key, so the camera is validated only if all keys are valid.
     problems.end(()).at("keys").at("path")?;
     let camera = camera(description, VERTICAL_UP)?;
     let camera_path = CameraPath::of(description);
@@ -141,7 +141,7 @@ pub(super) fn with_path(description: &CameraDescription) -> Result<(Camera, Opti
 }
 
 /// Validates a key. The frame of the key must be greater than the frame of the previous key.
-fn check_key(key: &CameraKeyDescription, camera: &CameraDescription, frame_before: Option<f64>) -> Checked<()> {
+fn check_key(key: &CameraKeyDescription, camera: &CameraDescription, previous_frame: Option<f64>) -> Checked<()> {
     let CameraKeyDescription {
         frame,
         position,
@@ -153,10 +153,10 @@ fn check_key(key: &CameraKeyDescription, camera: &CameraDescription, frame_befor
         focus_distance,
     } = *key;
     between(frame, FRAMES).at("frame")?;
-    if let Some(frame_before) = frame_before {
-        check(frame - frame_before >= MIN_KEY_DISTANCE, || {
-            let (frame, frame_before, min) = (number(frame), number(frame_before), number(MIN_KEY_DISTANCE));
-            format!("{frame} must be greater than the frame of the previous key, {frame_before}, by at least {min}")
+    if let Some(previous_frame) = previous_frame {
+        check(frame - previous_frame >= MIN_KEY_DISTANCE, || {
+            let (frame, previous_frame, min) = (number(frame), number(previous_frame), number(MIN_KEY_DISTANCE));
+            format!("{frame} must be greater than the frame of the previous key, {previous_frame}, by at least {min}")
         })
         .at("frame")?;
     }
@@ -228,7 +228,7 @@ mod tests {
     const STATIC_CAMERA: &str = "[camera]\nposition = [0, -4, 0]\nlook_at = [0, 0, 0]\nfov = 40\n";
 
     #[test]
-    fn each_value_is_interpolated_between_the_keys_that_have_it() {
+    fn each_value_is_interpolated_between_the_keys_that_set_it() {
         let scene = scene(&format!(
             "{STATIC_CAMERA}[camera.path]\nkeys = [{{ frame = 1, position = [2, -4, 0] }}, {{ frame = 2, fov = 20 }}, \
              {{ frame = 5, position = [4, -8, 4], fov = 50 }}, {{ frame = 6, up = [1, 0, 0] }}]"
@@ -255,7 +255,7 @@ mod tests {
                 panic!("the camera is not perspective");
             };
             assert!((found - fov.to_radians()).abs() < 1e-14, "{frame}: {found}");
-            // A value of one key applies to all frames.
+            // A value that only one key sets applies to all frames.
             assert!(camera.up.x > 0.5, "{frame}: {}", camera.up);
         }
     }
@@ -426,7 +426,7 @@ mod tests {
     }
 
     #[test]
-    fn a_description_with_a_path_reads_back() {
+    fn a_serialized_path_parses_to_the_same_description() {
         let path = "[[camera.path.keys]]\nframe = 1.5\nup = [0, 1, 1]\n[[camera.path.keys]]\nframe = 3\nfov = 7.5\n";
         let text = format!("image = {{ width = 4, height = 4 }}\n{STATIC_CAMERA}path.interpolation = 'smooth'\n{path}");
         let description = Description::parse(&text, "s.toml").unwrap();

@@ -9,10 +9,10 @@ use super::principled::dielectric;
 const GRAY: f64 = 0.8;
 /// Phong exponent, which has no effect because the specular factor is black.
 const SHININESS: f64 = 16.0;
-/// Roughness with the path tracer.
+/// Roughness of the material for the path tracer.
 const ROUGHNESS: f64 = 0.5;
 
-/// Returns the default materials of meshes without and with vertex colors; `phong` ignores the colors.
+/// Returns the default materials of meshes without and with vertex colors; the Phong integrator ignores the colors.
 pub(super) fn default_materials(integrator: Integrator) -> [Material; 2] {
     [false, true].map(|has_colors| Material {
         reflection: match integrator.follows_paths() {

@@ -13,7 +13,7 @@ use super::mesh::rotation_matrix;
 use super::path::needs_path;
 use super::{At, Checked, Description, Environment, Integrator, Problem, between, check, color, show};
 
-/// Default elevation of the sun in degrees, and turbidity.
+/// Default elevation of the sun in degrees, and default turbidity of the sky.
 const ELEVATION: f64 = 40.0;
 const TURBIDITY: f64 = 2.0;
 
@@ -97,7 +97,7 @@ fn from_description(description: &EnvironmentDescription, images: &mut Images) -
     }
 }
 
-/// Returns the parameters of the sky; the keys of the sky are errors for other environments.
+/// Returns the parameters of the sky. For other environments, keys of the sky are errors.
 fn sky_of(description: &EnvironmentDescription) -> Checked<Sky> {
     let is_sky = description.name == Some(EnvironmentName::Sky);
     let value = |key: &str, value: Option<f64>, default: f64, limits: (f64, f64)| {

@@ -12,6 +12,7 @@ use crate::{Assets, Image, ImageTextureDescription, Texels};
 /// Limit on the total memory of all texels in their render format, in bytes.
 pub(crate) const TEXEL_MEMORY: u64 = 1 << 30;
 
+/// The images that a scene refers to, and their total size.
 pub(super) struct Images<'a> {
     pub(super) assets: &'a Assets,
     /// False if the scene is invalid; images of 1 x 1 texels then replace the files.
@@ -35,9 +36,9 @@ impl<'a> Images<'a> {
         }
     }
 
-    /// Adds a warning about a damaged file, or returns an error ([`Assets::tolerate`]).
-    pub(super) fn tolerate(&mut self, damage: Problem, stand_in: &str) -> Checked<()> {
-        let note = self.assets.tolerate(damage, stand_in)?;
+    /// Adds a warning about a damaged file, or returns an error in strict mode ([`Assets::tolerate`]).
+    pub(super) fn tolerate(&mut self, damage: Problem, placeholder: &str) -> Checked<()> {
+        let note = self.assets.tolerate(damage, placeholder)?;
         if !self.notes.contains(&note) {
             self.notes.push(note);
         }
@@ -64,11 +65,11 @@ impl<'a> Images<'a> {
             environment_words(header.width, header.height)
         })?;
         let words = environment_words(image.width, image.height);
-        // The size of the file was counted as the size of a texture.
+        // A texture with the same file was counted before; the environment map is stored in addition.
         if self.used_bytes - other_bytes < 4 * words {
             let bytes = other_bytes + 4 * words;
             if bytes > TEXEL_MEMORY {
-                return Err(too_much(file, (image.width, image.height), 4 * words, other_bytes).into());
+                return Err(size_error(file, (image.width, image.height), 4 * words, other_bytes).into());
             }
             self.used_bytes = bytes;
         }
@@ -79,13 +80,13 @@ impl<'a> Images<'a> {
     pub(super) fn count_builtin(&mut self, name: &str, image: &Image) -> Result<(), String> {
         let bytes = 4 * environment_words(image.width, image.height);
         if self.used_bytes + bytes > TEXEL_MEMORY {
-            return Err(too_much(name, (image.width, image.height), bytes, self.used_bytes));
+            return Err(size_error(name, (image.width, image.height), bytes, self.used_bytes));
         }
         self.used_bytes += bytes;
         Ok(())
     }
 
-    /// Returns an image. `words_of` returns the size of the image in 32-bit words.
+    /// Returns an image and counts its size. `words_of` returns the size of the image in 32-bit words.
     fn with_words(&mut self, file: &str, part: Part, words_of: impl Fn(Header) -> u64) -> Checked<Arc<Image>> {
         let asset = self.assets.find(file)?;
         if !self.reads_files {
@@ -102,7 +103,7 @@ impl<'a> Images<'a> {
             let (bytes, other_bytes) = (4 * words, used_bytes - 4 * counted);
             match bytes + other_bytes <= TEXEL_MEMORY {
                 true => Ok(words),
-                false => Err(too_much(file, (header.width, header.height), bytes, other_bytes)),
+                false => Err(size_error(file, (header.width, header.height), bytes, other_bytes)),
             }
         };
         let cached = self
@@ -116,22 +117,22 @@ impl<'a> Images<'a> {
             *counted = words;
             return Ok(Arc::clone(&cached.image));
         }
-        let read = self
+        let decoded = self
             .assets
             .image(file, &asset, part, |header| fits(header, 0).map(|_| ()))?;
-        if let Some(damage) = &read.damage {
+        if let Some(damage) = &decoded.damage {
             self.tolerate(Problem::damage(damage), "they are clamped")?;
         }
-        let words = fits(Header::of(&read.image), 0)?;
+        let words = fits(Header::of(&decoded.image), 0)?;
         let files = self.files.entry(asset).or_default();
         self.used_bytes += 4 * words;
-        let image = Arc::clone(&read.image);
-        files.push((read, words));
+        let image = Arc::clone(&decoded.image);
+        files.push((decoded, words));
         Ok(image)
     }
 }
 
-fn too_much(file: &str, (width, height): (u32, u32), bytes: u64, other_bytes: u64) -> String {
+fn size_error(file: &str, (width, height): (u32, u32), bytes: u64, other_bytes: u64) -> String {
     let mib = |bytes: u64| format!("{:.1} MiB", bytes as f64 / f64::from(1 << 20));
     let (bytes, other_bytes, limit) = (mib(bytes), mib(other_bytes), mib(TEXEL_MEMORY));
     format!(

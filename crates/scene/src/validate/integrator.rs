@@ -4,8 +4,8 @@ use super::super::key_path::{KeyPath, Segment};
 use super::super::{Description, Integrator, MaterialDescription, ShapeDescription};
 
 impl Description {
-    /// Returns the integrator of `[render]`. If it is not specified, returns [`Integrator::Path`] if any key needs the
-    /// path tracer, and otherwise [`Integrator::Phong`].
+    /// Returns the integrator of `[render]`. If `[render]` specifies no integrator, returns [`Integrator::Path`] if any
+    /// key needs the path tracer, and otherwise [`Integrator::Phong`].
     pub fn integrator(&self) -> Integrator {
         let default = || path_tracer_key(self).map_or(Integrator::Phong, |_| Integrator::Path);
         self.render.integrator.unwrap_or_else(default)
@@ -32,25 +32,25 @@ fn path_tracer_key(description: &Description) -> Option<KeyPath> {
         ("alpha", render.alpha.is_some()),
     ];
     if let Some((name, _)) = settings.into_iter().find(|(_, is_set)| *is_set) {
-        return Some(path([Segment::from("render"), name.into()]));
+        return Some(key_path([Segment::from("render"), name.into()]));
     }
     if description.environment.is_some() {
-        return Some(path([Segment::from("environment")]));
+        return Some(key_path([Segment::from("environment")]));
     }
     let materials = description.materials.iter();
     let mut material_keys = materials.filter_map(|(name, material)| {
         let key = key_of_material(material)?;
-        Some(path([Segment::from("materials"), name.as_str().into(), key.into()]))
+        Some(key_path([Segment::from("materials"), name.as_str().into(), key.into()]))
     });
     let is_gltf = |shape: &ShapeDescription| matches!(shape, ShapeDescription::Gltf(_));
-    let gltf = || {
+    let gltf_key = || {
         let shape = description.shapes.iter().position(is_gltf)?;
-        Some(path([Segment::from("shapes"), shape.into(), "type".into()]))
+        Some(key_path([Segment::from("shapes"), shape.into(), "type".into()]))
     };
-    material_keys.next().or_else(gltf)
+    material_keys.next().or_else(gltf_key)
 }
 
-fn path<const N: usize>(segments: [Segment; N]) -> KeyPath {
+fn key_path<const N: usize>(segments: [Segment; N]) -> KeyPath {
     KeyPath(segments.to_vec())
 }
 
@@ -114,11 +114,11 @@ materials.red = { type = 'phong', color = [1, 0, 0] }
 
     #[test]
     fn overrides_and_defines_also_determine_the_integrator() {
-        let clear = Overrides {
+        let transparent = Overrides {
             background: Some(Background::Transparent),
             ..Overrides::default()
         };
-        assert!(load("", &clear).render.alpha);
+        assert!(load("", &transparent).render.alpha);
         let define = |text: &str| Overrides {
             define: vec![text.parse::<Define>().unwrap()],
             ..Overrides::default()

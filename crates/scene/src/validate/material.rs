@@ -18,7 +18,7 @@ impl Textures<'_> {
         };
         needs_path(self.integrator)?;
         let color = self.color(emission)?;
-        // The factor of a replaced texture would make the entire surface an emitter.
+        // A replaced texture is constant, so its color would make the entire surface an emitter.
         let is_replaced = matches!(color, Color::Texture(texture) if self.replaced.contains(&texture));
         Ok(if is_replaced { Color::BLACK } else { color })
     }
@@ -159,7 +159,7 @@ fn absorption(absorption: DVec3) -> Checked<DVec3> {
     Ok(absorption)
 }
 
-/// Returns the complex index of refraction, if it is set. Only one kind of key may set the reflectance.
+/// Returns the complex index of refraction, if it is set. Only one of the keys `color`, `metal` and `eta` may be set.
 fn metal_index(conductor: &ConductorDescription) -> Checked<Option<MetalIndex>> {
     let conflicting_key = |own_key: &str| {
         let keys = [

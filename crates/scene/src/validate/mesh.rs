@@ -20,7 +20,7 @@ use super::mtl::SceneMaterials;
 use super::{At, Checked, Collector, MIN_SINE, Problem, between, check, list, number, point, show, unit};
 use crate::mesh::{Group, Mesh, MeshError, Normals};
 
-/// Maximum number of groups of all shapes.
+/// Maximum total number of groups of all shapes.
 const MAX_GROUPS: usize = 1 << 24;
 
 /// The materials and files that shapes refer to.
@@ -125,7 +125,7 @@ pub(super) fn notes(
     shapes: &[Shape],
     meshes: &BTreeMap<&str, NamedMesh>,
 ) -> Vec<Note> {
-    let of_shapes = descriptions.iter().zip(shapes).filter_map(|pair| match pair {
+    let shape_meshes = descriptions.iter().zip(shapes).filter_map(|pair| match pair {
         (
             ShapeDescription::Mesh(description),
             Shape {
@@ -135,15 +135,15 @@ pub(super) fn notes(
         ) => Some((&description.file, mesh)),
         _ => None,
     });
-    let named = (meshes.values()).filter_map(|named| Some((&named.description.file, named.mesh.as_ref()?)));
-    let of_mesh = |(file, mesh): (&String, &Arc<Mesh>)| -> Vec<Note> {
+    let named_meshes = (meshes.values()).filter_map(|named| Some((&named.description.file, named.mesh.as_ref()?)));
+    let notes_of = |(file, mesh): (&String, &Arc<Mesh>)| -> Vec<Note> {
         mesh.notes.iter().map(|note| note.clone().in_file(file)).collect()
     };
-    let notes: BTreeSet<Note> = of_shapes.chain(named).flat_map(of_mesh).collect();
+    let notes: BTreeSet<Note> = shape_meshes.chain(named_meshes).flat_map(notes_of).collect();
     notes.into_iter().collect()
 }
 
-/// Returns a mesh; `None` if files are not read.
+/// Returns the mesh of a file, or the mesh in memory with this name; `None` if files are not read.
 fn load(file: &str, normals: Option<Normals>, lookup: &mut SceneLookup) -> Checked<Option<Arc<Mesh>>> {
     if let Some(mesh) = lookup.assets.meshes.get(file) {
         return match mesh.broken_rule() {
@@ -171,7 +171,7 @@ fn load(file: &str, normals: Option<Normals>, lookup: &mut SceneLookup) -> Check
     Ok(Some(mesh))
 }
 
-/// Returns a mesh as a shape with a placement. If there is no mesh, only validates the placement.
+/// Returns a mesh as a shape with a placement. If there is no mesh, only validates the placement and its materials.
 fn place_mesh(
     mesh: Option<Arc<Mesh>>,
     up: Up,
@@ -221,12 +221,13 @@ fn place_mesh(
     }))
 }
 
-/// Returns the material index of each group: from the scene, or else from the mesh's file.
+/// Returns the material index of each group: from the scene, or else from the mesh's file, or else the default
+/// material.
 fn materials(mesh: &Arc<Mesh>, file: &str, placement: &Placement, lookup: &mut SceneLookup) -> Checked<Vec<usize>> {
     let material_of = |name: &String| -> Checked<usize> {
         let index = lookup.material(name)?;
         check(
-            !mesh.uvs.is_empty() || !has_textures(&lookup.scene_materials.materials[index]),
+            !mesh.uvs.is_empty() || !needs_uvs(&lookup.scene_materials.materials[index]),
             || format!("{name:?} must have no texture here, because {file:?} has no texture coordinates"),
         )?;
         Ok(index)
@@ -234,13 +235,13 @@ fn materials(mesh: &Arc<Mesh>, file: &str, placement: &Placement, lookup: &mut S
     let default = placement.material.map(material_of).transpose().at("material")?;
     let mut by_name = BTreeMap::new();
     for (group, material) in placement.materials {
-        let exists = mesh.groups.iter().any(|g| names(g).any(|name| name == group));
+        let exists = (mesh.groups.iter()).any(|mesh_group| names(mesh_group).any(|name| name == group));
         check(exists, || {
-            let all = mesh.groups.iter().flat_map(names).filter(|name| !name.is_empty());
-            let all: BTreeSet<&str> = all.collect();
-            match all.is_empty() {
+            let available = mesh.groups.iter().flat_map(names).filter(|name| !name.is_empty());
+            let available: BTreeSet<&str> = available.collect();
+            match available.is_empty() {
                 true => format!("{file:?} has no groups with names"),
-                false => format!("{file:?} has no such group or material; available: {}", list(all)),
+                false => format!("{file:?} has no such group or material; available: {}", list(available)),
             }
         })
         .at(group.as_str())
@@ -302,7 +303,7 @@ fn names(group: &Group) -> impl Iterator<Item = &str> {
 }
 
 /// Returns true if a material depends on texture coordinates.
-fn has_textures(material: &Material) -> bool {
+fn needs_uvs(material: &Material) -> bool {
     let is_anisotropic = match &material.reflection {
         Reflection::Conductor { facets, .. } | Reflection::Dielectric { facets, .. } => facets.anisotropy > 0.0,
         _ => false,
@@ -310,7 +311,7 @@ fn has_textures(material: &Material) -> bool {
     is_anisotropic || !material.textures().is_empty()
 }
 
-/// Returns the rotation of an up axis to +z.
+/// Returns the rotation that maps an up axis to +z.
 pub(crate) fn to_z_up(up: Up) -> DAffine3 {
     DAffine3::from_mat3(match up {
         Up::X => DMat3::from_cols(DVec3::Z, DVec3::X, DVec3::Y),
@@ -375,7 +376,7 @@ pub(super) fn rotation_matrix(rotation: &Rotation) -> Checked<DMat3> {
     })
 }
 
-/// Returns a rotation, exact for quarter turns about coordinate axes.
+/// Returns the matrix of a rotation. The matrix is exact for quarter turns about coordinate axes.
 fn rotation_about(axis: DVec3, degrees: f64) -> DMat3 {
     let quarters = degrees / 90.0;
     let is_axis = DVec3::AXES.iter().any(|a| a.abs() == axis.abs());

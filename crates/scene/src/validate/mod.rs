@@ -103,11 +103,11 @@ impl Description {
             integrator,
             suggestions: Suggestions::default(),
         };
-        let [stand_in, _] = default_material::default_materials(integrator);
+        let [placeholder, _] = default_material::default_materials(integrator);
         let mut material_problems = Collector::default();
         let materials = (self.materials.iter())
             .map(|(name, description)| material_problems.value(texture_lookup.material(description).at(name.as_str())))
-            .map(|material| material.unwrap_or_else(|| stand_in.clone()))
+            .map(|material| material.unwrap_or_else(|| placeholder.clone()))
             .collect();
         let appearance = both(texture_result.at("textures"), material_problems.end(()).at("materials"));
         let environment = environment::environment(self, integrator, &mut images).at("environment");
@@ -215,10 +215,10 @@ fn validate_each<D, T>(
 ) -> Result<Vec<T>, Problems> {
     let mut problems = Collector::default();
     let descriptions = descriptions.iter().enumerate();
-    let all = descriptions
+    let values = descriptions
         .filter_map(|(i, description)| problems.value(check(description).at(i)).flatten())
         .collect();
-    problems.end(all)
+    problems.end(values)
 }
 
 pub(super) fn side(pixels: u32) -> Checked<u32> {

@@ -21,8 +21,8 @@ use super::{Checked, Problem, number, show};
 use crate::mesh::{Mesh, MtlMaterial};
 use crate::write::relative_path;
 
-/// Default values: `Kd` from Ramey, Rose and Tyerman, "MTL material format", 1995; the exponent is the default for
-/// materials of scene files.
+/// Default values of `Kd` (Ramey, Rose and Tyerman, "MTL material format", 1995) and `Ns` (the default exponent of
+/// materials of scene files).
 const DIFFUSE: f64 = 0.8;
 const NS: f64 = 16.0;
 
@@ -36,23 +36,23 @@ pub(super) struct SceneMaterials<'a> {
     pub textures: Vec<Texture>,
     pub files: &'a mut BTreeSet<PathBuf>,
     images: Images<'a>,
-    /// The folder to which paths in messages are relative, without symbolic links.
+    /// Canonical path of the folder to which paths in messages are relative.
     folder: PathBuf,
     /// The materials of each mesh, by the address of the mesh.
     group_materials: HashMap<usize, GroupMaterials>,
     integrator: Integrator,
-    /// The indices of materials, by file, line and traits.
+    /// Indices into `materials`, by MTL file, line, and traits of the mesh.
     indices: HashMap<(PathBuf, usize, Traits), usize>,
-    /// The textures of maps.
+    /// Indices into `textures`, by image and part of the image.
     maps: BTreeMap<(AssetKey, Part), usize>,
     /// For each keyword of a file, the first warning, and the number of materials with such a warning.
     warnings: BTreeMap<(PathBuf, String), (String, usize)>,
-    /// The default material for meshes without colors and for meshes with colors, and the index of the material once it
-    /// is used.
+    /// The default materials of meshes without and with vertex colors. The index of a default material in `materials`
+    /// is set when the material is first used.
     defaults: [(Material, Option<usize>); 2],
     /// Notes about materials that mesh files refer to, but no file defines.
     pub unmatched: BTreeSet<String>,
-    /// The first damaged image, if damage is an error.
+    /// In strict mode, the problem of the first damaged image.
     damage: Option<Problem>,
 }
 
@@ -66,7 +66,7 @@ struct Traits {
 struct GroupMaterials {
     /// For each group, the index of the MTL file and of the material in this file, if any.
     mtl_indices: Vec<Option<(usize, usize)>>,
-    /// For each group, the index of the material in the scene, once requested.
+    /// For each group, the index of the material in the scene, set when the material is first requested.
     materials: Vec<Option<usize>>,
 }
 
@@ -126,7 +126,7 @@ impl<'a> SceneMaterials<'a> {
         }
     }
 
-    /// Returns the material that the mesh's file assigns to a group.
+    /// Returns the index of the material that the mesh's file assigns to a group, if an MTL file defines the material.
     pub fn group_material(&mut self, mesh: &Arc<Mesh>, group: usize) -> Option<usize> {
         let address = Arc::as_ptr(mesh).addr();
         let group_materials = self.group_materials.get(&address)?;
@@ -160,7 +160,7 @@ impl<'a> SceneMaterials<'a> {
         Some(material)
     }
 
-    /// Warns about undefined materials of groups, or returns an error
+    /// Adds a note about undefined materials of groups, or returns an error in strict mode
     /// ([`Assets::tolerate`](super::super::Assets::tolerate)).
     pub fn report_missing(&mut self, damage: Problem) -> Checked<()> {
         let note = self.images.assets.tolerate(damage, "a gray material is used instead")?;
@@ -246,13 +246,13 @@ impl<'a> SceneMaterials<'a> {
         self.damage.take()
     }
 
-    /// Records warnings about a material, and the first damage if damage is an error.
+    /// Records warnings about a material, and in strict mode the first damage.
     fn warn(&mut self, mtl: &MtlMaterial, file: &Path, warnings: Warnings) {
         let is_strict = self.images.assets.strict;
         for Warning {
             keyword,
             message,
-            stand_in,
+            placeholder,
             is_damage,
         } in warnings.0
         {
@@ -266,8 +266,8 @@ impl<'a> SceneMaterials<'a> {
             if is_damage && is_strict {
                 self.damage.get_or_insert_with(|| Problem::damage(&*message));
             }
-            if let Some(stand_in) = stand_in {
-                message = format!("{message}; {stand_in}");
+            if let Some(placeholder) = placeholder {
+                message = format!("{message}; {placeholder}");
             }
             let warning = self.warnings.entry((file.to_owned(), keyword));
             warning.or_insert((message, 0)).1 += 1;
@@ -301,7 +301,8 @@ impl<'a> SceneMaterials<'a> {
         self.images.assets.file_system.resolve(folder, name)
     }
 
-    /// Returns a path for messages and textures: relative to the scene's folder if the file is inside, or in a source.
+    /// Returns a path for messages and textures. The path is relative to the scene's folder if the file is in this
+    /// folder or in a source.
     fn display_path<'p>(&self, path: &'p Path) -> Cow<'p, Path> {
         if let Ok(relative) = path.strip_prefix(&self.folder) {
             return Cow::Borrowed(relative);
@@ -318,7 +319,7 @@ struct Warning {
     keyword: String,
     message: String,
     /// The replacement of the map, if the warning is about a map that cannot be used.
-    stand_in: Option<&'static str>,
+    placeholder: Option<&'static str>,
     /// True for a damaged or missing file, which is an error in strict mode.
     is_damage: bool,
 }
@@ -332,7 +333,7 @@ impl Warnings {
         self.push(Warning {
             keyword: keyword.into(),
             message: message.into(),
-            stand_in: None,
+            placeholder: None,
             is_damage: false,
         });
     }
@@ -343,7 +344,7 @@ impl Warnings {
         }
     }
 
-    /// Adds the statements that have no effect.
+    /// Adds a warning for each statement that has no effect.
     fn ignored(&mut self, mtl: &MtlMaterial) {
         for keyword in &mtl.others {
             self.add(keyword.as_str(), "ignored");
@@ -351,13 +352,13 @@ impl Warnings {
     }
 
     /// Returns the texture of a map. A map that cannot be used causes a warning.
-    fn texture_or_warning(&mut self, keyword: &str, found: Checked<usize>, stand_in: &'static str) -> Option<usize> {
+    fn texture_or_warning(&mut self, keyword: &str, found: Checked<usize>, placeholder: &'static str) -> Option<usize> {
         found
             .map_err(|problem| {
                 self.push(Warning {
                     keyword: keyword.to_owned(),
                     message: cut_to(MAX_MAP_MESSAGE, &problem.message).into_owned(),
-                    stand_in: Some(stand_in),
+                    placeholder: Some(placeholder),
                     is_damage: problem.is_damage,
                 });
             })
@@ -370,7 +371,7 @@ impl GroupMaterials {
         let mut by_name = HashMap::new();
         for (i, library) in mesh.libraries.iter().enumerate() {
             for (j, material) in library.materials.iter().enumerate() {
-                by_name.entry(material.name.as_str()).or_insert((i, j)); // the first material of a name
+                by_name.entry(material.name.as_str()).or_insert((i, j)); // the first material with this name
             }
         }
         let mtl_index = |name: &String| by_name.get(name.as_str()).copied();
@@ -378,7 +379,7 @@ impl GroupMaterials {
             mtl_indices: mesh
                 .groups
                 .iter()
-                .map(|g| g.material.as_ref().and_then(mtl_index))
+                .map(|group| group.material.as_ref().and_then(mtl_index))
                 .collect(),
             materials: vec![None; mesh.groups.len()],
         }

@@ -11,6 +11,7 @@ const MAX_NAMES: usize = 8;
 /// Tolerance for rounding errors in a sum of two fractions.
 const ROUNDING: f64 = 1e-9;
 
+/// Warning about `light_samples`, which the path tracer ignores.
 pub(crate) const LIGHT_SAMPLES: &str =
     "render.light_samples: no effect with integrator = \"path\"; increase pixel_samples to reduce noise";
 

@@ -8,47 +8,49 @@ use super::texture::Textures;
 use super::{At, Checked, Problem, between, check};
 
 impl Textures<'_> {
-    pub(super) fn principled(&self, d: &PrincipledDescription) -> Checked<Principled> {
-        let thin = d.thickness == 0.0;
-        between(d.thickness, THICKNESSES).at("thickness")?;
-        let absorption = absorption(d.attenuation_color, d.attenuation_distance)?;
+    pub(super) fn principled(&self, description: &PrincipledDescription) -> Checked<Principled> {
+        let thin = description.thickness == 0.0;
+        between(description.thickness, THICKNESSES).at("thickness")?;
+        let absorption = absorption(description.attenuation_color, description.attenuation_distance)?;
         check(!thin || absorption == DVec3::ZERO, || {
             "needs a thickness: a thin surface has no interior that absorbs light".to_owned()
         })
         .at("attenuation_color")?;
         Ok(Principled {
-            base_color: self.tint(&d.base_color).at("base_color")?,
-            metallic: self.value(&d.metallic).at("metallic")?,
-            roughness: self.value(&d.roughness).at("roughness")?,
-            anisotropy: self.value(&d.anisotropy).at("anisotropy")?,
-            anisotropy_rotation: between(d.anisotropy_rotation, ROTATIONS)
+            base_color: self.tint(&description.base_color).at("base_color")?,
+            metallic: self.value(&description.metallic).at("metallic")?,
+            roughness: self.value(&description.roughness).at("roughness")?,
+            anisotropy: self.value(&description.anisotropy).at("anisotropy")?,
+            anisotropy_rotation: between(description.anisotropy_rotation, ROTATIONS)
                 .at("anisotropy_rotation")?
                 .to_radians(),
             anisotropy_direction: self
-                .direction(&d.anisotropy_direction)
+                .direction(&description.anisotropy_direction)
                 .at("texture")
                 .at("anisotropy_direction")?,
-            ior: between(d.ior, PRINCIPLED_IORS).at("ior")?,
-            specular: self.value(&d.specular).at("specular")?,
-            specular_color: self.color(&d.specular_color).at("specular_color")?,
-            transmission: self.value(&d.transmission).at("transmission")?,
+            ior: between(description.ior, PRINCIPLED_IORS).at("ior")?,
+            specular: self.value(&description.specular).at("specular")?,
+            specular_color: self.color(&description.specular_color).at("specular_color")?,
+            transmission: self.value(&description.transmission).at("transmission")?,
             thin,
             absorption,
-            clearcoat: self.value(&d.clearcoat).at("clearcoat")?,
-            clearcoat_roughness: self.value(&d.clearcoat_roughness).at("clearcoat_roughness")?,
-            clearcoat_normal_map: self.normal_map(&d.clearcoat_normal_map).at("clearcoat_normal_map")?,
-            sheen_color: self.tint(&d.sheen_color).at("sheen_color")?,
-            sheen_roughness: self.value(&d.sheen_roughness).at("sheen_roughness")?,
-            alpha: self.value(&d.alpha).at("alpha")?,
-            alpha_mode: d.alpha_mode,
-            alpha_cutoff: between(d.alpha_cutoff, FRACTIONS).at("alpha_cutoff")?,
-            vertex_colors: d.vertex_colors,
-            double_sided: d.double_sided,
+            clearcoat: self.value(&description.clearcoat).at("clearcoat")?,
+            clearcoat_roughness: self.value(&description.clearcoat_roughness).at("clearcoat_roughness")?,
+            clearcoat_normal_map: self
+                .normal_map(&description.clearcoat_normal_map)
+                .at("clearcoat_normal_map")?,
+            sheen_color: self.tint(&description.sheen_color).at("sheen_color")?,
+            sheen_roughness: self.value(&description.sheen_roughness).at("sheen_roughness")?,
+            alpha: self.value(&description.alpha).at("alpha")?,
+            alpha_mode: description.alpha_mode,
+            alpha_cutoff: between(description.alpha_cutoff, FRACTIONS).at("alpha_cutoff")?,
+            vertex_colors: description.vertex_colors,
+            double_sided: description.double_sided,
         })
     }
 }
 
-/// Returns a dielectric; all other values are defaults.
+/// Returns a dielectric with this base color and roughness, and with defaults for all other values.
 pub(super) fn dielectric(base_color: Color, roughness: f64) -> Principled {
     Principled {
         base_color,

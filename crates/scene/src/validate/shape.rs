@@ -34,7 +34,7 @@ pub(super) fn shape(description: &ShapeDescription, lookup: &mut SceneLookup) ->
         ShapeDescription::Triangle(shape) => (triangle(shape.vertices).at("vertices")?, &shape.material),
         ShapeDescription::Tetrahedron(shape) => (tetrahedron(shape.vertices).at("vertices")?, &shape.material),
         ShapeDescription::Mesh(shape) => return mesh::mesh(shape, lookup),
-        // Already expanded, unless the scene is invalid.
+        // glTF shapes are expanded before validation, unless the scene is invalid.
         ShapeDescription::Gltf(shape) => {
             placement(shape.translate, shape.rotate, shape.scale, shape.matrix.as_ref())?;
             return lookup.assets.find(&shape.file).at("file").map(|_| None);
@@ -66,8 +66,8 @@ pub(super) fn shape(description: &ShapeDescription, lookup: &mut SceneLookup) ->
     .at("material")?;
     if let Geometry::Plane { .. } = geometry {
         let emission = &lookup.scene_materials.materials[material].emission;
-        let is_dark = path::max_color(emission, &lookup.scene_materials.textures) == Some(DVec3::ZERO);
-        check(is_dark, || {
+        let is_black = path::max_color(emission, &lookup.scene_materials.textures) == Some(DVec3::ZERO);
+        check(is_black, || {
             format!("{name:?} must not emit light here, because this shape is infinite")
         })
         .at("material")?;
@@ -94,14 +94,14 @@ pub(super) fn rectangle(
 
 fn ellipsoid(shape: &EllipsoidDescription) -> Checked<Geometry> {
     let center = point(shape.center).at("center")?;
-    let x = unit(shape.a).at("a")?;
-    let y = unit(shape.b).at("b")?;
-    let z = unit(shape.c).at("c")?;
-    check(x.cross(y).length() > MIN_SINE, || {
+    let unit_a = unit(shape.a).at("a")?;
+    let unit_b = unit(shape.b).at("b")?;
+    let unit_c = unit(shape.c).at("c")?;
+    check(unit_a.cross(unit_b).length() > MIN_SINE, || {
         format!("{} must not be parallel to a, {}", show(shape.b), show(shape.a))
     })
     .at("b")?;
-    check(x.cross(y).dot(z).abs() > MIN_SINE, || {
+    check(unit_a.cross(unit_b).dot(unit_c).abs() > MIN_SINE, || {
         let (a, b, c) = (show(shape.a), show(shape.b), show(shape.c));
         format!("{c} must not lie in the plane of a and b, {a} and {b}")
     })

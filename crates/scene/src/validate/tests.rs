@@ -175,7 +175,7 @@ fn tetrahedron_faces_point_outwards_for_any_vertex_order() {
     }
 }
 
-/// Valid line, invalid replacement, error.
+/// Lines of [`VALID`], each with an invalid replacement and the expected error.
 const INVALID: &[(&str, &str, &str)] = &[
     ("width = 8", "width = 0", "image.width: 0 must be from 1 to 65536"),
     (
@@ -405,7 +405,7 @@ fn values_at_the_limits_are_valid() {
 }
 
 #[test]
-fn a_material_needs_a_factor_or_a_color() {
+fn a_phong_material_needs_each_factor_or_a_color() {
     let message = parse(&with_line("diffuse = [0.4, 0, 0]", "")).unwrap_err().to_string();
     let line = VALID
         .lines()

@@ -134,15 +134,16 @@ fn transform(scale: [f64; 2], rotate: f64, offset: [f64; 2]) -> Checked<[DVec3; 
 pub(super) struct Textures<'a> {
     pub(super) names: Vec<&'a str>,
     pub(super) textures: &'a [Texture],
-    /// For each name, the index of the alpha texture, or an error. Alpha textures follow the other textures.
+    /// For each name, the index of the alpha texture, or an error message. Alpha textures follow the other textures.
     pub(super) alphas: BTreeMap<&'a str, Result<usize, String>>,
+    /// Indices of textures that are replaced by a constant.
     pub(super) replaced: BTreeSet<usize>,
     /// The integrator, which determines the valid materials.
     pub(super) integrator: Integrator,
     pub(super) suggestions: Suggestions,
 }
 
-/// Adds the alpha textures for `channel = "a"`.
+/// Adds the alpha textures for `channel = "a"`. Returns their indices, or error messages, by name.
 pub(super) fn alphas<'a>(
     materials: &'a BTreeMap<String, MaterialDescription>,
     descriptions: &BTreeMap<String, TextureDescription>,

@@ -99,8 +99,8 @@ fn spheres_just_outside_of_the_view_are_reported_and_those_at_its_edge_are_not()
 #[test]
 fn orthographic_cameras_see_a_box() {
     let scene = |center| {
-        let all = format!("{CAMERA}{PATH}{GRAY}{LIGHT}{}", sphere(center));
-        all.replace("fov = 90", "type = 'orthographic'\nheight = 10")
+        let perspective = format!("{CAMERA}{PATH}{GRAY}{LIGHT}{}", sphere(center));
+        perspective.replace("fov = 90", "type = 'orthographic'\nheight = 10")
     };
     for center in [[10.5, 1e4, 0.0], [-10.5, 0.0, 0.0], [0.0, 0.0, 5.5], [0.0, -10.5, 0.0]] {
         assert_eq!(warnings(&scene(center)), [""; 0], "{center:?}");

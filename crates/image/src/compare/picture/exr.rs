@@ -53,18 +53,18 @@ pub(super) fn read(source: &mut dyn Source, max_pixels: u64) -> Result<Picture, 
     let names = names(&headers)?;
     let mut planes = Vec::new();
     for header in &headers {
-        let mut part = Vec::new();
+        let mut part_planes = Vec::new();
         for channel in &header.channels.list {
-            part.push(empty(columns, rows, channel.sample_type)?);
+            part_planes.push(empty(columns, rows, channel.sample_type)?);
         }
-        planes.push(part);
+        planes.push(part_planes);
     }
     let chunks = reader.filter_chunks(false, |_, _, block| (block.level.x(), block.level.y()) == (0, 0))?;
     // A file may contain a block twice and omit another block.
     let (mut blocks, mut area) = (BTreeSet::new(), 0);
     chunks.decompress_parallel(false, |_, block| {
         let damaged = || Error::Invalid("block".into());
-        let part = planes.get_mut(block.index.layer).ok_or_else(damaged)?;
+        let part_planes = planes.get_mut(block.index.layer).ok_or_else(damaged)?;
         let (position, size) = (block.index.pixel_position, block.index.pixel_size);
         if position.x().checked_add(size.x()).is_none_or(|end| end > width) {
             return Err(damaged());
@@ -77,7 +77,7 @@ pub(super) fn read(source: &mut dyn Source, max_pixels: u64) -> Result<Picture, 
         }
         let mut bytes = block.data.as_slice();
         for y in position.y()..position.y() + size.y() {
-            for plane in part.iter_mut() {
+            for plane in part_planes.iter_mut() {
                 let line = bytes.split_off(..size.x() * bytes_of(plane)).ok_or_else(damaged)?;
                 store(plane, y * width + position.x(), line);
             }
@@ -107,11 +107,11 @@ fn names(headers: &[Header]) -> Result<Vec<String>, Unreadable> {
     let mut names = Vec::new();
     let mut unique = BTreeSet::new();
     for header in headers {
-        let part = header.own_attributes.layer_name.as_ref().map(ToString::to_string);
-        let part = part.filter(|part| headers.len() > 1 && !part.is_empty());
+        let part_name = header.own_attributes.layer_name.as_ref().map(ToString::to_string);
+        let part_name = part_name.filter(|name| headers.len() > 1 && !name.is_empty());
         for channel in &header.channels.list {
             let channel = channel.name.to_string();
-            let name = match &part {
+            let name = match &part_name {
                 Some(part) if !channel.starts_with(&format!("{part}.")) => format!("{part}.{channel}"),
                 _ => channel,
             };
@@ -127,7 +127,7 @@ fn names(headers: &[Header]) -> Result<Vec<String>, Unreadable> {
     Ok(names)
 }
 
-fn empty(columns: u32, rows: u32, samples: SampleType) -> Result<Plane, Unreadable> {
+fn empty(columns: u32, rows: u32, sample_type: SampleType) -> Result<Plane, Unreadable> {
     /// Allocates zeros. The system maps their memory on first use, because a header may claim any size.
     fn zeros<T: Clone + Default>(width: u64, height: u64) -> Result<Vec<T>, Unreadable> {
         let count = width * height;
@@ -135,7 +135,7 @@ fn empty(columns: u32, rows: u32, samples: SampleType) -> Result<Plane, Unreadab
         Ok(vec![T::default(); count as usize])
     }
     let (width, height) = (u64::from(columns), u64::from(rows));
-    Ok(match samples {
+    Ok(match sample_type {
         SampleType::U32 => Plane::Integers(zeros(width, height)?),
         SampleType::F16 => Plane::Halves(zeros(width, height)?),
         SampleType::F32 => Plane::Floats(zeros(width, height)?),

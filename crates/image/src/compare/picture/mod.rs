@@ -64,15 +64,17 @@ pub enum Plane {
 }
 
 impl Plane {
-    /// Copies the values of a range of pixels; `to` must have the same length.
-    pub fn values(&self, pixels: Range<usize>, to: &mut [f64]) {
+    /// Copies the values of a range of pixels to `output`, which must have the same length.
+    pub fn values(&self, pixels: Range<usize>, output: &mut [f64]) {
         match self {
-            Plane::Bytes(values) => copy(&values[pixels], to, |value| f64::from(value) / 255.0),
-            Plane::Shorts(values) => copy(&values[pixels], to, |value| f64::from(value) / 65_535.0),
-            Plane::Integers(values) => copy(&values[pixels], to, f64::from),
-            Plane::Halves(values) => copy(&values[pixels], to, |value| f64::from(f16::from_bits(value).to_f32())),
-            Plane::Floats(values) => copy(&values[pixels], to, f64::from),
-            Plane::One => to.fill(1.0),
+            Plane::Bytes(values) => copy(&values[pixels], output, |value| f64::from(value) / 255.0),
+            Plane::Shorts(values) => copy(&values[pixels], output, |value| f64::from(value) / 65_535.0),
+            Plane::Integers(values) => copy(&values[pixels], output, f64::from),
+            Plane::Halves(values) => copy(&values[pixels], output, |value| {
+                f64::from(f16::from_bits(value).to_f32())
+            }),
+            Plane::Floats(values) => copy(&values[pixels], output, f64::from),
+            Plane::One => output.fill(1.0),
         }
     }
 

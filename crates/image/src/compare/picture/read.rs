@@ -166,7 +166,7 @@ pub(super) fn check(
     }
 }
 
-/// Reserves memory for values, or returns [`Unreadable::Memory`].
+/// Reserves memory for `count` values, or returns [`Unreadable::Memory`].
 pub(super) fn reserve<T>(width: u64, height: u64, count: u64) -> Result<Vec<T>, Unreadable> {
     let too_large = Unreadable::Memory {
         width,
@@ -217,12 +217,12 @@ fn png(source: &mut dyn Source, max_pixels: u64) -> Result<Picture, Unreadable> 
     let (width, height) = (reader.info().width, reader.info().height);
     let is_interlaced = reader.info().interlaced;
     let (color, depth) = reader.output_color_type();
-    let samples = color.samples();
+    let channel_count = color.samples();
     let is_deep = depth == png::BitDepth::Sixteen;
     let (columns, rows) = (u64::from(width), u64::from(height));
-    let bytes_per_pixel = samples as u64 * if is_deep { 2 } else { 1 };
+    let bytes_per_pixel = channel_count as u64 * if is_deep { 2 } else { 1 };
     check(max_pixels, length, (columns, rows), bytes_per_pixel)?;
-    let mut planes = Planes::new(columns, rows, samples, is_deep)?;
+    let mut planes = Planes::new(columns, rows, channel_count, is_deep)?;
     if is_interlaced {
         let size = reader.output_buffer_size().unwrap_or(usize::MAX) as u64;
         let mut bytes = reserve(columns, rows, size)?;
@@ -238,22 +238,22 @@ fn png(source: &mut dyn Source, max_pixels: u64) -> Result<Picture, Unreadable> 
     Ok(planes.picture(width, height))
 }
 
-/// Display values, one plane per sample of a pixel. 16-bit samples use `words`, 8-bit samples use bytes.
+/// Display values, one plane per channel: `bytes` for 8-bit values, `words` for 16-bit values.
 struct Planes {
-    samples: usize,
+    channel_count: usize,
     bytes: Vec<Vec<u8>>,
     words: Vec<Vec<u16>>,
 }
 
 impl Planes {
-    fn new(width: u64, height: u64, samples: usize, is_deep: bool) -> Result<Planes, Unreadable> {
+    fn new(width: u64, height: u64, channel_count: usize, is_deep: bool) -> Result<Planes, Unreadable> {
         let count = width * height;
         let mut planes = Planes {
-            samples,
+            channel_count,
             bytes: Vec::new(),
             words: Vec::new(),
         };
-        for _ in 0..samples {
+        for _ in 0..channel_count {
             match is_deep {
                 true => planes.words.push(reserve(width, height, count)?),
                 false => planes.bytes.push(reserve(width, height, count)?),
@@ -262,14 +262,14 @@ impl Planes {
         Ok(planes)
     }
 
-    /// Appends complete pixels; 16-bit samples are big-endian.
+    /// Appends complete pixels; 16-bit values are big-endian.
     fn append(&mut self, pixels: &[u8]) {
-        let samples = self.samples;
+        let channel_count = self.channel_count;
         for (i, plane) in self.bytes.iter_mut().enumerate() {
-            plane.extend(pixels.iter().skip(i).step_by(samples));
+            plane.extend(pixels.iter().skip(i).step_by(channel_count));
         }
         for (i, plane) in self.words.iter_mut().enumerate() {
-            let pairs = pixels.as_chunks().0.iter().skip(i).step_by(samples);
+            let pairs = pixels.as_chunks().0.iter().skip(i).step_by(channel_count);
             plane.extend(pairs.map(|pair| u16::from_be_bytes(*pair)));
         }
     }

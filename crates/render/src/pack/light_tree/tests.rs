@@ -70,7 +70,7 @@ impl Random {
     }
 }
 
-/// Returns true if a cone contains a normal, or its opposite if two-sided.
+/// Returns true if a cone contains a normal or, for a two-sided cone, the opposite of the normal.
 fn contains(cone: &Cone, normal: DVec3) -> bool {
     let angle = cone.axis.angle_between(normal);
     let angle = if cone.two_sided { angle.min(PI - angle) } else { angle };
@@ -156,11 +156,11 @@ fn probabilities(nodes: &[LightNode], count: usize, p: Vec3, n: Vec3) -> Vec<f64
     while let Some((number, probability)) = pending.pop() {
         let node = &nodes[number];
         let shares = light_shares(light_importances(node, p, n));
-        for (i, below) in children(node) {
+        for (i, child_index) in children(node) {
             let probability = probability * f64::from(shares[i]);
-            match below {
+            match child_index {
                 NO_INDEX => found[node.index[i] as usize] = probability,
-                below => pending.push((below as usize, probability)),
+                child_index => pending.push((child_index as usize, probability)),
             }
         }
     }
@@ -168,12 +168,12 @@ fn probabilities(nodes: &[LightNode], count: usize, p: Vec3, n: Vec3) -> Vec<f64
 }
 
 #[test]
-fn a_tree_built_in_parallel_has_the_same_nodes() {
+fn parallel_and_serial_builds_give_the_same_nodes() {
     let mut random = Random(5);
     for count in [0, 1, 2, 5, 16, 17, 300, 5000] {
         let emitters: Vec<TreeEmitter> = (0..count).map(|i| random.emitter(i, i % 3 == 0)).collect();
         let serial = build_with(&emitters, usize::MAX);
-        for parallel in [1, 40, PARALLEL] {
+        for parallel in [1, 40, MIN_PARALLEL_EMITTERS] {
             let nodes = build_with(&emitters, parallel);
             assert!(
                 bytemuck::cast_slice::<_, u32>(&nodes) == bytemuck::cast_slice::<_, u32>(&serial),
@@ -195,7 +195,7 @@ fn probabilities_sum_to_one_and_are_positive_for_visible_emitters() {
             nodes
                 .iter()
                 .flat_map(children)
-                .filter(|(_, below)| *below == NO_INDEX)
+                .filter(|(_, child_index)| *child_index == NO_INDEX)
                 .count(),
             emitters.len()
         );
@@ -211,11 +211,11 @@ fn probabilities_sum_to_one_and_are_positive_for_visible_emitters() {
             let sum: f64 = found.iter().sum();
             assert!((sum - 1.0).abs() < 1e-5, "{sum}");
             for emitter in &emitters {
-                // Facing the surface, on both sides.
+                // An emitter is visible if one of nine points on it faces p and lies above the surface.
                 let (center, half) = (0.5 * (emitter.low + emitter.high), 0.5 * (emitter.high - emitter.low).x);
                 let u = emitter.cone.axis.any_orthonormal_vector();
                 let v = emitter.cone.axis.cross(u);
-                let lit = (0..9).any(|k| {
+                let is_visible = (0..9).any(|k| {
                     let point = center + (u * f64::from(k % 3 - 1) + v * f64::from(k / 3 - 1)) * half / 2.0;
                     let to_point = (point - p).normalize();
                     let faces =
@@ -223,7 +223,7 @@ fn probabilities_sum_to_one_and_are_positive_for_visible_emitters() {
                     faces && (n == DVec3::ZERO || to_point.dot(n) > 0.0)
                 });
                 let probability = found[emitter.index as usize];
-                assert!(!lit || probability > 0.0, "{emitter:?} from {p}, {n}");
+                assert!(!is_visible || probability > 0.0, "{emitter:?} from {p}, {n}");
                 dark += u32::from(probability == 0.0);
             }
         }
@@ -244,21 +244,22 @@ fn nodes_link_to_parents_and_bound_children() {
     while let Some(number) = pending.pop() {
         visited += 1;
         let node = &nodes[number as usize];
-        for (i, below) in children(node) {
-            if below == NO_INDEX {
+        for (i, child_index) in children(node) {
+            if child_index == NO_INDEX {
                 leaves += 1;
                 continue;
             }
-            let child = &nodes[below as usize];
+            let child = &nodes[child_index as usize];
             assert_eq!(child.parent.x, 4 * number + i as u32);
             let mut sum = 0.0;
             for (j, _) in children(child) {
-                // Spheres around boxes: a child's sphere may stick out, but its center does not.
+                // The spheres surround boxes, so a child's sphere may exceed the parent's sphere, but the center of the
+                // child's sphere does not.
                 assert!((center(node, i) - center(child, j)).length() <= node.radius[i] * 1.0001);
                 sum += child.intensity[j];
             }
             assert!((sum - node.intensity[i]).abs() <= 1e-5 * node.intensity[i]);
-            pending.push(below);
+            pending.push(child_index);
         }
     }
     assert_eq!((visited, leaves), (nodes.len(), emitters.len()));
@@ -396,8 +397,8 @@ fn coincident_and_exponential_emitters_give_shallow_trees() {
         .map(|i| emitter_at(i, DVec3::X * f64::from(i), 1.0))
         .collect();
     assert!(depth(&row) <= 12, "{}", depth(&row));
-    // The distances and intensities form geometric progressions: without a depth limit, the emitters would be split off
-    // one by one.
+    // The distances and intensities form geometric progressions: without a depth limit, each split would separate a
+    // single emitter.
     let geometric: Vec<TreeEmitter> = (0..300)
         .map(|i| emitter_at(i, DVec3::X * 0.5_f64.powi(i as i32), 0.001_f64.powi(i as i32 % 90)))
         .collect();

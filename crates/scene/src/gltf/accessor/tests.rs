@@ -128,7 +128,7 @@ fn every_type_is_read() {
 
 #[test]
 fn columns_of_matrices_begin_at_multiples_of_4_bytes() {
-    // The tables of section 3.6.2.4; 99 is padding.
+    // The layouts of section 3.6.2.4.
     let matrix = |kind: &str, component: u32, bytes: &[u8]| {
         accessor(
             bytes,
@@ -143,12 +143,13 @@ fn columns_of_matrices_begin_at_multiples_of_4_bytes() {
         1, 2, 3, pad, 4, 5, 6, pad, 7, 8, 9, pad, 10, 11, 12, pad, 13, 14, 15, pad, 16, 17, 18, pad,
     ];
     let found = matrix("MAT3", 5121, &bytes).vectors::<9>(0).unwrap();
-    let row = |first: usize| -> [f32; 9] { std::array::from_fn(|i| (first + i) as f32) };
-    assert_eq!(found, [row(1), row(10)]);
+    let nine_from = |first: usize| -> [f32; 9] { std::array::from_fn(|i| (first + i) as f32) };
+    assert_eq!(found, [nine_from(1), nine_from(10)]);
     let shorts = |values: &[u16]| -> Vec<u8> { values.iter().flat_map(|x| x.to_le_bytes()).collect() };
     let bytes = shorts(&bytes.map(u16::from));
-    assert_eq!(matrix("MAT3", 5123, &bytes).vectors::<9>(0).unwrap(), [row(1), row(10)]);
-    // No padding is necessary: columns have 4 bytes.
+    let found = matrix("MAT3", 5123, &bytes).vectors::<9>(0).unwrap();
+    assert_eq!(found, [nine_from(1), nine_from(10)]);
+    // Columns of 4 bytes need no padding.
     let bytes = shorts(&[1, 2, 3, 4, 5, 6, 7, 8]);
     let found = matrix("MAT2", 5123, &bytes).vectors::<4>(0).unwrap();
     assert_eq!(found, [[1.0, 2.0, 3.0, 4.0], [5.0, 6.0, 7.0, 8.0]]);
@@ -182,7 +183,7 @@ fn elements_are_located_by_offsets_and_strides() {
 }
 
 #[test]
-fn indices_are_integers() {
+fn indices_are_unsigned_integers_below_the_restart_value() {
     let bytes = [1, 0, 2, 0, 3, 0, 0, 0];
     let accessor_of = |component: u32, count: usize| {
         let description = json!({ "bufferView": 0, "componentType": component, "count": count, "type": "SCALAR" });
@@ -281,9 +282,9 @@ fn an_accessor_without_bytes_is_zero() {
     );
     assert!(accessor_of(u64::MAX).vectors::<2>(0).is_err());
     // An accessor is not zero if an unsupported extension contains the data.
-    let hidden = json!({ "componentType": 5126, "count": 2, "type": "VEC2", "extensions": { "X_bytes": {} } });
+    let with_extension = json!({ "componentType": 5126, "count": 2, "type": "VEC2", "extensions": { "X_bytes": {} } });
     assert_eq!(
-        error_of(accessor(&[0], hidden).vectors::<2>(0)),
+        error_of(accessor(&[0], with_extension).vectors::<2>(0)),
         "accessors[0]: \"X_bytes\" is not supported, but contains the only data; export the file without this extension"
     );
 }

@@ -12,7 +12,7 @@ use crate::gltf::made::{container, json_of, read};
 
 fn error_of(json: &Value) -> String {
     match read(json.to_string().into_bytes()) {
-        Ok(_) => "fine".to_owned(),
+        Ok(_) => "valid".to_owned(),
         Err(fault) => fault.of(Path::new("a")).to_string(),
     }
 }
@@ -53,7 +53,8 @@ fn small() -> (Value, Vec<u8>) {
     (json, binary)
 }
 
-/// Counts successful reads. Failures must not panic.
+/// Reads all data, with an index beyond the end of each list. Returns the number of values that were read. Failures
+/// must not panic.
 fn count_reads(document: &Document) -> usize {
     let mut count = 0;
     for i in 0..document.json.accessors.len() + 1 {
@@ -105,7 +106,7 @@ fn other_files_are_read_and_listed() {
         { "uri": "a.png" }, { "uri": "none.png" }, { "uri": "../out.png" }, { "name": "nothing" },
         { "extensions": { "X_image": {} } },
     ]);
-    let path = folder.join("small.txt"); // detected by content
+    let path = folder.join("small.txt"); // glTF is detected by content, not by name
     fs::write(&path, json.to_string()).unwrap();
     let mut files = BTreeSet::new();
     let document = Document::open(&path, &folder, &FileSystem::Disk, &mut files).unwrap();
@@ -200,10 +201,10 @@ fn buffers_may_be_data_uris() {
 #[test]
 fn files_that_are_not_gltf_are_rejected() {
     let outcome = |text: &str| match read(text.as_bytes().to_vec()) {
-        Ok(_) => "fine".to_owned(),
+        Ok(_) => "valid".to_owned(),
         Err(fault) => fault.of(Path::new("a")).to_string(),
     };
-    assert_eq!(outcome("\u{feff}{\"asset\":{\"version\":\"2.0\"}}  \n\0\0"), "fine");
+    assert_eq!(outcome("\u{feff}{\"asset\":{\"version\":\"2.0\"}}  \n\0\0"), "valid");
     assert_eq!(outcome(""), "a: the file is empty");
     assert_eq!(outcome("{\n  x"), "a:2:3: key must be a string");
     assert_eq!(outcome("[]"), "a:1:1: the JSON must be an object");
@@ -222,8 +223,8 @@ fn files_that_are_not_gltf_are_rejected() {
             "2.0",
             "a: asset.version: 2.0 is not supported; convert the file to glTF 2.0",
         ),
-        ("\"2.1\"", "fine"),
-        ("\"2.0\",\"minVersion\":\"2.0\"", "fine"),
+        ("\"2.1\"", "valid"),
+        ("\"2.0\",\"minVersion\":\"2.0\"", "valid"),
         (
             "\"2.1\",\"minVersion\":\"2.1\"",
             "a: asset.minVersion: \"2.1\" must be at most \"2.0\", the supported version",
@@ -272,11 +273,11 @@ fn indices_and_enumerations_are_validated() {
         let mut json = valid.clone();
         *json.pointer_mut(key).unwrap_or_else(|| panic!("{key}")) = value;
         match read(container(&json, &binary)) {
-            Ok(document) => format!("fine {}", count_reads(&document) > 0),
+            Ok(document) => format!("valid {}", count_reads(&document) > 0),
             Err(fault) => fault.of(Path::new("a")).to_string(),
         }
     };
-    assert_eq!(read_with("/scene", json!(0)), "fine true");
+    assert_eq!(read_with("/scene", json!(0)), "valid true");
     for (key, location) in [
         ("/accessors/0/bufferView", "accessors[0].bufferView"),
         (
@@ -325,7 +326,7 @@ fn indices_and_enumerations_are_validated() {
         // Some exporters write integers as floats.
         if key != "/textures/0/source" {
             let as_float = valid.pointer(key).unwrap().as_f64().unwrap();
-            assert_eq!(read_with(key, json!(as_float)), "fine true", "{key}");
+            assert_eq!(read_with(key, json!(as_float)), "valid true", "{key}");
         }
     }
     for (key, location) in [
@@ -338,8 +339,8 @@ fn indices_and_enumerations_are_validated() {
         }
     }
     assert!(read_with("/nodes/0/translation/0", json!(1e39)).starts_with("a: nodes[0].translation[0]: 1e39 exceeds"));
-    assert_eq!(read_with("/accessors/0/min", json!("none")), "fine true");
-    assert_eq!(read_with("/meshes/0/primitives/0/attributes", json!({})), "fine true");
+    assert_eq!(read_with("/accessors/0/min", json!("none")), "valid true");
+    assert_eq!(read_with("/meshes/0/primitives/0/attributes", json!({})), "valid true");
 }
 
 #[test]
@@ -413,9 +414,9 @@ fn unsupported_extensions_are_rejected_or_reported_by_name() {
         read_with(&[], &["X_a", "KHR_materials_sheen", "X_a"]).unwrap(),
         ["the extension \"X_a\" is not supported and is ignored"]
     );
-    let many: Vec<String> = (0..1000).map(|i| format!("X_{i}")).collect();
-    let many: Vec<&str> = many.iter().map(String::as_str).collect();
-    assert_eq!(read_with(&[], &many).unwrap().len(), 21);
+    let names: Vec<String> = (0..1000).map(|i| format!("X_{i}")).collect();
+    let names: Vec<&str> = names.iter().map(String::as_str).collect();
+    assert_eq!(read_with(&[], &names).unwrap().len(), 21);
     // A mesh whose data is only present in an extension.
     let (mut json, binary) = small();
     let draco = json!({ "KHR_draco_mesh_compression": { "bufferView": 0, "attributes": { "POSITION": 0 } } });
@@ -515,7 +516,10 @@ fn changed_bytes_do_not_panic() {
         }
     }
     // Both outcomes must be frequent.
-    assert!(accepted > 1000 && rejected > 1000, "{accepted} {rejected}");
+    assert!(
+        accepted > 1000 && rejected > 1000,
+        "accepted: {accepted}, rejected: {rejected}"
+    );
 }
 
 #[test]

@@ -7,7 +7,7 @@ const GROUP: usize = 16;
 /// Maximum number of elements in a block.
 const BLOCK: usize = 256;
 
-/// Delta widths in bits by group header: version 0, and control modes 0 and 1.
+/// Delta widths in bits by group header: for version 0, and for control modes 0 and 1 of version 1.
 const WIDTHS: [[u32; 4]; 3] = [[0, 2, 4, 8], [0, 1, 2, 4], [1, 2, 4, 8]];
 
 /// Delta coding of four bytes of an element.
@@ -44,7 +44,7 @@ pub(super) fn attributes(stream: &[u8], count: usize, stride: usize) -> Result<V
         };
     }
     let max_elements = ((8192 / stride) & !(GROUP - 1)).min(BLOCK);
-    // Each block takes at least one byte per channel, which limits the memory use.
+    // Each block has at least one byte per channel, so this check limits the size of `elements`.
     if count.div_ceil(max_elements).saturating_mul(stride / 4) > data.len() {
         return Err(TOO_SHORT);
     }
@@ -63,7 +63,7 @@ pub(super) fn attributes(stream: &[u8], count: usize, stride: usize) -> Result<V
                     None => WIDTHS[0],
                     Some(0) => WIDTHS[1],
                     Some(1) => WIDTHS[2],
-                    Some(2) => continue, // all zero
+                    Some(2) => continue, // all deltas are zero
                     Some(_) => {
                         deltas[..length].copy_from_slice(take(&mut data, length)?);
                         continue;
@@ -122,7 +122,7 @@ fn read_group(data: &mut &[u8], width: u32) -> Result<[u8; GROUP], &'static str>
     Ok(deltas)
 }
 
-/// Decodes a channel of a block; returns the last element.
+/// Decodes a channel of a block; returns the channel of the last element.
 fn decode_channel(
     kind: Channel,
     deltas: &[[u8; BLOCK]; 4],

@@ -108,12 +108,12 @@ fn exponential(value: i32) -> f32 {
     power * mantissa as f32
 }
 
-/// Decodes a YCoCg color. The highest bit of alpha determines the bit depth.
+/// Decodes a YCoCg color. The highest set bit of alpha determines the bit depth.
 fn color(y: i32, co: i32, cg: i32, a: i32, max: f32) -> [f32; 4] {
     let bits = 32 - a.leading_zeros();
-    let max_value = (1 << bits) - 1;
-    let alpha = a & (max_value >> 1);
+    let max_code = (1 << bits) - 1;
+    let alpha = a & (max_code >> 1);
     let alpha = alpha << 1 | alpha & 1;
-    let scale = max / max_value as f32;
+    let scale = max / max_code as f32;
     [y + co - cg, y + cg, y - co - cg, alpha].map(|x| (x as f32 * scale).round())
 }

@@ -60,7 +60,7 @@ fn zigzag_decoded(number: u32) -> u32 {
     (number >> 1) ^ (number & 1).wrapping_neg()
 }
 
-/// Bytes, and variable-length integers with 7 bits per byte.
+/// Reads bytes, and variable-length integers with 7 bits per byte.
 struct Numbers<'a> {
     data: &'a [u8],
 }
@@ -97,11 +97,11 @@ impl<T: Copy> Fifo<T> {
         self.pushed += 1;
     }
 
-    /// Returns an entry by its age, 0 for the newest; `index` is below 16.
-    fn get(&self, index: u8) -> Result<T, &'static str> {
-        let index = usize::from(index);
-        match index < self.pushed {
-            true => Ok(self.entries[(self.pushed - 1 - index) % 16]),
+    /// Returns an entry by its age: 0 for the newest, at most 15.
+    fn get(&self, age: u8) -> Result<T, &'static str> {
+        let age = usize::from(age);
+        match age < self.pushed {
+            true => Ok(self.entries[(self.pushed - 1 - age) % 16]),
             false => Err("the stream must only refer to earlier edges and vertices"),
         }
     }
@@ -109,8 +109,9 @@ impl<T: Copy> Fifo<T> {
 
 struct Decoder<'a> {
     numbers: Numbers<'a>,
+    /// The next new index; new indices are in ascending order.
     next: u32,
-    /// The last index coded as a delta.
+    /// The last index that was coded as a delta.
     last: u32,
     edges: Fifo<[u32; 2]>,
     vertices: Fifo<u32>,
@@ -141,7 +142,7 @@ impl Decoder<'_> {
         Ok([a, b, c])
     }
 
-    /// Decodes a triangle that shares no edge with the FIFO.
+    /// Decodes a triangle that shares no edge of the FIFO.
     fn corners(&mut self, low: u8, table: &[u8; 16]) -> Result<[u32; 3], &'static str> {
         let codes = match low {
             0..14 => table[usize::from(low)],
@@ -181,7 +182,7 @@ impl Decoder<'_> {
         }
     }
 
-    /// Returns the next index in ascending order.
+    /// Returns the next new index.
     fn next_index(&mut self) -> u32 {
         let index = self.next;
         self.next = index.wrapping_add(1);

@@ -51,7 +51,7 @@ struct MeshoptExtension {
     filter: Option<String>,
 }
 
-/// Returns the compression of a buffer view of `length` bytes; `None` if it is not compressed.
+/// Returns the compression of a buffer view of `length` bytes; `None` if the view is not compressed.
 pub(super) fn parse_compression(
     key: &str,
     extensions: &Map<String, Value>,

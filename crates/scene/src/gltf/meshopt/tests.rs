@@ -127,7 +127,7 @@ fn examples_of_the_specification_are_decoded() {
         })
         .collect();
     assert_eq!(bytes, expected);
-    // 7 bits per byte, zigzag, from the first baseline.
+    // Zigzag-coded deltas from the first baseline, with 7 bits per byte.
     let indices = |numbers: &[u8]| {
         let mut stream = vec![0xd1];
         stream.extend(numbers);
@@ -143,7 +143,7 @@ fn examples_of_the_specification_are_decoded() {
         indices(&[0xff, 0xff, 0xff, 0xff, 0x8f, 0x00]),
         Err("the numbers of the stream must have at most 5 bytes")
     );
-    // A new triangle, and one that shares an edge.
+    // A triangle with three new indices, and a triangle that shares an edge with the first triangle.
     let mut stream = vec![0xe1, 0xf0, 0x00];
     stream.extend([0; 16]);
     let bytes = compression_of("TRIANGLES", "NONE", 2, 6)
@@ -151,7 +151,7 @@ fn examples_of_the_specification_are_decoded() {
         .decode(&stream)
         .unwrap();
     assert_eq!(bytes, [0, 0, 1, 0, 2, 0, 0, 0, 2, 0, 3, 0]);
-    // No edge yet.
+    // A triangle that shares an edge, although the FIFO is empty.
     let mut stream = vec![0xe1, 0x00];
     stream.extend([0; 16]);
     assert!(
@@ -197,7 +197,10 @@ fn damaged_streams_do_not_panic() {
             }
         }
     }
-    assert!(accepted > 1000 && rejected > 1000, "{accepted} {rejected}");
+    assert!(
+        accepted > 1000 && rejected > 1000,
+        "accepted: {accepted}, rejected: {rejected}"
+    );
 }
 
 #[test]
@@ -336,7 +339,7 @@ fn extension_values_are_validated() {
 }
 
 #[test]
-fn compressed_views_behave_like_others() {
+fn compressed_views_are_decoded_once_and_validated() {
     let streams = streams();
     let stream = streams
         .iter()
@@ -395,8 +398,8 @@ fn compressed_views_behave_like_others() {
     );
     assert!(message("buffer", json!(-1)).starts_with(&format!("a: {key}.buffer: ")));
     assert!(message("count", json!(99)).starts_with(&format!("a: {key}.count: 99 times byteStride 12 ")));
-    let parts = [(5, length), (u64::MAX, length), (0, usize::MAX)];
-    for (offset, length) in parts {
+    let invalid_ranges = [(5, length), (u64::MAX, length), (0, usize::MAX)];
+    for (offset, length) in invalid_ranges {
         let message = match view(name, &[("byteOffset", json!(offset)), ("byteLength", json!(length))]) {
             Err(message) => message,
             Ok(document) => document.view(0).unwrap_err().to_string(),

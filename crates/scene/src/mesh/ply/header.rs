@@ -46,7 +46,7 @@ impl Scalar {
         }
     }
 
-    /// Returns the maximum of an integer type.
+    /// Returns the maximum of an integer type; `None` for floats.
     pub fn max_value(self) -> Option<f64> {
         Some(match self {
             Scalar::I8 => i8::MAX.into(),

@@ -10,7 +10,7 @@ pub(super) trait Values {
     fn min_bytes(&self, scalar: Scalar) -> usize;
     fn bytes_left(&self) -> usize;
     fn location(&mut self) -> Location;
-    /// Ends a row. Returns the line of the row if it has unread values.
+    /// Ends a row. Returns the location of the row if the row has unread values.
     fn end_row(&mut self) -> Option<Location> {
         None
     }
@@ -18,7 +18,7 @@ pub(super) trait Values {
 
 pub(super) struct Ascii<'a> {
     pub words: Tokens<'a>,
-    /// Each row is one line.
+    /// True if each row is one line.
     pub row_per_line: bool,
 }
 

@@ -68,6 +68,7 @@ pub struct Parts<'a> {
     pub parts: Cow<'a, [Part]>,
 }
 
+/// An error in the text of a scene file.
 #[derive(Debug)]
 pub struct SyntaxFault {
     /// Byte offset in the file.
@@ -78,7 +79,7 @@ pub struct SyntaxFault {
 }
 
 impl SyntaxFault {
-    /// Returns an error of the document that starts at `start`.
+    /// Converts an error in the document that starts at byte `start` of the file.
     pub fn of(start: usize, error: &Error) -> SyntaxFault {
         SyntaxFault {
             offset: start + error.span().map_or(0, |span| span.start),
@@ -181,16 +182,16 @@ impl<'a> Parts<'a> {
         rest
     }
 
-    /// Returns the error of a text with a part larger than [`MAX_PART_BYTES`].
+    /// Returns an error if a part, or the text outside of the parts, is larger than [`MAX_PART_BYTES`].
     pub fn too_large(&self) -> Option<SyntaxFault> {
         let large = self.parts.iter().find(|part| part.range.len() > MAX_PART_BYTES);
         if let Some(part) = large {
             let message = format!("the table that starts here is larger than {} MiB", MAX_PART_BYTES >> 20);
             return Some(SyntaxFault::too_large(part.range.start, message));
         }
-        let parts: usize = self.parts.iter().map(|part| part.range.len()).sum();
-        let rest = self.text.len() - parts;
-        (rest > MAX_PART_BYTES).then(|| SyntaxFault::file_too_large(self.text))
+        let part_bytes: usize = self.parts.iter().map(|part| part.range.len()).sum();
+        let rest_bytes = self.text.len() - part_bytes;
+        (rest_bytes > MAX_PART_BYTES).then(|| SyntaxFault::file_too_large(self.text))
     }
 
     pub fn read_rest(&self) -> Result<Table, SyntaxFault> {
@@ -277,7 +278,7 @@ struct Header<'a> {
 struct Headers<'a, T: Iterator<Item = Token>> {
     text: &'a str,
     tokens: T,
-    /// True where a statement may begin: at the start, and on a new line.
+    /// True if a statement may begin at the next token: at the start of the text, or on a new line.
     at_statement_start: bool,
 }
 
@@ -294,7 +295,7 @@ impl<'a> Headers<'a, toml_parser::lexer::Lexer<'a>> {
 impl<'a, T: Iterator<Item = Token>> Headers<'a, T> {
     fn header(&mut self, start: usize) -> Option<Header<'a>> {
         let mut keys = Vec::new();
-        let mut brackets = [1, 0]; // opened, closed
+        let mut brackets = [1, 0]; // numbers of opening and closing brackets
         for token in self.tokens.by_ref() {
             let (begin, end) = (token.span().start(), token.span().end());
             match token.kind() {
@@ -331,7 +332,7 @@ impl<'a, T: Iterator<Item = Token>> Iterator for Headers<'a, T> {
                     self.at_statement_start = false;
                     match self.header(token.span().start()) {
                         Some(header) => return Some(header),
-                        None => self.at_statement_start = true, // a line break in the header, or an invalid text
+                        None => self.at_statement_start = true, // a line break in the header, or invalid text
                     }
                 }
                 TokenKind::LeftSquareBracket | TokenKind::LeftCurlyBracket => {

@@ -32,7 +32,7 @@ fn assert_same(text: &str) {
 }
 
 #[test]
-fn valid_files_parse_equally_by_parts() {
+fn parsing_by_parts_gives_the_same_result() {
     let subtable = "[materials.a.normal_map]\ntexture = 't'\n";
     let image = "[textures.t]\ntype = 'image'\nfile = 'a [[shapes]] b'\n";
     let unusual = "[[ shapes ]] # [[lights]]\n type = \"\"\"sphere\"\"\"\nmaterial = '[[shapes]]'\ncenter = [ # [x]\n0,\n\
@@ -41,7 +41,7 @@ fn valid_files_parse_equally_by_parts() {
     let text = "[materials.z]\ntype = 'phong'\n[materials.z.color]\ntexture = \"\"\"\n[[shapes]]\n\"\"\"\n";
     let render = "[render]\nseed = 3\n[render.pixel_samples]\ncount = 4\n";
     let pieces = [POINT, SPHERE, RED, BLUE, subtable, image, nested, text, render];
-    // All orders of three pieces; misplaced subtables and duplicate tables are errors.
+    // All sequences of three pieces; misplaced subtables and duplicate tables are errors.
     for a in pieces {
         for b in pieces {
             for c in pieces {
@@ -66,7 +66,7 @@ fn valid_files_parse_equally_by_parts() {
 }
 
 #[test]
-fn invalid_files_have_equal_errors_by_parts() {
+fn parsing_by_parts_gives_the_same_errors() {
     let valid = format!(
         "{START}{POINT}{RED}{render}{SPHERE}{BLUE}{SPHERE}{POINT}",
         render = "[render]\nseed = 3\n"
@@ -77,7 +77,7 @@ fn invalid_files_have_equal_errors_by_parts() {
     for i in 0..lines.len() {
         let line = lines[i];
         let half = &line[..line.len() / 2];
-        for new in [
+        for replacement in [
             String::new(),
             format!("{line}\n{line}"),
             half.to_owned(),
@@ -95,7 +95,7 @@ fn invalid_files_have_equal_errors_by_parts() {
             line.replace("[0", "['x'"),
         ] {
             let mut changed: Vec<&str> = lines.clone();
-            changed[i] = &new;
+            changed[i] = &replacement;
             assert_same(&changed.join("\n"));
         }
     }

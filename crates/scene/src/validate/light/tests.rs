@@ -1,4 +1,4 @@
-//! Tests of spot lights at both ends of the parameter ranges.
+//! Tests of the directions and angles of spot lights.
 
 use crate::{Light, Scene};
 
@@ -44,7 +44,7 @@ fn a_spot_has_a_direction_or_looks_at_a_point() {
 }
 
 #[test]
-fn a_spot_has_angles_in_their_ranges() {
+fn the_angles_of_a_spot_are_limited() {
     let parse = |keys: &str| spot(&format!("direction = [1, 0, 0]\n{keys}"));
     for keys in [
         "cone_angle = 0.01",

@@ -1,4 +1,4 @@
-//! Tests of the errors of meshes, and of their placement.
+//! Tests of errors in meshes, and of the placement of meshes.
 
 use std::fs;
 
@@ -45,7 +45,7 @@ rotate = { axis = [0, 0, 2], degrees = 45 }
 const ONE: &str = "v 0 0 0\nv 1 0 0\nv 0 2 4\nf 1 2 3\n";
 /// A triangle with texture coordinates.
 const COORDINATES: &str = "v 0 0 0\nv 1 0 0\nv 0 2 4\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n";
-/// Three groups: `roof` without a material, `wall` of brick, and `door` of brick.
+/// Three groups: `roof` without a material, and `wall` and `door` with the material `brick`.
 const PARTS: &str = "v 0 0 0\nv 1 0 0\nv 0 2 4\ng roof\nf 1 2 3\nv 0 0 5\nv 1 0 5\nv 0 2 9\nusemtl brick\ng wall\nf 4 5 6\n\
                      v 0 0 7\nv 1 0 7\nv 0 2 8\ng door\nf 7 8 9\n";
 
@@ -94,7 +94,7 @@ fn groups(scene: &Scene, shape: usize) -> &[usize] {
 const MATERIALS_LINE: &str = r#"materials = { roof = "red", brick = "white" }"#;
 const MATRIX_LINE: &str = "matrix = [[1, 0, 0, 5], [0, 1, 0, 6], [0, 0, 1, 7]]";
 
-/// Valid line, replacement, error.
+/// Lines of [`VALID`], each with an invalid replacement and the expected error.
 const INVALID: &[(&str, &str, &str)] = &[
     (
         "file = \"parts.obj\"",
@@ -280,7 +280,7 @@ fn invalid_meshes_are_reported_with_line_key_value_and_rule() {
 }
 
 #[test]
-fn errors_in_mesh_files_have_their_own_location() {
+fn errors_in_mesh_files_name_the_mesh_file() {
     let folder = folder();
     for (file, expected) in [
         ("broken.obj", "broken.obj:2: vertex 2 of the face does not exist"),
@@ -361,7 +361,7 @@ fn groups_are_counted() {
 
 #[test]
 fn group_names_take_precedence_over_material_names() {
-    // The materials in order are checked, red and white.
+    // Material indices: checked is 0, red is 1, and white is 2.
     let scene = parse(VALID).unwrap();
     assert_eq!((groups(&scene, 0), groups(&scene, 1)), (&[1][..], &[2][..]));
     assert_eq!(groups(&scene, 2), [1, 2, 2]);
@@ -434,8 +434,8 @@ fn meshes_are_scaled_then_rotated_then_translated() {
     assert_eq!(transformed(0, [1.0, 0.0, 0.0]), DVec3::new(1.0, 4.0, 3.0));
     assert_eq!(transformed(0, [0.0, 2.0, 4.0]), DVec3::new(-3.0, 2.0, 11.0));
     assert_eq!(transformed(1, [1.0, 2.0, 4.0]), DVec3::new(6.0, 8.0, 11.0));
-    let half = std::f64::consts::FRAC_1_SQRT_2;
-    assert!(transformed(2, [1.0, 0.0, 0.0]).distance(DVec3::new(half, half, 0.0)) < 1e-15);
+    let sqrt_half = std::f64::consts::FRAC_1_SQRT_2;
+    assert!(transformed(2, [1.0, 0.0, 0.0]).distance(DVec3::new(sqrt_half, sqrt_half, 0.0)) < 1e-15);
 }
 
 #[test]
@@ -487,7 +487,7 @@ fn any_axis_may_be_up() {
 }
 
 #[test]
-fn a_matrix_may_have_a_fourth_row_and_mirror() {
+fn a_matrix_may_have_a_fourth_row_or_mirror() {
     let expected = to_world(&parse(VALID).unwrap(), 1);
     let four_rows = "matrix = [[1, 0, 0, 5], [0, 1, 0, 6], [0, 0, 1, 7], [0, 0, 0, 1]]";
     assert_eq!(
@@ -512,7 +512,7 @@ fn values_at_the_limits_are_valid() {
 }
 
 #[test]
-fn warnings_about_a_file_appear_once() {
+fn warnings_appear_once_per_file_name() {
     assert_eq!(parse(VALID).unwrap().notes, Vec::<String>::new());
     let scene = parse(&VALID.replace("one.obj", "degenerate.obj")).unwrap();
     assert_eq!(
@@ -524,7 +524,7 @@ fn warnings_about_a_file_appear_once() {
 }
 
 #[test]
-fn shapes_and_instances_of_a_file_share_its_triangles() {
+fn shapes_and_instances_of_a_file_share_its_mesh() {
     let scene = parse(&(VALID.to_owned() + "[[instances]]\nmesh = 'parts'\nmaterial = 'red'\n")).unwrap();
     let mesh = |shape: usize| match &scene.shapes[shape].geometry {
         Geometry::Mesh { mesh, .. } => mesh,

@@ -20,7 +20,7 @@ use crate::mesh::MtlMaterial;
 const SPECULAR: f64 = 2.0;
 
 impl SceneMaterials<'_> {
-    /// Returns a principled material. Ignores `Ka`, because exporters write arbitrary values for it.
+    /// Returns a principled material. Ignores `Ka`, because exporters write arbitrary values for `Ka`.
     pub(super) fn principled(&mut self, mtl: &MtlMaterial, file: &Path, traits: Traits) -> Material {
         let mut warnings = Warnings::default();
         let clamp_color = |warnings: &mut Warnings, name: &'static str, color: [f64; 3], limit: f64| {
@@ -55,7 +55,7 @@ impl SceneMaterials<'_> {
         };
         let roughness = match (mtl.roughness, mtl.shininess) {
             (Some(roughness), _) => clamp_fraction(&mut warnings, "Pr", roughness),
-            // The highlight is as wide as with the Blinn-Phong exponent.
+            // The highlight is as wide as the Blinn-Phong highlight with this exponent.
             (None, Some(exponent)) => (2.0 / (exponent.max(0.0) + 2.0)).powf(0.25),
             (None, None) => 1.0,
         };
@@ -117,8 +117,8 @@ impl SceneMaterials<'_> {
         Some(Value::Texture(texture, Channel::R))
     }
 
-    /// Returns true if the texture of `map_Bump` is a normal map. A gray image is a height map, which is not supported:
-    /// adds a warning.
+    /// Returns true if the texture of `map_Bump` is a normal map. Adds a warning about a gray image, which is a height
+    /// map and not supported.
     fn has_directions(&self, texture: usize, warnings: &mut Warnings) -> bool {
         let has_colors = match &self.textures[texture].kind {
             TextureKind::Image { image, .. } => match &image.texels {

@@ -1,4 +1,4 @@
-//! Tests of materials from MTL files, and of warnings about them.
+//! Tests of materials from MTL files, and of warnings about these materials.
 
 use std::fs;
 use std::path::PathBuf;
@@ -20,7 +20,7 @@ const OBJ: &str = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 2 4\nv 0 0 5\nv 1 0 5\nv 
 struct TestFolder(TempDir);
 
 impl TestFolder {
-    /// Writes the mesh to the folder `in`.
+    /// Creates a folder with a mesh, its MTL file and images.
     fn new(mtl: &str) -> TestFolder {
         let folder = TestFolder(tempfile::tempdir().unwrap());
         fs::create_dir(folder.path("in")).unwrap();
@@ -93,7 +93,7 @@ fn groups_have_the_materials_of_their_file() {
         phong(material_named(&scene, "red")),
         (red, red, plain(0.125, 0.125, 0.125), 96.5)
     );
-    // The defaults of MTL files; the illumination model of the file has no highlights.
+    // `Kd` and `Ns` have the defaults of MTL files, and the illumination model 1 has no highlights.
     let gray = plain(0.8, 0.8, 0.8);
     assert_eq!(
         phong(material_named(&scene, "blue")),
@@ -162,7 +162,7 @@ fn maps_are_textures() {
 }
 
 #[test]
-fn unsupported_statements_cause_one_warning() {
+fn invalid_and_unsupported_statements_cause_one_warning() {
     for (mtl, warning) in [
         (
             "Kd -1 0 0",
@@ -234,9 +234,9 @@ fn a_map_needs_texture_coordinates() {
 }
 
 #[test]
-fn missing_materials_get_a_default() {
+fn undefined_materials_are_replaced_by_a_default() {
     let folder = TestFolder::new("newmtl red\n");
-    let note = |rest: &str| format!("in/a.obj: no material {rest}; a gray material is used instead");
+    let note = |details: &str| format!("in/a.obj: no material {details}; a gray material is used instead");
     let notes = |keys: &str| folder.scene(&format!("{MESH}{keys}")).unwrap().notes;
     let scene = folder.scene(MESH).unwrap();
     assert_eq!(scene.notes, [note("\"blue\": not defined in its MTL files")]);
@@ -257,10 +257,10 @@ fn missing_materials_get_a_default() {
         format!("{text}usemtl m{i}\nf 1/1 2/1 {}/1\n", i % 6 + 4)
     });
     folder.write("in/a.obj", &many);
-    let rest =
+    let details =
         "\"blue\", \"m0\", \"m1\", \"m10\", \"m11\", \"m12\", \"m13\", \"m14\" and 14 more: the file names no MTL file";
     let found = notes("");
-    assert!(found.iter().any(|found| *found == note(rest)), "{found:?}");
+    assert!(found.iter().any(|found| *found == note(details)), "{found:?}");
 }
 
 #[test]

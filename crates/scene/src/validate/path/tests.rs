@@ -212,9 +212,9 @@ fn a_path_tracer_scene_has_the_values_of_its_file() {
 }
 
 #[test]
-fn metals_have_an_index_by_name_or_by_numbers() {
+fn metals_have_an_index_of_refraction_by_name_or_by_numbers() {
     let silver = "color = [0.9, 0.9, 0.8]";
-    let index = |text: &str| {
+    let conductor = |text: &str| {
         let scene = parse(&with_line(silver, text)).unwrap();
         let silver_index = scene.material_names.iter().position(|name| name == "silver").unwrap();
         match &scene.materials[silver_index].reflection {
@@ -222,12 +222,12 @@ fn metals_have_an_index_by_name_or_by_numbers() {
             other => panic!("{other:?}"),
         }
     };
-    let (color, plain, facets) = index(silver);
-    assert_eq!((plain, facets), (None, Facets::default()));
+    let (color, no_index, facets) = conductor(silver);
+    assert_eq!((no_index, facets), (None, Facets::default()));
     assert_eq!(color, Color::Plain(DVec3::new(0.9, 0.9, 0.8)));
     let keys = "eta = [1, 2, 3]\nk = [0, 5, 100]\nroughness = 0.5\nanisotropy = 1\nanisotropy_rotation = -90\n\
                 energy_compensation = false";
-    let (color, metal, facets) = index(keys);
+    let (color, metal, facets) = conductor(keys);
     let metal = metal.unwrap();
     assert_eq!(
         (metal.eta, metal.k),
@@ -236,10 +236,10 @@ fn metals_have_an_index_by_name_or_by_numbers() {
     assert_eq!(color, Color::Plain(DVec3::ONE));
     let found = (facets.roughness, facets.anisotropy, facets.rotation, facets.compensated);
     assert_eq!(found, (Value::Plain(0.5), 1.0, -90.0, false));
-    // The page lists all names.
+    // The page lists all metals.
     let page = include_str!("../../../../../docs/scene-format.md");
     for name in MetalIndex::names() {
-        let (_, found, _) = index(&format!("metal = '{name}'"));
+        let (_, found, _) = conductor(&format!("metal = '{name}'"));
         assert_eq!(found, MetalIndex::named(name));
         assert!(page.contains(&format!("`\"{name}\"`")), "{name}");
     }
@@ -327,7 +327,7 @@ fn the_background_becomes_the_environment() {
 }
 
 #[test]
-fn descriptions_made_in_code_are_written_and_read_back() {
+fn serialized_descriptions_parse_to_the_same_scene() {
     let mut clay = DiffuseDescription::new([0.5, 0.4, 0.3]);
     clay.roughness = ValueDescription::texture("spots");
     clay.emission = Some(ColorDescription::texture("spots"));

@@ -107,7 +107,7 @@ blades = 1
 }
 
 #[test]
-fn keys_and_types_of_all_entries_are_reported() {
+fn invalid_keys_and_types_of_all_entries_are_reported() {
     let text = "\
 [image]
 width = 4
@@ -249,7 +249,7 @@ fn files_are_not_read_for_a_scene_with_invalid_settings() {
 }
 
 #[test]
-fn all_keys_of_a_table_with_errors_are_reported() {
+fn all_invalid_keys_of_a_table_are_reported() {
     let text = "\
 [render]
 seed = -5
@@ -277,11 +277,11 @@ radius = 1
             "s.toml:12: shapes[0].material: 7 must be a string",
         ]
     );
-    // All keys are also reported if there is an unknown section.
+    // All invalid keys are also reported if the file has an unknown section.
     let found = errors(&format!("{SMALL}{text}[shape]\n[environment]\nrotate = 'x'\n"));
     assert_eq!(found.len(), 9, "{found:#?}");
     assert_eq!(found[7], "s.toml:14: shape: unknown key; did you mean \"shapes\"?");
-    // A missing key is not reported if a misspelled key may be meant.
+    // A missing key is not reported if a misspelled key may stand for the missing key.
     assert_eq!(
         errors(&format!(
             "{SMALL}[[shapes]]\ntype = 'sphere'\ncentre = [0, 0, 0]\nradius = 'x'\nmaterial = 'm'\n"
@@ -296,14 +296,14 @@ radius = 1
 #[test]
 fn only_the_first_20_errors_are_reported() {
     let shape = "[[shapes]]\ntype = 'sphere'\nmaterial = 'none'\ncenter = [0, 0, 0]\nradius = 1\n";
-    for (count, last) in [
+    for (count, expected_more) in [
         (20, None),
         (21, Some("and 1 more error")),
         (300, Some("and 280 more errors")),
     ] {
         let error = Scene::parse(&format!("{SMALL}{}", shape.repeat(count)), "s.toml").unwrap_err();
         let (errors, more) = error.each();
-        assert_eq!((errors.len(), more.as_deref()), (20, last));
+        assert_eq!((errors.len(), more.as_deref()), (20, expected_more));
         assert_eq!(errors[19].place().key.as_deref(), Some("shapes[19].material"));
     }
     let light = "[[lights]]\ntype = 'point'\nposition = [0, 0, 0]\ncolor = [-1, 0, 0]\n";
@@ -317,7 +317,7 @@ fn only_the_first_20_errors_are_reported() {
         assert_eq!((errors.len(), more.as_deref()), (20, Some("and 10 more errors")));
         assert_eq!(error.place().key.as_deref(), Some(key));
     }
-    // Suggestions for all errors would take minutes.
+    // The search for suggestions is limited: for all errors, the search would take minutes.
     let materials = (0..50_000)
         .map(|i| format!("m{i}.type = 'mirror'\n"))
         .collect::<String>();

@@ -2,7 +2,7 @@
 
 use super::*;
 
-/// Valid line, invalid replacement, error.
+/// Lines of [`VALID`], each with an invalid replacement and the expected error.
 const INVALID: &[(&str, &str, &str)] = &[
     (
         "max_depth = 3",
@@ -304,7 +304,7 @@ fn path_tracer_features_are_rejected_under_phong() {
         };
         parse(&under_path).unwrap();
         let expected = expected.replace("s.toml:", "").split_once(": ").unwrap().1.to_owned();
-        let refused = Scene::parse_with(&under_path, "s.toml", &overrides(Integrator::Phong)).unwrap_err();
-        assert!(refused.to_string().ends_with(&expected), "{refused}");
+        let error = Scene::parse_with(&under_path, "s.toml", &overrides(Integrator::Phong)).unwrap_err();
+        assert!(error.to_string().ends_with(&expected), "{error}");
     }
 }
