@@ -94,7 +94,7 @@
 //!
 //! - `gpu`: rendering on GPUs and software Vulkan. Without it, [`Device::Auto`] is the CPU, and wgpu is not linked.
 //! - `cli`: the program `wgray`.
-//! - `dev`: the program's development mode, a page that updates when a shader or scene is saved. Enables `gpu`.
+//! - `dev`: the program's development mode, a page that updates when a shader or scene is saved. Enables `cli` and `gpu`.
 //!
 //! # Stability
 //!
