@@ -61,7 +61,8 @@ fn nearest_color(t: Texture, uv: vec2f) -> vec3f {
     return load_texel(t, level, i32(x), i32(y));
 }
 
-// Returns the fractional level at which `length`, in texels of the finest level, is 1 to 2 texels.
+// Returns log2 of `length` (in texels of the finest level), clamped to the levels that exist: the fractional level whose
+// texels are as long as `length`.
 fn level_of_length(t: Texture, length: f32) -> f32 {
     let coarsest = f32(t.levels - 1u);
     let level = max(log2(max(length, 1.0)), 0.0);

@@ -1,4 +1,4 @@
-//! Images in memory and as files: PNG, JPEG and WebP as displayed, OpenEXR with linear values.
+//! Images in memory and as files: PNG, JPEG and WebP with display values, OpenEXR with linear values.
 
 pub use wgray_image::{
     Difference, Output, Pending, Pixels, difference, encode, is_complete, remove_temporary_files, to_8_bits, to_16_bits,

@@ -134,7 +134,7 @@ impl<'s> ProgressiveRender<'s> {
     /// Returns the number of samples that every pixel has. With adaptive sampling, pixels that needed no more samples
     /// have fewer. After a cancellation, some pixels may have more.
     pub fn samples(&self) -> u32 {
-        self.bands.passed_samples()
+        self.bands.completed_samples()
     }
 
     /// Returns the finished fraction of the samples, 0 to 1.

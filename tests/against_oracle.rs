@@ -246,10 +246,10 @@ fn first_hits_match_the_oracle() {
                 differ as f64 / hits.len() as f64
             };
             let fraction = differing_fraction(&expected);
-            println!("{name} {mode:?}: the first hits differ in a fraction of {fraction} of the pixels");
+            println!("{name} {mode:?}: the first hits of a fraction {fraction} of the pixels differ");
             assert!(
                 fraction <= MAX_EDGE_FRACTION,
-                "{name}, {mode:?}: the first hits differ in a fraction of {fraction} of the pixels"
+                "{name}, {mode:?}: the first hits of a fraction {fraction} of the pixels differ"
             );
             assert!(
                 differing_fraction(&shifted) > 0.1,

@@ -173,7 +173,7 @@ fn adjacent_faces_do_not_shadow_each_other_at_shared_edges() {
             let vertices = [a, b, c].map(p).join(", ");
             format!("[[shapes]]\ntype = 'triangle'\nmaterial = 'dull'\nvertices = [{vertices}]\n")
         };
-        // A tilted square of two triangles, and a third triangle below the square that receives the shadow.
+        // A tilted square of two triangles, and below it a triangle that receives its shadow.
         let tilt = |x: f64, y: f64| [x, y, 0.3 * x + 0.1 * y];
         let corners = [tilt(-3.0, -3.0), tilt(3.0, -3.0), tilt(3.0, 3.0), tilt(-3.0, 3.0)];
         let receiver = triangle([-1.0, -1.0, -3.0], [1.0, -1.0, -3.0], [0.0, 1.0, -3.0]);

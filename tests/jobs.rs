@@ -278,11 +278,11 @@ fn the_last_pass_is_a_complete_image() {
                 loop {
                     match bands.next_pass(&mut *backend, &mut watch, &mut || {}) {
                         Ok(None) => break,
-                        Ok(Some(samples)) => assert_eq!(samples, bands.passed_samples()),
+                        Ok(Some(samples)) => assert_eq!(samples, bands.completed_samples()),
                         Err(RenderError::Cancelled) => interrupted += 1,
                         Err(error) => panic!("{error}"),
                     }
-                    let samples = bands.passed_samples();
+                    let samples = bands.completed_samples();
                     if passes.last() != Some(&samples) {
                         passes.push(samples);
                     }

@@ -415,7 +415,7 @@ fn futures_return_the_same_image_and_can_be_cancelled_and_dropped() {
     }
 }
 
-/// Collects the names of spans, and the reasons of events.
+/// Collects the names of spans, and the field `reason` of events.
 #[derive(Clone, Default)]
 struct Recorder(Arc<std::sync::Mutex<Vec<String>>>);
 

@@ -6,7 +6,7 @@
 TOML files of 96 x 96 pixels are written to FOLDER, three JSON scenes to FOLDER/configs, and the meshes of the JSON
 scenes to FOLDER/assets. The JSON scenes have the format of a university course's renderer. The course's dragon and bunny
 are not redistributed: bumpy closed meshes of similar size and position replace them. `ray_differentials` is off, because
-Mitsuba does not filter its checkers.
+Mitsuba does not filter its checkerboard textures.
 """
 import json
 import math

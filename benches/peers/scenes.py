@@ -283,8 +283,8 @@ def load(path, integrator="phong"):
     if traced and str(path).endswith(".json"):
         return read_course_scene(path)
     with open(path, "rb") as file:
-        text = tomllib.load(file)
-    camera, render = text["camera"], text.get("render", {})
+        document = tomllib.load(file)
+    camera, render = document["camera"], document.get("render", {})
     orthographic = camera.get("type", "perspective") == "orthographic"
     if camera.get("type") == "panorama" or camera.get("blades", 0) or "f_number" in camera:
         raise ValueError(f"{path}: other renderers support neither panoramas, blades nor f-numbers")
@@ -294,14 +294,14 @@ def load(path, integrator="phong"):
         raise ValueError(f"{path}: other renderers support only perspective cameras here")
     if any(render.get("background", [0, 0, 0])):
         raise ValueError(f"{path}: other renderers support only a black background")
-    scene = Scene(text["image"]["width"], text["image"]["height"], camera["position"], camera["look_at"],
+    scene = Scene(document["image"]["width"], document["image"]["height"], camera["position"], camera["look_at"],
                   camera.get("up", [0, 0, 1]), camera.get("fov"), render.get("ambient", [0, 0, 0]), integrator=integrator,
-                  view_height=camera["height"] if orthographic else None, environment=environment(path, text.get("environment", {})),
+                  view_height=camera["height"] if orthographic else None, environment=environment(path, document.get("environment", {})),
                   lens=(camera["aperture"], camera.get("focus_distance", math.dist(camera["position"], camera["look_at"])))
                   if camera.get("aperture") else None, max_depth=render.get("max_depth", 8), rr_depth=render.get("rr_depth", 5),
                   spp=render.get("pixel_samples", {}).get("count", 16))
-    textures = text.get("textures", {})
-    materials = {name: material(path, row, textures, traced) for name, row in text["materials"].items()}
+    textures = document.get("textures", {})
+    materials = {name: material(path, row, textures, traced) for name, row in document["materials"].items()}
     folder = os.path.dirname(os.path.abspath(path))
 
     def mesh(row, source):
@@ -310,14 +310,14 @@ def load(path, integrator="phong"):
         file = os.path.join(folder, source["file"])
         scene.shapes.append(Mesh(file, source.get("normals"), to_world(row, source.get("up", "z")), materials[row["material"]]))
 
-    for row in text.get("shapes", []):
+    for row in document.get("shapes", []):
         if row["type"] == "mesh":
             mesh(row, row)
         else:
             scene.shapes.append(shape(path, row, materials[row["material"]]))
-    for row in text.get("instances", []):
-        mesh(row, text["meshes"][row["mesh"]])
-    for row in text.get("lights", []):
+    for row in document.get("instances", []):
+        mesh(row, document["meshes"][row["mesh"]])
+    for row in document.get("lights", []):
         if row["type"] == "rectangle":
             scene.lights.append(quad(row, color=row["color"]))
         elif row["type"] == "point" and traced:
@@ -370,14 +370,14 @@ def read_course_scene(path):
     """Reads a JSON scene in the format of a university course. The axes are not converted (y is up), which does not affect
     the image."""
     with open(path, encoding="utf-8") as file:
-        text = json.load(file)
-    camera, light = text["cam_config"], text["light_config"]
-    scene = Scene(*text["image_resolution"], camera["position"], camera["look_at"], camera["ref_up"], camera["vertical_fov"],
-                  [0, 0, 0], integrator="path", max_depth=text["max_depth"], spp=text["spp"])
+        config = json.load(file)
+    camera, light = config["cam_config"], config["light_config"]
+    scene = Scene(*config["image_resolution"], camera["position"], camera["look_at"], camera["ref_up"], camera["vertical_fov"],
+                  [0, 0, 0], integrator="path", max_depth=config["max_depth"], spp=config["spp"])
     kinds = {"diffuse": "diffuse", "specular": "conductor"}
-    materials = {row["name"]: Material(kinds[row["type"]], color=row["color"]) for row in text["materials"]}
+    materials = {row["name"]: Material(kinds[row["type"]], color=row["color"]) for row in config["materials"]}
     folder = os.path.dirname(os.path.abspath(path))
-    for row in text["objects"]:
+    for row in config["objects"]:
         transform = to_world({"scale": row.get("scale", 1), "translate": row.get("translate", [0, 0, 0])}, "z")
         scene.shapes.append(Mesh(os.path.join(folder, row["obj_file_path"]), "flat", transform, materials[row["material_name"]]))
     scene.lights.append(quad({"center": light["position"], "size": light["size"], "normal": [0, -1, 0], "tangent": [1, 0, 0]},

@@ -199,7 +199,7 @@ fn a_second_signal_ends_at_once() {
     let child = start(&folder, &["-o", "out.exr", "--device", "cpu"]);
     wait_for(&folder, "out.exr");
     std::thread::sleep(Duration::from_millis(500));
-    // While the program is stopped, signals stay pending. The program then receives all of them at once.
+    // While the program is stopped, signals stay pending. When it continues, it receives all of them at once.
     send("-STOP", &child);
     std::thread::sleep(Duration::from_millis(100));
     let before = folder.read("out.exr");

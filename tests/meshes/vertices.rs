@@ -443,7 +443,7 @@ fn invalid_factors_and_sets_are_reported() {
         (
             "base_color = { texture = 'second' }",
             sphere,
-            "shapes[0].material: \"m\" must have no texture with uv_set = 1 here, because this shape has only the set 0",
+            "shapes[0].material: \"m\" must have no texture with uv_set = 1 here, because this shape has only UV set 0",
         ),
     ] {
         let message = message(keys, shape);

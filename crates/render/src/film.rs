@@ -161,8 +161,8 @@ impl Film {
     }
 
     /// Returns the estimated variance of a pixel's mean per channel. Requires adaptive sampling. The estimate assumes
-    /// independent samples; for stratified patterns it is, on average, an upper bound. A pixel's number of samples
-    /// depends on the variance of its neighbors, not on the variance of the pixel itself.
+    /// independent samples; for stratified patterns it is, on average, an upper bound. The estimate
+    /// is not biased by the choice of sample counts, which depends on the variance of a pixel's neighbors only.
     pub fn variance(&self, pixel: usize) -> [f32; 3] {
         variance_of_mean(self.sums[pixel], self.moments[pixel]).to_array()
     }

@@ -31,7 +31,8 @@ static IN_USE: Mutex<Option<HashMap<Key, CachedMesh>>> = Mutex::new(None);
 /// Reads a mesh; returns the existing mesh if it is in use and its files have not changed.
 pub fn load(file_system: &FileSystem, path: &Path, normals: Option<Normals>) -> Result<Arc<Mesh>, MeshError> {
     let Some(key) = key(file_system, path, normals) else {
-        return Mesh::load_from(file_system, path, normals).map(Arc::new); // returns the error
+        // The file has no modification time, usually because it does not exist: reading it reports the error.
+        return Mesh::load_from(file_system, path, normals).map(Arc::new);
     };
     if let Some(mesh) = cached_mesh(file_system, &key) {
         return Ok(mesh);

@@ -222,8 +222,8 @@ pub enum Light {
     Point {
         /// Position.
         position: DVec3,
-        /// Color. With [`Integrator::Path`], the intensity (power per unit solid angle) with inverse-square falloff;
-        /// with [`Integrator::Phong`], without falloff.
+        /// With [`Integrator::Path`], the intensity (power per unit solid angle), so that the light falls off with the
+        /// squared distance. With [`Integrator::Phong`], the color at any distance.
         color: DVec3,
     },
     /// A directional light, invisible to the camera.

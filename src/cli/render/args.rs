@@ -191,7 +191,8 @@ impl Args {
         Frame::all(self.frames.as_ref().or(turntable.as_ref()))
     }
 
-    /// Returns the frames per second of glTF animations; `None` if the frames do not play animations.
+    /// Returns the frames per second of glTF animations; `None` if the animation time does not
+    /// depend on the frame.
     pub fn fps(&self, scene: &Scene) -> Result<Option<f64>, Usage> {
         let error = |rule: &str| Err(Usage(format!("--fps: {rule}")));
         // A scene file that includes a model sets the animation time itself.
@@ -201,8 +202,8 @@ impl Args {
             Some(_) if !is_animated => error("only applies to glTF files with animations"),
             Some(fps) => Ok(Some(fps)),
             None => {
-                let plays_frames = self.frames.is_some() && self.turntable.is_none() && !self.options.has_time();
-                Ok((plays_frames && is_animated).then_some(DEFAULT_FPS))
+                let frames_set_time = self.frames.is_some() && self.turntable.is_none() && !self.options.has_time();
+                Ok((frames_set_time && is_animated).then_some(DEFAULT_FPS))
             }
         }
     }

@@ -149,7 +149,7 @@ fn render(
                 }
                 Ok(_) => break,
                 Err(RenderError::Cancelled) if plan.checkpoint.is_none() => {
-                    if bands.passed_samples() == 0 {
+                    if bands.completed_samples() == 0 {
                         let note = "some pixels have no complete sample yet, so no image was written";
                         plan.log.log(Level::Note, note);
                     } else if let Some(partial) = save_pass(plan, renderer, &mut bands, previews, layout)? {
@@ -210,7 +210,7 @@ fn save_pass(
     previews: &mut Previews,
     layout: &Layout,
 ) -> Result<Option<RenderTotals>, RenderError> {
-    let (samples, all) = (bands.passed_samples(), plan.scene.sampling.pixel_samples);
+    let (samples, all) = (bands.completed_samples(), plan.scene.sampling.pixel_samples);
     let metadata = (plan.metadata).partial(renderer.info(), plan.picture_options.reproducible, (samples, all));
     let options = plan.picture_options.save_options(metadata);
     let mut totals = RenderTotals {

@@ -5,58 +5,58 @@ use wgray::scene::*;
 
 /// Scales and translates all objects of a scene.
 pub fn moved(description: &mut Description, scale: f64, offset: DVec3) {
-    let point = |p: &mut DVec3| *p = *p * scale + offset;
+    let move_point = |p: &mut DVec3| *p = *p * scale + offset;
     match &mut description.camera {
         CameraDescription::Perspective(c) => {
             for length in [&mut c.aperture, &mut c.focus_distance].into_iter().flatten() {
                 *length *= scale;
             }
-            [&mut c.position, &mut c.look_at].map(point)
+            [&mut c.position, &mut c.look_at].map(move_point)
         }
-        CameraDescription::Panorama(c) => [&mut c.position, &mut c.look_at].map(point),
+        CameraDescription::Panorama(c) => [&mut c.position, &mut c.look_at].map(move_point),
         CameraDescription::Orthographic(c) => {
             c.height *= scale;
-            [&mut c.position, &mut c.look_at].map(point)
+            [&mut c.position, &mut c.look_at].map(move_point)
         }
     };
     for light in &mut description.lights {
         match light {
             LightDescription::Rectangle(l) => {
-                point(&mut l.center);
+                move_point(&mut l.center);
                 l.size = l.size.map(|side| side * scale);
             }
-            LightDescription::Point(l) => point(&mut l.position),
-            LightDescription::Spot(l) => point(&mut l.position),
+            LightDescription::Point(l) => move_point(&mut l.position),
+            LightDescription::Spot(l) => move_point(&mut l.position),
             _ => {}
         }
     }
     for shape in &mut description.shapes {
         match shape {
             ShapeDescription::Rectangle(s) => {
-                point(&mut s.center);
+                move_point(&mut s.center);
                 s.size = s.size.map(|side| side * scale);
             }
             ShapeDescription::Sphere(s) => {
-                point(&mut s.center);
+                move_point(&mut s.center);
                 s.radius *= scale;
             }
             ShapeDescription::Disk(s) => {
-                point(&mut s.center);
+                move_point(&mut s.center);
                 s.radius *= scale;
             }
             ShapeDescription::Ellipsoid(s) => {
-                point(&mut s.center);
+                move_point(&mut s.center);
                 [&mut s.a, &mut s.b, &mut s.c]
                     .into_iter()
                     .for_each(|axis| *axis *= scale);
             }
             ShapeDescription::Cylinder(s) => {
-                [&mut s.start, &mut s.end].into_iter().for_each(point);
+                [&mut s.start, &mut s.end].into_iter().for_each(move_point);
                 s.radius *= scale;
             }
-            ShapeDescription::Triangle(s) => s.vertices.iter_mut().for_each(point),
-            ShapeDescription::Tetrahedron(s) => s.vertices.iter_mut().for_each(point),
-            ShapeDescription::Plane(s) => point(&mut s.point),
+            ShapeDescription::Triangle(s) => s.vertices.iter_mut().for_each(move_point),
+            ShapeDescription::Tetrahedron(s) => s.vertices.iter_mut().for_each(move_point),
+            ShapeDescription::Plane(s) => move_point(&mut s.point),
             ShapeDescription::Mesh(s) => move_placement(&mut s.translate, &mut s.scale, &mut s.matrix, scale, offset),
             other => panic!("no random scene has the shape {other:?}"),
         }

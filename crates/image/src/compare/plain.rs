@@ -93,8 +93,8 @@ pub struct Difference {
     pub first_non_finite: Option<PixelCoord>,
 }
 
-/// Returns the layers of both images, colors first, and the channels that exist only in the first or only in the second
-/// image.
+/// Returns the layers that both images have, colors first; the channels that only the first image has; and the channels
+/// that only the second image has.
 pub fn layers<'a>(a: &'a Picture, b: &'a Picture) -> (Vec<Layer<'a>>, Vec<&'a str>, Vec<&'a str>) {
     let mut layers: Vec<Layer> = Vec::new();
     let mut only_a = Vec::new();

@@ -282,7 +282,7 @@ impl<S: CheckpointStore> Bands<S> {
         watch: &mut Watch,
         on_progress: &mut dyn FnMut(),
     ) -> Result<Option<u32>, RenderError> {
-        let samples = self.passed_samples();
+        let samples = self.completed_samples();
         if self.pass_end.is_none() || self.joint_rendering_ended != Some(false) || samples >= self.samples {
             return Ok(None);
         }
@@ -298,11 +298,12 @@ impl<S: CheckpointStore> Bands<S> {
         for band in &mut self.bands {
             band.last_pass = None;
         }
-        Ok(Some(self.passed_samples()))
+        Ok(Some(self.completed_samples()))
     }
 
-    /// Returns the number of samples of every pixel after the last complete pass.
-    pub fn passed_samples(&self) -> u32 {
+    /// Returns the samples per pixel that were requested up to the end of the last complete pass. With adaptive sampling,
+    /// pixels may have fewer.
+    pub fn completed_samples(&self) -> u32 {
         let samples = |band: &Band| match &band.last_pass {
             Some(piece) => piece.reached.pass.start,
             None => band.samples(self.samples),

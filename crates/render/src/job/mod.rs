@@ -1,6 +1,6 @@
 //! Scheduling of renders on any backend: bands that fit into memory, dispatches of bounded duration, progress,
-//! cancellation, checkpoints and parts. Each dispatch adds samples to the film, so that every partition of a render
-//! gives the same bits.
+//! cancellation, checkpoints and parts. Each dispatch adds its samples directly to the film's sums, for every pixel in
+//! ascending order, so that the bits do not depend on how a render is divided.
 
 mod bands;
 pub mod checkpoint;

@@ -38,7 +38,7 @@ pub struct Header {
     /// [`FORMAT`].
     pub format: u32,
     pub identity: Identity,
-    /// Data for the merged image; `None` in a checkpoint.
+    /// What a merge needs besides the films; `None` in a checkpoint.
     pub part: Option<PartHeader>,
 }
 

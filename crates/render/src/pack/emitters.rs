@@ -434,15 +434,15 @@ fn mean(color: Vec3) -> f64 {
 
 /// Returns the mean of a color's components; for a texture, averaged over the texture.
 fn mean_of(scene: &Scene, color: &Color) -> f64 {
-    let mean = |color: DVec3| color.element_sum() / 3.0;
+    let component_mean = |color: DVec3| color.element_sum() / 3.0;
     match *color {
-        Color::Plain(color) => mean(color),
+        Color::Plain(color) => component_mean(color),
         Color::Texture(i) => match &scene.textures[i].kind {
-            TextureKind::Constant(color) => mean(*color),
-            TextureKind::Checker { even, odd } => mean((*even + *odd) / 2.0),
-            TextureKind::Lines { cell, line, .. } => mean((*cell + *line) / 2.0),
+            TextureKind::Constant(color) => component_mean(*color),
+            TextureKind::Checker { even, odd } => component_mean((*even + *odd) / 2.0),
+            TextureKind::Lines { cell, line, .. } => component_mean((*cell + *line) / 2.0),
             TextureKind::Image { image, factor, .. } => {
-                mean(*factor)
+                component_mean(*factor)
                     * match &image.texels {
                         Texels::Bytes(_, bytes) => {
                             let sum: u64 = bytes.as_flattened().par_iter().map(|byte| u64::from(*byte)).sum();

@@ -4,8 +4,9 @@ use super::environment_map::EnvironmentMap;
 use super::materials::Appearances;
 use wgray_scene::{Environment, Scene};
 
-/// Packed materials, textures and environment map, without their texels. Packing texels takes most of the time: mip
-/// pyramids, and tables of the environment and of materials.
+/// Packed materials, textures and environment map, without their texels. A session reuses them together with the texels of
+/// the previous packing while only shapes, lights or the camera change, because computing texels (mip pyramids, and tables
+/// of the environment and of materials) takes most of the time of packing.
 pub struct PackedShading {
     pub(super) appearances: Appearances,
     pub(super) environment_map: EnvironmentMap,

@@ -183,7 +183,7 @@ fn the_margins_of_a_leaning_triangle_are_equal() {
     let points: Vec<DVec3> = points.chain([DVec3::new(0.0, -1.0, 3.0)]).collect();
     for aspect in [0.25, 4.0] {
         let camera = camera(&points, Framing::new(View::Front, aspect));
-        // The lower end is at depth D + 1, and the upper end is at depth D. For a camera at height h,
+        // The lower end is at depth D + 1, and the upper end is at depth D (`near`). For a camera at height h,
         // -(0 - h) / (D + 1) = (3 - h) / D.
         let near = -1.0 - camera.position.y;
         let height = 3.0 * (near + 1.0) / (2.0 * near + 1.0);

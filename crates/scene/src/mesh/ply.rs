@@ -267,12 +267,12 @@ fn read_faces(
 ) -> Result<(), MeshFault> {
     let is_list = |property: &Property| property.count.is_some() && property.scalar.is_integer();
     let has_name = |property: &Property| ["vertex_indices", "vertex_index"].contains(&property.name.as_str());
-    let indices = element
+    let indices_property = element
         .properties
         .iter()
         .position(|property| is_list(property) && has_name(property))
         .or_else(|| element.properties.iter().position(is_list));
-    let Some(indices) = indices else {
+    let Some(indices_property) = indices_property else {
         let rule = "a list of whole numbers, \"vertex_indices\", is missing";
         return Err(element.location.fault(format!("element \"face\": {rule}")));
     };
@@ -286,7 +286,7 @@ fn read_faces(
     for i in 0..element.count {
         for (k, property) in element.properties.iter().enumerate() {
             let count = match property.count {
-                Some(count) if k == indices => count,
+                Some(count) if k == indices_property => count,
                 _ => {
                     skip(property, values)?;
                     continue;

@@ -38,7 +38,7 @@ pub(super) struct SceneMaterials<'a> {
     images: Images<'a>,
     /// Canonical path of the folder to which paths in messages are relative.
     folder: PathBuf,
-    /// The materials of each mesh, by the address of the mesh.
+    /// The materials of each mesh, by the address of the [`Mesh`] in memory.
     group_materials: HashMap<usize, GroupMaterials>,
     integrator: Integrator,
     /// Indices into `materials`, by MTL file, line, and traits of the mesh.

@@ -61,7 +61,7 @@ pub(super) fn shape(description: &ShapeDescription, lookup: &mut SceneLookup) ->
     let uv_sets = textures.iter().map(|i| lookup.scene_materials.textures[*i].uv_set);
     let uv_set = uv_sets.max().unwrap_or(0);
     check(uv_set == 0, || {
-        format!("{name:?} must have no texture with uv_set = {uv_set} here, because this shape has only the set 0")
+        format!("{name:?} must have no texture with uv_set = {uv_set} here, because this shape has only UV set 0")
     })
     .at("material")?;
     if let Geometry::Plane { .. } = geometry {
