@@ -7,7 +7,7 @@ the walls of a room: the mean over the points, and the median in parentheses. Co
     target/peers/venv/bin/python benches/peers/light_importance.py
 
 The tree splits at the median of the longest side, unlike wgray's. The importance of a child is that of
-docs/path-tracing.md ("Light tree"), compared with that of earlier versions. The variance is exact: it follows
+docs/decisions/light-tree.md, compared with that of earlier versions. The variance is exact: it follows
 from the contribution and the probability of each light, without sampling.
 """
 import argparse
