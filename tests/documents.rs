@@ -1,4 +1,4 @@
-//! The documentation: its links, the table of pages, and the scene of the README.
+//! The documentation: its links, the table of pages, the tutorials, and the scene of the README.
 
 use std::path::{Path, PathBuf};
 
@@ -152,4 +152,101 @@ fn the_readme_scene_renders() {
         ground.iter().all(|&value| value > 0.1) && ground[0] < 1.3 * ground[2],
         "{ground:?}"
     );
+}
+
+/// The tutorials, run with `sh` and `timeout`.
+#[cfg(all(target_os = "linux", feature = "dev"))]
+mod tutorials {
+    use super::{Path, pages_in, project, read};
+
+    /// Returns the commands of a tutorial as a shell script, and the texts that its output must contain.
+    ///
+    /// Blocks marked `sh` run in order. A block after a line that ends with "`NAME`:" is the contents of the file NAME.
+    /// Other blocks marked `text` are output.
+    fn tutorial_script(page: &str) -> (String, Vec<String>) {
+        let (mut script, mut outputs, mut introduction) = (String::new(), Vec::new(), "");
+        let mut lines = page.lines();
+        while let Some(line) = lines.next() {
+            let Some(language) = line.strip_prefix("```") else {
+                if !line.is_empty() {
+                    introduction = line;
+                }
+                continue;
+            };
+            let block = lines.by_ref().take_while(|line| *line != "```");
+            let block: String = block.map(|line| format!("{line}\n")).collect();
+            let file = introduction
+                .strip_suffix("`:")
+                .and_then(|start| start.rsplit('`').next());
+            introduction = "";
+            match (language, file) {
+                ("sh", _) => script += &block,
+                (_, Some(file)) => script += &format!("cat > {file} << 'END_OF_FILE'\n{block}END_OF_FILE\n"),
+                ("text", None) => outputs.push(block),
+                _ => {}
+            }
+        }
+        (script, outputs)
+    }
+
+    /// Runs `wgray dev` in the background, at a free port. Waits for the images that the tutorial compares.
+    fn with_dev_in_background(script: &str) -> String {
+        let dev = "wgray dev scene.toml --out live.png";
+        let in_background = format!("{dev} --listen 127.0.0.1:0 > dev.log 2>&1 &\ntrap \"kill $!\" EXIT");
+        let has_first = "until grep -q Finished dev.log && [ -e live.png ]; do sleep 0.1; done";
+        let has_second =
+            "until [ $(grep -c Finished dev.log) -ge 2 ] && ! cmp -s live.png before.png; do sleep 0.1; done";
+        script
+            .replace(&format!("{dev}\n"), &format!("{in_background}\n{has_first}\n"))
+            .replace("wgray diff live.png", &format!("{has_second}\nwgray diff live.png"))
+    }
+
+    /// Runs a tutorial in an empty folder beside the folder `wgray`, the repository. Returns whether it succeeds, and
+    /// its output.
+    fn run_tutorial(script: &str) -> (bool, String) {
+        let folder = tempfile::tempdir().unwrap();
+        let work = folder.path().join("work");
+        std::fs::create_dir(&work).unwrap();
+        std::os::unix::fs::symlink(project(""), folder.path().join("wgray")).unwrap();
+        let program = Path::new(env!("CARGO_BIN_EXE_wgray")).parent().unwrap();
+        let path = format!("{}:{}", program.display(), std::env::var("PATH").unwrap());
+        let script = format!("exec 2>&1\n{}", with_dev_in_background(script));
+        let output = std::process::Command::new("timeout")
+            .args(["300", "sh", "-ec", &script])
+            .current_dir(work)
+            .env("PATH", path)
+            .output()
+            .unwrap();
+        (
+            output.status.success(),
+            String::from_utf8_lossy(&output.stdout).into_owned(),
+        )
+    }
+
+    #[test]
+    fn the_tutorials_run_from_an_empty_folder() {
+        let pages = pages_in("docs/tutorials");
+        assert!(pages.len() >= 6, "{pages:?}");
+        for page in pages {
+            if page.ends_with("shader-edit.md") && crate::adapter::device().is_none() {
+                continue;
+            }
+            let (script, outputs) = tutorial_script(&read(&page));
+            let (succeeds, output) = run_tutorial(&script);
+            assert!(succeeds, "{}:\n{output}", page.display());
+            for text in outputs {
+                assert!(output.contains(&text), "{}: {text} is not in\n{output}", page.display());
+            }
+        }
+    }
+
+    #[test]
+    fn mistakes_in_tutorials_are_detected() {
+        let page = "Save `a b` as `name.txt`:\n\n```text\nx\n```\n\n```sh\ncat name.txt\n```\n\n```text\nx\n```\n";
+        let (script, outputs) = tutorial_script(page);
+        assert_eq!(outputs, ["x\n"]);
+        assert_eq!(run_tutorial(&script), (true, "x\n".to_owned()));
+        let (succeeds, _) = run_tutorial(&script.replace("cat name.txt", "wgray render name.png\necho x"));
+        assert!(!succeeds, "the script continues after a failure");
+    }
 }

@@ -222,3 +222,6 @@ fn to_toml(value: &Value) -> String {
         other => other.to_string(),
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -29,21 +29,21 @@ pub struct PerspectiveDescription {
     /// Center of projection.
     #[schemars(with = "Point")]
     pub position: DVec3,
-    /// Point at the center of the image.
+    /// Point at the center of the image; must differ from `position`.
     #[schemars(with = "Point")]
     pub look_at: DVec3,
-    /// Up direction.
+    /// Up direction in the image, not parallel to the view. In a vertical view, the default becomes +y.
     #[serde(default = "z_up")]
     #[schemars(with = "Vector")]
     pub up: DVec3,
     /// Vertical field of view in degrees.
     #[schemars(with = "Fov")]
     pub fov: f64,
-    /// Focal length of the lens in scene units; only used with `f_number`.
+    /// Focal length in scene units; only used with `f_number`.
     #[serde(default = "one")]
     #[schemars(with = "Length")]
     pub focal_length: f64,
-    /// Diameter of the lens in scene units; 0, or absent without `f_number`, for a pinhole camera.
+    /// Diameter of the lens in scene units; 0 for a pinhole camera. If absent, 0 unless `f_number` is set.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Aperture>")]
     pub aperture: Option<f64>,
@@ -55,11 +55,11 @@ pub struct PerspectiveDescription {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Length>")]
     pub focus_distance: Option<f64>,
-    /// Number of corners of the lens, 3 to 16; 0 for a round lens.
+    /// Number of corners of the lens; 0 for a round lens.
     #[serde(default)]
     #[schemars(with = "Blades")]
     pub blades: u32,
-    /// Rotation of the corners in degrees, counter-clockwise in the image. At 0, a corner is at the top.
+    /// Rotation of the corners in degrees, counter-clockwise in the image; at 0 one is at the top.
     #[serde(default)]
     #[schemars(with = "Degrees")]
     pub blade_rotation: f64,
@@ -94,10 +94,10 @@ pub struct OrthographicDescription {
     /// Center of the image plane, where the rays start.
     #[schemars(with = "Point")]
     pub position: DVec3,
-    /// Point at the center of the image.
+    /// Point at the center of the image; must differ from `position`.
     #[schemars(with = "Point")]
     pub look_at: DVec3,
-    /// Up direction.
+    /// Up direction in the image, not parallel to the view. In a vertical view, the default becomes +y.
     #[serde(default = "z_up")]
     #[schemars(with = "Vector")]
     pub up: DVec3,
@@ -129,10 +129,10 @@ pub struct PanoramaDescription {
     /// Origin of all rays.
     #[schemars(with = "Point")]
     pub position: DVec3,
-    /// Point at the center of the image.
+    /// Point at the center of the image; must differ from `position`.
     #[schemars(with = "Point")]
     pub look_at: DVec3,
-    /// Up direction.
+    /// Up direction in the image, not parallel to the view. In a vertical view, the default becomes +y.
     #[serde(default = "z_up")]
     #[schemars(with = "Vector")]
     pub up: DVec3,

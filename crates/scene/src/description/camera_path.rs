@@ -13,7 +13,7 @@ pub struct CameraPathDescription {
     /// Interpolation between keys.
     #[serde(default)]
     pub interpolation: Interpolation,
-    /// Keys in ascending order of their frames.
+    /// Keys in ascending order of their frames; at least one.
     #[schemars(length(min = 1))]
     pub keys: Vec<CameraKeyDescription>,
 }
@@ -46,7 +46,7 @@ pub enum Interpolation {
 #[serde(deny_unknown_fields)]
 #[schemars(extend("minProperties" = 2))] // at least one value
 pub struct CameraKeyDescription {
-    /// Frame number; may be a fraction.
+    /// Frame number; may be a fraction. At least 1e-6 above that of the previous key.
     #[schemars(with = "FrameNumber")]
     pub frame: f64,
     /// Position of the camera.
@@ -57,7 +57,7 @@ pub struct CameraKeyDescription {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Point>")]
     pub look_at: Option<DVec3>,
-    /// Up direction.
+    /// Up direction. Its components are interpolated without normalization.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Vector>")]
     pub up: Option<DVec3>,
@@ -69,7 +69,7 @@ pub struct CameraKeyDescription {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Length>")]
     pub height: Option<f64>,
-    /// Diameter of the lens in scene units; only for perspective cameras.
+    /// Diameter of the lens in scene units, which replaces `f_number`; only for perspective cameras.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Aperture>")]
     pub aperture: Option<f64>,

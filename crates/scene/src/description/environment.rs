@@ -12,7 +12,7 @@ use crate::description::kinds::{Degrees, Elevation, EnvironmentScale, Rgb, Turbi
 #[serde(deny_unknown_fields)]
 #[schemars(extend("oneOf" = [{ "required": ["color"] }, { "required": ["file"] }, { "required": ["name"] }]))]
 pub struct EnvironmentDescription {
-    /// Constant radiance; linear RGB.
+    /// Radiance from all directions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Rgb>")]
     pub color: Option<DVec3>,
@@ -27,14 +27,14 @@ pub struct EnvironmentDescription {
     #[serde(default = "one")]
     #[schemars(with = "EnvironmentScale")]
     pub scale: f64,
-    /// Rotation: an angle about the z axis in degrees, counter-clockwise as seen from above, or any rotation that a
-    /// mesh accepts; each angle from -360 to 360 degrees. If absent, no rotation.
+    /// Rotation: degrees about z, counter-clockwise as seen from above, or as for meshes; each angle from -360 to 360
+    /// degrees. If absent, none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rotate: Option<EnvironmentRotation>,
     /// Visible to the camera.
     #[serde(default = "default_true")]
     pub visible: bool,
-    /// Radiance that the camera sees instead of the environment; linear RGB.
+    /// Radiance that the camera sees instead.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Rgb>")]
     pub background: Option<DVec3>,
@@ -46,7 +46,7 @@ pub struct EnvironmentDescription {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Degrees>", extend("default" = 0))]
     pub sun_azimuth: Option<f64>,
-    /// Turbidity of `"sky"`: extinction by air and haze, relative to clean air.
+    /// Turbidity of `"sky"`; 1 is clean air.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Turbidity>", extend("default" = 2))]
     pub turbidity: Option<f64>,

@@ -15,41 +15,41 @@ use crate::description::kinds::{ListIndex, Matrix, Point, Seconds};
 #[serde(deny_unknown_fields)]
 #[schemars(extend("not" = { "required": ["matrix"], "anyOf": [{ "required": ["scale"] }, { "required": ["rotate"] }, { "required": ["translate"] }] }))]
 pub struct GltfDescription {
-    /// The file, relative to the scene file's folder.
+    /// A .gltf or .glb file, relative to the scene file.
     #[schemars(length(min = 1))]
     pub file: String,
-    /// Scene of the file. If absent, the default scene of the file, or else the first scene.
+    /// Scene of the file. If absent, the file's default, else its first.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scene: Option<Selection>,
-    /// Time of the animation. If absent, the file is not animated.
+    /// Time of the animation in seconds. If absent, no animation.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Seconds>")]
     pub time: Option<f64>,
-    /// Animation of the file. If absent, the first animation if `time` is set.
+    /// Animation of the file. If absent, the first if `time` is set.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub animation: Option<Selection>,
-    /// Material variant of the file. If absent, the default materials of the file.
+    /// Material variant of the file. If absent, none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub variant: Option<Selection>,
     /// Use the lights of the file.
     #[serde(default = "default_true")]
     pub lights: bool,
-    /// Names of the scene's materials, by the names of the file's materials that they replace.
+    /// Materials of the scene that replace materials of the file, by name.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub materials: BTreeMap<String, String>,
     /// Translation, applied last.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Point>", extend("default" = [0, 0, 0]))]
     pub translate: Option<DVec3>,
-    /// Rotation, applied after the scale: three angles about x, y and z, or one angle about an axis, each from -360 to
-    /// 360 degrees. If absent, no rotation.
+    /// Rotation, applied after the scale: about x, y and z, or about one axis; each angle from -360 to 360 degrees. If
+    /// absent, none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rotate: Option<Rotation>,
-    /// Scale: one factor or three factors, each from 1e-6 to 1e6, or from -1e6 to -1e-6.
+    /// Factors, each from 1e-6 to 1e6, or from -1e6 to -1e-6.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("default" = 1))]
     pub scale: Option<Scale>,
-    /// Rows of an affine transform, which replaces `scale`, `rotate` and `translate`.
+    /// Affine transform, which replaces `scale`, `rotate` and `translate`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Matrix>")]
     pub matrix: Option<Vec<[f64; 4]>>,

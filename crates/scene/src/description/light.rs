@@ -33,14 +33,14 @@ pub struct RectangleLightDescription {
     /// Lengths along the tangent and the bitangent.
     #[schemars(with = "Size")]
     pub size: [f64; 2],
-    /// Normal; any length.
+    /// Normal. Under `"path"` only this side emits.
     #[schemars(with = "Vector")]
     pub normal: DVec3,
-    /// Direction of the first edge; any length. If absent, the x axis, or the y axis if the normal is nearly along x.
+    /// Direction of the first edge. If absent, x, or y if the normal is nearly along x.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Vector>")]
     pub tangent: Option<DVec3>,
-    /// Linear RGB.
+    /// Radiance under `"path"`, else the light at every point.
     #[schemars(with = "Rgb")]
     pub color: DVec3,
     /// Visible to the camera.
@@ -79,7 +79,7 @@ pub struct PointLightDescription {
     /// Position.
     #[schemars(with = "Point")]
     pub position: DVec3,
-    /// Linear RGB.
+    /// Radiant intensity under `"path"`, else the light at every point.
     #[schemars(with = "Rgb")]
     pub color: DVec3,
 }
@@ -98,10 +98,10 @@ impl PointLightDescription {
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DirectionalLightDescription {
-    /// Direction of propagation; any length.
+    /// Direction of propagation: `[0, 0, -1]` is light from straight above.
     #[schemars(with = "Vector")]
     pub direction: DVec3,
-    /// Linear RGB.
+    /// Irradiance under `"path"`, else the light at every point.
     #[schemars(with = "Rgb")]
     pub color: DVec3,
 }
@@ -124,21 +124,21 @@ pub struct SpotLightDescription {
     /// Position.
     #[schemars(with = "Point")]
     pub position: DVec3,
-    /// Direction of the axis, away from the light; any length.
+    /// Direction of the axis, away from the light.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Vector>")]
     pub direction: Option<DVec3>,
-    /// A point on the axis, in front of the light.
+    /// A point on the axis, in front of the light; at least 1e-9 from `position`.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Point>")]
     pub look_at: Option<DVec3>,
-    /// Linear RGB on the axis.
+    /// Radiant intensity on the axis under `"path"`, else the light at every point of the axis.
     #[schemars(with = "Rgb")]
     pub color: DVec3,
     /// Angle between axis and edge of the cone, in degrees.
     #[schemars(with = "ConeAngle")]
     pub cone_angle: f64,
-    /// Angle between the axis and the start of the falloff, in degrees.
+    /// Angle between the axis and the start of the falloff, in degrees; at most `cone_angle`.
     #[serde(default)]
     #[schemars(with = "InnerAngle")]
     pub inner_angle: f64,

@@ -59,21 +59,21 @@ impl MaterialDescription {
 pub struct PhongDescription {
     /// Default of `ambient`, `diffuse` and `specular`.
     pub color: Option<ColorDescription>,
-    /// Factor of the ambient light: linear red, green and blue, or a texture. If absent, `color`.
+    /// Factor ka of the ambient light. If absent, `color`.
     pub ambient: Option<ColorDescription>,
-    /// Factor of the diffuse term: linear red, green and blue, or a texture. If absent, `color`.
+    /// Factor kd of the diffuse term. If absent, `color`.
     pub diffuse: Option<ColorDescription>,
-    /// Factor of the specular term: linear red, green and blue, or a texture. If absent, `color`.
+    /// Factor ks of the specular term. If absent, `color`.
     pub specular: Option<ColorDescription>,
     /// Exponent of the specular term.
     #[serde(default = "default_shininess")]
     #[schemars(with = "Shininess")]
     pub shininess: f64,
-    /// Normal map.
+    /// Normal map, which tilts the shading normals.
     pub normal_map: Option<NormalMapDescription>,
-    /// Emitted radiance, for `integrator = "path"`; black if absent.
+    /// Radiance emitted on both sides, for `"path"`. If absent, black.
     pub emission: Option<ColorDescription>,
-    /// Visible to the camera; true if absent.
+    /// Visible to the camera. If absent, true.
     pub visible: Option<bool>,
 }
 
@@ -101,11 +101,11 @@ pub struct MirrorDescription {
     #[serde(default)]
     #[schemars(with = "FractionColor")]
     pub tint: ColorDescription,
-    /// Normal map.
+    /// Normal map, which tilts the shading normals.
     pub normal_map: Option<NormalMapDescription>,
-    /// Emitted radiance, for `integrator = "path"`; black if absent.
+    /// Radiance emitted on both sides, for `"path"`. If absent, black.
     pub emission: Option<ColorDescription>,
-    /// Visible to the camera; true if absent.
+    /// Visible to the camera. If absent, true.
     pub visible: Option<bool>,
 }
 
@@ -113,18 +113,18 @@ pub struct MirrorDescription {
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GlassDescription {
-    /// Index of refraction.
+    /// Index of refraction behind the surface, relative to that in front.
     #[schemars(with = "Ior")]
     pub ior: f64,
-    /// Factor of the transmitted light.
+    /// Factor of transmitted light, in either direction.
     #[serde(default)]
     #[schemars(with = "FractionColor")]
     pub tint: ColorDescription,
-    /// Normal map.
+    /// Normal map, which tilts the shading normals.
     pub normal_map: Option<NormalMapDescription>,
-    /// Emitted radiance, for `integrator = "path"`; black if absent.
+    /// Radiance emitted on both sides, for `"path"`. If absent, black.
     pub emission: Option<ColorDescription>,
-    /// Visible to the camera; true if absent.
+    /// Visible to the camera. If absent, true.
     pub visible: Option<bool>,
 }
 
@@ -145,17 +145,17 @@ impl GlassDescription {
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DiffuseDescription {
-    /// Albedo.
+    /// Albedo: the reflected fraction of the light.
     #[schemars(with = "FractionColor")]
     pub color: ColorDescription,
-    /// Roughness, 0 to 1.
+    /// Roughness, 0 to 1; 0 is a Lambertian surface.
     #[serde(default)]
     pub roughness: ValueDescription,
-    /// Normal map.
+    /// Normal map, which tilts the shading normals.
     pub normal_map: Option<NormalMapDescription>,
-    /// Emitted radiance; black if absent.
+    /// Radiance emitted on both sides, for `"path"`. If absent, black.
     pub emission: Option<ColorDescription>,
-    /// Visible to the camera; true if absent.
+    /// Visible to the camera. If absent, true.
     pub visible: Option<bool>,
 }
 
@@ -180,25 +180,25 @@ macro_rules! microfacet_material {
         #[serde(deny_unknown_fields)]
         pub struct $name {
             $($(#[$field_doc])* pub $field: $ty,)*
-            /// Roughness, 0 to 1.
+            /// Roughness, 0 to 1; GGX's alpha is its square.
             #[serde(default)]
             pub roughness: ValueDescription,
-            /// Increase of the roughness along the first axis, 0 to 1.
+            /// Additional roughness along the first axis.
             #[serde(default)]
             #[schemars(with = "Fraction")]
             pub anisotropy: f64,
-            /// Rotation of the first axis from the direction of u towards the direction of v, in degrees.
+            /// Rotation of the first axis from u towards v, in degrees.
             #[serde(default)]
             #[schemars(with = "Degrees")]
             pub anisotropy_rotation: f64,
-            /// Add the energy of multiple scattering between microfacets, which a single-scattering model loses.
+            /// Restore the energy of multiple scattering between microfacets.
             #[serde(default = "default_true")]
             pub energy_compensation: bool,
-            /// Normal map.
+            /// Normal map, which tilts the shading normals.
             pub normal_map: Option<NormalMapDescription>,
-            /// Emitted radiance; black if absent.
+            /// Radiance emitted on both sides, for `"path"`. If absent, black.
             pub emission: Option<ColorDescription>,
-            /// Visible to the camera; true if absent.
+            /// Visible to the camera. If absent, true.
             pub visible: Option<bool>,
         }
     };
@@ -207,16 +207,16 @@ macro_rules! microfacet_material {
 microfacet_material! {
     /// Smooth or rough metal, whose reflectance is given by `color`, by `metal`, or by `eta` and `k`.
     ConductorDescription {
-        /// Reflectance; 1 if no key sets it.
+        /// Reflectance, equal at all angles. If absent, `[1, 1, 1]`.
         #[schemars(with = "Option<FractionColor>")]
         color: Option<ColorDescription>,
-        /// A metal's name, such as `"gold"`.
+        /// A metal's name, such as `"gold"`; replaces `color`.
         #[schemars(with = "Option<Metal>")]
         metal: Option<String>,
-        /// Real part of the index of refraction for red, green and blue.
+        /// Real part of the index of refraction for red, green and blue; replaces `color`.
         #[schemars(with = "Option<Etas>")]
         eta: Option<DVec3>,
-        /// Imaginary part of the index of refraction for red, green and blue.
+        /// Imaginary part of the index of refraction for red, green and blue; required with `eta`.
         #[schemars(with = "Option<Ks>")]
         k: Option<DVec3>,
     }
@@ -254,18 +254,18 @@ impl Default for ConductorDescription {
 microfacet_material! {
     /// Smooth or rough glass or liquid, or a thin sheet.
     DielectricDescription {
-        /// Index of refraction.
+        /// Index of refraction behind the surface, relative to that in front.
         #[schemars(with = "Ior")]
         ior: f64,
-        /// Factor of the transmitted light.
+        /// Factor of transmitted light, in either direction.
         #[serde(default)]
         #[schemars(with = "FractionColor")]
         color: ColorDescription,
-        /// Absorption coefficient.
+        /// Absorption coefficients behind the surface, per scene unit.
         #[serde(default)]
         #[schemars(with = "Absorption")]
         absorption: DVec3,
-        /// Thin sheet, with the same medium on both sides.
+        /// Thin sheet, with the same medium on both sides; `absorption` must be 0.
         #[serde(default)]
         thin: bool,
     }

@@ -15,13 +15,13 @@ use crate::mesh::Normals;
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MeshFileDescription {
-    /// The file, relative to the scene file's folder.
+    /// An OBJ, PLY or STL file, relative to the scene file.
     #[schemars(length(min = 1))]
     pub file: String,
-    /// Shading normals. If absent, the normals of the file, or else flat normals.
+    /// Shading normals. If absent, `"file"` if the file has normals, else `"flat"`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub normals: Option<Normals>,
-    /// Up axis of the file.
+    /// Axis of the file that becomes the scene's z axis.
     #[serde(default)]
     pub up: Up,
 }
@@ -42,16 +42,16 @@ impl MeshFileDescription {
 #[serde(deny_unknown_fields)]
 #[schemars(extend("not" = { "required": ["matrix"], "anyOf": [{ "required": ["scale"] }, { "required": ["rotate"] }, { "required": ["translate"] }] }))]
 pub struct MeshDescription {
-    /// The file, relative to the scene file's folder.
+    /// An OBJ, PLY or STL file, relative to the scene file.
     #[schemars(length(min = 1))]
     pub file: String,
-    /// Shading normals. If absent, the normals of the file, or else flat normals.
+    /// Shading normals. If absent, `"file"` if the file has normals, else `"flat"`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub normals: Option<Normals>,
-    /// Up axis of the file.
+    /// Axis of the file that becomes the scene's z axis.
     #[serde(default)]
     pub up: Up,
-    /// Name of the material of all groups that are not in `materials`.
+    /// Material of all groups that `materials` does not name. If absent, the file's own, else gray.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub material: Option<String>,
     /// Names of materials, by the names of groups or materials of the file.
@@ -61,15 +61,15 @@ pub struct MeshDescription {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Point>", extend("default" = [0, 0, 0]))]
     pub translate: Option<DVec3>,
-    /// Rotation, applied after the scale: three angles about x, y and z, or one angle about an axis, each from -360 to
-    /// 360 degrees. If absent, no rotation.
+    /// Rotation, applied after the scale: about x, y and z, or about one axis; each angle from -360 to 360 degrees. If
+    /// absent, none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rotate: Option<Rotation>,
-    /// Scale: one factor or three factors, each from 1e-6 to 1e6, or from -1e6 to -1e-6.
+    /// Factors, each from 1e-6 to 1e6, or from -1e6 to -1e-6.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("default" = 1))]
     pub scale: Option<Scale>,
-    /// Rows of an affine transform, which replaces `scale`, `rotate` and `translate`.
+    /// Affine transform, which replaces `scale`, `rotate` and `translate`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Matrix>")]
     pub matrix: Option<Vec<[f64; 4]>>,
@@ -99,25 +99,25 @@ impl MeshDescription {
 pub struct InstanceDescription {
     /// Name of the mesh.
     pub mesh: String,
-    /// Name of the material of all groups that are not in `materials`.
+    /// Material of all groups that `materials` does not name. If absent, the file's own, else gray.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub material: Option<String>,
-    /// Names of materials, by the names of groups or materials of the mesh file.
+    /// Names of materials, by the names of groups or materials of the file.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub materials: BTreeMap<String, String>,
     /// Translation, applied last.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Point>", extend("default" = [0, 0, 0]))]
     pub translate: Option<DVec3>,
-    /// Rotation, applied after the scale: three angles about x, y and z, or one angle about an axis, each from -360 to
-    /// 360 degrees. If absent, no rotation.
+    /// Rotation, applied after the scale: about x, y and z, or about one axis; each angle from -360 to 360 degrees. If
+    /// absent, none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rotate: Option<Rotation>,
-    /// Scale: one factor or three factors, each from 1e-6 to 1e6, or from -1e6 to -1e-6.
+    /// Factors, each from 1e-6 to 1e6, or from -1e6 to -1e-6.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("default" = 1))]
     pub scale: Option<Scale>,
-    /// Rows of an affine transform, which replaces `scale`, `rotate` and `translate`.
+    /// Affine transform, which replaces `scale`, `rotate` and `translate`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Matrix>")]
     pub matrix: Option<Vec<[f64; 4]>>,

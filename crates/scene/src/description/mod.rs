@@ -184,7 +184,7 @@ pub struct ImageDescription {
     /// View transform, from linear radiance to display values.
     #[serde(default)]
     pub view_transform: ViewTransform,
-    /// Exposure in stops: radiance is multiplied by 2 to the power of the exposure before the view transform.
+    /// Exposure in stops: radiance is multiplied by 2 to this power before the view transform.
     #[serde(default)]
     #[schemars(with = "Stops")]
     pub exposure: f64,

@@ -13,65 +13,66 @@ use crate::description::kinds::{
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct PrincipledDescription {
-    /// Albedo of the dielectric's diffuse base, or reflectance of the metal at normal incidence.
+    /// Diffuse albedo, reflectance of metal at normal incidence, factor of transmitted light.
     #[schemars(with = "FractionColor")]
     pub base_color: ColorDescription,
-    /// Metallic weight, 0 to 1.
+    /// Fraction of metal, 0 to 1; the rest is a dielectric.
     pub metallic: ValueDescription,
-    /// Roughness, 0 to 1.
+    /// Roughness, 0 to 1; GGX's alpha is its square.
     pub roughness: ValueDescription,
-    /// Increase of the roughness along the tangent, 0 to 1.
+    /// Additional roughness along the tangent, 0 to 1.
     pub anisotropy: ValueDescription,
     /// Rotation of the tangent, counter-clockwise in degrees.
     #[schemars(with = "Degrees")]
     pub anisotropy_rotation: f64,
-    /// Texture of the unrotated tangent: red and green, mapped to -1 to 1, are the components along u and v.
+    /// Linear image of the unrotated tangent: red and green, mapped to -1 to 1, are its components along u and v. If
+    /// absent, u.
     pub anisotropy_direction: Option<TextureReference>,
     /// Index of refraction of the dielectric.
     #[schemars(with = "PrincipledIor")]
     pub ior: f64,
     /// Factor of the dielectric's reflection, 0 to 1.
     pub specular: ValueDescription,
-    /// Color factor of the dielectric's reflection at normal incidence.
+    /// Color factor of the dielectric's reflection at normal incidence; the product is clamped to 1.
     pub specular_color: ColorDescription,
-    /// Fraction of the dielectric's light that is transmitted, 0 to 1.
+    /// Fraction of the dielectric that transmits light instead of reflecting it diffusely, 0 to 1.
     pub transmission: ValueDescription,
-    /// Thickness: 0 for a thin sheet; otherwise the surface encloses a volume.
+    /// 0 for a thin sheet, which does not refract; otherwise the surface encloses a volume.
     #[schemars(with = "Thickness")]
     pub thickness: f64,
-    /// Transmittance of the volume over `attenuation_distance`.
+    /// Fraction of light that remains in the volume after `attenuation_distance`.
     #[schemars(with = "FractionRgb")]
     pub attenuation_color: DVec3,
-    /// Distance over which the transmittance is `attenuation_color`; infinite if absent.
+    /// Distance for `attenuation_color`; required if that color is not white.
     #[schemars(with = "Option<AttenuationDistance>")]
     pub attenuation_distance: Option<f64>,
-    /// Weight of the clear coat, 0 to 1.
+    /// Weight of a clear coat with an index of refraction of 1.5, 0 to 1.
     pub clearcoat: ValueDescription,
     /// Roughness of the clear coat, 0 to 1.
     pub clearcoat_roughness: ValueDescription,
-    /// Normal map of the clear coat.
+    /// Normal map of the clear coat. If absent, the normals of the shape.
     pub clearcoat_normal_map: Option<NormalMapDescription>,
-    /// Color of the sheen.
+    /// Color of the sheen of cloth.
     #[schemars(with = "FractionColor")]
     pub sheen_color: ColorDescription,
-    /// Roughness of the sheen, 0 to 1.
+    /// Roughness of the sheen, 0 to 1; values below 0.15 count as 0.15.
     pub sheen_roughness: ValueDescription,
-    /// Opacity, 0 to 1.
+    /// Opacity, 0 to 1; without effect if `alpha_mode` is `"opaque"`.
     pub alpha: ValueDescription,
     /// Effect of `alpha`.
     pub alpha_mode: AlphaMode,
-    /// Minimum alpha of opaque points, with `alpha_mode = "mask"`.
+    /// Alpha from which the surface exists, with `alpha_mode = "mask"`.
     #[schemars(with = "Fraction")]
     pub alpha_cutoff: f64,
-    /// Use of a mesh's vertex colors.
+    /// Key that is multiplied by a mesh's vertex colors, in addition to `alpha`.
     pub vertex_colors: VertexColors,
-    /// True if back faces are visible to the camera.
+    /// The camera sees the back of the surface.
     pub double_sided: bool,
-    /// Normal map.
+    /// Normal map, which tilts the shading normals.
     pub normal_map: Option<NormalMapDescription>,
-    /// Emitted radiance; black if absent.
+    /// Radiance emitted on both sides, for `"path"`. If absent, black.
     pub emission: Option<ColorDescription>,
-    /// Visible to the camera; true if absent.
+    /// Visible to the camera. If absent, true.
     pub visible: Option<bool>,
 }
 

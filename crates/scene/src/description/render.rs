@@ -29,33 +29,32 @@ pub enum Shadows {
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RenderDescription {
-    /// Light transport algorithm. If absent, `"path"` if the scene uses a key that needs `"path"`, else
-    /// `"phong"`.
+    /// Light transport algorithm. If absent, `"path"` if a key needs it, else `"phong"`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub integrator: Option<Integrator>,
-    /// Ambient light.
+    /// Ambient light; ignored under `"path"`.
     #[schemars(with = "Rgb")]
     pub ambient: DVec3,
-    /// Radiance of rays that leave the scene.
+    /// Radiance of rays that leave the scene; lights the scene under `"path"`.
     #[schemars(with = "Rgb")]
     pub background: DVec3,
-    /// Minimum offset of ray origins above a surface, relative to the largest coordinate of the origin.
+    /// Minimum offset of ray origins above a surface, relative to the largest coordinate.
     #[schemars(with = "ShadowEpsilon")]
     pub shadow_epsilon: f64,
-    /// Shadows of glass.
+    /// Shadows of glass; ignored under `"path"`.
     pub shadows: Shadows,
-    /// Maximum number of bounces of a path; `"phong"` counts only bounces at mirrors and glass.
+    /// Maximum number of bounces of a path. `"phong"` counts only bounces at mirrors and glass, and accepts 1 to 64.
     #[schemars(with = "Depth")]
     pub max_depth: u32,
-    /// First bounce with Russian roulette, for `integrator = "path"`; 5 if absent.
+    /// First bounce with Russian roulette, for `"path"`. If absent, 5.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Depth>")]
     pub rr_depth: Option<u32>,
-    /// Maximum contribution of a sample of indirect light, for `integrator = "path"`; unlimited if absent.
+    /// Maximum contribution of a sample of indirect light, for `"path"`. If absent, unlimited.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Clamp>")]
     pub clamp: Option<f64>,
-    /// Transparent background, for `integrator = "path"`; opaque if absent.
+    /// Transparent background, for `"path"`. If absent, false.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub alpha: Option<bool>,
     /// Filter textures over the footprint of each ray.
@@ -63,9 +62,9 @@ pub struct RenderDescription {
     /// Seed of all random patterns.
     #[schemars(with = "Seed")]
     pub seed: u32,
-    /// Samples per pixel.
+    /// Samples per pixel; under `"path"` one path for each.
     pub pixel_samples: SamplesDescription,
-    /// Samples per area light and hit.
+    /// Samples per area light and hit; ignored under `"path"`.
     pub light_samples: SamplesDescription,
     /// Reconstruction filter.
     pub filter: PixelFilterDescription,
@@ -106,10 +105,10 @@ impl Default for RenderDescription {
 /// A number of samples and their pattern; in a scene file, a table or only the number.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SamplesDescription {
-    /// Pattern. If absent, `"sobol"` under `integrator = "path"`, else `"grid"`.
+    /// Pattern. If absent, `"sobol"` under `"path"`, else `"grid"`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub pattern: Option<Pattern>,
-    /// Number of samples.
+    /// Number of samples; a square number for patterns of n x n cells.
     pub count: u32,
 }
 
@@ -117,10 +116,10 @@ pub struct SamplesDescription {
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct SamplesTable {
-    /// Pattern. If absent, `"sobol"` under `integrator = "path"`, else `"grid"`.
+    /// Pattern. If absent, `"sobol"` under `"path"`, else `"grid"`.
     #[serde(default)]
     pattern: Option<Pattern>,
-    /// Number of samples.
+    /// Number of samples; a square number for patterns of n x n cells.
     #[schemars(with = "Count")]
     count: u32,
 }
@@ -238,10 +237,11 @@ impl Pattern {
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, expecting = "a table, such as { error = 0.01 }")]
 pub struct AdaptiveDescription {
-    /// Target standard error of a pixel's displayed value.
+    /// Target standard error of a pixel's value in `gamma22`, without exposure: 0 is black, 1 is white.
     #[schemars(with = "Fraction")]
     pub error: f64,
-    /// Maximum number of samples per pixel. If absent, 16 times the count of `pixel_samples`.
+    /// Maximum number of samples per pixel; at least the count of `pixel_samples`. If absent, 16 times the count of
+    /// `pixel_samples`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<MaxSamples>")]
     pub max_samples: Option<u32>,

@@ -49,10 +49,10 @@ pub struct RectangleDescription {
     /// Lengths along the tangent and the bitangent.
     #[schemars(with = "Size")]
     pub size: [f64; 2],
-    /// Normal; any length.
+    /// Normal.
     #[schemars(with = "Vector")]
     pub normal: DVec3,
-    /// Direction of the first edge; any length. If absent, the x axis, or the y axis if the normal is nearly along x.
+    /// Direction of the first edge. If absent, x, or y if the normal is nearly along x.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Vector>")]
     pub tangent: Option<DVec3>,
@@ -89,11 +89,10 @@ pub struct DiskDescription {
     /// Radius.
     #[schemars(with = "Length")]
     pub radius: f64,
-    /// Normal; any length.
+    /// Normal.
     #[schemars(with = "Vector")]
     pub normal: DVec3,
-    /// Direction of the texture coordinate u; any length. If absent, the x axis, or the y axis if the normal is
-    /// nearly along x.
+    /// Direction of u. If absent, x, or y if the normal is nearly along x.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Vector>")]
     pub tangent: Option<DVec3>,
@@ -121,13 +120,13 @@ pub struct EllipsoidDescription {
     /// Center.
     #[schemars(with = "Point")]
     pub center: DVec3,
-    /// First semi-axis.
+    /// First semi-axis, with its length.
     #[schemars(with = "Vector")]
     pub a: DVec3,
-    /// Second semi-axis.
+    /// Second semi-axis, not parallel to `a`.
     #[schemars(with = "Vector")]
     pub b: DVec3,
-    /// Third semi-axis, the pole of the texture coordinates.
+    /// Third semi-axis, not in the plane of `a` and `b`.
     #[schemars(with = "Vector")]
     pub c: DVec3,
 }
@@ -182,17 +181,16 @@ impl SphereDescription {
 pub struct CylinderDescription {
     /// Name of the material.
     pub material: String,
-    /// Center of the cap where the texture coordinate v is 0.
+    /// Center of the cap where v is 0.
     #[schemars(with = "Point")]
     pub start: DVec3,
-    /// Center of the cap where the texture coordinate v is 1.
+    /// Center of the cap where v is 1; at least 1e-9 from `start`.
     #[schemars(with = "Point")]
     pub end: DVec3,
     /// Radius.
     #[schemars(with = "Length")]
     pub radius: f64,
-    /// Direction from the axis where the texture coordinate u is 0; any length. If absent, the x axis, or the y
-    /// axis if the cylinder is nearly along x.
+    /// Direction from the axis where u is 0. If absent, x, or y if the axis is nearly along x.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Vector>")]
     pub tangent: Option<DVec3>,
@@ -217,7 +215,7 @@ impl CylinderDescription {
 pub struct TriangleDescription {
     /// Name of the material.
     pub material: String,
-    /// Vertices, counter-clockwise as seen from outside.
+    /// Vertices v0, v1 and v2, counter-clockwise as seen from outside; not on one line.
     #[schemars(with = "Points3")]
     pub vertices: [DVec3; 3],
 }
@@ -238,7 +236,7 @@ impl TriangleDescription {
 pub struct TetrahedronDescription {
     /// Name of the material.
     pub material: String,
-    /// Vertices.
+    /// Vertices v0, v1, v2 and v3, not in one plane.
     #[schemars(with = "Points4")]
     pub vertices: [DVec3; 4],
 }
@@ -259,14 +257,13 @@ impl TetrahedronDescription {
 pub struct PlaneDescription {
     /// Name of the material.
     pub material: String,
-    /// A point of the plane, the origin of the texture coordinates.
+    /// A point of the plane, where (u, v) is (0, 0).
     #[schemars(with = "Point")]
     pub point: DVec3,
-    /// Normal; any length.
+    /// Normal.
     #[schemars(with = "Vector")]
     pub normal: DVec3,
-    /// Direction of the texture coordinate u; any length. If absent, the x axis, or the y axis if the normal is
-    /// nearly along x.
+    /// Direction of u. If absent, x, or y if the normal is nearly along x.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Vector>")]
     pub tangent: Option<DVec3>,

@@ -195,7 +195,7 @@ tagged! {
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ConstantDescription {
-    /// Linear RGB.
+    /// Color at every point.
     #[schemars(with = "Rgb")]
     pub color: DVec3,
 }
@@ -211,10 +211,10 @@ impl ConstantDescription {
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CheckerDescription {
-    /// Color of the square from (0, 0) to (1, 1); linear RGB.
+    /// Color of the square from (0, 0) to (1, 1), and of every second square.
     #[schemars(with = "Rgb")]
     pub even: DVec3,
-    /// Color of the neighboring squares; linear RGB.
+    /// Color of the other squares.
     #[schemars(with = "Rgb")]
     pub odd: DVec3,
     /// Factors of u and v.
@@ -248,13 +248,13 @@ impl CheckerDescription {
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LinesDescription {
-    /// Color between the lines; linear RGB.
+    /// Color between the lines.
     #[schemars(with = "Rgb")]
     pub cell: DVec3,
-    /// Color of the lines; linear RGB.
+    /// Color of the lines.
     #[schemars(with = "Rgb")]
     pub line: DVec3,
-    /// Width of the lines, relative to the distance between lines.
+    /// Width of the lines, relative to their distance.
     #[schemars(with = "LineWidth")]
     pub line_width: f64,
     /// Factors of u and v.
@@ -289,18 +289,19 @@ impl LinesDescription {
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ImageTextureDescription {
-    /// Path, relative to the scene file.
+    /// A PNG, JPEG, WebP, KTX2, EXR or HDR file, relative to the scene file.
     #[schemars(length(min = 1))]
     pub file: String,
-    /// Encoding of the values. If absent, linear for EXR and HDR files, and sRGB for other files.
+    /// Encoding of the values; EXR and HDR files are always linear. If absent, `"linear"` for EXR and HDR files, else
+    /// `"srgb"`.
     pub encoding: Option<Encoding>,
-    /// Addressing beyond the edges of the image.
+    /// Addressing beyond the edges of the image, along u and v.
     #[serde(default)]
     pub wrap: WrapDescription,
-    /// Filter.
+    /// Texture filter.
     #[serde(default)]
     pub filter: TextureFilter,
-    /// Maximum ratio of the axes of a footprint, for the filter `"ewa"`.
+    /// Maximum ratio of the axes of a footprint, for `"ewa"`.
     #[serde(default = "default_max_anisotropy")]
     #[schemars(with = "Anisotropy")]
     pub max_anisotropy: f64,

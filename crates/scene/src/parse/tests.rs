@@ -351,9 +351,9 @@ fn rows(heading: &str) -> Vec<&'static str> {
     names.collect()
 }
 
-/// Checks that the rows of a section of the page are the keys that are allowed at the end of the text. The allowed keys
-/// are taken from the error message for an unknown key.
-fn check_keys(text: &str, heading: &str) {
+/// Checks that the rows of a section of the page are the keys that are allowed at the end of the text, except `type`
+/// and the keys that have a row under `shared`. The allowed keys are taken from the error message for an unknown key.
+fn check_keys(text: &str, heading: &str, shared: Option<&str>) {
     let message = message(&format!("{text}\n'?' = 1"));
     let (_, keys) = message
         .split_once("expected one of ")
@@ -361,58 +361,68 @@ fn check_keys(text: &str, heading: &str) {
     let mut keys: Vec<_> = keys.split(", ").map(|key| key.trim_matches('"')).collect();
     let mut rows = rows(heading);
     rows.retain(|name| !name.starts_with('"'));
+    let shared_rows = shared.map_or_else(Vec::new, self::rows);
+    keys.retain(|key| *key != "type" && (rows.contains(key) || !shared_rows.contains(key)));
     keys.sort_unstable();
     rows.sort_unstable();
     assert_eq!(rows, keys, "under {heading}");
 }
 
-fn check_types<T: Tagged>(before: &str, header: &str, title: &str) {
+fn check_types<T: Tagged>(before: &str, header: &str, title: &str, shared: Option<&str>) {
     for tag in T::TYPES {
         let text = format!("{before}\n{header}\ntype = '{tag}'");
-        check_keys(&text, &format!("### `{title}` of type `\"{tag}\"`"));
+        check_keys(&text, &format!("### `{title}` of type `\"{tag}\"`"), shared);
     }
 }
 
 #[test]
 fn the_page_has_every_key() {
     let image = "[image]\nwidth = 1\nheight = 1";
-    check_keys("[camera]\n[image]", "## `[image]`");
-    check_keys(&format!("{START}[render]"), "## `[render]`");
-    check_keys(&format!("{START}[render.pixel_samples]"), "### Samples");
-    check_keys(&format!("{START}[environment]"), "## `[environment]`");
-    check_types::<CameraDescription>(image, "[camera]", "[camera]");
-    check_keys(&format!("{START}[camera.path]"), "### The camera's path");
-    check_keys(&format!("{START}[[camera.path.keys]]"), "### Keys of the path");
-    check_types::<TextureDescription>(START, "[textures.a]", "[textures.NAME]");
-    check_types::<MaterialDescription>(START, "[materials.a]", "[materials.NAME]");
-    check_types::<LightDescription>(START, "[[lights]]", "[[lights]]");
-    check_types::<ShapeDescription>(START, "[[shapes]]", "[[shapes]]");
-    check_keys(&format!("{START}[meshes.a]"), "## `[meshes.NAME]`");
-    check_keys(&format!("{START}[[instances]]"), "## `[[instances]]`");
+    let check = |text: &str, heading: &str| check_keys(text, heading, None);
+    check("[camera]\n[image]", "## `[image]`");
+    check(&format!("{START}[render]"), "## `[render]`");
+    check(&format!("{START}[render.pixel_samples]"), "### Samples");
+    check(&format!("{START}[environment]"), "## `[environment]`");
+    let camera = Some("### Keys of all cameras");
+    check_types::<CameraDescription>(image, "[camera]", "[camera]", camera);
+    check(&format!("{START}[camera.path]"), "### The camera's path");
+    check(&format!("{START}[[camera.path.keys]]"), "### Keys of the path");
+    let texture = Some("### Keys of several textures");
+    check_types::<TextureDescription>(START, "[textures.a]", "[textures.NAME]", texture);
+    let material = Some("### Keys of all materials");
+    check_types::<MaterialDescription>(START, "[materials.a]", "[materials.NAME]", material);
+    check_types::<LightDescription>(START, "[[lights]]", "[[lights]]", None);
+    let several = Some("### Keys of several shapes");
+    check_types::<ShapeDescription>(START, "[[shapes]]", "[[shapes]]", several);
+    check(&format!("{START}[meshes.a]"), "## `[meshes.NAME]`");
+    check_keys(&format!("{START}[[instances]]"), "## `[[instances]]`", several);
 }
 
 #[test]
 fn the_page_has_the_defaults_of_the_render_settings() {
     let lines = section("## `[render]`").lines();
-    let cells = lines.filter_map(|line| Some(line.strip_prefix("| `")?.split('|')));
-    let text: String = cells
-        .map(|mut cells| {
-            let mut next = || cells.next().unwrap().replace('`', "").trim().to_owned();
-            (next(), next())
-        })
-        .filter(|(_, default)| default != "none")
-        .map(|(key, default)| format!("{key} = {default}\n"))
-        .collect();
+    let rows = lines.filter_map(|line| {
+        let mut cells = line.strip_prefix("| `")?.split(" | ");
+        let key = cells.next()?.split('`').next()?;
+        Some(format!("{key} = {}\n", cells.nth(1)?.replace('`', "")))
+    });
+    // Other defaults are described in words.
+    let rows = rows.filter(|line| line.parse::<toml::Table>().is_ok());
     // In the default description, keys of the path tracer have no value.
-    let (text, path_keys) = text.split_at(text.find("rr_depth").unwrap());
-    let written: RenderDescription = toml::from_str(text).unwrap();
+    let (path_keys, other_keys): (Vec<_>, Vec<_>) =
+        rows.partition(|line| ["rr_depth", "alpha"].contains(&line.split(' ').next().unwrap_or_default()));
+    assert_eq!(
+        (path_keys.len(), other_keys.len()),
+        (2, 10),
+        "{path_keys:?} {other_keys:?}"
+    );
+    let written: RenderDescription = toml::from_str(&other_keys.concat()).unwrap();
     assert_eq!(written, RenderDescription::default());
-    assert_eq!(path_keys.lines().count(), 2, "{path_keys}");
     let scene = |lines: &str| {
         let text = format!("{START}[render]\nintegrator = 'path'\n{lines}");
         Scene::parse(&text, "s.toml").unwrap()
     };
-    assert_eq!(scene(path_keys).render, scene("").render);
+    assert_eq!(scene(&path_keys.concat()).render, scene("").render);
 }
 
 #[test]
@@ -431,7 +441,7 @@ fn the_page_has_every_pattern() {
 #[test]
 #[should_panic(expected = "under ## `[image]`")]
 fn a_key_that_is_missing_in_the_page_is_found() {
-    check_keys(&format!("{START}[render]"), "## `[image]`");
+    check_keys(&format!("{START}[render]"), "## `[image]`", None);
 }
 
 #[test]
