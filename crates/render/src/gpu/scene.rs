@@ -34,7 +34,7 @@ pub struct SceneBuffers {
 }
 
 impl SceneBuffers {
-    /// Uploads a scene. `texels` tells how the scene's texels are divided among storage buffers.
+    /// Uploads a scene. `texels` is the division of the scene's texels into storage buffers.
     pub fn upload(
         device: &Device,
         packed: &Packed,

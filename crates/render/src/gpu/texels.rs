@@ -10,7 +10,7 @@ use super::pipeline::{GROUPS, SCENE_GROUP, STORAGE_BUFFERS};
 use crate::error::RenderError;
 use crate::records::Packed;
 
-/// How texels are divided among storage buffers. All buffers except the last have 2^shift words.
+/// Division of texels into storage buffers. All buffers except the last have 2^shift words.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TexelParts {
     /// Number of buffers, at least 1.

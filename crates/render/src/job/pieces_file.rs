@@ -38,7 +38,7 @@ pub struct Header {
     /// [`FORMAT`].
     pub format: u32,
     pub identity: Identity,
-    /// What a merge needs besides the films; `None` in a checkpoint.
+    /// Data that a merge needs besides the films; `None` in a checkpoint.
     pub part: Option<PartHeader>,
 }
 
