@@ -689,6 +689,7 @@ fn functions_give_the_same_bits_on_gpu_and_cpu() {
 /// Predicates are true for some inputs and false for others, and intersection functions have both hits and misses.
 #[test]
 fn inputs_cover_both_outcomes_of_predicates() {
+    const CALLS: usize = 2048;
     let source = shared_source();
     let module = parse(&source);
     for (file, function) in functions(&module, &source) {

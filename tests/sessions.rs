@@ -48,7 +48,7 @@ fn cameras(descriptions: &[Description]) -> Vec<Camera> {
 
 #[test]
 fn scenes_with_edited_cameras_are_packed_like_new_scenes() {
-    let descriptions = random_descriptions(24);
+    let descriptions = random_descriptions(14);
     let cameras = cameras(&descriptions);
     let (mut kept, mut moved) = (0, 0);
     for description in &descriptions {

@@ -55,16 +55,16 @@ fn a_film_that_does_not_fit_is_reported_with_its_size() {
 fn exhausted_memory_is_an_error_or_falls_back_to_the_cpu() {
     let Some(driver) = driver() else { return };
     let folder = TestFolder::with_scene(SCENE);
-    let large = ["--size", "1024x1024"];
-    let expected = folder.render_expected(driver, &large);
-    let unlimited = folder.run_on(driver, &[large, ["--device", "gpu"]].concat(), &[]);
+    let size = ["--size", "256x256"];
+    let expected = folder.render_expected(driver, &size);
+    let unlimited = folder.run_on(driver, &[size, ["--device", "gpu"]].concat(), &[]);
     let allocations = unlimited.count("allocation");
     assert!((2..100).contains(&allocations), "{:?}", unlimited.log);
     let mut failures = 0;
     for first_failure in 1..=allocations {
         let first_failure = first_failure.to_string();
         let faults = [("FAULTS_NO_MEMORY_FROM", first_failure.as_str())];
-        let result = folder.run_on(driver, &[large, ["--device", "gpu"]].concat(), &faults);
+        let result = folder.run_on(driver, &[size, ["--device", "gpu"]].concat(), &faults);
         // The number of allocations depends on timing, so a run may not reach the first allocation that fails.
         if result.log.iter().any(|line| line.ends_with("refused")) {
             assert_out_of_memory(&result, &[": out of memory: the driver "]);
@@ -72,7 +72,7 @@ fn exhausted_memory_is_an_error_or_falls_back_to_the_cpu() {
         } else {
             assert_eq!(result.code, 0, "{first_failure}: {}", result.stderr);
         }
-        let result = folder.run_on(driver, &[large, ["--device", "auto"]].concat(), &faults);
+        let result = folder.run_on(driver, &[size, ["--device", "auto"]].concat(), &faults);
         assert_eq!(result.code, 0, "{first_failure}: {}", result.stderr);
         assert!(result.picture.as_ref() == Some(&expected), "{first_failure}");
     }

@@ -182,7 +182,7 @@ fn glass_with_shading_normals_creates_no_energy() {
         for ior in [0.5, 1.5, 2.4] {
             let text = format!(
                 "image = {{ width = 16, height = 16 }}\ncamera = {{ position = [0.3, -6, 0.5], look_at = [0, 0, 0], fov = 25 }}\n\
-                 render = {{ integrator = 'path', max_depth = 200, rr_depth = 200, pixel_samples = {{ count = 256 }} }}\n\
+                 render = {{ integrator = 'path', max_depth = 200, rr_depth = 200, pixel_samples = {{ count = 64 }} }}\n\
                  environment = {{ color = [1, 1, 1] }}\nmaterials.m = {{ type = 'dielectric', ior = {ior} }}\n\
                  [[shapes]]\ntype = 'mesh'\nmaterial = 'm'\nfile = '{name}.obj'\nnormals = 'smooth'\n"
             );

@@ -79,7 +79,7 @@ fn mixture(packed: &Packed, material: &Material, wo: Vec3, side: f32) -> Princip
 /// 5.2). Transmitted radiance is not scaled by the squared index.
 fn furnace(alpha: Vec2, ior: Option<f64>, thin: bool, wo: Vec3, f: impl Fn(Vec3) -> f32) -> f64 {
     // The integrand is periodic in the longitude, so few longitudes suffice.
-    let (steps, longitudes) = (360, 120);
+    let (steps, longitudes) = (120, 120);
     let a = alpha.as_dvec2();
     let o = wo.as_dvec3();
     let mut sum = 0.0;

@@ -499,7 +499,7 @@ fn sampled_directions_follow_their_pdf() {
         // The expected counts are integrated on a grid much finer than the texels, because bins and texels do not
         // align.
         let mut expected = [0.0, 0.08].map(|_| vec![0.0; COLUMNS * ROWS]);
-        let fine = image.width.max(image.height).max(24) * 24;
+        let fine = image.width.max(image.height).max(24) * 16;
         for row in 0..fine {
             let v = (f64::from(row) + 0.5) / f64::from(fine);
             let (sine, cosine) = (PI * v).sin_cos();
