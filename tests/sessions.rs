@@ -53,8 +53,8 @@ fn edited_cameras_are_packed_like_fresh_ones() {
     let (mut kept, mut moved) = (0, 0);
     for description in &descriptions {
         let scene = scene_of(description);
-        let (shading, texels) = PackedShading::of(&scene);
-        let mut packed = pack_with(&scene, &shading, texels);
+        let shading = PackedShading::of(&scene);
+        let mut packed = pack_with(&scene, &shading);
         assert_eq!(packed, pack(&scene));
         for camera in &cameras {
             let other = with_camera(&scene, *camera);
@@ -63,7 +63,7 @@ fn edited_cameras_are_packed_like_fresh_ones() {
                 pack::set_camera(&mut packed, &other);
             } else {
                 moved += 1;
-                packed = pack_with(&other, &shading, packed.textures.texels);
+                packed = pack_with(&other, &shading);
             }
             assert_eq!(packed, pack(&other));
         }

@@ -14,7 +14,7 @@ use wgray_scene::{
     TextureFilter, TextureKind, Value, VertexColors, Wrap,
 };
 
-#[derive(Default)]
+#[derive(Debug, Default)]
 pub struct Appearances {
     pub materials: Vec<Material>,
     /// Texture lookups; the lookups of a material are consecutive.

@@ -1,26 +1,30 @@
 //! The part of a packed scene that depends on neither shapes, lights nor the camera.
 
+use std::sync::Arc;
+
 use super::environment_map::EnvironmentMap;
 use super::materials::Appearances;
 use wgray_scene::{Environment, Scene};
 
-/// Packed materials, textures and environment map, without their texels. Packing texels takes most of the time: mip
-/// pyramids, and tables of the environment and of materials.
+/// Packed materials, textures and environment map. Packing texels takes most of the time: mip pyramids, and tables of
+/// the environment and of materials.
+#[derive(Debug)]
 pub struct PackedShading {
     pub(super) appearances: Appearances,
     pub(super) environment_map: EnvironmentMap,
+    pub(super) texels: Arc<Vec<u32>>,
 }
 
 impl PackedShading {
-    /// Packs materials, textures and environment map. Also returns their texels.
-    pub fn of(scene: &Scene) -> (PackedShading, Vec<u32>) {
+    /// Packs materials, textures and environment map.
+    pub fn of(scene: &Scene) -> PackedShading {
         let mut appearances = Appearances::of(scene);
         let mut texels = std::mem::take(&mut appearances.texels);
-        let shading = PackedShading {
+        PackedShading {
             appearances,
             environment_map: EnvironmentMap::of(scene, &mut texels),
-        };
-        (shading, texels)
+            texels: Arc::new(texels),
+        }
     }
 
     /// Returns true if both scenes are packed to the same materials, textures and environment map.

@@ -80,8 +80,9 @@ pub struct PackedTextures {
     pub lookups: Vec<Lookup>,
     /// Textures that the lookups sample.
     pub records: Vec<Texture>,
-    /// Words of images: tables of level offsets, and texels. Also sampling tables and albedo tables.
-    pub texels: Vec<u32>,
+    /// Words of images: tables of level offsets, and texels. Also sampling tables and albedo tables. Copies of the scene
+    /// share them.
+    pub texels: Arc<Vec<u32>>,
 }
 
 /// Settings of pixel sampling: reconstruction filter and sample counts.
@@ -195,7 +196,7 @@ impl Packed {
             cast_slice(leaves),
             cast_slice(lookups),
             cast_slice(records),
-            cast_slice(texels),
+            cast_slice(texels.as_slice()),
             cast_slice(&sampling.filter_table),
         ];
         lists.into_iter()
