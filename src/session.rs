@@ -280,8 +280,7 @@ impl SceneState {
             if packed.origin == pack::origin(camera) {
                 pack::set_camera(Arc::make_mut(&mut packed), scene);
             } else {
-                let texels = Arc::unwrap_or_clone(packed).textures.texels;
-                packed = Arc::new(pack::pack_with(scene, shading, texels));
+                packed = Arc::new(pack::pack_with(scene, shading));
             }
             self.packed = Some(packed);
         }
@@ -290,10 +289,10 @@ impl SceneState {
 
     fn set_scene(&mut self, former: &Scene, scene: &Scene) {
         self.close();
-        match (&self.shading, self.packed.take()) {
-            (Some(shading), Some(packed)) if PackedShading::is_shared(former, scene) => {
-                let texels = Arc::unwrap_or_clone(packed).textures.texels;
-                self.packed = Some(Arc::new(pack::pack_with(scene, shading, texels)));
+        self.packed = None;
+        match &self.shading {
+            Some(shading) if PackedShading::is_shared(former, scene) => {
+                self.packed = Some(Arc::new(pack::pack_with(scene, shading)));
             }
             _ => self.shading = None,
         }
@@ -333,10 +332,8 @@ impl SceneState {
         }
         self.close();
         let packed = self.packed.get_or_insert_with(|| {
-            let (shading, texels) = PackedShading::of(scene);
-            let packed = pack::pack_with(scene, &shading, texels);
-            self.shading = Some(shading);
-            Arc::new(packed)
+            let shading = self.shading.insert(PackedShading::of(scene));
+            Arc::new(pack::pack_with(scene, shading))
         });
         if packed.film_layout().layers != layers {
             Arc::make_mut(packed).specialization.layers = layers.into();

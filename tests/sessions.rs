@@ -53,8 +53,8 @@ fn scenes_with_edited_cameras_are_packed_like_new_scenes() {
     let (mut kept, mut moved) = (0, 0);
     for description in &descriptions {
         let scene = scene_of(description);
-        let (shading, texels) = PackedShading::of(&scene);
-        let mut packed = pack_with(&scene, &shading, texels);
+        let shading = PackedShading::of(&scene);
+        let mut packed = pack_with(&scene, &shading);
         assert_eq!(packed, pack(&scene));
         for camera in &cameras {
             let edited = with_camera(&scene, *camera);
@@ -63,7 +63,7 @@ fn scenes_with_edited_cameras_are_packed_like_new_scenes() {
                 pack::set_camera(&mut packed, &edited);
             } else {
                 moved += 1;
-                packed = pack_with(&edited, &shading, packed.textures.texels);
+                packed = pack_with(&edited, &shading);
             }
             assert_eq!(packed, pack(&edited));
         }

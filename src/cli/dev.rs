@@ -3,6 +3,7 @@
 use std::io::{self, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::sync::{Mutex, PoisonError};
 use std::time::SystemTime;
 
 use crate::error::RenderError;
@@ -47,8 +48,8 @@ pub struct Args {
 
     /// Render on this device
     ///
-    /// auto and gpu prefer a GPU over software Vulkan; NAME is a part of an adapter's name, driver or type, or its
-    /// number in `wgray devices`.
+    /// auto and gpu prefer a GPU over software Vulkan; with auto, the CPU replaces software Vulkan for scenes with a BVH
+    /// and unedited shaders. NAME is a part of an adapter's name, driver or type, or its number in `wgray devices`.
     #[arg(long, value_name = "auto|gpu|NAME", default_value = "auto", value_parser = NonEmptyStringValueParser::new())]
     device: String,
 
@@ -100,8 +101,6 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if args.no_page && args.out.is_none() {
         return Err(Usage("--no-page requires --out FILE.png".to_string()).into());
     }
-    // The cache of meshes keeps a mesh only while a scene uses the mesh. This scene is dropped after the session has
-    // read the scene, so that meshes are read only once.
     let scene = args
         .out
         .as_ref()
@@ -115,6 +114,9 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     };
     let editor = editor(&args.editor)?;
     let terminal = Terminal::new();
+    // The cache of meshes keeps a mesh only while a scene uses the mesh. This scene is kept until the first report, when
+    // the session has read the scene, so that meshes are read only once.
+    let scene = Mutex::new(scene);
     let watch_message = format!("Watching {}", watched_paths(&sources));
     let session = Session::start(Settings {
         sources,
@@ -122,14 +124,16 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         out,
         only_for_viewers: true,
         editor,
-        report: Box::new(move |report| terminal.report(&report)),
+        report: Box::new(move |report| {
+            drop(scene.lock().unwrap_or_else(PoisonError::into_inner).take());
+            terminal.report(&report);
+        }),
     })
     .map_err(|error| match error {
         StartError::Device(error) => anyhow::Error::from(error),
         StartError::NoScene(path, error) => SceneError::Read { path, error }.into(),
         error => anyhow::Error::from(error),
     })?;
-    drop(scene);
     terminal.line("", &watch_message);
     let Some(listener) = listener else {
         Terminal::new().line("", &format!("Writing {}", args.out.unwrap_or_default().display()));

@@ -1,6 +1,7 @@
 //! The development mode without a browser. After any change of the files, a session shows the image that `render` makes
 //! of the current files, or the last valid image together with the error.
 
+mod cpu;
 mod faults;
 mod film_layers;
 mod gltf;

@@ -194,9 +194,13 @@ pub fn serve(session: TestSession) -> (&'static TestSession, SocketAddr) {
 
 impl TestSession {
     pub fn start(sources: Sources, out: Option<PathBuf>) -> TestSession {
+        TestSession::start_on(sources, out, AdapterChoice::Auto)
+    }
+
+    pub fn start_on(sources: Sources, out: Option<PathBuf>, device: AdapterChoice) -> TestSession {
         let settings = Settings {
             sources,
-            device: AdapterChoice::Auto,
+            device,
             only_for_viewers: out.is_some(), // has no effect if there is an output file
             out,
             editor: None,

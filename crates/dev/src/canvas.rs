@@ -14,6 +14,7 @@ use wgray_render::job::{Order, Steps, WorkSplit};
 use wgray_render::output::Aov;
 use wgray_render::records::{Camera, FirstHit, Packed};
 
+use super::engine::Engine;
 use super::film_layer::FilmLayer;
 use super::picture::{Content, View};
 use super::pixel_values::means;
@@ -33,7 +34,7 @@ const MAX_SIDE: u32 = 1 << 14;
 const HITS_PER_DISPATCH: u32 = 1 << 17;
 
 pub struct Canvas {
-    gpu: Gpu,
+    engine: Engine,
     /// The scene, with the camera of the current stage.
     scene: Packed,
     /// The camera of the full-size image.
@@ -83,7 +84,7 @@ struct Stage {
 }
 
 impl Canvas {
-    pub fn new(gpu: Gpu, scene: Packed, view: View, limits: Limits) -> Result<Canvas, RenderError> {
+    pub fn new(engine: Engine, scene: Packed, view: View, limits: Limits) -> Result<Canvas, RenderError> {
         let camera = scene.camera;
         let stage = Stage {
             scale: 1,
@@ -92,7 +93,7 @@ impl Canvas {
             has_result: false,
         };
         let mut canvas = Canvas {
-            gpu,
+            engine,
             scene,
             camera,
             final_scale: 1,
@@ -109,6 +110,25 @@ impl Canvas {
         Ok(canvas)
     }
 
+    /// Returns whether the CPU renders the image.
+    pub fn is_on_cpu(&self) -> bool {
+        self.engine.is_cpu()
+    }
+
+    /// Continues the image of the CPU on an adapter that computes the same bits and that has this scene. If the film
+    /// does not fit the adapter, renders the image again.
+    pub fn continue_on(&mut self, gpu: Box<Gpu>, view: View) -> Result<(), RenderError> {
+        let film = self.engine.backend().film()?;
+        self.engine = Engine::Gpu(gpu);
+        self.steps.forget_pace();
+        let largest_film = self.engine.backend().largest_film();
+        if final_scale(self.camera.width, self.camera.height, largest_film, self.limits.scale) != self.final_scale {
+            return self.restart(self.camera, view);
+        }
+        self.engine.set_camera(&self.scene.camera)?;
+        self.engine.backend().resume(film)
+    }
+
     /// Returns whether this scene is being rendered.
     pub fn renders(&self, scene: &Packed) -> bool {
         scene.camera == self.camera && scene.same_but_camera(&self.scene)
@@ -116,7 +136,7 @@ impl Canvas {
 
     /// Starts to render a changed scene. If the scene needs a different kernel, does nothing and returns false.
     pub fn update(&mut self, scene: &Packed, view: View) -> Result<bool, RenderError> {
-        let same_kernel = self.gpu.update(scene)?;
+        let same_kernel = self.engine.update(scene)?;
         if same_kernel {
             self.scene = scene.clone();
             self.restart(scene.camera, view)?;
@@ -126,12 +146,12 @@ impl Canvas {
 
     /// Sets the slider values, given as bits. The caller must restart the image.
     pub fn set_sliders(&mut self, values: &[u32]) -> Result<(), RenderError> {
-        self.gpu.set_sliders(values)
+        self.engine.set_sliders(values)
     }
 
     /// Returns the dispatches that have ended since the last call.
     pub fn dispatches(&mut self) -> Vec<Dispatch> {
-        self.gpu.dispatches()
+        self.engine.dispatches()
     }
 
     pub fn restart(&mut self, camera: Camera, view: View) -> Result<(), RenderError> {
@@ -143,7 +163,7 @@ impl Canvas {
         self.coarser = None;
         self.hits.clear();
         self.has_result = false;
-        let largest_film = self.gpu.largest_film();
+        let largest_film = self.engine.backend().largest_film();
         self.final_scale = final_scale(camera.width, camera.height, largest_film, self.limits.scale);
         let scale = if self.hit_layer(view).is_some() {
             self.final_scale
@@ -199,8 +219,8 @@ impl Canvas {
             height,
             ..self.camera
         };
-        self.gpu.set_camera(&self.scene.camera)?;
-        self.gpu.begin(region)?;
+        self.engine.set_camera(&self.scene.camera)?;
+        self.engine.backend().begin(region)?;
         if self.compare {
             self.cpu = Film::of(region, self.scene.film_layout());
         }
@@ -209,7 +229,7 @@ impl Canvas {
         } else {
             self.scene.sampling.pixel_samples
         };
-        self.steps.start(&self.gpu, region, samples);
+        self.steps.start(self.engine.backend(), region, samples);
         self.steps.stop_at(self.limits.samples);
         Ok(())
     }
@@ -232,6 +252,14 @@ impl Canvas {
     /// Returns true until the image has a result that can be shown.
     pub fn is_new(&self) -> bool {
         !self.has_result
+    }
+
+    /// Returns true once every pixel of the finished image's size has a result.
+    pub fn is_complete(&self, view: View) -> bool {
+        match self.hit_layer(view) {
+            Some(_) => self.is_done(view),
+            None => self.stage.scale == self.final_scale && self.steps.samples() > 0,
+        }
     }
 
     pub fn is_done(&self, view: View) -> bool {
@@ -263,7 +291,7 @@ impl Canvas {
             y1: first_row + rows,
             ..Region::whole(width, height)
         };
-        self.hits.extend(self.gpu.first_hits(strip)?);
+        self.hits.extend(self.engine.backend().first_hits(strip)?);
         Ok(self.is_done(view))
     }
 
@@ -274,18 +302,18 @@ impl Canvas {
             let mut cpu = Cpu::new(&self.scene);
             cpu.resume(film)?;
             let mut backends = GpuAndCpu {
-                gpu: &mut self.gpu,
+                gpu: self.engine.backend(),
                 cpu,
             };
             let result = self.steps.step(&mut backends);
             self.cpu = backends.cpu.into_film().unwrap_or(Film::new(Region::whole(0, 0)));
             result?;
         } else {
-            self.steps.step(&mut self.gpu)?;
+            self.steps.step(self.engine.backend())?;
         }
         self.stage.has_result = true;
         if self.stage.scale > self.final_scale && self.steps.is_done() {
-            let gpu = self.gpu.film()?;
+            let gpu = self.engine.backend().film()?;
             self.coarser = Some((gpu, self.compare.then(|| self.cpu.clone())));
             self.begin((self.stage.scale / 4).max(self.final_scale))?;
             return Ok(true);
@@ -301,7 +329,7 @@ impl Canvas {
         }
         let size = [self.stage.width, self.stage.height];
         if view == View::Samples {
-            let film = self.gpu.film()?;
+            let film = self.engine.backend().film()?;
             let counts = match self.scene.sampling.adaptive {
                 true => film.sample_counts().collect(),
                 false => (0..self.stage.height)
@@ -316,7 +344,7 @@ impl Canvas {
         let (gpu, cpu, coarser) = match coarser.filter(|_| !self.stage.has_result) {
             Some((gpu, cpu)) => (gpu, cpu.as_ref(), None),
             None => {
-                film = self.gpu.film()?;
+                film = self.engine.backend().film()?;
                 (&film, self.compare.then_some(&self.cpu), coarser)
             }
         };
@@ -385,7 +413,7 @@ fn final_scale(width: u32, height: u32, largest_film: u64, min_scale: u32) -> u3
 
 /// Submits each dispatch to both the GPU and the CPU, so that their films can be compared.
 struct GpuAndCpu<'a> {
-    gpu: &'a mut Gpu,
+    gpu: &'a mut dyn Backend,
     cpu: Cpu<&'a Packed>,
 }
 

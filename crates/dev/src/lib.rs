@@ -4,7 +4,7 @@
 //! ```text
 //! files ── watch ──> Snapshot ──> painter ──> builder (compiles)
 //!                                    │  ^─────────┘
-//!                   Canvas (renders, one dispatch at a time)
+//!                   Canvas (renders, one dispatch at a time, on an Engine)
 //!                                    └──> State, Frame, SceneView ──> server ──> page
 //! ```
 
@@ -16,6 +16,7 @@ mod diagnostic;
 mod display_settings;
 mod download;
 mod edit;
+mod engine;
 mod film_layer;
 mod guard;
 mod histogram;

@@ -5,7 +5,6 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
-use std::time::Instant;
 
 use tokio::sync::watch;
 
@@ -100,7 +99,8 @@ pub enum StartError {
 }
 
 impl Session {
-    /// Opens the device, reads the files and starts to render. Errors in the files are reported until they are fixed.
+    /// Opens the device, and starts to read the files and to render. Errors in the files are reported until they are
+    /// fixed.
     ///
     /// # Errors
     ///
@@ -115,17 +115,15 @@ impl Session {
             report,
         } = settings;
         std::fs::metadata(&sources.scene).map_err(|error| StartError::NoScene(sources.scene.clone(), error))?;
-        let device = choose(&choice)?;
-        let snapshot = sources.read();
         let (events, inbox) = sync_channel(MAX_EVENTS);
-        let started = Instant::now();
-        let first_event = Event::Files(Box::new(snapshot.clone()), started, 0);
-        let _ = events.send(first_event); // the inbox exists
         let writes = Arc::default();
-        let watch = Watch::start(sources.clone(), snapshot, Arc::clone(&writes), {
+        // The files are read while the device is opened, and while the page loads.
+        let watch = Watch::start(sources.clone(), Arc::clone(&writes), {
             let events = events.clone();
             move |event| events.send(event).is_ok()
         })?;
+        let device = choose(&choice)?;
+        let may_use_cpu = choice == AdapterChoice::Auto;
         let times = Times::default();
         let builder = Builder::start(choice, times.clone(), {
             let events = events.clone();
@@ -147,7 +145,15 @@ impl Session {
             scene_views: scene_sender,
             events: events.clone(),
         };
-        let painter = Painter::new(sources, device, builder, (out, viewer_count), writes, channels);
+        let mut painter = Painter::new(
+            sources,
+            (device, may_use_cpu),
+            builder,
+            (out, viewer_count),
+            writes,
+            channels,
+        );
+        painter.handle(Event::Reading(true));
         let thread = std::thread::Builder::new()
             .name("render".to_string())
             .spawn(move || run(painter, inbox))?;
@@ -232,7 +238,7 @@ fn run(mut painter: Painter, inbox: Receiver<Event>) {
 #[cfg(test)]
 mod tests {
     use std::fs;
-    use std::time::Duration;
+    use std::time::{Duration, Instant};
 
     use super::*;
     use crate::camera::Move;

@@ -68,43 +68,57 @@ impl Loaded {
     }
 }
 
-/// The constants of a kernel, the integrator, and whether sampling is adaptive.
-pub type Constants = (Specialization, Integrator, bool);
-
-pub fn constants(packed: &Packed, view: View) -> Constants {
-    let integrator = packed.integrator;
-    let is_sample_layer = view
-        .aov()
-        .is_some_and(|aov| aov.source(integrator) == AovSource::Samples);
-    let specialization = Specialization {
-        layers: (is_sample_layer && integrator.has_layers()).into(),
-        ..packed.specialization
-    };
-    (specialization, integrator, packed.sampling.adaptive)
+/// The properties of a scene and a view that determine a kernel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Constants {
+    /// The override constants.
+    pub specialization: Specialization,
+    pub integrator: Integrator,
+    /// True if sampling is adaptive.
+    pub adaptive: bool,
+    /// True if the CPU renders the scene, without a kernel.
+    pub on_cpu: bool,
 }
 
-/// Returns the view that a kernel shows if `view` is selected: the color view if `view` needs a different kernel.
-pub fn supported_view((specialization, integrator, adaptive): &Constants, view: View) -> View {
-    match view.aov().map(|aov| aov.source(*integrator)) {
-        Some(AovSource::Samples) if specialization.layers == 0 => View::Color,
-        Some(AovSource::Adaptive) if !adaptive => View::Color,
-        _ => view,
-    }
-}
-
-/// Returns whether two kernels of a scene differ only in the layers that they support.
-pub fn differ_only_in_layers(a: &Constants, b: &Constants) -> bool {
-    let without_layers = |(specialization, integrator, ..): &Constants| {
-        let layers = 0;
-        (
-            Specialization {
-                layers,
-                ..*specialization
+impl Constants {
+    pub fn of(packed: &Packed, view: View, on_cpu: bool) -> Constants {
+        let integrator = packed.integrator;
+        let is_sample_layer = view
+            .aov()
+            .is_some_and(|aov| aov.source(integrator) == AovSource::Samples);
+        Constants {
+            specialization: Specialization {
+                layers: (is_sample_layer && integrator.has_layers()).into(),
+                ..packed.specialization
             },
-            *integrator,
-        )
-    };
-    without_layers(a) == without_layers(b)
+            integrator,
+            adaptive: packed.sampling.adaptive,
+            on_cpu,
+        }
+    }
+
+    /// Returns the view that this kernel shows if `view` is selected: the color view if `view` needs a different kernel.
+    pub fn supported_view(&self, view: View) -> View {
+        match view.aov().map(|aov| aov.source(self.integrator)) {
+            Some(AovSource::Samples) if self.specialization.layers == 0 => View::Color,
+            Some(AovSource::Adaptive) if !self.adaptive => View::Color,
+            None if self.on_cpu && view.is_rendered_twice() => View::Color,
+            _ => view,
+        }
+    }
+
+    /// Returns whether two kernels of a scene differ only in the views that they support.
+    pub fn differ_only_in_view(&self, other: &Constants) -> bool {
+        let without_view = |constants: &Constants| Constants {
+            specialization: Specialization {
+                layers: 0,
+                ..constants.specialization
+            },
+            on_cpu: false,
+            ..*constants
+        };
+        without_view(self) == without_view(other)
+    }
 }
 
 /// The state of all files at one point in time.

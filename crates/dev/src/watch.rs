@@ -70,12 +70,11 @@ pub struct Watch {
 }
 
 impl Watch {
-    /// Reports [`Event::Reading`] and [`Event::Files`] until `report` returns false. `first` is the initial state.
+    /// Reads the files, then reports [`Event::Reading`] and [`Event::Files`] until `report` returns false.
     pub fn start(
         sources: Sources,
-        first: Snapshot,
         writes: Arc<Mutex<Writes>>,
-        report: impl FnMut(Event) -> bool + Send + 'static,
+        mut report: impl FnMut(Event) -> bool + Send + 'static,
     ) -> notify::Result<Watch> {
         let (sender, receiver) = channel();
         let stop = sender.clone();
@@ -88,10 +87,17 @@ impl Watch {
             watcher,
             watched: BTreeMap::new(),
         };
-        folders.follow(&sources, &first);
+        let started = Instant::now();
         let thread = std::thread::Builder::new()
             .name("watch".to_string())
-            .spawn(move || run(&receiver, &mut folders, &sources, first, &writes, report))
+            .spawn(move || {
+                let first = sources.read();
+                let is_wanted = report(Event::Files(Box::new(first.clone()), started, 0));
+                folders.follow(&sources, &first);
+                if is_wanted {
+                    run(&receiver, &mut folders, &sources, first, &writes, report);
+                }
+            })
             .map_err(notify::Error::io)?;
         Ok(Watch {
             stop,
@@ -118,7 +124,9 @@ fn run(
     mut report: impl FnMut(Event) -> bool,
 ) {
     let mut reading_reported = false; // true between reports of the start and the end of reading
-    let mut deferred = None; // the event during a possibly incomplete save, and the time of the save's first change
+    // The event during a possibly incomplete save, and the time of the save's first change. At first the files are
+    // compared with their states at the start, because they have been watched only since they were read.
+    let mut deferred = Some((Wake::Content, Instant::now()));
     let mut has_errors = last.scene.is_err(); // whether the last scene that was read has errors, reported or not
     loop {
         let Some((wake, noticed_at)) = deferred.take().or_else(|| Some((wakes.recv().ok()?, Instant::now()))) else {

@@ -8,7 +8,7 @@ use crate::build::guarded;
 use crate::canvas::Limits;
 use crate::messages::{Command, Notice};
 use crate::picture::View;
-use crate::source::{Constants, Loaded, constants};
+use crate::source::{Constants, Loaded};
 use wgray_render::pack::pack_camera;
 use wgray_render::records::{Camera, Packed};
 
@@ -112,14 +112,9 @@ impl Painter {
         })
     }
 
-    /// Returns the kernel constants for the selected view.
-    pub(super) fn constants(&self, loaded: &Loaded) -> Constants {
-        constants(&loaded.packed, self.view)
-    }
-
     /// Returns the packed scene with the current camera, for the selected view.
     pub(super) fn packed(&self, loaded: &Loaded) -> Packed {
-        let (specialization, ..) = self.constants(loaded);
+        let Constants { specialization, .. } = Constants::of(&loaded.packed, self.view, false);
         Packed {
             camera: self.packed_camera(loaded),
             specialization,

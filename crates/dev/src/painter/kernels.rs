@@ -7,7 +7,8 @@ use super::{MAX_ATTEMPTS, Painter, Running};
 use crate::build::{BuildResult, guarded};
 use crate::canvas::Canvas;
 use crate::diagnostic::Diagnostic;
-use crate::source::{Constants, differ_only_in_layers, supported_view};
+use crate::engine::Engine;
+use crate::source::Constants;
 use wgray_render::error::{RenderError, ShaderError};
 use wgray_render::gpu::Gpu;
 use wgray_render::gpu::compose::Shaders;
@@ -29,7 +30,6 @@ impl Painter {
         match built.result {
             Some(Ok((gpu, shaders))) => {
                 self.state.compile_seconds = Some(built.duration.as_secs_f64());
-                self.compiled = self.state.compile_seconds;
                 self.run(*gpu, shaders, pending.constants, built.noticed_at);
             }
             None => {
@@ -46,7 +46,10 @@ impl Painter {
             Some(Err(error)) => {
                 let (view, running) = (self.shown_view(), &mut self.running);
                 let is_alive = |running: &mut Running| guarded(|| running.canvas.content(view)).is_ok();
-                if running.as_mut().is_some_and(is_alive) {
+                let is_on_cpu = running.as_ref().is_some_and(|running| running.canvas.is_on_cpu());
+                if is_on_cpu && self.failures < MAX_ATTEMPTS {
+                    self.lose_device(&error); // the CPU's image does not show whether the device works
+                } else if is_on_cpu || running.as_mut().is_some_and(is_alive) {
                     // The driver rejected the kernel although naga accepted it; the device still works.
                     self.reject((pending.shaders, pending.constants), Vec::new());
                     self.problems.device = Some((&error).into());
@@ -62,13 +65,15 @@ impl Painter {
     /// Handles a kernel although a newer kernel was requested. If the outdated kernel fits the scene, it renders until
     /// the newer kernel is compiled.
     fn handle_outdated_build(&mut self, built: BuildResult) {
-        let constants = self.loaded.as_ref().map(|loaded| self.constants(loaded));
+        let constants = self
+            .loaded
+            .as_ref()
+            .map(|loaded| Constants::of(&loaded.packed, self.view, false));
         let is_useful =
             self.pending.is_some() && built.id >= self.first_valid_request && constants == Some(built.constants);
         match built.result {
             Some(Ok((gpu, shaders))) if is_useful && built.shader_errors.is_none() => {
                 self.state.compile_seconds = Some(built.duration.as_secs_f64());
-                self.compiled = self.state.compile_seconds;
                 self.run(*gpu, shaders, built.constants, built.noticed_at);
             }
             result => {
@@ -81,20 +86,24 @@ impl Painter {
     }
 
     /// Starts to render with a new kernel.
-    fn run(&mut self, mut gpu: Gpu, shaders: Arc<Shaders>, constants: Constants, noticed_at: Instant) {
+    fn run(&mut self, gpu: Gpu, shaders: Arc<Shaders>, constants: Constants, noticed_at: Instant) {
         let Some(loaded) = self.loaded.clone() else { return };
-        let info = &gpu.device().info;
-        self.state.device = format!("{}, {}", info.name, info.driver);
+        self.adapter = gpu.device().info.clone();
         self.device = Some(gpu.device().clone());
+        let Some(mut gpu) = self.continue_on(gpu, &shaders, &constants, &loaded) else {
+            return;
+        };
+        self.compiled = self.state.compile_seconds;
+        self.drop_interim();
         let (packed, limits) = (self.packed(&loaded), self.limits);
-        let view = supported_view(&constants, self.view);
+        let view = constants.supported_view(self.view);
         let sliders = gpu.sliders().to_vec();
         let slider_values = self.sliders.bits(&sliders);
         self.park(&shaders, &constants);
         let canvas = guarded(|| {
             self.times.measure("upload", || gpu.update(&packed))?; // the scene may have changed since the upload
             gpu.set_sliders(&slider_values)?;
-            Canvas::new(gpu, packed, view, limits)
+            Canvas::new(Engine::Gpu(Box::new(gpu)), packed, view, limits)
         });
         match canvas {
             Ok(canvas) => {
@@ -177,6 +186,12 @@ impl Painter {
             return self.publish();
         }
         self.stop_running();
+        self.lose_device(error);
+        self.publish();
+    }
+
+    /// Opens a device again, up to a maximum number of attempts.
+    fn lose_device(&mut self, error: &RenderError) {
         drop_guarded(self.parked.take());
         self.problems.device = Some(error.into());
         self.device = None;
@@ -184,20 +199,24 @@ impl Painter {
         self.first_valid_request = self.requests + 1;
         self.rejected.clear(); // another device may accept these shaders
         self.failures += 1;
-        if let Some((loaded, shaders)) = self.target().filter(|_| self.failures <= MAX_ATTEMPTS) {
-            self.request(&loaded, shaders, Instant::now());
+        let change = (Instant::now(), true);
+        match self.target().filter(|_| self.failures <= MAX_ATTEMPTS) {
+            Some((loaded, shaders, constants)) if constants.on_cpu => {
+                self.run_on_cpu(&loaded, shaders, constants, change);
+            }
+            Some((loaded, shaders, constants)) => self.request(&loaded, shaders, constants, change),
+            None => {}
         }
-        self.publish();
     }
 
     pub(super) fn stop_running(&mut self) {
         drop_guarded(self.running.take());
     }
 
-    /// Keeps the running kernel if only its layers differ from the new kernel, because viewers often switch back.
-    fn park(&mut self, shaders: &Arc<Shaders>, constants: &Constants) {
+    /// Keeps the running kernel if only its views differ from the new kernel, because viewers often switch back.
+    pub(super) fn park(&mut self, shaders: &Arc<Shaders>, constants: &Constants) {
         let is_reusable = |kernel: &Running| {
-            let same_scene = differ_only_in_layers(&kernel.constants, constants);
+            let same_scene = kernel.constants.differ_only_in_view(constants);
             kernel.shaders == *shaders && same_scene && kernel.constants != *constants
         };
         for kernel in [self.parked.take(), self.running.take()].into_iter().flatten() {

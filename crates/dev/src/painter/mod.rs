@@ -2,6 +2,7 @@
 
 mod commands;
 mod comparison;
+mod cpu;
 mod kernels;
 mod shader;
 mod show;
@@ -33,9 +34,9 @@ use super::sliders::Sliders;
 use super::source::{Constants, FileStamp, Loaded, Snapshot, Sources};
 use super::times::Times;
 use super::watch::Writes;
-use wgray_render::gpu::Device;
 use wgray_render::gpu::compose::Shaders;
 use wgray_render::gpu::sliders::Slider;
+use wgray_render::gpu::{Device, GpuInfo};
 use wgray_scene::CameraDescription;
 
 /// Minimum time between frames while an image is refined. At most a tenth of the time is spent on making frames.
@@ -69,6 +70,12 @@ pub struct Painter {
     /// The last shaders whose loops the driver truncated. In a different scene, the loops may be shorter.
     truncated: Option<(Arc<Shaders>, Constants)>,
     device: Option<Device>,
+    /// The adapter of the last device.
+    adapter: GpuInfo,
+    /// True if the CPU may replace software Vulkan.
+    may_use_cpu: bool,
+    /// The shaders whose bits the CPU computes.
+    built_in: Shaders,
     running: Option<Running>,
     /// The color kernel while a layer kernel runs; otherwise the last layer kernel.
     parked: Option<Running>,
@@ -153,7 +160,7 @@ pub struct SessionChannels {
 impl Painter {
     pub fn new(
         sources: Sources,
-        device: Device,
+        (device, may_use_cpu): (Device, bool),
         builder: Builder,
         (out, viewers): (Option<PathBuf>, Option<Arc<AtomicUsize>>),
         writes: Arc<Mutex<Writes>>,
@@ -171,7 +178,6 @@ impl Painter {
         let state = State {
             scene: sources.scene.display().to_string(),
             shaders: sources.shaders.as_ref().map(|folder| folder.display().to_string()),
-            device: format!("{}, {}", device.info.name, device.info.driver),
             read_only: sources.read_only(),
             gain: DEFAULT_GAIN,
             editor,
@@ -193,7 +199,10 @@ impl Painter {
             last_good: None,
             rejected: Vec::new(),
             truncated: None,
+            adapter: device.info.clone(),
             device: Some(device),
+            may_use_cpu,
+            built_in: Shaders::built_in(),
             running: None,
             parked: None,
             pending: None,
@@ -323,29 +332,33 @@ impl Painter {
         // If only the display settings changed, shows the current image again. The first image of a new rendering is
         // shown later.
         let has_image = self.running.as_ref().is_some_and(|running| !running.canvas.is_new());
-        if display_changed && self.pending.is_none() && has_image {
+        if display_changed && (self.pending.is_none() || self.is_on_cpu()) && has_image {
             self.record_change((noticed_at, true));
             self.show();
         }
     }
 
-    /// Returns the scene and the shaders to render: the newest shaders, or the last good shaders if the newest shaders
-    /// have errors.
-    fn target(&self) -> Option<(Arc<Loaded>, Arc<Shaders>)> {
+    /// Returns the scene, the shaders and the constants to render: the newest shaders, or the last good shaders if the
+    /// newest shaders have errors.
+    fn target(&self) -> Option<(Arc<Loaded>, Arc<Shaders>, Constants)> {
         let (loaded, newest) = (self.loaded.clone()?, self.shaders.clone()?);
-        let constants = self.constants(&loaded);
-        let mut candidates = [Some(newest), self.last_good.clone()].into_iter().flatten();
-        let shaders = candidates.find(|shaders| !self.rejected.contains(&(shaders.clone(), constants)))?;
-        Some((loaded, shaders))
+        let candidates = [Some(newest), self.last_good.clone()].into_iter().flatten();
+        let mut kernels = candidates.map(|shaders| {
+            let constants = self.constants(&loaded, &shaders);
+            (shaders, constants)
+        });
+        let (shaders, constants) = kernels.find(|kernel| !self.rejected.contains(kernel))?;
+        Some((loaded, shaders, constants))
     }
 
     /// Makes the rendering match the current scene and shaders.
     fn synchronize(&mut self, change: (Instant, bool)) {
-        let Some((loaded, shaders)) = self.target() else { return };
+        let Some((loaded, shaders, constants)) = self.target() else {
+            return;
+        };
         if self.shaders.as_ref() == Some(&shaders) {
             self.problems.shader.clear();
         }
-        let constants = self.constants(&loaded);
         let matches =
             |other_shaders: &Arc<Shaders>, other_constants| *other_shaders == shaders && constants == other_constants;
         let running = self.running.as_ref();
@@ -357,20 +370,32 @@ impl Painter {
                 self.show_parked(change);
             }
             self.draw_scene(change);
+        } else if constants.on_cpu {
+            self.pending = None;
+            self.first_valid_request = self.requests + 1;
+            self.run_on_cpu(&loaded, shaders, constants, change);
         } else if !(self.pending.as_ref()).is_some_and(|pending| matches(&pending.shaders, pending.constants)) {
             self.change.get_or_insert(change);
-            self.request(&loaded, shaders, change.0);
+            self.request(&loaded, shaders, constants, change);
+        } else {
+            self.show_on_cpu_meanwhile(&loaded, shaders, constants, change);
         }
     }
 
-    fn request(&mut self, loaded: &Loaded, shaders: Arc<Shaders>, noticed_at: Instant) {
-        let constants = self.constants(loaded);
+    fn request(
+        &mut self,
+        loaded: &Loaded,
+        shaders: Arc<Shaders>,
+        constants: Constants,
+        (noticed_at, is_save): (Instant, bool),
+    ) {
         let running = self.running.as_ref();
         let can_show_scene = running.is_some_and(|running| running.constants == constants);
+        let needs_kernel = |shaders: &Arc<Shaders>| !self.constants(loaded, shaders).on_cpu;
         let fallback = self
             .last_good
             .clone()
-            .filter(|last_good| !can_show_scene && *last_good != shaders);
+            .filter(|last_good| !can_show_scene && *last_good != shaders && needs_kernel(last_good));
         self.requests += 1;
         self.builder.request(Request {
             id: self.requests,
@@ -383,9 +408,10 @@ impl Painter {
         });
         self.pending = Some(Pending {
             id: self.requests,
-            shaders,
+            shaders: Arc::clone(&shaders),
             constants,
         });
+        self.show_on_cpu_meanwhile(loaded, shaders, constants, (noticed_at, is_save));
     }
 
     fn draw_scene(&mut self, change: (Instant, bool)) {
@@ -434,8 +460,10 @@ impl Painter {
             .is_some_and(|running| {
                 let is_unfinished = !running.canvas.is_done(self.shown_view());
                 let is_first = running.canvas.is_new();
-                // While a kernel is compiled, only camera moves are rendered.
-                self.restart_pending || (is_unfinished && (is_first || (self.pending.is_none() && !self.paused)))
+                // While a kernel is compiled, only camera moves are rendered, and on the CPU the first samples.
+                let needs_samples = running.canvas.is_on_cpu() && !running.canvas.is_complete(self.shown_view());
+                let may_refine = !self.paused && (self.pending.is_none() || needs_samples);
+                self.restart_pending || (is_unfinished && (is_first || may_refine))
             })
     }
 

@@ -23,7 +23,9 @@ impl Painter {
         // A kernel with unchanged code keeps running, but errors and sliders refer to the new text.
         let kernels = [&mut self.running, &mut self.parked].into_iter().flatten();
         for kernel in kernels.filter(|kernel| kernel.shaders.has_same_code(&shaders)) {
-            let (_, integrator, adaptive) = kernel.constants;
+            let Constants {
+                integrator, adaptive, ..
+            } = kernel.constants;
             kernel.sliders = sliders(&shaders, integrator, adaptive);
             kernel.shaders = shaders.clone();
         }

@@ -105,7 +105,9 @@ impl Painter {
         self.measure(&frame);
         self.last_frame = Instant::now();
         self.frame_cost = start.elapsed();
-        self.failures = 0;
+        if !self.is_on_cpu() {
+            self.failures = 0; // the CPU's image is no success of the device
+        }
         self.problems.truncated = None;
         if let Some(running) = self.running.as_ref().filter(|_| done || is_complete) {
             self.last_good = Some(running.shaders.clone());
@@ -184,6 +186,7 @@ impl Painter {
         if problems.is_empty() && !self.state.problems.is_empty() {
             (self.report)(Report::AllFixed);
         }
+        self.state.device = self.device_text();
         self.state.viewpoint = camera.map(Viewpoint::of);
         self.state.camera = camera.map(text).unwrap_or_default();
         self.state.steps = self.camera_history.steps();

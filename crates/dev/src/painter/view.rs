@@ -5,11 +5,10 @@ use std::time::Instant;
 use super::Painter;
 use crate::build::guarded;
 use crate::picture::View;
-use crate::source::supported_view;
 
 impl Painter {
     pub(super) fn choose_view(&mut self, view: View) {
-        let kernel = |painter: &Painter| painter.loaded.as_ref().map(|loaded| painter.constants(loaded));
+        let kernel = |painter: &Painter| painter.target().map(|(_, _, constants)| constants);
         let before = kernel(self);
         self.view = view;
         self.replace_unavailable_view();
@@ -61,7 +60,7 @@ impl Painter {
     /// Returns the view that is shown: the selected view, unless it needs a different kernel.
     pub(super) fn shown_view(&self) -> View {
         match &self.running {
-            Some(running) => supported_view(&running.constants, self.view),
+            Some(running) => running.constants.supported_view(self.view),
             None => View::Color,
         }
     }

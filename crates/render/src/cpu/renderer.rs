@@ -1,6 +1,6 @@
 //! CPU backend: evaluates the kernels' twins on a thread pool.
 
-use std::ops::{Deref, Range};
+use std::ops::{Deref, DerefMut, Range};
 use std::sync::{Arc, OnceLock};
 
 use glam::{UVec2, Vec4};
@@ -14,7 +14,7 @@ use super::wavefront::{BatchMeshes, MAX_PATHS, Wavefront};
 use crate::backend::{Backend, FilmState, Rules};
 use crate::error::RenderError;
 use crate::film::{Film, Layer};
-use crate::records::{FirstHit, Packed};
+use crate::records::{Camera, FirstHit, Packed};
 use wgray_image::Region;
 use wgray_scene::Integrator;
 
@@ -64,6 +64,14 @@ impl<P: Deref<Target = Packed>> Cpu<P> {
             Some(_) => Err(RenderError::Pending),
             None => Ok(()),
         }
+    }
+}
+
+impl<P: DerefMut<Target = Packed>> Cpu<P> {
+    /// Changes the camera and discards the film. Keeps the meshes in their form for batches of rays.
+    pub fn set_camera(&mut self, camera: &Camera) {
+        self.scene.camera = *camera;
+        (self.rules, self.film, self.pending) = (Rules::of(&self.scene), None, None);
     }
 }
 

@@ -96,6 +96,8 @@ fn mebibytes(bytes: u64) -> String {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
     use super::*;
     use crate::pack::pack;
     use wgray_scene::Scene;
@@ -120,7 +122,7 @@ mod tests {
         let sphere = "[[shapes]]\ntype = 'sphere'\nmaterial = 'm'\ncenter = [0, 0, 0]\nradius = 1\n";
         let text = format!("{start}{}", sphere.repeat(shapes));
         let mut packed = pack(&Scene::parse(&text, "s").unwrap());
-        packed.textures.texels = (0..texels as u32).collect();
+        packed.textures.texels = Arc::new((0..texels as u32).collect());
         packed
     }
 
@@ -135,7 +137,7 @@ mod tests {
             let split: Vec<&[u32]> = parts.split(&packed.textures.texels).collect();
             assert_eq!(split.len(), buffers);
             assert!(split.iter().all(|part| part.len() <= 1024));
-            assert_eq!(split.concat(), packed.textures.texels);
+            assert_eq!(split.concat(), *packed.textures.texels);
         }
     }
 

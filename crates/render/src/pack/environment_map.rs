@@ -20,9 +20,10 @@ const PARTS_PER_SIDE: usize = 4;
 /// Approximate angular radius of a bin of normals.
 const BIN_RADIUS: f64 = 0.06;
 
-#[derive(Default)]
+#[derive(Debug, Default)]
 pub struct EnvironmentMap(Option<PackedMap>);
 
+#[derive(Debug)]
 struct PackedMap {
     rows: [Vec3; 3],
     width: u32,
@@ -133,7 +134,7 @@ struct Grid {
 }
 
 /// Integrals over a part of a block.
-#[derive(Clone, Copy, Default)]
+#[derive(Clone, Copy, Debug, Default)]
 struct Part {
     /// Integral of direction times radiance.
     vector: DVec3,

@@ -15,7 +15,7 @@ use wgray_scene::{
 };
 
 /// Packed materials, texture lookups, textures and texels.
-#[derive(Default)]
+#[derive(Debug, Default)]
 pub struct Appearances {
     pub materials: Vec<Material>,
     /// Texture lookups; the lookups of a material are consecutive.

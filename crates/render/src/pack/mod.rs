@@ -18,6 +18,8 @@ mod shading;
 mod shadow_casters;
 mod specialize;
 
+use std::sync::Arc;
+
 use bytemuck::Zeroable as _;
 use glam::{UVec2, UVec4, Vec3};
 
@@ -44,15 +46,15 @@ const MIN_EPSILON: f64 = 32.0 / 16_777_216.0;
 
 /// Packs a scene.
 pub fn pack(scene: &Scene) -> Packed {
-    let (shading, texels) = PackedShading::of(scene);
-    pack_with(scene, &shading, texels)
+    pack_with(scene, &PackedShading::of(scene))
 }
 
 /// Packs a scene, with materials, textures and environment map that are already packed.
-pub fn pack_with(scene: &Scene, shading: &PackedShading, texels: Vec<u32>) -> Packed {
+pub fn pack_with(scene: &Scene, shading: &PackedShading) -> Packed {
     let PackedShading {
         appearances,
         environment_map,
+        texels,
     } = shading;
     let _span = tracing::debug_span!("pack").entered();
     let origin = origin::origin(&scene.camera);
@@ -134,7 +136,7 @@ pub fn pack_with(scene: &Scene, shading: &PackedShading, texels: Vec<u32>) -> Pa
         textures: PackedTextures {
             lookups: appearances.lookups.clone(),
             records: appearances.textures.clone(),
-            texels,
+            texels: Arc::clone(texels),
         },
         sampling: Sampling {
             filter_table,

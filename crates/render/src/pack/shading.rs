@@ -1,27 +1,30 @@
 //! The part of a packed scene that is independent of shapes, lights and camera.
 
+use std::sync::Arc;
+
 use super::environment_map::EnvironmentMap;
 use super::materials::Appearances;
 use wgray_scene::{Environment, Scene};
 
-/// Packed materials, textures and environment map, without their texels. A session reuses them together with the texels of
-/// the previous packing while only shapes, lights or the camera change, because computing texels (mip pyramids, and tables
-/// of the environment and of materials) takes most of the time of packing.
+/// Packed materials, textures and environment map. A session reuses them while only shapes, lights or the camera change,
+/// because computing texels (mip pyramids, and tables of the environment and of materials) takes most of the time of packing.
+#[derive(Debug)]
 pub struct PackedShading {
     pub(super) appearances: Appearances,
     pub(super) environment_map: EnvironmentMap,
+    pub(super) texels: Arc<Vec<u32>>,
 }
 
 impl PackedShading {
-    /// Packs materials, textures and environment map. Also returns their texels.
-    pub fn of(scene: &Scene) -> (PackedShading, Vec<u32>) {
+    /// Packs materials, textures and environment map.
+    pub fn of(scene: &Scene) -> PackedShading {
         let mut appearances = Appearances::of(scene);
         let mut texels = std::mem::take(&mut appearances.texels);
-        let shading = PackedShading {
+        PackedShading {
             appearances,
             environment_map: EnvironmentMap::of(scene, &mut texels),
-        };
-        (shading, texels)
+            texels: Arc::new(texels),
+        }
     }
 
     /// Returns true if both scenes are packed to the same materials, textures and environment map.

@@ -81,8 +81,8 @@ pub struct PackedTextures {
     /// Textures that the lookups sample.
     pub records: Vec<Texture>,
     /// Words of images: tables of level offsets, and texels. Also the sampling tables of the environment map and the
-    /// albedo tables of materials.
-    pub texels: Vec<u32>,
+    /// albedo tables of materials. Copies of the scene share them.
+    pub texels: Arc<Vec<u32>>,
 }
 
 /// Settings of pixel sampling: reconstruction filter and sample counts.
@@ -196,7 +196,7 @@ impl Packed {
             cast_slice(leaves),
             cast_slice(lookups),
             cast_slice(records),
-            cast_slice(texels),
+            cast_slice(texels.as_slice()),
             cast_slice(&sampling.filter_table),
         ];
         lists.into_iter()
