@@ -25,6 +25,7 @@ pub mod footprint;
 pub mod geometry;
 pub mod ggx;
 pub mod integrators;
+mod lanes;
 pub mod lens;
 pub mod light;
 pub mod light_choice;

@@ -157,9 +157,9 @@ pub fn uv_derivative(q: &Primitive, local: Vec3, d: Vec3) -> Vec2 {
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Tangents {
-    pub u: Vec3,
-    pub v: Vec3,
+pub struct Tangents<V = Vec3> {
+    pub u: V,
+    pub v: V,
 }
 
 pub fn local_tangents(q: &Primitive, local: Vec3) -> Tangents {
