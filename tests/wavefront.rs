@@ -9,8 +9,8 @@ use proptest::test_runner::TestRunner;
 use wgray::scene::Integrator;
 use wgray_render::cpu::integrators::path::{path_layers, path_value};
 use wgray_render::cpu::pixel::{Layers, pixel_radiance};
-use wgray_render::cpu::wavefront::{BatchMeshes, Wavefront};
-use wgray_render::records::Packed;
+use wgray_render::cpu::wavefront::{BatchMeshes, LaneHits, Wavefront};
+use wgray_render::records::{Packed, RANDOM};
 
 use crate::random_scenes::any_scene;
 use crate::scenes;
@@ -43,17 +43,23 @@ fn samples(packed: &Packed, step: u32, count: u32) -> Vec<(UVec2, u32)> {
 }
 
 fn wavefront(packed: &Packed, samples: &[(UVec2, u32)], batch: usize) -> Vec<Path> {
-    wavefront_with(BatchMeshes::new(packed), packed, samples, batch)
+    wavefront_with(BatchMeshes::new(packed), packed, samples, batch).0
 }
 
-fn wavefront_with(meshes: BatchMeshes, packed: &Packed, samples: &[(UVec2, u32)], batch: usize) -> Vec<Path> {
+/// Returns the paths, and the numbers of hits shaded in lanes.
+fn wavefront_with(
+    meshes: BatchMeshes,
+    packed: &Packed,
+    samples: &[(UVec2, u32)],
+    batch: usize,
+) -> (Vec<Path>, LaneHits) {
     let mut wavefront = Wavefront::new(Arc::new(meshes));
     let mut paths = Vec::new();
     for samples in samples.chunks(batch) {
         let traced = wavefront.trace(packed, samples.iter().copied());
         paths.extend(traced.iter().map(|path| bits(path_value(path), path_layers(path))));
     }
-    paths
+    (paths, wavefront.lane_hits())
 }
 
 fn scalar(packed: &Packed, samples: &[(UVec2, u32)]) -> Vec<Path> {
@@ -67,6 +73,69 @@ fn scalar(packed: &Packed, samples: &[(UVec2, u32)]) -> Vec<Path> {
 fn differing(a: &[Path], b: &[Path]) -> usize {
     assert_eq!(a.len(), b.len());
     a.iter().zip(b).filter(|(a, b)| a != b).count()
+}
+
+/// Numbers of scenes with hits shaded in lanes, by feature.
+#[derive(Debug, Default)]
+struct Lanes {
+    flat: usize,
+    faces: usize,
+    without_lights: usize,
+    one_emitter: usize,
+    several_emitters: usize,
+    light_tree: usize,
+    environment_map: usize,
+    roulette: usize,
+    random_pattern: usize,
+    textures: usize,
+    alpha: usize,
+    layers: usize,
+}
+
+impl Lanes {
+    fn add(&mut self, packed: &Packed, hits: LaneHits) {
+        let s = &packed.specialization;
+        if hits == LaneHits::default() {
+            return;
+        }
+        for (count, has_feature) in [
+            (&mut self.flat, hits.flat > 0),
+            (&mut self.faces, hits.faces > 0),
+            (&mut self.without_lights, s.emitters == 0),
+            (&mut self.one_emitter, s.emitters == 1),
+            (&mut self.several_emitters, s.emitters > 1 && s.light_tree == 0),
+            (&mut self.light_tree, s.light_tree != 0),
+            (&mut self.environment_map, s.has_environment_map()),
+            (&mut self.roulette, s.rr_depth < s.bounces),
+            (&mut self.random_pattern, s.pixel_pattern == RANDOM),
+            (&mut self.textures, s.lookups != 0),
+            (&mut self.alpha, s.alpha_surfaces != 0),
+            (&mut self.layers, s.layers != 0),
+        ] {
+            *count += usize::from(has_feature);
+        }
+    }
+
+    fn assert_all_covered(&self) {
+        let Lanes {
+            flat,
+            faces,
+            without_lights,
+            one_emitter,
+            several_emitters,
+            light_tree,
+            environment_map,
+            roulette,
+            random_pattern,
+            textures,
+            alpha,
+            layers,
+        } = *self;
+        let single = [one_emitter, several_emitters, light_tree, environment_map, roulette];
+        let more = [without_lights, random_pattern, textures, alpha, layers];
+        assert!(flat > 20 && faces > 5, "{self:?}");
+        assert!(single.into_iter().chain(more).all(|count| count > 0), "{self:?}");
+    }
 }
 
 fn random_path_scenes() -> impl Iterator<Item = Packed> {
@@ -144,17 +213,22 @@ fn scene_with_many_items() -> Packed {
 #[test]
 fn random_scenes_have_the_paths_of_the_scalar_integrator() {
     let (mut scenes, mut meshes, mut alpha) = (0, 0, 0);
+    let mut lanes = Lanes::default();
     for (i, packed) in random_path_scenes().enumerate() {
         let packed = if i % 2 == 0 { packed.with_layers() } else { packed };
         let samples = samples(&packed, 2, 3);
         let batch = [1, 7, 64, 1024][i % 4];
-        let differ = differing(&wavefront(&packed, &samples, batch), &scalar(&packed, &samples));
+        let (paths, lane_hits) = wavefront_with(BatchMeshes::new(&packed), &packed, &samples, batch);
+        let differ = differing(&paths, &scalar(&packed, &samples));
         assert_eq!(differ, 0, "of {} paths of scene {i}", samples.len());
+        lanes.add(&packed, lane_hits);
         scenes += 1;
         meshes += usize::from(!packed.bvh.meshes.is_empty());
         alpha += usize::from(packed.specialization.alpha_surfaces != 0);
     }
     assert!(scenes > 100 && meshes > 20 && alpha > 5, "{scenes} {meshes} {alpha}");
+    eprintln!("{lanes:?}");
+    lanes.assert_all_covered();
 }
 
 #[test]
@@ -179,7 +253,10 @@ fn meshes_that_are_too_large_are_traced_one_by_one() {
     for (limit, is_missing) in [(triangles, false), (triangles - 1, true)] {
         let meshes = BatchMeshes::with_limit(&packed, limit);
         assert_eq!(meshes.are_missing(&packed), is_missing);
-        assert_eq!(differing(&wavefront_with(meshes, &packed, &samples, 256), &expected), 0);
+        assert_eq!(
+            differing(&wavefront_with(meshes, &packed, &samples, 256).0, &expected),
+            0
+        );
     }
 }
 
