@@ -46,9 +46,9 @@ const RUST_FILES_WITHOUT_SHADER: &[&str] = &[
     "mod.rs",
     "renderer.rs",
     "integrators",
+    "lanes",
     "lanes.rs",
     "lobes.rs",
-    "rectangles.rs",
     "samples.rs",
     "shadow_ray.rs",
     "traversal",
@@ -266,6 +266,8 @@ fn generic_signatures_have_wgsl_types() {
     ] {
         assert_eq!(functions(generic), scalar, "{generic}");
     }
+    let masks = functions("fn f<V: Vector2>(x: V::Real) -> <V::Real as Real>::Mask {}");
+    assert_eq!(masks, functions("fn f(x: f32) -> bool {}"));
     // A type parameter hides the type of the same name, and a bound that is no number matches no WGSL type.
     assert_ne!(functions("fn f<Vec3: Real>(n: Vec3) {}"), functions("fn f(n: Vec3) {}"));
     assert_ne!(functions("fn f<F: Copy>(x: F) {}"), functions("fn f(x: f32) {}"));

@@ -115,6 +115,8 @@ pub trait Vector3:
     + Add<Output = Self>
     + Sub<Output = Self>
     + Mul<Output = Self>
+    + Add<Self::Real, Output = Self>
+    + Sub<Self::Real, Output = Self>
     + Mul<Self::Real, Output = Self>
     + Div<Self::Real, Output = Self>
 {
@@ -523,7 +525,7 @@ macro_rules! scalar_operators {
     };
 }
 
-scalar_operators! { Mul mul; Div div; }
+scalar_operators! { Add add; Sub sub; Mul mul; Div div; }
 
 impl<F: Real> Mul<F> for Lanes2<F> {
     type Output = Lanes2<F>;

@@ -49,7 +49,6 @@ pub mod principled;
 pub mod procedural;
 pub mod ray;
 pub mod rectangle;
-mod rectangles;
 mod renderer;
 pub mod rng;
 pub mod rough_dielectric;

@@ -2,6 +2,7 @@
 
 use glam::{UVec2, Vec2, Vec3};
 
+use super::lanes::{Real, Vector2, Vector3};
 use super::math::{cross, dot};
 use crate::records::{INFINITE_T, NO_INDEX, Primitive};
 
@@ -51,14 +52,16 @@ pub fn plane_distance(q: &Primitive, ray: Ray) -> f32 {
     dot(q.z, q.anchor - ray.origin) / dot(q.z, ray.direction)
 }
 
-pub fn crosses_plane(o: Vec3, d: Vec3, t_max: f32) -> bool {
-    (o.z * d.z < 0.0) & (o.z.abs() < t_max * d.z.abs())
+#[inline(always)]
+pub fn crosses_plane<V: Vector3>(o: V, d: V, t_max: V::Real) -> <V::Real as Real>::Mask {
+    (o.z() * d.z()).lt(t_max.splat(0.0)) & o.z().abs().lt(t_max * d.z().abs())
 }
 
-pub fn scaled_crossing(o: Vec3, d: Vec3) -> Vec2 {
-    let a = d.z.abs();
-    let s = o.z.abs();
-    Vec2::new(o.x * a + s * d.x, o.y * a + s * d.y)
+#[inline(always)]
+pub fn scaled_crossing<V: Vector3>(o: V, d: V) -> <V::Real as Real>::Vec2 {
+    let a = d.z().abs();
+    let s = o.z().abs();
+    Vector2::new(o.x() * a + s * d.x(), o.y() * a + s * d.y())
 }
 
 pub fn closer(hit: Hit, t: f32, i: u32, origin_prim: u32) -> Hit {

@@ -1,7 +1,6 @@
 //! Twin of `shaders/rectangle.wgsl`.
 
-use glam::Vec3;
-
+use super::lanes::{Real, Vector2, Vector3};
 use super::math::dot;
 use super::ray::{Ray, crosses_plane, plane_distance, scaled_crossing};
 use crate::records::Primitive;
@@ -13,14 +12,16 @@ pub fn intersect_rectangle(q: &Primitive, ray: Ray, limit: f32) -> f32 {
     if (t > 0.0) & (t < limit) & inside { t } else { limit }
 }
 
-pub fn rectangle_occludes(o: Vec3, d: Vec3, t_max: f32) -> bool {
+#[inline(always)]
+pub fn rectangle_occludes<V: Vector3>(o: V, d: V, t_max: V::Real) -> <V::Real as Real>::Mask {
     let p = scaled_crossing(o, d);
-    crosses_plane(o, d, t_max) & (p.x.abs() <= d.z.abs()) & (p.y.abs() <= d.z.abs())
+    let depth = d.z().abs();
+    crosses_plane(o, d, t_max) & p.x().abs().le(depth) & p.y().abs().le(depth)
 }
 
 #[cfg(test)]
 mod tests {
-    use glam::{DMat3, DVec3};
+    use glam::{DMat3, DVec3, Vec3};
 
     use super::*;
     use crate::pack::primitive;

@@ -7,6 +7,8 @@ mod items;
 mod linear;
 mod meshes;
 mod occlusion;
+mod rectangles;
+mod rows;
 mod scratch;
 mod shade;
 mod surfaces;

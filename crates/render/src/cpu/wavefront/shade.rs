@@ -24,7 +24,8 @@ use super::super::samples::LEVEL;
 use super::super::shadow_ray::ShadowRay;
 use super::super::surface::largest;
 use super::QueuedShadowRay;
-use super::surfaces::{FaceHits, FlatHits, LANES, LaneSurfaces, Row, Rows3, get3, load3, set3, splat3, store3};
+use super::rows::{F, LANES, Row, Rows3, V, get3, load3, set3, splat3, store3};
+use super::surfaces::{FaceHits, FlatHits, LaneSurfaces};
 use crate::records::{
     DIFFUSE, ENVIRONMENT_MAP, INFINITE_T, INSTANCE, Light, Material, NO_COLORS, NO_SHADOW, OPAQUE, Packed, RECTANGLE,
 };
@@ -273,7 +274,7 @@ impl Batch<'_> {
         );
         let seed = x.splat(scene.camera.seed);
         let key = hash4([x, y, seed, (depth << 1) + 1]);
-        let zero: f32x8<S> = SimdBase::splat(simd, 0.0);
+        let zero: F<S> = SimdBase::splat(simd, 0.0);
         let one = zero.splat(1.0);
         let has_roulette = s.rr_depth < s.bounces;
         let decision_key = if has_roulette || s.emitters > 1 || s.light_tree != 0 {
@@ -416,13 +417,13 @@ impl Batch<'_> {
 
 /// Values of [`Reflection`](super::super::scattering::Reflection) in lanes.
 struct Reflections<S: Simd> {
-    value: Lanes3<f32x8<S>>,
-    pdf: f32x8<S>,
+    value: V<S>,
+    pdf: F<S>,
 }
 
 /// Returns the reflection to a direction, like `reflection` for diffuse materials.
 #[inline(always)]
-fn reflections<S: Simd>(surface: &LaneSurfaces<S>, diffuse: Lanes3<f32x8<S>>, wi: Lanes3<f32x8<S>>) -> Reflections<S> {
+fn reflections<S: Simd>(surface: &LaneSurfaces<S>, diffuse: V<S>, wi: V<S>) -> Reflections<S> {
     // The direction to the previous vertex does not matter.
     let pdf = diffuse_pdf(angles_at(surface.shading_normal, wi, wi));
     Reflections {
@@ -437,12 +438,12 @@ fn reflections<S: Simd>(surface: &LaneSurfaces<S>, diffuse: Lanes3<f32x8<S>>, wi
 
 /// Returns colors with components up to 1, like `bounded`.
 #[inline(always)]
-fn clamped<S: Simd>(color: Lanes3<f32x8<S>>, is_textured: bool) -> Lanes3<f32x8<S>> {
+fn clamped<S: Simd>(color: V<S>, is_textured: bool) -> V<S> {
     if !is_textured {
         return color;
     }
     let one = color.x.splat(1.0);
-    let clamped = |x: f32x8<S>| select(x, one, x.gt(one));
+    let clamped = |x: F<S>| select(x, one, x.gt(one));
     Lanes3 {
         x: clamped(color.x),
         y: clamped(color.y),
@@ -452,12 +453,7 @@ fn clamped<S: Simd>(color: Lanes3<f32x8<S>>, is_textured: bool) -> Lanes3<f32x8<
 
 /// Returns the vectors to light samples, their radiance and their pdfs, like `sample_light` for rectangles.
 #[inline(always)]
-fn rectangle_samples<S: Simd>(
-    simd: S,
-    light: &Light,
-    p: Lanes3<f32x8<S>>,
-    u: Lanes2<f32x8<S>>,
-) -> (Lanes3<f32x8<S>>, Lanes3<f32x8<S>>, f32x8<S>) {
+fn rectangle_samples<S: Simd>(simd: S, light: &Light, p: V<S>, u: Lanes2<F<S>>) -> (V<S>, V<S>, F<S>) {
     let vector = |v| splat3(simd, v);
     let (x, y) = (u.x * 2.0 - 1.0, u.y * 2.0 - 1.0);
     let normal = vector(light.normal);

@@ -6,61 +6,13 @@ use fearless_simd::{f32x8, mask32x8};
 use glam::{Vec3, Vec4Swizzles as _};
 
 use super::super::geometry::instance_of;
-use super::super::lanes::{Lanes3, Real, Vector3, constant, select};
+use super::super::lanes::{Real, Vector3, constant, select};
 use super::super::math::{cross, dot, max, normalize};
 use super::super::mesh::{flipped_to, lift};
 use super::super::ray::{Hit, Ray};
 use super::super::surface::largest;
+use super::rows::{F, LANES, Row, Rows3, V, load3, set3, splat3};
 use crate::records::{Instance, NO_INDEX, Packed};
-
-/// Number of paths shaded at a time.
-pub const LANES: usize = 8;
-
-/// A number of each path.
-pub type Row = [f32; LANES];
-/// A vector of each path.
-pub type Rows3 = [Row; 3];
-type F<S> = f32x8<S>;
-type V<S> = Lanes3<f32x8<S>>;
-
-/// Stores the vector of a lane.
-#[inline(always)]
-pub fn set3(rows: &mut Rows3, lane: usize, v: Vec3) {
-    rows[0][lane] = v.x;
-    rows[1][lane] = v.y;
-    rows[2][lane] = v.z;
-}
-
-/// Returns the vector of a lane.
-#[inline(always)]
-pub fn get3(rows: &Rows3, lane: usize) -> Vec3 {
-    Vec3::new(rows[0][lane], rows[1][lane], rows[2][lane])
-}
-
-#[inline(always)]
-pub fn load3<S: Simd>(simd: S, rows: &Rows3) -> V<S> {
-    Lanes3 {
-        x: f32x8::simd_from(simd, rows[0]),
-        y: f32x8::simd_from(simd, rows[1]),
-        z: f32x8::simd_from(simd, rows[2]),
-    }
-}
-
-#[inline(always)]
-pub fn store3<S: Simd>(v: V<S>) -> Rows3 {
-    [v.x.into(), v.y.into(), v.z.into()]
-}
-
-/// Returns a vector in all lanes.
-#[inline(always)]
-pub fn splat3<S: Simd>(simd: S, v: Vec3) -> V<S> {
-    let [x, y, z] = v.to_array();
-    Lanes3 {
-        x: SimdBase::splat(simd, x),
-        y: SimdBase::splat(simd, y),
-        z: SimdBase::splat(simd, z),
-    }
-}
 
 /// The fields of [`Surface`](super::super::surface::Surface) that shading in lanes needs. The smooth normal is the
 /// shading normal.
