@@ -75,7 +75,7 @@ fn differing(a: &[Path], b: &[Path]) -> usize {
     a.iter().zip(b).filter(|(a, b)| a != b).count()
 }
 
-/// Changes most materials to diffuse ones without textures, which are shaded in lanes.
+/// Changes most materials to diffuse ones, which are shaded in lanes. Most of these have no textures.
 fn with_diffuse_materials(mut packed: Packed, scene: usize) -> Packed {
     packed.specialization.absorption = 0;
     for (i, material) in packed.materials.iter_mut().enumerate() {
@@ -85,9 +85,11 @@ fn with_diffuse_materials(mut packed: Packed, scene: usize) -> Packed {
         material.kind = DIFFUSE;
         material.diffuse = Vec3::new(0.9, 0.6, 0.3);
         material.roughness = 0.0;
-        material.lookups.y = 0;
         material.alpha_mode = OPAQUE;
-        material.vertex_colors = NO_COLORS;
+        if (scene + i) % 4 != 2 {
+            material.lookups.y = 0;
+            material.vertex_colors = NO_COLORS;
+        }
     }
     packed
 }
@@ -97,6 +99,7 @@ fn with_diffuse_materials(mut packed: Packed, scene: usize) -> Packed {
 struct Lanes {
     flat: usize,
     faces: usize,
+    evaluated: usize,
     without_lights: usize,
     one_emitter: usize,
     several_emitters: usize,
@@ -118,6 +121,7 @@ impl Lanes {
         for (count, has_feature) in [
             (&mut self.flat, hits.flat > 0),
             (&mut self.faces, hits.faces > 0),
+            (&mut self.evaluated, hits.evaluated > 0),
             (&mut self.without_lights, s.emitters == 0),
             (&mut self.one_emitter, s.emitters == 1),
             (&mut self.several_emitters, s.emitters > 1 && s.light_tree == 0),
@@ -137,6 +141,7 @@ impl Lanes {
         let Lanes {
             flat,
             faces,
+            evaluated,
             without_lights,
             one_emitter,
             several_emitters,
@@ -150,7 +155,7 @@ impl Lanes {
         } = *self;
         let single = [one_emitter, several_emitters, light_tree, environment_map, roulette];
         let more = [without_lights, random_pattern, textures, alpha, layers];
-        assert!(flat > 100 && faces > 30, "{self:?}");
+        assert!(flat > 100 && faces > 30 && evaluated > 30, "{self:?}");
         assert!(single.into_iter().chain(more).all(|count| count > 5), "{self:?}");
     }
 }
@@ -285,7 +290,10 @@ fn changed_scenes_are_found() {
     assert!(packed.bvh.items.len() > 70 && packed.bvh.instances.len() == 8);
     let samples = samples(&packed, 1, 2);
     let expected = scalar(&packed, &samples);
-    assert_eq!(differing(&wavefront(&packed, &samples, 256), &expected), 0);
+    let (paths, lane_hits) = wavefront_with(BatchMeshes::new(&packed), &packed, &samples, 256);
+    assert_eq!(differing(&paths, &expected), 0);
+    let LaneHits { flat, faces, evaluated } = lane_hits;
+    assert!(flat > 100 && faces > 100 && evaluated > 100, "{lane_hits:?}");
     let changed = |change: fn(&mut Packed)| {
         let mut packed = packed.clone();
         change(&mut packed);
@@ -296,6 +304,13 @@ fn changed_scenes_are_found() {
         changed(|packed| packed.bvh.instances[3].anchor.x += 1e-4),
         changed(|packed| packed.environment.shadow_epsilon *= 1.5),
         changed(|packed| packed.primitives[0].anchor.z += 1e-5),
+        changed(|packed| {
+            packed
+                .materials
+                .iter_mut()
+                .for_each(|material| material.diffuse.y *= 1.000_001)
+        }),
+        changed(|packed| packed.lighting.lights[0].center.x += 1e-5),
     ];
     assert!(found.iter().all(|differ| *differ > 0), "{found:?}");
 }

@@ -10,24 +10,31 @@ use glam::{UVec2, Vec2, Vec3};
 use super::super::differential::Differential;
 use super::super::diffuse::{angles_at, diffuse_pdf, diffuse_sample};
 use super::super::emitter::{LightSample, sample_emitter, select_emitter};
-use super::super::geometry::{group_word, instance_of, is_on_mesh};
+use super::super::geometry::{
+    fetch_hit_primitive, group_word, hit_differential, instance_of, is_on_mesh, material_of, surface_of,
+};
 use super::super::integrators::path::{PathState, add_radiance, decision, decision_set, shade};
 use super::super::lanes::{Lanes2, Lanes3, Real, Vector3, Word, constant, select};
 use super::super::light_choice::{EmitterSelection, light_tree_select};
 use super::super::light_sample::{power_heuristic, solid_angle_pdf};
 use super::super::math::{dot, min, normalize};
+use super::super::mesh::HitPrimitive;
 use super::super::path::Path;
 use super::super::primitive::is_solid;
 use super::super::ray::{Hit, Ray};
 use super::super::rng::{hash4, unit_float};
 use super::super::samples::LEVEL;
+use super::super::scattering::bounded;
 use super::super::shadow_ray::ShadowRay;
-use super::super::surface::largest;
+use super::super::surface::{Surface, largest};
+use super::super::texture::evaluate_material;
+use super::super::vertices::with_vertex_colors;
 use super::QueuedShadowRay;
 use super::rows::{F, LANES, Row, Rows3, V, get3, load3, set3, splat3, store3};
-use super::surfaces::{FaceHits, FlatHits, LaneSurfaces};
+use super::surfaces::{EvaluatedHits, FaceHits, FlatHits, LaneSurfaces};
 use crate::records::{
-    DIFFUSE, ENVIRONMENT_MAP, INFINITE_T, INSTANCE, Light, Material, NO_COLORS, NO_SHADOW, OPAQUE, Packed, RECTANGLE,
+    DIFFUSE, ENVIRONMENT_MAP, FOR_ROUGHNESS, INFINITE_T, INSTANCE, Light, Material, NO_COLORS, NO_SHADOW, OPAQUE,
+    Packed, RECTANGLE,
 };
 
 /// Hits to shade in lanes.
@@ -37,6 +44,8 @@ pub struct ShadingQueues {
     flat: Vec<QueuedHit>,
     /// Hits on triangles of meshes.
     faces: Vec<QueuedHit>,
+    /// Hits whose surfaces and materials are evaluated one by one.
+    evaluated: Vec<QueuedHit>,
 }
 
 /// Numbers of hits shaded in lanes.
@@ -46,12 +55,15 @@ pub struct LaneHits {
     pub flat: usize,
     /// On triangles of meshes.
     pub faces: usize,
+    /// On solids and on materials with textures or vertex colors, evaluated one by one.
+    pub evaluated: usize,
 }
 
 impl AddAssign for LaneHits {
     fn add_assign(&mut self, other: LaneHits) {
         self.flat += other.flat;
         self.faces += other.faces;
+        self.evaluated += other.evaluated;
     }
 }
 
@@ -77,23 +89,24 @@ pub fn shade_hits(
     shadow_rays.clear();
     queues.flat.clear();
     queues.faces.clear();
+    queues.evaluated.clear();
     let has_lanes = scene.specialization.absorption == 0;
     for (&path, &hit) in active.iter().zip(hits) {
         let state = &mut paths[path as usize];
-        let material = if has_lanes {
+        let found = if has_lanes {
             lane_material(scene, state, hit)
         } else {
             None
         };
-        if let Some(material) = material {
+        if let Some((surface, material)) = found {
             if state.path.depth >= scene.specialization.bounces {
                 state.ended = true;
                 continue;
             }
-            let queue = if is_on_mesh(hit) {
-                &mut queues.faces
-            } else {
-                &mut queues.flat
+            let queue = match surface {
+                SurfaceKind::Flat => &mut queues.flat,
+                SurfaceKind::Face => &mut queues.faces,
+                SurfaceKind::Evaluated => &mut queues.evaluated,
             };
             queue.push(QueuedHit { path, material, hit });
         } else if let Some(ray) = shade(scene, state, hit, pixels[path as usize]) {
@@ -103,42 +116,82 @@ pub fn shade_hits(
     let lane_hits = LaneHits {
         flat: queues.flat.len(),
         faces: queues.faces.len(),
+        evaluated: queues.evaluated.len(),
     };
     if lane_hits != LaneHits::default() {
         dispatch!(*LEVEL, simd => {
             let mut batch = Batch { scene, paths, pixels, shadow_rays };
             batch.shade_flat(simd, &queues.flat);
             batch.shade_faces(simd, &queues.faces);
+            batch.shade_evaluated(simd, &queues.evaluated);
         });
     }
     lane_hits
 }
 
-/// Returns the material of a hit that can be shaded in lanes.
-#[inline(always)]
-fn lane_material(scene: &Packed, state: &PathState, hit: Hit) -> Option<u32> {
-    let index = if is_on_mesh(hit) {
-        group_word(scene, instance_of(scene, hit), hit.slot) & !NO_SHADOW
-    } else {
-        let q = scene.primitives.get(hit.primitive as usize)?;
-        if is_solid(q.kind) {
-            return None;
-        }
-        q.material
-    };
-    let has_recorded_layers = scene.specialization.layers == 0 || state.path.depth > 0 && state.albedo_recorded;
-    (has_recorded_layers && is_plain_diffuse(&scene.materials[index as usize])).then_some(index)
+/// How the surface of a hit is found.
+#[derive(Clone, Copy)]
+enum SurfaceKind {
+    Flat,
+    Face,
+    Evaluated,
 }
 
-/// Returns true for diffuse materials without emission, alpha and textures.
+/// Returns the surface and the material of a hit that can be shaded in lanes.
 #[inline(always)]
-fn is_plain_diffuse(material: &Material) -> bool {
-    material.kind == DIFFUSE
-        && !(material.roughness > 0.0)
-        && !(material.density > 0.0)
-        && material.alpha_mode == OPAQUE
-        && material.lookups.y == 0
-        && material.vertex_colors == NO_COLORS
+fn lane_material(scene: &Packed, state: &PathState, hit: Hit) -> Option<(SurfaceKind, u32)> {
+    let (surface, index) = if is_on_mesh(hit) {
+        let material = group_word(scene, instance_of(scene, hit), hit.slot) & !NO_SHADOW;
+        (SurfaceKind::Face, material)
+    } else {
+        let q = scene.primitives.get(hit.primitive as usize)?;
+        let surface = match is_solid(q.kind) {
+            false => SurfaceKind::Flat,
+            true => SurfaceKind::Evaluated,
+        };
+        (surface, q.material)
+    };
+    // Layers are recorded one by one.
+    if scene.specialization.layers != 0 && (state.path.depth == 0 || !state.albedo_recorded) {
+        return None;
+    }
+    let material = &scene.materials[index as usize];
+    if !is_opaque_diffuse(material) {
+        return None;
+    }
+    if material.lookups.y == 0 && material.vertex_colors == NO_COLORS {
+        return Some((surface, index));
+    }
+    let mut lookups = (0..material.lookups.y).map(|i| &scene.textures.lookups[(material.lookups.x + i) as usize]);
+    let has_constant_roughness = lookups.all(|lookup| lookup.purposes & FOR_ROUGHNESS == 0);
+    has_constant_roughness.then_some((SurfaceKind::Evaluated, index))
+}
+
+/// Returns true for diffuse materials without roughness, emission and alpha.
+#[inline(always)]
+fn is_opaque_diffuse(material: &Material) -> bool {
+    let is_smooth = !(material.roughness > 0.0);
+    let is_emissive = material.density > 0.0;
+    material.kind == DIFFUSE && is_smooth && !is_emissive && material.alpha_mode == OPAQUE
+}
+
+/// Returns a hit's primitive, its surface with the shading normal, and the diffuse reflectance, like the first part of
+/// [`shade`].
+fn evaluate(scene: &Packed, path: &Path, hit: Hit) -> (HitPrimitive, Surface, Vec3) {
+    let s = &scene.specialization;
+    let prim = fetch_hit_primitive(scene, hit);
+    let mut surface = surface_of(scene, &prim, hit, path.ray);
+    let material = material_of(scene, &prim);
+    if (s.lookups == 0) & (s.vertex_colors == 0) {
+        return (prim, surface, material.diffuse);
+    }
+    let hit_diff = hit_differential(scene, &prim, hit, surface, path.ray, path.differential);
+    let mut shading = evaluate_material(scene, &prim, hit, material, surface, hit_diff, s.lookups);
+    if s.vertex_colors != 0 {
+        shading.material = with_vertex_colors(scene, &shading.material, hit);
+    }
+    surface.shading_normal = shading.normal;
+    (prim, surface, bounded(shading.material).diffuse)
 }
 
 /// The paths of a batch.
@@ -159,6 +212,8 @@ struct PathRows {
     pixel_y: [u32; LANES],
     sample: [u32; LANES],
     depth: [u32; LANES],
+    exclude_front: [UVec2; LANES],
+    exclude_back: [UVec2; LANES],
 }
 
 /// Light samples of paths.
@@ -215,6 +270,13 @@ impl Batch<'_> {
             for (lane, queued) in hits.iter().enumerate() {
                 rows.set(self.scene, lane, self.paths[queued.path as usize].path.ray, queued.hit);
                 self.gather(&mut paths, lane, queued);
+                set3(
+                    &mut paths.diffuse,
+                    lane,
+                    self.scene.materials[queued.material as usize].diffuse,
+                );
+                let prim_id = UVec2::new(queued.hit.instance, queued.hit.primitive);
+                (paths.exclude_front[lane], paths.exclude_back[lane]) = (prim_id, prim_id);
             }
             let surfaces = rows.surfaces(simd, self.scene.environment.shadow_epsilon);
             self.shade(simd, hits, &paths, &mut lights, surfaces);
@@ -230,9 +292,35 @@ impl Batch<'_> {
             for (lane, queued) in hits.iter().enumerate() {
                 rows.set(self.scene, lane, self.paths[queued.path as usize].path.ray, queued.hit);
                 self.gather(&mut paths, lane, queued);
+                set3(
+                    &mut paths.diffuse,
+                    lane,
+                    self.scene.materials[queued.material as usize].diffuse,
+                );
+                let prim_id = UVec2::new(queued.hit.instance, queued.hit.primitive);
+                (paths.exclude_front[lane], paths.exclude_back[lane]) = (prim_id, prim_id);
             }
             let surfaces = rows.surfaces(simd, self.scene.environment.shadow_epsilon);
             self.shade(simd, hits, &paths, &mut lights, surfaces);
+        }
+    }
+
+    #[inline(always)]
+    fn shade_evaluated<S: Simd>(&mut self, simd: S, queue: &[QueuedHit]) {
+        let mut rows = EvaluatedHits::default();
+        let mut lights = LightRows::new(only_light(self.scene));
+        for hits in queue.chunks(LANES) {
+            let mut paths = PathRows::default();
+            for (lane, queued) in hits.iter().enumerate() {
+                let path = &self.paths[queued.path as usize].path;
+                let (prim, surface, diffuse) = evaluate(self.scene, path, queued.hit);
+                rows.set(lane, &surface, &prim);
+                self.gather(&mut paths, lane, queued);
+                set3(&mut paths.diffuse, lane, diffuse);
+                paths.exclude_front[lane] = surface.exclude_front;
+                paths.exclude_back[lane] = surface.exclude_back;
+            }
+            self.shade(simd, hits, &paths, &mut lights, rows.surfaces(simd));
         }
     }
 
@@ -241,11 +329,6 @@ impl Batch<'_> {
         let i = queued.path as usize;
         let state = &self.paths[i];
         set3(&mut rows.throughput, lane, state.path.throughput);
-        set3(
-            &mut rows.diffuse,
-            lane,
-            self.scene.materials[queued.material as usize].diffuse,
-        );
         rows.eta2[lane] = state.eta2;
         rows.pixel_x[lane] = self.pixels[i].x;
         rows.pixel_y[lane] = self.pixels[i].y;
@@ -367,7 +450,7 @@ impl Batch<'_> {
         let has_previous_normal = has_light_tree || s.environment_flags & ENVIRONMENT_MAP != 0;
         for (lane, queued) in hits.iter().enumerate() {
             let state = &mut self.paths[queued.path as usize];
-            let prim_id = UVec2::new(queued.hit.instance, queued.hit.primitive);
+            let (exclude_front, exclude_back) = (rows.exclude_front[lane], rows.exclude_back[lane]);
             let origin = get3(&origins, lane);
             let bounces = rows.depth[lane] + 1;
             if s.emitters != 0 {
@@ -379,8 +462,8 @@ impl Batch<'_> {
                             origin,
                             to_light: get3(&lights.to, lane),
                             t_max: lights.t_max[lane],
-                            exclude_front: prim_id,
-                            exclude_back: prim_id,
+                            exclude_front,
+                            exclude_back,
                             target_prim: lights.primitive[lane],
                             contribution,
                             bounces,
@@ -399,8 +482,8 @@ impl Batch<'_> {
                 throughput: get3(&throughputs, lane),
                 depth: bounces,
                 branch: 0,
-                origin_prim: prim_id,
-                inside_prim: prim_id,
+                origin_prim: exclude_front,
+                inside_prim: exclude_back,
             };
             state.pdf = pdfs[lane];
             state.skipped_distance = 0.0;

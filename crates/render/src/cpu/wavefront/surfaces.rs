@@ -1,5 +1,4 @@
-//! Surfaces at the hits of several paths in SIMD lanes, for materials that need neither texture coordinates nor
-//! tangents.
+//! Surfaces at the hits of several paths in SIMD lanes, without texture coordinates and tangents.
 
 use fearless_simd::prelude::*;
 use fearless_simd::{f32x8, mask32x8};
@@ -8,21 +7,22 @@ use glam::{Vec3, Vec4Swizzles as _};
 use super::super::geometry::instance_of;
 use super::super::lanes::{Real, Vector3, constant, select};
 use super::super::math::{cross, dot, max, normalize};
-use super::super::mesh::{flipped_to, lift};
+use super::super::mesh::{HitPrimitive, flipped_to, lift};
 use super::super::ray::{Hit, Ray};
-use super::super::surface::largest;
+use super::super::surface::{Surface, largest};
 use super::rows::{F, LANES, Row, Rows3, V, load3, set3, splat3};
 use crate::records::{Instance, NO_INDEX, Packed};
 
-/// The fields of [`Surface`](super::super::surface::Surface) that shading in lanes needs. The smooth normal is the
-/// shading normal.
+/// The fields of [`Surface`] that shading in lanes needs.
 #[derive(Clone, Copy)]
 pub struct LaneSurfaces<S: Simd> {
     pub position: V<S>,
     pub normal: V<S>,
+    pub smooth_normal: V<S>,
     pub shading_normal: V<S>,
     pub ray_origin: V<S>,
     pub terminator_offset: V<S>,
+    /// [`None`] if no hit is on a mesh.
     pub face: Option<LaneFaces<S>>,
 }
 
@@ -38,11 +38,12 @@ impl<S: Simd> LaneSurfaces<S> {
     /// Returns true where a surface may reflect light to a direction, like `direction_allowed`.
     #[inline(always)]
     pub fn direction_allowed(&self, wi: V<S>) -> mask32x8<S> {
-        let lit = dot(self.shading_normal, wi).gt(wi.x.splat(0.0));
+        let zero = wi.x.splat(0.0);
+        let lit = dot(self.shading_normal, wi).gt(zero) & dot(self.smooth_normal, wi).gt(zero);
         let Some(face) = &self.face else {
             return lit;
         };
-        let zero = wi.x.splat(0.0);
+        // On other surfaces, the smooth normal is the normal: light does not fall from below.
         let fall = -dot(self.normal, wi);
         let height = dot(self.normal, self.terminator_offset);
         let crossing = self.position + self.terminator_offset + wi * (height / max(fall, fall.splat(1e-30)));
@@ -98,6 +99,7 @@ impl FlatHits {
         LaneSurfaces {
             position,
             normal,
+            smooth_normal: normal,
             shading_normal: normal,
             ray_origin: position + normal * (constant(epsilon) * size),
             terminator_offset: splat3(simd, Vec3::ZERO),
@@ -257,13 +259,65 @@ impl FaceHits {
         let lift_0 = lift(flipped_to(normal_0, normal), from_anchor, normal);
         let lift_1 = lift(flipped_to(normal_1, normal), from_anchor - edge_1, normal);
         let lift_2 = lift(flipped_to(normal_2, normal), from_anchor - edge_2, normal);
+        let smooth_normal = smooth * side;
         LaneSurfaces {
             position,
             normal,
-            shading_normal: smooth * side,
+            smooth_normal,
+            shading_normal: smooth_normal,
             ray_origin,
             terminator_offset: lift_0 * b_0 + lift_1 * b_x + lift_2 * b_y,
             face: Some(face),
+        }
+    }
+}
+
+/// Hits whose surfaces are evaluated one by one: on solids, and on materials with textures or vertex colors.
+#[derive(Default)]
+pub struct EvaluatedHits {
+    position: Rows3,
+    normal: Rows3,
+    smooth_normal: Rows3,
+    shading_normal: Rows3,
+    ray_origin: Rows3,
+    terminator_offset: Rows3,
+    face_anchor: Rows3,
+    face_x: Rows3,
+    face_y: Rows3,
+}
+
+impl EvaluatedHits {
+    #[inline(always)]
+    pub fn set(&mut self, lane: usize, surface: &Surface, prim: &HitPrimitive) {
+        for (rows, v) in [
+            (&mut self.position, surface.position),
+            (&mut self.normal, surface.normal),
+            (&mut self.smooth_normal, surface.smooth_normal),
+            (&mut self.shading_normal, surface.shading_normal),
+            (&mut self.ray_origin, surface.ray_origin),
+            (&mut self.terminator_offset, surface.terminator_offset),
+            (&mut self.face_anchor, prim.primitive.anchor),
+            (&mut self.face_x, prim.primitive.x),
+            (&mut self.face_y, prim.primitive.y),
+        ] {
+            set3(rows, lane, v);
+        }
+    }
+
+    #[inline(always)]
+    pub fn surfaces<S: Simd>(&self, simd: S) -> LaneSurfaces<S> {
+        LaneSurfaces {
+            position: load3(simd, &self.position),
+            normal: load3(simd, &self.normal),
+            smooth_normal: load3(simd, &self.smooth_normal),
+            shading_normal: load3(simd, &self.shading_normal),
+            ray_origin: load3(simd, &self.ray_origin),
+            terminator_offset: load3(simd, &self.terminator_offset),
+            face: Some(LaneFaces {
+                anchor: load3(simd, &self.face_anchor),
+                x: load3(simd, &self.face_x),
+                y: load3(simd, &self.face_y),
+            }),
         }
     }
 }
