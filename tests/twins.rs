@@ -73,16 +73,6 @@ const ONE_SIDED: &[(&str, &str, &str)] = &[
         "reads the scene: in WGSL, it is in buffers.wgsl",
     ),
     (
-        "linear_primitives.wgsl",
-        "closest_of_kind",
-        "only in Rust, for the wavefront: the loop over the primitives of a kind",
-    ),
-    (
-        "linear_primitives.wgsl",
-        "is_occluded_by_kind",
-        "only in Rust, for the wavefront: the loop over the primitives of a kind",
-    ),
-    (
         "integrators/path.wgsl",
         "shade",
         "only in Rust: the part of `advance` after the closest hit",

@@ -75,9 +75,11 @@ fn differing(a: &[Path], b: &[Path]) -> usize {
     a.iter().zip(b).filter(|(a, b)| a != b).count()
 }
 
-/// Changes most materials to diffuse ones, which are shaded in lanes. Most of these have no textures.
+/// Changes most materials to diffuse ones, which are shaded in lanes, most of them without textures and emission. Paths
+/// have at least three bounces.
 fn with_diffuse_materials(mut packed: Packed, scene: usize) -> Packed {
     packed.specialization.absorption = 0;
+    packed.specialization.bounces = packed.specialization.bounces.max(3);
     for (i, material) in packed.materials.iter_mut().enumerate() {
         if material.kind == EMITTER || (scene + i) % 4 == 3 {
             continue;
@@ -86,6 +88,9 @@ fn with_diffuse_materials(mut packed: Packed, scene: usize) -> Packed {
         material.diffuse = Vec3::new(0.9, 0.6, 0.3);
         material.roughness = 0.0;
         material.alpha_mode = OPAQUE;
+        if i % 2 == 0 {
+            material.density = 0.0;
+        }
         if (scene + i) % 4 != 2 {
             material.lookups.y = 0;
             material.vertex_colors = NO_COLORS;
@@ -155,7 +160,7 @@ impl Lanes {
         } = *self;
         let single = [one_emitter, several_emitters, light_tree, environment_map, roulette];
         let more = [without_lights, random_pattern, textures, alpha, layers];
-        assert!(flat > 100 && faces > 30 && evaluated > 30, "{self:?}");
+        assert!(flat > 30 && faces > 20 && evaluated > 30, "{self:?}");
         assert!(single.into_iter().chain(more).all(|count| count > 5), "{self:?}");
     }
 }
@@ -293,7 +298,7 @@ fn changed_scenes_are_found() {
     let (paths, lane_hits) = wavefront_with(BatchMeshes::new(&packed), &packed, &samples, 256);
     assert_eq!(differing(&paths, &expected), 0);
     let LaneHits { flat, faces, evaluated } = lane_hits;
-    assert!(flat > 100 && faces > 100 && evaluated > 100, "{lane_hits:?}");
+    assert!(flat > 50 && faces > 50 && evaluated > 50, "{lane_hits:?}");
     let changed = |change: fn(&mut Packed)| {
         let mut packed = packed.clone();
         change(&mut packed);

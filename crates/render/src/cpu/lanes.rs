@@ -21,7 +21,11 @@ pub trait Real:
     + Mul<f32, Output = Self>
 {
     /// A condition.
-    type Mask: Copy + BitAnd<Output = Self::Mask> + BitOr<Output = Self::Mask> + Not<Output = Self::Mask>;
+    type Mask: Copy
+        + BitAnd<Output = Self::Mask>
+        + BitOr<Output = Self::Mask>
+        + BitXor<Output = Self::Mask>
+        + Not<Output = Self::Mask>;
     type Vec2: Vector2<Real = Self>;
     type Vec3: Vector3<Real = Self>;
 
@@ -106,6 +110,15 @@ pub trait Vector2: Copy + Mul<Self::Real, Output = Self> {
     fn new(x: Self::Real, y: Self::Real) -> Self;
     fn x(self) -> Self::Real;
     fn y(self) -> Self::Real;
+
+    /// Returns `if_true` where the condition is true.
+    #[inline(always)]
+    fn select(if_false: Self, if_true: Self, condition: <Self::Real as Real>::Mask) -> Self {
+        Self::new(
+            select(if_false.x(), if_true.x(), condition),
+            select(if_false.y(), if_true.y(), condition),
+        )
+    }
 }
 
 /// A vector of three floating-point numbers.
@@ -126,6 +139,13 @@ pub trait Vector3:
     fn x(self) -> Self::Real;
     fn y(self) -> Self::Real;
     fn z(self) -> Self::Real;
+
+    /// Returns `value` in all lanes.
+    #[inline(always)]
+    fn broadcast(self, value: Vec3) -> Self {
+        let x = self.x();
+        Self::new(x.splat(value.x), x.splat(value.y), x.splat(value.z))
+    }
 
     /// Returns `if_true` where the condition is true.
     #[inline(always)]

@@ -7,9 +7,9 @@ use super::math::{cross, dot};
 use crate::records::{INFINITE_T, NO_INDEX, Primitive};
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Ray {
-    pub origin: Vec3,
-    pub direction: Vec3,
+pub struct Ray<V = Vec3> {
+    pub origin: V,
+    pub direction: V,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,12 +35,18 @@ pub fn standalone_prim(prim_id: UVec2) -> u32 {
     if prim_id.x == 0 { prim_id.y } else { NO_INDEX }
 }
 
-pub fn point_to_local(q: &Primitive, p: Vec3) -> Vec3 {
-    vector_to_local(q, p - q.anchor) - q.middle
+#[inline(always)]
+pub fn point_to_local<V: Vector3>(q: &Primitive, p: V) -> V {
+    vector_to_local(q, p - p.broadcast(q.anchor)) - p.broadcast(q.middle)
 }
 
-pub fn vector_to_local(q: &Primitive, v: Vec3) -> Vec3 {
-    Vec3::new(dot(q.x, v), dot(q.y, v), dot(q.z, v))
+#[inline(always)]
+pub fn vector_to_local<V: Vector3>(q: &Primitive, v: V) -> V {
+    V::new(
+        dot(v.broadcast(q.x), v),
+        dot(v.broadcast(q.y), v),
+        dot(v.broadcast(q.z), v),
+    )
 }
 
 pub fn vector_to_world(q: &Primitive, v: Vec3) -> Vec3 {
@@ -48,8 +54,10 @@ pub fn vector_to_world(q: &Primitive, v: Vec3) -> Vec3 {
     sum / q.determinant
 }
 
-pub fn plane_distance(q: &Primitive, ray: Ray) -> f32 {
-    dot(q.z, q.anchor - ray.origin) / dot(q.z, ray.direction)
+#[inline(always)]
+pub fn plane_distance<V: Vector3>(q: &Primitive, ray: Ray<V>) -> V::Real {
+    let z = ray.origin.broadcast(q.z);
+    dot(z, ray.origin.broadcast(q.anchor) - ray.origin) / dot(z, ray.direction)
 }
 
 #[inline(always)]

@@ -1,15 +1,19 @@
 //! Twin of `shaders/rectangle.wgsl`.
 
-use super::lanes::{Real, Vector2, Vector3};
+use super::lanes::{Real, Vector2, Vector3, select};
 use super::math::dot;
 use super::ray::{Ray, crosses_plane, plane_distance, scaled_crossing};
 use crate::records::Primitive;
 
-pub fn intersect_rectangle(q: &Primitive, ray: Ray, limit: f32) -> f32 {
+#[inline(always)]
+pub fn intersect_rectangle<V: Vector3>(q: &Primitive, ray: Ray<V>, limit: V::Real) -> V::Real {
     let t = plane_distance(q, ray);
-    let p = ray.origin + ray.direction * t - q.anchor;
-    let inside = (dot(q.x, p).abs() <= 1.0) & (dot(q.y, p).abs() <= 1.0);
-    if (t > 0.0) & (t < limit) & inside { t } else { limit }
+    let p = ray.origin + ray.direction * t - ray.origin.broadcast(q.anchor);
+    let x = dot(p.broadcast(q.x), p);
+    let y = dot(p.broadcast(q.y), p);
+    let one = t.splat(1.0);
+    let inside = x.abs().le(one) & y.abs().le(one);
+    select(limit, t, t.gt(t.splat(0.0)) & t.lt(limit) & inside)
 }
 
 #[inline(always)]

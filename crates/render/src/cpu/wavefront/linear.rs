@@ -1,23 +1,21 @@
-//! Queries of a batch of rays on the primitives outside of the BVH. Rectangles are tested against several rays at a
+//! Queries of a batch of rays on the primitives outside of the BVH. Each primitive is tested against several rays at a
 //! time.
 
 use fearless_simd::prelude::*;
 use fearless_simd::u32x8;
 
 use super::super::lanes::{Real, select};
-use super::super::linear_primitives::{closest_of_kind, is_occluded_by_kind};
 use super::super::path::Path;
+use super::super::primitive::intersect;
 use super::super::ray::{Hit, Ray, no_hit, standalone_prim};
-use super::super::shadow_ray::ShadowRay;
+use super::super::shadow::occludes_segment;
 use super::QueuedShadowRay;
-use super::rectangles::{intersect_rectangle, rectangle_occludes};
-use super::rows::{F, LANES, Row, Rows3, V, get3, load3, set3};
-use crate::records::{INFINITE_T, NO_INDEX, Packed, RECTANGLE};
+use super::rows::{F, LANES, Row, Rows3, V, load3, set3};
+use crate::records::{INFINITE_T, NO_INDEX, Packed, with_primitive_kind};
 
 /// Rays of up to [`LANES`] paths.
 #[derive(Default)]
 pub struct RayRows {
-    count: usize,
     origin: Rows3,
     direction: Rows3,
     /// Primitives outside of meshes that the rays start on, as in [`Path`].
@@ -53,13 +51,11 @@ impl RayRows {
     /// Arranges the next rays of paths.
     #[inline(always)]
     pub fn set<'a>(&mut self, paths: impl Iterator<Item = &'a Path>) {
-        self.count = 0;
         for (lane, path) in paths.enumerate() {
             set3(&mut self.origin, lane, path.ray.origin);
             set3(&mut self.direction, lane, path.ray.direction);
             self.origin_prim[lane] = standalone_prim(path.origin_prim);
             self.inside_prim[lane] = standalone_prim(path.inside_prim);
-            self.count += 1;
         }
     }
 
@@ -77,31 +73,21 @@ impl RayRows {
             t: [INFINITE_T; LANES],
             primitive: [NO_INDEX; LANES],
         };
+        let inside_prim = u32x8::simd_from(simd, self.inside_prim);
+        let ray = Ray { origin, direction };
+        let mut t = F::simd_from(simd, hits.t);
+        let mut primitive = u32x8::simd_from(simd, hits.primitive);
         for (kind, range) in scene.kinds() {
-            if kind == RECTANGLE {
-                let mut t = F::simd_from(simd, hits.t);
-                let mut primitive = u32x8::simd_from(simd, hits.primitive);
-                for i in range {
-                    let (is_hit, distance) = intersect_rectangle(simd, &scene.primitives[i], origin, direction, t);
-                    let index = u32x8::simd_from(simd, i as u32);
-                    let is_hit = is_hit & !origin_prim.simd_eq(index);
-                    t = select(t, distance, is_hit);
-                    primitive = is_hit.select(index, primitive);
-                }
-                (hits.t, hits.primitive) = (t.into(), primitive.into());
-                continue;
-            }
-            for lane in 0..self.count {
-                let ray = Ray {
-                    origin: get3(&self.origin, lane),
-                    direction: get3(&self.direction, lane),
-                };
-                let (origin_prim, inside_prim) = (self.origin_prim[lane], self.inside_prim[lane]);
-                let before = hits.get(lane);
-                let hit = closest_of_kind(scene, kind, range.clone(), before, ray, origin_prim, inside_prim);
-                hits.set(lane, hit);
-            }
+            with_primitive_kind!(kind, |kind| for i in range {
+                let index = u32x8::simd_from(simd, i as u32);
+                let from_inside = inside_prim.simd_eq(index);
+                let distance = intersect(kind, &scene.primitives[i], from_inside, ray, t);
+                let is_nearer = distance.lt(t) & !origin_prim.simd_eq(index);
+                t = select(t, distance, is_nearer);
+                primitive = is_nearer.select(index, primitive);
+            });
         }
+        (hits.t, hits.primitive) = (t.into(), primitive.into());
         hits
     }
 }
@@ -114,6 +100,8 @@ pub struct ShadowRayRows {
     t_max: Row,
     /// Primitives outside of meshes at the start.
     origin_prim: [u32; LANES],
+    /// Solids that the segments enter, as in [`Surface`](super::super::surface::Surface).
+    inside_prim: [u32; LANES],
     target_prim: [u32; LANES],
 }
 
@@ -125,6 +113,7 @@ impl ShadowRayRows {
             set3(&mut self.to_light, lane, ray.to_light);
             self.t_max[lane] = ray.t_max;
             self.origin_prim[lane] = standalone_prim(ray.exclude_front);
+            self.inside_prim[lane] = standalone_prim(ray.exclude_back);
             self.target_prim[lane] = ray.target_prim;
         }
     }
@@ -140,36 +129,108 @@ impl ShadowRayRows {
 
     /// Returns the mask of the rays that a primitive occludes, like `is_occluded_by_primitives`.
     #[inline(always)]
-    pub fn occluded<S: Simd>(&self, simd: S, scene: &Packed, rays: &[QueuedShadowRay]) -> u64 {
+    pub fn occluded<S: Simd>(&self, simd: S, scene: &Packed) -> u64 {
         let (origin, to_light, t_max) = self.load(simd);
         let (origin_prim, target_prim) = (
             u32x8::simd_from(simd, self.origin_prim),
             u32x8::simd_from(simd, self.target_prim),
         );
-        let mut occluded = 0;
+        let inside_prim = u32x8::simd_from(simd, self.inside_prim);
+        let mut is_occluded = t_max.lt(t_max);
         for (kind, range) in scene.shadow_casters() {
-            if kind == RECTANGLE {
-                let mut is_occluded = t_max.lt(t_max);
-                for i in range {
-                    let index = u32x8::simd_from(simd, i as u32);
-                    let is_excluded = origin_prim.simd_eq(index) | target_prim.simd_eq(index);
-                    let occludes = rectangle_occludes(simd, &scene.primitives[i], origin, to_light, t_max);
-                    is_occluded = is_occluded | (occludes & !is_excluded);
-                }
-                occluded |= is_occluded.to_bitmask();
-                continue;
-            }
-            for (lane, QueuedShadowRay { ray, .. }) in rays.iter().enumerate() {
-                if occluded >> lane & 1 == 0 && is_occluded(scene, kind, range.clone(), ray) {
-                    occluded |= 1 << lane;
-                }
-            }
+            with_primitive_kind!(kind, |kind| for i in range {
+                let index = u32x8::simd_from(simd, i as u32);
+                let is_excluded = origin_prim.simd_eq(index) | target_prim.simd_eq(index);
+                let from_inside = inside_prim.simd_eq(index);
+                let q = &scene.primitives[i];
+                let occludes = occludes_segment(kind, q, origin, from_inside, to_light, t_max);
+                is_occluded = is_occluded | (occludes & !is_excluded);
+            });
         }
-        occluded
+        is_occluded.to_bitmask()
     }
 }
 
-fn is_occluded(scene: &Packed, kind: u32, range: std::ops::Range<usize>, ray: &ShadowRay) -> bool {
-    let surface = ray.surface();
-    is_occluded_by_kind(scene, kind, range, &surface, ray.to_light, ray.t_max, ray.target_prim)
+#[cfg(test)]
+mod tests {
+    use fearless_simd::dispatch;
+    use glam::{DMat3, DVec3};
+
+    use super::*;
+    use crate::cpu::traversal::levels;
+    use crate::pack::primitive;
+    use crate::records::KINDS;
+
+    struct Random(u64);
+
+    impl Random {
+        /// Returns a number from -1 to 1; often a small multiple of 1/2, so that rays meet edges and planes exactly.
+        fn number(&mut self) -> f64 {
+            self.0 = self
+                .0
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            let number = (self.0 >> 32) as f64 / f64::from(1u32 << 31) - 1.0;
+            if self.0 >> 20 & 1 == 0 {
+                (2.0 * number).round() / 2.0
+            } else {
+                number
+            }
+        }
+
+        fn vector(&mut self) -> DVec3 {
+            DVec3::new(self.number(), self.number(), self.number())
+        }
+    }
+
+    #[test]
+    fn rays_in_lanes_equal_single_rays() {
+        for kind in 0..KINDS {
+            let (hits, occluded) = test_kind(kind);
+            assert!(hits > 1000 && occluded > 1000, "{kind}: {hits} {occluded}");
+        }
+    }
+
+    /// Returns the numbers of hits and of occluded segments.
+    fn test_kind(kind: u32) -> (usize, usize) {
+        let random = &mut Random(1);
+        let (mut hits, mut occluded) = (0, 0);
+        for i in 0..2000 {
+            let edges = [random.vector(), random.vector()];
+            let columns = DMat3::from_cols(edges[0], edges[1], edges[0].cross(edges[1]) + DVec3::Z * 1e-3);
+            let q = &primitive(kind, random.vector(), columns, 0, 0);
+            let limit = [INFINITE_T, 0.7][i % 2];
+            let rays = [(); LANES].map(|()| Ray {
+                origin: random.vector().as_vec3(),
+                direction: random.vector().as_vec3(),
+            });
+            let inside = random.0 >> 40 & 0xff;
+            let (mut origins, mut directions) = (Rows3::default(), Rows3::default());
+            for (lane, ray) in rays.iter().enumerate() {
+                set3(&mut origins, lane, ray.origin);
+                set3(&mut directions, lane, ray.direction);
+            }
+            for level in levels() {
+                let (t, occluding) = dispatch!(level, simd => {
+                    let (origin, direction) = (load3(simd, &origins), load3(simd, &directions));
+                    let limit: F<_> = SimdBase::splat(simd, limit);
+                    let from_inside = SimdMask::from_bitmask(simd, inside);
+                    let t = intersect(kind, q, from_inside, Ray { origin, direction }, limit);
+                    let occluding = occludes_segment(kind, q, origin, from_inside, direction, limit);
+                    let t: Row = t.into();
+                    (t, occluding.to_bitmask())
+                });
+                for (lane, ray) in rays.into_iter().enumerate() {
+                    let from_inside = inside >> lane & 1 == 1;
+                    let expected = intersect(kind, q, from_inside, ray, limit);
+                    assert_eq!(t[lane].to_bits(), expected.to_bits(), "kind {kind}");
+                    let is_occluded = occludes_segment(kind, q, ray.origin, from_inside, ray.direction, limit);
+                    assert_eq!(occluding >> lane & 1 == 1, is_occluded, "kind {kind}");
+                    hits += usize::from(expected < limit);
+                    occluded += usize::from(is_occluded);
+                }
+            }
+        }
+        (hits, occluded)
+    }
 }

@@ -7,7 +7,6 @@ mod items;
 mod linear;
 mod meshes;
 mod occlusion;
-mod rectangles;
 mod rows;
 mod scratch;
 mod shade;

@@ -52,7 +52,7 @@ fn find<S: Simd>(
     let mut rows = ShadowRayRows::default();
     for rays in rays.chunks(LANES) {
         rows.set(rays);
-        let mut is_occluded = rows.occluded(simd, scene, rays);
+        let mut is_occluded = rows.occluded(simd, scene);
         if has_bvh {
             is_occluded |= queue_rays(
                 simd,
