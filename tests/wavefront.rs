@@ -10,7 +10,7 @@ use wgray::scene::Integrator;
 use wgray_render::cpu::integrators::path::{path_layers, path_value};
 use wgray_render::cpu::pixel::{Layers, pixel_radiance};
 use wgray_render::cpu::wavefront::{BatchMeshes, LaneHits, Wavefront};
-use wgray_render::records::{DIFFUSE, EMITTER, NO_COLORS, OPAQUE, Packed, RANDOM};
+use wgray_render::records::{DIFFUSE, EMITTER, NO_COLORS, OPAQUE, Packed, RANDOM, SOBOL};
 
 use crate::random_scenes::any_scene;
 use crate::scenes;
@@ -102,6 +102,7 @@ fn with_diffuse_materials(mut packed: Packed, scene: usize) -> Packed {
 /// Numbers of scenes with hits shaded in lanes, by feature.
 #[derive(Debug, Default)]
 struct Lanes {
+    camera: usize,
     flat: usize,
     faces: usize,
     evaluated: usize,
@@ -120,10 +121,14 @@ struct Lanes {
 impl Lanes {
     fn add(&mut self, packed: &Packed, hits: LaneHits) {
         let s = &packed.specialization;
+        // Rays of other cameras are computed one by one.
+        let has_pinhole = s.lens == 0 && s.panoramic == 0 && s.camera_invisible == 0;
+        let has_lane_camera = has_pinhole && s.pixel_pattern == SOBOL && s.filter_bins == 0;
         if hits == LaneHits::default() {
             return;
         }
         for (count, has_feature) in [
+            (&mut self.camera, has_lane_camera),
             (&mut self.flat, hits.flat > 0),
             (&mut self.faces, hits.faces > 0),
             (&mut self.evaluated, hits.evaluated > 0),
@@ -144,6 +149,7 @@ impl Lanes {
 
     fn assert_all_covered(&self) {
         let Lanes {
+            camera,
             flat,
             faces,
             evaluated,
@@ -158,7 +164,14 @@ impl Lanes {
             alpha,
             layers,
         } = *self;
-        let single = [one_emitter, several_emitters, light_tree, environment_map, roulette];
+        let single = [
+            camera,
+            one_emitter,
+            several_emitters,
+            light_tree,
+            environment_map,
+            roulette,
+        ];
         let more = [without_lights, random_pattern, textures, alpha, layers];
         assert!(flat > 30 && faces > 20 && evaluated > 30, "{self:?}");
         assert!(single.into_iter().chain(more).all(|count| count > 5), "{self:?}");

@@ -31,6 +31,13 @@ pub trait Real:
 
     /// Returns `value` in all lanes.
     fn splat(self, value: f32) -> Self;
+
+    /// Returns a vector in all lanes.
+    #[inline(always)]
+    fn broadcast(self, value: Vec3) -> Self::Vec3 {
+        Vector3::new(self.splat(value.x), self.splat(value.y), self.splat(value.z))
+    }
+
     fn abs(self) -> Self;
     fn sqrt(self) -> Self;
     fn lt(self, other: Self) -> Self::Mask;

@@ -2,12 +2,13 @@
 
 use glam::{UVec2, Vec2};
 
-use super::lanes::{Word, WordVector2};
+use super::lanes::{Real, Vector2, Word, WordVector2};
 use super::rng::unit_float;
 
-pub fn sobol_sample(index: u32, key: UVec2) -> Vec2 {
+#[inline(always)]
+pub fn sobol_sample<W: Word>(index: W, key: W::UVec2) -> <W::Real as Real>::Vec2 {
     let bits = sobol_bits(index, key);
-    Vec2::new(unit_float(bits.x), unit_float(bits.y))
+    Vector2::new(unit_float(bits.x()), unit_float(bits.y()))
 }
 
 #[inline(always)]

@@ -2,6 +2,7 @@
 //! occlusion and compaction bounce by bounce. Shading is that of [`advance`](super::integrators::path::advance), so each
 //! path has the bits of its scalar version. Tracing whole batches is faster.
 
+mod begin;
 mod closest_hits;
 mod items;
 mod linear;
@@ -16,13 +17,14 @@ use std::sync::Arc;
 
 use glam::UVec2;
 
+use self::begin::begin_paths;
 use self::closest_hits::closest_hits;
 pub use self::meshes::BatchMeshes;
 use self::occlusion::occluded_rays;
 use self::scratch::Scratch;
 pub use self::shade::LaneHits;
 use self::shade::{ShadingQueues, shade_hits};
-use super::integrators::path::{PathState, add_radiance, begin_path};
+use super::integrators::path::{PathState, add_radiance};
 use super::ray::Hit;
 use super::shadow_ray::ShadowRay;
 use crate::records::Packed;
@@ -87,12 +89,7 @@ impl Wavefront {
     }
 
     fn begin(&mut self, scene: &Packed, samples: impl Iterator<Item = (UVec2, u32)>) {
-        self.paths.clear();
-        self.pixels.clear();
-        for (pixel, sample) in samples {
-            self.paths.push(begin_path(scene, pixel, sample));
-            self.pixels.push(pixel);
-        }
+        begin_paths(scene, samples, &mut self.paths, &mut self.pixels);
         self.active.clear();
         self.active.extend(0..self.paths.len() as u32);
     }
