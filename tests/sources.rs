@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
-use syn::{FnArg, Item, Pat, ReturnType, Type};
+use syn::{FnArg, Generics, Item, Pat, ReturnType, Type};
 use wgray_render::gpu::compose::{KERNELS, Shaders, Source, built_in};
 use wgray_render::gpu::naga;
 use wgray_render::gpu::naga::{ArraySize, Module, ScalarKind, TypeInner};
@@ -160,16 +160,18 @@ pub fn rust_functions(file: &syn::File) -> Vec<Signature> {
         let arguments = function.sig.inputs.iter();
         let mut exclusive = arguments.filter_map(|input| match input {
             FnArg::Typed(typed) => match &*typed.ty {
-                Type::Reference(reference) if reference.mutability.is_some() => Some(rust_type(&reference.elem)),
+                Type::Reference(reference) if reference.mutability.is_some() => {
+                    Some(rust_type(&reference.elem, &function.sig.generics))
+                }
                 _ => None,
             },
             FnArg::Receiver(_) => None,
         });
         exclusive.next()
     };
-    let argument = |input: &FnArg| match input {
+    let argument = |input: &FnArg, generics: &Generics| match input {
         FnArg::Typed(typed) => match &*typed.pat {
-            Pat::Ident(name) => (name.ident.to_string(), rust_type(&typed.ty)),
+            Pat::Ident(name) => (name.ident.to_string(), rust_type(&typed.ty, generics)),
             other => panic!("a twin's argument has a name, not {other:?}"),
         },
         FnArg::Receiver(_) => unreachable!("a free function"),
@@ -177,10 +179,15 @@ pub fn rust_functions(file: &syn::File) -> Vec<Signature> {
     let function = |item: &Item| match item {
         Item::Fn(function) => Some(Signature {
             name: function.sig.ident.to_string(),
-            members: function.sig.inputs.iter().map(argument).collect(),
+            members: function
+                .sig
+                .inputs
+                .iter()
+                .map(|input| argument(input, &function.sig.generics))
+                .collect(),
             result: match &function.sig.output {
                 ReturnType::Default => updated(function),
-                ReturnType::Type(_, ty) => Some(rust_type(ty)),
+                ReturnType::Type(_, ty) => Some(rust_type(ty, &function.sig.generics)),
             },
         }),
         _ => None,
@@ -188,18 +195,18 @@ pub fn rust_functions(file: &syn::File) -> Vec<Signature> {
     file.items.iter().filter_map(function).collect()
 }
 
-/// Returns the structs in source order.
+/// Returns the structs in source order. A type parameter has the type of its default.
 pub fn rust_records(file: &syn::File) -> Vec<Signature> {
-    let field = |f: &syn::Field| {
+    let field = |f: &syn::Field, generics: &Generics| {
         (
             f.ident.as_ref().map(|i| i.to_string()).unwrap_or_default(),
-            rust_type(&f.ty),
+            rust_type(&f.ty, generics),
         )
     };
     let record = |item: &Item| match item {
         Item::Struct(s) => Some(Signature {
             name: s.ident.to_string(),
-            members: s.fields.iter().map(field).collect(),
+            members: s.fields.iter().map(|f| field(f, &s.generics)).collect(),
             result: None,
         }),
         _ => None,
@@ -207,10 +214,40 @@ pub fn rust_records(file: &syn::File) -> Vec<Signature> {
     file.items.iter().filter_map(record).collect()
 }
 
+/// Traits of numbers and vectors of one path or of several paths in lanes (`lanes.rs`) and the associated type of
+/// conditions, with the WGSL types that they stand for. The associated types `Real` and `Word` have the types of the
+/// traits, and other associated types those of glam's vectors with their names.
+const NUMBER_TRAITS: &[(&str, &str)] = &[
+    ("Real", "f32"),
+    ("Word", "u32"),
+    ("Vector2", "vec2<f32>"),
+    ("Vector3", "vec3<f32>"),
+    ("WordVector2", "vec2<u32>"),
+    ("WordVector4", "vec4<u32>"),
+    ("Mask", "bool"),
+];
+
+/// Returns the WGSL type of a type parameter.
+fn parameter_type(name: &str, generics: &Generics) -> Option<String> {
+    let parameter = generics.type_params().find(|parameter| parameter.ident == name)?;
+    if let Some(default) = &parameter.default {
+        return Some(rust_type(default, generics));
+    }
+    parameter.bounds.iter().find_map(|bound| match bound {
+        syn::TypeParamBound::Trait(bound) => wgsl_type_of_trait(&bound.path.segments.last()?.ident.to_string()),
+        _ => None,
+    })
+}
+
+fn wgsl_type_of_trait(name: &str) -> Option<String> {
+    let (_, wgsl) = NUMBER_TRAITS.iter().find(|(number, _)| *number == name)?;
+    Some(wgsl.to_string())
+}
+
 /// Returns the WGSL type. Rust passes records by reference, WGSL by value.
-fn rust_type(ty: &Type) -> String {
+fn rust_type(ty: &Type, generics: &Generics) -> String {
     match ty {
-        Type::Reference(reference) => rust_type(&reference.elem),
+        Type::Reference(reference) => rust_type(&reference.elem, generics),
         Type::Array(array) => {
             let length = match &array.len {
                 syn::Expr::Lit(syn::ExprLit {
@@ -219,10 +256,13 @@ fn rust_type(ty: &Type) -> String {
                 }) => length.base10_digits().to_string(),
                 other => format!("{other:?}"), // matches no WGSL type: a shared array has a literal length
             };
-            format!("array<{}, {length}>", rust_type(&array.elem))
+            format!("array<{}, {length}>", rust_type(&array.elem, generics))
         }
         Type::Path(path) => {
             let name = path.path.segments.last().expect("a path has a name").ident.to_string();
+            if let Some(wgsl) = parameter_type(&name, generics).or_else(|| wgsl_type_of_trait(&name)) {
+                return wgsl;
+            }
             let (vector, scalar) = match name.strip_suffix(['2', '3', '4']) {
                 Some("Vec") => (true, "f32"),
                 Some("UVec") => (true, "u32"),

@@ -46,8 +46,9 @@ const RUST_FILES_WITHOUT_SHADER: &[&str] = &[
     "mod.rs",
     "renderer.rs",
     "integrators",
+    "lanes",
+    "lanes.rs",
     "lobes.rs",
-    "rectangles.rs",
     "samples.rs",
     "shadow_ray.rs",
     "traversal",
@@ -70,16 +71,6 @@ const ONE_SIDED: &[(&str, &str, &str)] = &[
         "linear_primitives.wgsl",
         "is_occluded_by_primitives",
         "reads the scene: in WGSL, it is in buffers.wgsl",
-    ),
-    (
-        "linear_primitives.wgsl",
-        "closest_of_kind",
-        "only in Rust, for the wavefront: the loop over the primitives of a kind",
-    ),
-    (
-        "linear_primitives.wgsl",
-        "is_occluded_by_kind",
-        "only in Rust, for the wavefront: the loop over the primitives of a kind",
     ),
     (
         "integrators/path.wgsl",
@@ -216,11 +207,14 @@ fn a_changed_twin_is_detected() {
         (
             "swapped arguments",
             "math.rs",
-            "cross(a: Vec3, b: Vec3)",
-            "cross(b: Vec3, a: Vec3)",
+            "cross<V: Vector3>(a: V, b: V)",
+            "cross<V: Vector3>(b: V, a: V)",
         ),
         ("another type", "ray.rs", "t: f32, i: u32", "t: f32, i: i32"),
-        ("another result", "rng.rs", "(bits: u32) -> f32", "(bits: u32) -> f64"),
+        ("another result", "specular.rs", "eta: f32) -> f32", "eta: f32) -> f64"),
+        ("another generic result", "rng.rs", "-> W::Real", "-> W"),
+        ("another bound", "math.rs", "max<F: Real>", "max<F: Word>"),
+        ("a function that is not generic", "math.rs", "min<F: Real>", "min"),
         ("a renamed function", "plane.rs", "fn plane_occludes", "fn plane_block"),
         (
             "one more function",
@@ -254,6 +248,28 @@ fn an_argument_updated_in_place_is_a_result() {
     );
     assert_ne!(functions("fn advance(state: &PathState, pixel: UVec2) {}"), by_value);
     assert_ne!(functions("fn advance(state: &mut Path, pixel: UVec2) {}"), by_value);
+}
+
+#[test]
+fn generic_signatures_have_wgsl_types() {
+    let functions = |text: &str| rust_functions(&syn::parse_file(text).expect("Rust"));
+    let records = |text: &str| rust_records(&syn::parse_file(text).expect("Rust"));
+    let scalar = functions("fn f(x: f32, i: u32, u: Vec2, n: Vec3, key: UVec2, words: UVec4) -> Vec3 { n }");
+    for generic in [
+        "fn f<F: Real>(x: F, i: F::Word, u: F::Vec2, n: F::Vec3, key: UVec2, words: UVec4) -> F::Vec3 { n }",
+        "fn f<V: Vector3>(x: V::Real, i: u32, u: <V::Real as Real>::Vec2, n: V, key: UVec2, words: UVec4) -> V { n }",
+        "fn f<W: Word, K: WordVector4>(x: W::Real, i: W, u: Vec2, n: Vec3, key: W::UVec2, words: K) -> Vec3 { n }",
+        "fn f<U: Vector2, K: WordVector2>(x: U::Real, i: u32, u: U, n: Vec3, key: K, words: UVec4) -> Vec3 { n }",
+    ] {
+        assert_eq!(functions(generic), scalar, "{generic}");
+    }
+    let masks = functions("fn f<V: Vector2>(x: V::Real) -> <V::Real as Real>::Mask {}");
+    assert_eq!(masks, functions("fn f(x: f32) -> bool {}"));
+    // A type parameter hides the type of the same name, and a bound that is no number matches no WGSL type.
+    assert_ne!(functions("fn f<Vec3: Real>(n: Vec3) {}"), functions("fn f(n: Vec3) {}"));
+    assert_ne!(functions("fn f<F: Copy>(x: F) {}"), functions("fn f(x: f32) {}"));
+    assert_eq!(records("struct R<V = Vec3> { u: V }"), records("struct R { u: Vec3 }"));
+    assert_ne!(records("struct R<F = f32> { u: F }"), records("struct R { u: Vec3 }"));
 }
 
 #[test]

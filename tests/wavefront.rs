@@ -3,14 +3,14 @@
 use std::fmt::Write as _;
 use std::sync::Arc;
 
-use glam::{UVec2, Vec4};
+use glam::{UVec2, Vec3, Vec4};
 use proptest::strategy::{Strategy as _, ValueTree as _};
 use proptest::test_runner::TestRunner;
 use wgray::scene::Integrator;
 use wgray_render::cpu::integrators::path::{path_layers, path_value};
 use wgray_render::cpu::pixel::{Layers, pixel_radiance};
-use wgray_render::cpu::wavefront::{BatchMeshes, Wavefront};
-use wgray_render::records::Packed;
+use wgray_render::cpu::wavefront::{BatchMeshes, LaneHits, Wavefront};
+use wgray_render::records::{DIFFUSE, EMITTER, NO_COLORS, OPAQUE, Packed, RANDOM, SOBOL};
 
 use crate::random_scenes::any_scene;
 use crate::scenes;
@@ -44,17 +44,23 @@ fn samples(packed: &Packed, step: u32, count: u32) -> Vec<(UVec2, u32)> {
 }
 
 fn wavefront(packed: &Packed, samples: &[(UVec2, u32)], batch: usize) -> Vec<PathBits> {
-    wavefront_with(BatchMeshes::new(packed), packed, samples, batch)
+    wavefront_with(BatchMeshes::new(packed), packed, samples, batch).0
 }
 
-fn wavefront_with(meshes: BatchMeshes, packed: &Packed, samples: &[(UVec2, u32)], batch: usize) -> Vec<PathBits> {
+/// Returns the paths, and the numbers of hits shaded in lanes.
+fn wavefront_with(
+    meshes: BatchMeshes,
+    packed: &Packed,
+    samples: &[(UVec2, u32)],
+    batch: usize,
+) -> (Vec<PathBits>, LaneHits) {
     let mut wavefront = Wavefront::new(Arc::new(meshes));
     let mut paths = Vec::new();
     for samples in samples.chunks(batch) {
         let traced = wavefront.trace(packed, samples.iter().copied());
         paths.extend(traced.iter().map(|path| bits(path_value(path), path_layers(path))));
     }
-    paths
+    (paths, wavefront.lane_hits())
 }
 
 fn scalar(packed: &Packed, samples: &[(UVec2, u32)]) -> Vec<PathBits> {
@@ -68,6 +74,109 @@ fn scalar(packed: &Packed, samples: &[(UVec2, u32)]) -> Vec<PathBits> {
 fn differing(a: &[PathBits], b: &[PathBits]) -> usize {
     assert_eq!(a.len(), b.len());
     a.iter().zip(b).filter(|(a, b)| a != b).count()
+}
+
+/// Changes most materials to diffuse ones, which are shaded in lanes, most of them without textures and emission. Paths
+/// have at least three bounces.
+fn with_diffuse_materials(mut packed: Packed, scene: usize) -> Packed {
+    packed.specialization.absorption = 0;
+    packed.specialization.bounces = packed.specialization.bounces.max(3);
+    for (i, material) in packed.materials.iter_mut().enumerate() {
+        if material.kind == EMITTER || (scene + i) % 4 == 3 {
+            continue;
+        }
+        material.kind = DIFFUSE;
+        material.diffuse = Vec3::new(0.9, 0.6, 0.3);
+        material.roughness = 0.0;
+        material.alpha_mode = OPAQUE;
+        if i % 2 == 0 {
+            material.density = 0.0;
+        }
+        if (scene + i) % 4 != 2 {
+            material.lookups.y = 0;
+            material.vertex_colors = NO_COLORS;
+        }
+    }
+    packed
+}
+
+/// Numbers of scenes with hits shaded in lanes, by feature.
+#[derive(Debug, Default)]
+struct Lanes {
+    camera: usize,
+    flat: usize,
+    faces: usize,
+    evaluated: usize,
+    without_lights: usize,
+    one_emitter: usize,
+    several_emitters: usize,
+    light_tree: usize,
+    environment_map: usize,
+    roulette: usize,
+    random_pattern: usize,
+    textures: usize,
+    alpha: usize,
+    layers: usize,
+}
+
+impl Lanes {
+    fn add(&mut self, packed: &Packed, hits: LaneHits) {
+        let s = &packed.specialization;
+        // Rays of other cameras are computed one by one.
+        let has_pinhole = s.lens == 0 && s.panoramic == 0 && s.camera_invisible == 0;
+        let has_lane_camera = has_pinhole && s.pixel_pattern == SOBOL && s.filter_bins == 0;
+        if hits == LaneHits::default() {
+            return;
+        }
+        for (count, has_feature) in [
+            (&mut self.camera, has_lane_camera),
+            (&mut self.flat, hits.flat > 0),
+            (&mut self.faces, hits.faces > 0),
+            (&mut self.evaluated, hits.evaluated > 0),
+            (&mut self.without_lights, s.emitters == 0),
+            (&mut self.one_emitter, s.emitters == 1),
+            (&mut self.several_emitters, s.emitters > 1 && s.light_tree == 0),
+            (&mut self.light_tree, s.light_tree != 0),
+            (&mut self.environment_map, s.has_environment_map()),
+            (&mut self.roulette, s.rr_depth < s.bounces),
+            (&mut self.random_pattern, s.pixel_pattern == RANDOM),
+            (&mut self.textures, s.lookups != 0),
+            (&mut self.alpha, s.alpha_surfaces != 0),
+            (&mut self.layers, s.layers != 0),
+        ] {
+            *count += usize::from(has_feature);
+        }
+    }
+
+    fn assert_all_covered(&self) {
+        let Lanes {
+            camera,
+            flat,
+            faces,
+            evaluated,
+            without_lights,
+            one_emitter,
+            several_emitters,
+            light_tree,
+            environment_map,
+            roulette,
+            random_pattern,
+            textures,
+            alpha,
+            layers,
+        } = *self;
+        let single = [
+            camera,
+            one_emitter,
+            several_emitters,
+            light_tree,
+            environment_map,
+            roulette,
+        ];
+        let more = [without_lights, random_pattern, textures, alpha, layers];
+        assert!(flat > 30 && faces > 20 && evaluated > 30, "{self:?}");
+        assert!(single.into_iter().chain(more).all(|count| count > 5), "{self:?}");
+    }
 }
 
 fn random_path_scenes() -> impl Iterator<Item = Packed> {
@@ -145,22 +254,29 @@ fn scene_with_many_items() -> Packed {
 #[test]
 fn random_scenes_have_the_paths_of_the_scalar_integrator() {
     let (mut scenes, mut meshes, mut alpha) = (0, 0, 0);
+    let mut lanes = Lanes::default();
     for (i, packed) in random_path_scenes().enumerate() {
         let packed = if i % 2 == 0 { packed.with_layers() } else { packed };
-        let samples = samples(&packed, 2, 3);
         let batch = [1, 7, 64, 1024][i % 4];
-        let differ = differing(&wavefront(&packed, &samples, batch), &scalar(&packed, &samples));
-        assert_eq!(
-            differ,
-            0,
-            "number of differing paths, of {} in scene {i}",
-            samples.len()
-        );
+        let diffuse = with_diffuse_materials(packed.clone(), i);
+        for (packed, step) in [(&packed, 2), (&diffuse, 3)] {
+            let samples = samples(packed, step, 3);
+            let (paths, lane_hits) = wavefront_with(BatchMeshes::new(packed), packed, &samples, batch);
+            let differ = differing(&paths, &scalar(packed, &samples));
+            assert_eq!(
+                differ,
+                0,
+                "number of differing paths, of {} in scene {i}, {lane_hits:?}",
+                samples.len()
+            );
+            lanes.add(packed, lane_hits);
+        }
         scenes += 1;
         meshes += usize::from(!packed.bvh.meshes.is_empty());
         alpha += usize::from(packed.specialization.alpha_surfaces != 0);
     }
     assert!(scenes > 100 && meshes > 20 && alpha > 5, "{scenes} {meshes} {alpha}");
+    lanes.assert_all_covered();
 }
 
 #[test]
@@ -185,7 +301,10 @@ fn meshes_that_are_too_large_are_traced_one_by_one() {
     for (limit, is_missing) in [(triangles, false), (triangles - 1, true)] {
         let meshes = BatchMeshes::with_limit(&packed, limit);
         assert_eq!(meshes.are_missing(&packed), is_missing);
-        assert_eq!(differing(&wavefront_with(meshes, &packed, &samples, 256), &expected), 0);
+        assert_eq!(
+            differing(&wavefront_with(meshes, &packed, &samples, 256).0, &expected),
+            0
+        );
     }
 }
 
@@ -195,7 +314,10 @@ fn changed_scenes_are_detected() {
     assert!(packed.bvh.items.len() > 70 && packed.bvh.instances.len() == 8);
     let samples = samples(&packed, 1, 2);
     let expected = scalar(&packed, &samples);
-    assert_eq!(differing(&wavefront(&packed, &samples, 256), &expected), 0);
+    let (paths, lane_hits) = wavefront_with(BatchMeshes::new(&packed), &packed, &samples, 256);
+    assert_eq!(differing(&paths, &expected), 0);
+    let LaneHits { flat, faces, evaluated } = lane_hits;
+    assert!(flat > 50 && faces > 50 && evaluated > 50, "{lane_hits:?}");
     let changed = |change: fn(&mut Packed)| {
         let mut packed = packed.clone();
         change(&mut packed);
@@ -206,6 +328,13 @@ fn changed_scenes_are_detected() {
         changed(|packed| packed.bvh.instances[3].anchor.x += 1e-4),
         changed(|packed| packed.environment.shadow_epsilon *= 1.5),
         changed(|packed| packed.primitives[0].anchor.z += 1e-5),
+        changed(|packed| {
+            packed
+                .materials
+                .iter_mut()
+                .for_each(|material| material.diffuse.y *= 1.000_001)
+        }),
+        changed(|packed| packed.lighting.lights[0].center.x += 1e-5),
     ];
     assert!(found.iter().all(|differ| *differ > 0), "{found:?}");
 }

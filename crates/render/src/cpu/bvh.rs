@@ -4,6 +4,7 @@ use bytemuck::cast_slice;
 use glam::{UVec2, Vec2, Vec3, Vec4Swizzles as _};
 
 use super::geometry::triangle_casts;
+use super::lanes::{Vector3, constant};
 use super::light::{LightSegments, segments_to_light};
 use super::linear_primitives::is_occluded_by_primitive;
 use super::math::max;
@@ -24,8 +25,9 @@ use crate::records::{
 /// Maximum number of items tested without the BVH: in a small BVH, rays hit most nodes.
 pub const FEW_ITEMS: usize = 4;
 
-pub fn item_pad(scene: &Packed, origin: Vec3) -> f32 {
-    scene.counts.item_padding.x * (largest(origin) + scene.counts.item_padding.y)
+#[inline(always)]
+pub fn item_pad<V: Vector3>(scene: &Packed, origin: V) -> V::Real {
+    constant(scene.counts.item_padding.x) * (largest(origin) + scene.counts.item_padding.y)
 }
 
 pub fn closest_in_bvh(scene: &Packed, before: Hit, ray: Ray, origin_prim: UVec2, inside_prim: UVec2) -> Hit {

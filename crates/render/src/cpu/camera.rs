@@ -3,21 +3,27 @@
 use glam::{Vec2, Vec3};
 
 use super::differential::{Derivative, Differential};
+use super::lanes::{Real, Vector2, constant};
 use super::math::{dot, normalize};
 use super::ray::Ray;
 use crate::records::{Camera, ORTHOGRAPHIC};
 
-pub fn camera_ray(camera: &Camera, raster: Vec2) -> Ray {
+#[inline(always)]
+pub fn camera_ray<V: Vector2>(camera: &Camera, raster: V) -> Ray<<V::Real as Real>::Vec3> {
     let offset = image_plane_offset(camera, raster);
+    let (position, forward) = (
+        raster.x().broadcast(camera.position),
+        raster.x().broadcast(camera.forward),
+    );
     if camera.projection == ORTHOGRAPHIC {
         return Ray {
-            origin: camera.position + offset,
-            direction: camera.forward,
+            origin: position + offset,
+            direction: forward,
         };
     }
     Ray {
-        origin: camera.position,
-        direction: normalize(camera.forward + offset),
+        origin: position,
+        direction: normalize(forward + offset),
     }
 }
 
@@ -43,10 +49,11 @@ pub fn camera_derivative(camera: &Camera, raster: Vec2, step: Vec3) -> Derivativ
     }
 }
 
-pub fn image_plane_offset(camera: &Camera, at: Vec2) -> Vec3 {
-    let x = at.x * (2.0 / camera.width as f32) - 1.0;
-    let y = 1.0 - at.y * (2.0 / camera.height as f32);
-    camera.right * x + camera.up * y
+#[inline(always)]
+pub fn image_plane_offset<V: Vector2>(camera: &Camera, at: V) -> <V::Real as Real>::Vec3 {
+    let x = at.x() * (2.0 / camera.width as f32) - 1.0;
+    let y = constant(1.0) - at.y() * (2.0 / camera.height as f32);
+    x.broadcast(camera.right) * x + x.broadcast(camera.up) * y
 }
 
 #[cfg(test)]
@@ -79,7 +86,7 @@ mod tests {
             ((0.0, 0.0), (-2.0, 1.0, 1.0)),
             ((8.0, 4.0), (2.0, 1.0, -1.0)),
         ] {
-            let ray = camera_ray(&camera, raster.into());
+            let ray = camera_ray(&camera, Vec2::from(raster));
             assert_eq!(ray.origin, camera.position);
             assert!(
                 (ray.direction - Vec3::from(direction).normalize()).length() < 1e-6,
@@ -97,7 +104,7 @@ mod tests {
             ((0.0, 0.0), (-1.0, 2.0, 4.0)),
             ((8.0, 4.0), (3.0, 2.0, 2.0)),
         ] {
-            let ray = camera_ray(&camera, raster.into());
+            let ray = camera_ray(&camera, Vec2::from(raster));
             assert_eq!((ray.origin, ray.direction), (origin.into(), Vec3::Y), "{raster:?}");
         }
     }

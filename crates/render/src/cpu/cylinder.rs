@@ -5,68 +5,75 @@ use std::f32::consts::{FRAC_1_PI, TAU};
 use glam::{Vec2, Vec3};
 
 use super::ellipsoid::longitude;
+use super::lanes::{Real, Vector2, Vector3, constant, select};
 use super::math::{max, min};
 use super::ray::{Ray, vector_to_local};
 use super::solid::{interval_occludes, levels_on_surface, nearest_end};
 use crate::records::{INFINITE_T, Primitive};
 
-pub fn cylinder_levels(q: &Primitive, from_anchor: Vec3) -> Vec2 {
-    let side = from_anchor.x * (from_anchor.x - q.middle.x * 2.0)
-        + from_anchor.y * (from_anchor.y - q.middle.y * 2.0)
-        + q.level;
-    let top = from_anchor.z - (q.middle.z + 1.0);
-    let bottom = (q.middle.z - 1.0) - from_anchor.z;
-    Vec2::new(side, max(top, bottom))
+#[inline(always)]
+pub fn cylinder_levels<V: Vector3>(q: &Primitive, from_anchor: V) -> <V::Real as Real>::Vec2 {
+    let (x, y, z) = (from_anchor.x(), from_anchor.y(), from_anchor.z());
+    let side = x * (x - q.middle.x * 2.0) + y * (y - q.middle.y * 2.0) + q.level;
+    let top = z - (q.middle.z + 1.0);
+    let bottom = constant(q.middle.z - 1.0) - z;
+    Vector2::new(side, max(top, bottom))
 }
 
-pub fn cylinder_interval(o: Vec3, d: Vec3, levels: Vec2) -> Vec2 {
-    let a = d.x * d.x + d.y * d.y;
-    let b = o.x * d.x + o.y * d.y;
-    let moment = o.x * d.y - o.y * d.x;
-    let discriminant = if levels.x < 1.0 {
-        b * b - a * levels.x
-    } else {
-        a - moment * moment
-    };
-    let root = max(discriminant, 0.0).sqrt();
-    let sum = if b < 0.0 { root - b } else { -b - root };
-    let s0 = levels.x / sum;
+#[inline(always)]
+pub fn cylinder_interval<V: Vector3>(o: V, d: V, levels: <V::Real as Real>::Vec2) -> <V::Real as Real>::Vec2 {
+    let (side_level, cap_level) = (levels.x(), levels.y());
+    let a = d.x() * d.x() + d.y() * d.y();
+    let b = o.x() * d.x() + o.y() * d.y();
+    let moment = o.x() * d.y() - o.y() * d.x();
+    let zero = a.splat(0.0);
+    let infinite = a.splat(INFINITE_T);
+    let is_near = side_level.lt(a.splat(1.0));
+    let discriminant = select(a - moment * moment, b * b - a * side_level, is_near);
+    let root = max(discriminant, zero).sqrt();
+    let sum = select(-b - root, root - b, b.lt(zero));
+    let s0 = side_level / sum;
     let s1 = sum / a;
-    let is_parallel = a == 0.0;
-    let misses = if is_parallel {
-        !((levels.x <= 0.0) & (b == 0.0))
-    } else {
-        !(discriminant >= 0.0)
-    };
-    if misses {
-        return Vec2::new(INFINITE_T, -INFINITE_T);
-    }
-    let near_side = if is_parallel { -INFINITE_T } else { min(s0, s1) };
-    let far_side = if is_parallel { INFINITE_T } else { max(s0, s1) };
-    let (upper, lower) = if o.z > 0.0 {
-        (levels.y, -2.0 - levels.y)
-    } else {
-        (-2.0 - levels.y, levels.y)
-    };
-    let slope = if d.z == 0.0 { 1e-30 } else { d.z };
+    let is_parallel = a.eq(zero);
+    let misses_side = !(side_level.le(zero) & b.eq(zero));
+    let misses = (is_parallel & misses_side) | (!is_parallel & !discriminant.ge(zero));
+    let near_side = select(min(s0, s1), -infinite, is_parallel);
+    let far_side = select(max(s0, s1), infinite, is_parallel);
+    let is_above = o.z().gt(zero);
+    let opposite_level = constant(-2.0) - cap_level;
+    let upper = select(opposite_level, cap_level, is_above);
+    let lower = select(cap_level, opposite_level, is_above);
+    let slope = select(d.z(), a.splat(1e-30), d.z().eq(zero));
     let s2 = -upper / slope;
     let s3 = lower / slope;
-    Vec2::new(max(near_side, min(s2, s3)), min(far_side, max(s2, s3)))
+    let near = max(near_side, min(s2, s3));
+    let far = min(far_side, max(s2, s3));
+    Vector2::new(select(near, infinite, misses), select(far, -infinite, misses))
 }
 
-pub fn intersect_cylinder(q: &Primitive, from_inside: bool, ray: Ray, limit: f32) -> f32 {
-    let from_anchor = vector_to_local(q, ray.origin - q.anchor);
+#[inline(always)]
+pub fn intersect_cylinder<V: Vector3>(
+    q: &Primitive,
+    from_inside: <V::Real as Real>::Mask,
+    ray: Ray<V>,
+    limit: V::Real,
+) -> V::Real {
+    let from_anchor = vector_to_local(q, ray.origin - ray.origin.broadcast(q.anchor));
     let d = vector_to_local(q, ray.direction);
     let raw_levels = cylinder_levels(q, from_anchor);
-    let levels = if from_inside {
-        levels_on_surface(raw_levels, 0.0)
-    } else {
-        raw_levels
-    };
-    nearest_end(cylinder_interval(from_anchor - q.middle, d, levels), limit)
+    let on_surface = levels_on_surface(raw_levels, limit.splat(0.0));
+    let levels = Vector2::select(raw_levels, on_surface, from_inside);
+    let o = from_anchor - from_anchor.broadcast(q.middle);
+    nearest_end(cylinder_interval(o, d, levels), limit)
 }
 
-pub fn cylinder_occludes(o: Vec3, d: Vec3, levels: Vec2, t_max: f32) -> bool {
+#[inline(always)]
+pub fn cylinder_occludes<V: Vector3>(
+    o: V,
+    d: V,
+    levels: <V::Real as Real>::Vec2,
+    t_max: V::Real,
+) -> <V::Real as Real>::Mask {
     interval_occludes(cylinder_interval(o, d, levels), t_max)
 }
 
@@ -254,7 +261,7 @@ mod tests {
         let q = cylinder(DVec3::ZERO, 1.0, 2.0);
         let occludes = |p: [f32; 3], d: [f32; 3], from_inside| {
             let levels = solid_levels(CYLINDER, &q, vector_to_local(&q, Vec3::from(p) - q.anchor), from_inside);
-            cylinder_occludes(p.into(), d.into(), levels, 1.0)
+            cylinder_occludes(Vec3::from(p), Vec3::from(d), levels, 1.0)
         };
         assert!(occludes([-3.0, 0.0, 0.0], [6.0, 0.0, 0.0], false), "through");
         assert!(occludes([-3.0, 0.0, 0.0], [3.0, 0.0, 0.0], false), "into");

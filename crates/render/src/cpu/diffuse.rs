@@ -2,20 +2,22 @@
 
 use std::f32::consts::FRAC_1_PI;
 
-use glam::{Vec2, Vec3};
+use glam::Vec3;
 
+use super::lanes::{Real, Vector3};
 use super::math::{atan2, dot, max};
 use super::warp::hemisphere_sample;
 use crate::records::Material;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Angles {
-    pub wi: f32,
-    pub wo: f32,
-    pub between: f32,
+pub struct Angles<F = f32> {
+    pub wi: F,
+    pub wo: F,
+    pub between: F,
 }
 
-pub fn angles_at(normal: Vec3, wo: Vec3, wi: Vec3) -> Angles {
+#[inline(always)]
+pub fn angles_at<V: Vector3>(normal: V, wo: V, wi: V) -> Angles<V::Real> {
     Angles {
         wi: dot(normal, wi),
         wo: dot(normal, wo),
@@ -50,10 +52,12 @@ pub fn albedo_growth(cosine: f32) -> f32 {
     (s * (angle - s * cosine) + 0.666_666_7 * (tangent - s)) * FRAC_1_PI
 }
 
-pub fn diffuse_pdf(angles: Angles) -> f32 {
-    max(angles.wi, 0.0) * FRAC_1_PI
+#[inline(always)]
+pub fn diffuse_pdf<F: Real>(angles: Angles<F>) -> F {
+    max(angles.wi, angles.wi.splat(0.0)) * FRAC_1_PI
 }
 
-pub fn diffuse_sample(normal: Vec3, u: Vec2) -> Vec3 {
+#[inline(always)]
+pub fn diffuse_sample<V: Vector3>(normal: V, u: <V::Real as Real>::Vec2) -> V {
     hemisphere_sample(normal, u)
 }

@@ -1,31 +1,29 @@
 //! Twin of `shaders/disk.wgsl`.
 
-use glam::Vec3;
-
+use super::lanes::{Real, Vector2, Vector3, select};
 use super::math::dot;
 use super::ray::{Ray, crosses_plane, plane_distance, scaled_crossing};
 use crate::records::Primitive;
 
-pub fn intersect_disk(q: &Primitive, ray: Ray, limit: f32) -> f32 {
+#[inline(always)]
+pub fn intersect_disk<V: Vector3>(q: &Primitive, ray: Ray<V>, limit: V::Real) -> V::Real {
     let t = plane_distance(q, ray);
-    let p = ray.origin + ray.direction * t - q.anchor;
-    let x = dot(q.x, p);
-    let y = dot(q.y, p);
-    if (t > 0.0) & (t < limit) & (x * x + y * y <= 1.0) {
-        t
-    } else {
-        limit
-    }
+    let p = ray.origin + ray.direction * t - ray.origin.broadcast(q.anchor);
+    let x = dot(p.broadcast(q.x), p);
+    let y = dot(p.broadcast(q.y), p);
+    let inside = (x * x + y * y).le(t.splat(1.0));
+    select(limit, t, t.gt(t.splat(0.0)) & t.lt(limit) & inside)
 }
 
-pub fn disk_occludes(o: Vec3, d: Vec3, t_max: f32) -> bool {
+#[inline(always)]
+pub fn disk_occludes<V: Vector3>(o: V, d: V, t_max: V::Real) -> <V::Real as Real>::Mask {
     let p = scaled_crossing(o, d);
-    crosses_plane(o, d, t_max) & (p.x * p.x + p.y * p.y <= d.z * d.z)
+    crosses_plane(o, d, t_max) & (p.x() * p.x() + p.y() * p.y()).le(d.z() * d.z())
 }
 
 #[cfg(test)]
 mod tests {
-    use glam::{DMat3, DVec3};
+    use glam::{DMat3, DVec3, Vec3};
 
     use super::*;
     use crate::pack::primitive;

@@ -4,23 +4,23 @@ use std::f32::consts::FRAC_1_PI;
 
 use glam::Vec3;
 
+use super::lanes::{Real, Vector3, constant, select};
 use super::math::{atan2, cross, dot, max, min};
 use super::ray::{Ray, vector_to_local};
 use crate::records::Primitive;
 
-pub fn ellipsoid_level(q: &Primitive, from_anchor: Vec3) -> f32 {
-    dot(from_anchor, from_anchor - q.middle * 2.0) + q.level
+#[inline(always)]
+pub fn ellipsoid_level<V: Vector3>(q: &Primitive, from_anchor: V) -> V::Real {
+    dot(from_anchor, from_anchor - from_anchor.broadcast(q.middle * 2.0)) + q.level
 }
 
-pub fn ellipsoid_discriminant(o: Vec3, d: Vec3, start_level: f32) -> f32 {
+#[inline(always)]
+pub fn ellipsoid_discriminant<V: Vector3>(o: V, d: V, start_level: V::Real) -> V::Real {
     let a = dot(d, d);
     let b = dot(o, d);
     let moment = cross(o, d);
-    if start_level < 1.0 {
-        b * b - a * start_level
-    } else {
-        a - dot(moment, moment)
-    }
+    let is_near = start_level.lt(start_level.splat(1.0));
+    select(a - dot(moment, moment), b * b - a * start_level, is_near)
 }
 
 pub fn longitude(local: Vec3) -> f32 {
@@ -28,37 +28,38 @@ pub fn longitude(local: Vec3) -> f32 {
     if turn < 0.0 { turn + 1.0 } else { turn }
 }
 
-pub fn intersect_ellipsoid(q: &Primitive, from_inside: bool, ray: Ray, limit: f32) -> f32 {
-    let from_anchor = vector_to_local(q, ray.origin - q.anchor);
-    let o = from_anchor - q.middle;
+#[inline(always)]
+pub fn intersect_ellipsoid<V: Vector3>(
+    q: &Primitive,
+    from_inside: <V::Real as Real>::Mask,
+    ray: Ray<V>,
+    limit: V::Real,
+) -> V::Real {
+    let from_anchor = vector_to_local(q, ray.origin - ray.origin.broadcast(q.anchor));
+    let o = from_anchor - from_anchor.broadcast(q.middle);
     let d = vector_to_local(q, ray.direction);
     let a = dot(d, d);
     let b = dot(o, d);
-    let start_level = if from_inside {
-        0.0
-    } else {
-        ellipsoid_level(q, from_anchor)
-    };
+    let zero = b.splat(0.0);
+    let start_level = select(ellipsoid_level(q, from_anchor), zero, from_inside);
     let discriminant = ellipsoid_discriminant(o, d, start_level);
-    let root = max(discriminant, 0.0).sqrt();
-    let sum = if b < 0.0 { root - b } else { -b - root };
+    let root = max(discriminant, zero).sqrt();
+    let sum = select(-b - root, root - b, b.lt(zero));
     let t0 = start_level / sum;
     let t1 = sum / a;
     let near = min(t0, t1);
-    let t = if near > 0.0 { near } else { max(t0, t1) };
-    if (discriminant >= 0.0) & (t > 0.0) & (t < limit) {
-        t
-    } else {
-        limit
-    }
+    let t = select(max(t0, t1), near, near.gt(zero));
+    select(limit, t, discriminant.ge(zero) & t.gt(zero) & t.lt(limit))
 }
 
-pub fn ellipsoid_occludes(o: Vec3, d: Vec3, start_level: f32, t_max: f32) -> bool {
+#[inline(always)]
+pub fn ellipsoid_occludes<V: Vector3>(o: V, d: V, start_level: V::Real, t_max: V::Real) -> <V::Real as Real>::Mask {
     let a = dot(d, d);
     let b = dot(o, d);
-    let end_level = start_level + t_max * (2.0 * b + t_max * a);
-    let crosses_twice = (b < 0.0) & (-b < t_max * a) & (ellipsoid_discriminant(o, d, start_level) >= 0.0);
-    ((start_level < 0.0) != (end_level < 0.0)) | ((start_level > 0.0) & crosses_twice)
+    let zero = b.splat(0.0);
+    let end_level = start_level + t_max * (constant(2.0) * b + t_max * a);
+    let crosses_twice = b.lt(zero) & (-b).lt(t_max * a) & ellipsoid_discriminant(o, d, start_level).ge(zero);
+    (start_level.lt(zero) ^ end_level.lt(zero)) | (start_level.gt(zero) & crosses_twice)
 }
 
 #[cfg(test)]

@@ -6,12 +6,14 @@ use glam::{Vec2, Vec3};
 
 use super::cylinder::cylinder_levels;
 use super::ellipsoid::{ellipsoid_discriminant, ellipsoid_level};
+use super::lanes::{Real, Vector3, constant, select};
 use super::math::{atan2, dot, max, min, normalize, sine};
 use super::ray::{vector_to_local, vector_to_world};
 use super::warp::{cap_sample, disk_sample, vector_around};
 use crate::records::Primitive;
 
-pub fn solid_angle_pdf(density: f32, to_light: Vec3, normal: Vec3) -> f32 {
+#[inline(always)]
+pub fn solid_angle_pdf<V: Vector3>(density: V::Real, to_light: V, normal: V) -> V::Real {
     let d2 = dot(to_light, to_light);
     density * d2 * d2.sqrt() / dot(normal, to_light).abs()
 }
@@ -127,9 +129,11 @@ pub fn cylinder_share(q: &Primitive, p: Vec3) -> f32 {
     (4.0 * cylinder_height_ratio(q) + 2.0) / (part.side + part.end + part.start)
 }
 
-pub fn power_heuristic(pdf: f32, other_pdf: f32) -> f32 {
+#[inline(always)]
+pub fn power_heuristic<F: Real>(pdf: F, other_pdf: F) -> F {
     let ratio = other_pdf / pdf;
-    if pdf > 0.0 { 1.0 / (1.0 + ratio * ratio) } else { 0.0 }
+    let weight = constant(1.0) / (constant(1.0) + ratio * ratio);
+    select(pdf.splat(0.0), weight, pdf.gt(pdf.splat(0.0)))
 }
 
 pub fn uniform_below(bits: u32, count: u32) -> u32 {

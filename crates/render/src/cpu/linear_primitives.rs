@@ -14,25 +14,11 @@ use crate::records::{Light, Packed, Primitive, with_primitive_kind};
 pub fn closest_primitive(scene: &Packed, ray: Ray, origin_prim: u32, inside_prim: u32) -> Hit {
     let mut hit = no_hit();
     for (kind, range) in scene.kinds() {
-        hit = closest_of_kind(scene, kind, range, hit, ray, origin_prim, inside_prim);
+        with_primitive_kind!(kind, |kind| for i in range {
+            let t = intersect(kind, &scene.primitives[i], i as u32 == inside_prim, ray, hit.t);
+            hit = closer(hit, t, i as u32, origin_prim);
+        });
     }
-    hit
-}
-
-pub fn closest_of_kind(
-    scene: &Packed,
-    kind: u32,
-    range: Range<usize>,
-    before: Hit,
-    ray: Ray,
-    origin_prim: u32,
-    inside_prim: u32,
-) -> Hit {
-    let mut hit = before;
-    with_primitive_kind!(kind, |kind| for i in range {
-        let t = intersect(kind, &scene.primitives[i], i as u32 == inside_prim, ray, hit.t);
-        hit = closer(hit, t, i as u32, origin_prim);
-    });
     hit
 }
 
@@ -54,32 +40,14 @@ pub fn is_occluded_by_primitives(
     t_max: f32,
     target_prim: u32,
 ) -> bool {
-    let mut casters = scene.shadow_casters();
-    casters.any(|(kind, range)| is_occluded_by_kind(scene, kind, range, surface, to_light, t_max, target_prim))
-}
-
-pub fn is_occluded_by_kind(
-    scene: &Packed,
-    kind: u32,
-    range: Range<usize>,
-    surface: &Surface,
-    to_light: Vec3,
-    t_max: f32,
-    target_prim: u32,
-) -> bool {
-    with_primitive_kind!(kind, |kind| for i in range {
-        if is_occluded_by_primitive(
-            kind,
-            &scene.primitives[i],
-            i as u32,
-            surface,
-            to_light,
-            t_max,
-            target_prim,
-        ) {
-            return true;
-        }
-    });
+    for (kind, range) in scene.shadow_casters() {
+        with_primitive_kind!(kind, |kind| for i in range {
+            let q = &scene.primitives[i];
+            if is_occluded_by_primitive(kind, q, i as u32, surface, to_light, t_max, target_prim) {
+                return true;
+            }
+        });
+    }
     false
 }
 

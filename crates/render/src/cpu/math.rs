@@ -2,22 +2,32 @@
 
 use std::f32::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 
-use glam::{Vec3, Vec4};
+use glam::Vec4;
 
-pub fn dot(a: Vec3, b: Vec3) -> f32 {
-    a.x * b.x + a.y * b.y + a.z * b.z
+use super::lanes::{Real, Vector3, constant, select};
+
+#[inline(always)]
+pub fn dot<V: Vector3>(a: V, b: V) -> V::Real {
+    a.x() * b.x() + a.y() * b.y() + a.z() * b.z()
 }
 
-pub fn cross(a: Vec3, b: Vec3) -> Vec3 {
-    Vec3::new(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x)
+#[inline(always)]
+pub fn cross<V: Vector3>(a: V, b: V) -> V {
+    V::new(
+        a.y() * b.z() - a.z() * b.y(),
+        a.z() * b.x() - a.x() * b.z(),
+        a.x() * b.y() - a.y() * b.x(),
+    )
 }
 
-pub fn normalize(v: Vec3) -> Vec3 {
-    v * (1.0 / dot(v, v).sqrt())
+#[inline(always)]
+pub fn normalize<V: Vector3>(v: V) -> V {
+    v * (constant(1.0) / dot(v, v).sqrt())
 }
 
-pub fn max(a: f32, b: f32) -> f32 {
-    if a > b { a } else { b }
+#[inline(always)]
+pub fn max<F: Real>(a: F, b: F) -> F {
+    select(b, a, a.gt(b))
 }
 
 #[inline(always)]
@@ -25,8 +35,9 @@ pub fn max4(a: Vec4, b: Vec4) -> Vec4 {
     Vec4::select(a.cmpgt(b), a, b)
 }
 
-pub fn min(a: f32, b: f32) -> f32 {
-    if a < b { a } else { b }
+#[inline(always)]
+pub fn min<F: Real>(a: F, b: F) -> F {
+    select(b, a, a.lt(b))
 }
 
 pub fn positive_zero(x: f32) -> f32 {

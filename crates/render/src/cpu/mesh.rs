@@ -4,6 +4,7 @@ use glam::{UVec2, Vec2, Vec3, Vec4};
 
 use super::differential::{Differential, HitDifferential, transferred};
 use super::footprint::Footprint;
+use super::lanes::{Real, Vector3, select};
 use super::math::{cross, dot, max, max4, min, normalize, positive_zero};
 use super::primitive::Tangents;
 use super::ray::{Hit, Ray, point_to_local, vector_to_local};
@@ -223,8 +224,10 @@ pub fn face_normal(face: &HitPrimitive, b: Vec2) -> Vec3 {
     }
 }
 
-pub fn flipped_to(v: Vec3, side: Vec3) -> Vec3 {
-    v * if dot(v, side) < 0.0 { -1.0 } else { 1.0 }
+#[inline(always)]
+pub fn flipped_to<V: Vector3>(v: V, side: V) -> V {
+    let cosine = dot(v, side);
+    v * select(cosine.splat(1.0), cosine.splat(-1.0), cosine.lt(cosine.splat(0.0)))
 }
 
 pub fn face_terminator_offset(face: &HitPrimitive, b: Vec2, side: f32) -> Vec3 {
@@ -236,12 +239,11 @@ pub fn face_terminator_offset(face: &HitPrimitive, b: Vec2, side: f32) -> Vec3 {
     lift_0 * (1.0 - b.x - b.y) + lift_1 * b.x + lift_2 * b.y
 }
 
-pub fn lift(n: Vec3, from_vertex: Vec3, up: Vec3) -> Vec3 {
-    n * if dot(n, up) > 0.8 {
-        max(-dot(n, from_vertex), 0.0)
-    } else {
-        0.0
-    }
+#[inline(always)]
+pub fn lift<V: Vector3>(n: V, from_vertex: V, up: V) -> V {
+    let cosine = dot(n, up);
+    let zero = cosine.splat(0.0);
+    n * select(zero, max(-dot(n, from_vertex), zero), cosine.gt(cosine.splat(0.8)))
 }
 
 pub fn face_direction_allowed(face: &HitPrimitive, surface: &Surface, direction: Vec3) -> bool {

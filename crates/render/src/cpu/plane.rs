@@ -1,22 +1,23 @@
 //! Twin of `shaders/plane.wgsl`.
 
-use glam::Vec3;
-
+use super::lanes::{Real, Vector3, select};
 use super::ray::{Ray, crosses_plane, plane_distance};
 use crate::records::Primitive;
 
-pub fn intersect_plane(q: &Primitive, ray: Ray, limit: f32) -> f32 {
+#[inline(always)]
+pub fn intersect_plane<V: Vector3>(q: &Primitive, ray: Ray<V>, limit: V::Real) -> V::Real {
     let t = plane_distance(q, ray);
-    if (t > 0.0) & (t < limit) { t } else { limit }
+    select(limit, t, t.gt(t.splat(0.0)) & t.lt(limit))
 }
 
-pub fn plane_occludes(o: Vec3, d: Vec3, t_max: f32) -> bool {
+#[inline(always)]
+pub fn plane_occludes<V: Vector3>(o: V, d: V, t_max: V::Real) -> <V::Real as Real>::Mask {
     crosses_plane(o, d, t_max)
 }
 
 #[cfg(test)]
 mod tests {
-    use glam::{DMat3, DVec3};
+    use glam::{DMat3, DVec3, Vec3};
 
     use super::*;
     use crate::pack::primitive;

@@ -10,6 +10,7 @@ use super::cylinder::{
 };
 use super::disk::{disk_occludes, intersect_disk};
 use super::ellipsoid::{ellipsoid_level, ellipsoid_occludes, intersect_ellipsoid, longitude};
+use super::lanes::{Real, Vector2, Vector3, select};
 use super::math::{atan2, max, normalize};
 use super::plane::{intersect_plane, plane_occludes};
 use super::ray::Ray;
@@ -19,7 +20,13 @@ use super::triangle::{intersect_triangle, triangle_occludes};
 use crate::records::{CYLINDER, DISK, ELLIPSOID, Primitive, RECTANGLE, SOLID_KINDS, TRIANGLE};
 
 #[inline(always)] // compiled for each kind
-pub fn intersect(kind: u32, q: &Primitive, from_inside: bool, ray: Ray, limit: f32) -> f32 {
+pub fn intersect<V: Vector3>(
+    kind: u32,
+    q: &Primitive,
+    from_inside: <V::Real as Real>::Mask,
+    ray: Ray<V>,
+    limit: V::Real,
+) -> V::Real {
     if kind == RECTANGLE {
         return intersect_rectangle(q, ray, limit);
     }
@@ -39,7 +46,13 @@ pub fn intersect(kind: u32, q: &Primitive, from_inside: bool, ray: Ray, limit: f
 }
 
 #[inline(always)] // compiled for each kind
-pub fn occludes(kind: u32, o: Vec3, d: Vec3, levels: Vec2, t_max: f32) -> bool {
+pub fn occludes<V: Vector3>(
+    kind: u32,
+    o: V,
+    d: V,
+    levels: <V::Real as Real>::Vec2,
+    t_max: V::Real,
+) -> <V::Real as Real>::Mask {
     if kind == RECTANGLE {
         return rectangle_occludes(o, d, t_max);
     }
@@ -47,7 +60,7 @@ pub fn occludes(kind: u32, o: Vec3, d: Vec3, levels: Vec2, t_max: f32) -> bool {
         return triangle_occludes(o, d, t_max);
     }
     if kind == ELLIPSOID {
-        return ellipsoid_occludes(o, d, levels.x, t_max);
+        return ellipsoid_occludes(o, d, levels.x(), t_max);
     }
     if kind == DISK {
         return disk_occludes(o, d, t_max);
@@ -67,23 +80,19 @@ pub fn is_centered(kind: u32) -> bool {
 }
 
 #[inline(always)] // compiled for each kind
-pub fn solid_levels(kind: u32, q: &Primitive, from_anchor: Vec3, from_inside: bool) -> Vec2 {
+pub fn solid_levels<V: Vector3>(
+    kind: u32,
+    q: &Primitive,
+    from_anchor: V,
+    from_inside: <V::Real as Real>::Mask,
+) -> <V::Real as Real>::Vec2 {
+    let inner_level = from_anchor.x().splat(-1e-30);
     if kind == CYLINDER {
         let levels = cylinder_levels(q, from_anchor);
-        return if from_inside {
-            levels_on_surface(levels, -1e-30)
-        } else {
-            levels
-        };
+        return Vector2::select(levels, levels_on_surface(levels, inner_level), from_inside);
     }
-    Vec2::new(
-        if from_inside {
-            -1e-30
-        } else {
-            ellipsoid_level(q, from_anchor)
-        },
-        0.0,
-    )
+    let level = select(ellipsoid_level(q, from_anchor), inner_level, from_inside);
+    Vector2::new(level, level.splat(0.0))
 }
 
 pub fn primitive_gradient(q: &Primitive, local: Vec3) -> Vec3 {
@@ -157,9 +166,9 @@ pub fn uv_derivative(q: &Primitive, local: Vec3, d: Vec3) -> Vec2 {
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Tangents {
-    pub u: Vec3,
-    pub v: Vec3,
+pub struct Tangents<V = Vec3> {
+    pub u: V,
+    pub v: V,
 }
 
 pub fn local_tangents(q: &Primitive, local: Vec3) -> Tangents {

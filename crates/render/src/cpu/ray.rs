@@ -2,13 +2,14 @@
 
 use glam::{UVec2, Vec2, Vec3};
 
+use super::lanes::{Real, Vector2, Vector3};
 use super::math::{cross, dot};
 use crate::records::{INFINITE_T, NO_INDEX, Primitive};
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Ray {
-    pub origin: Vec3,
-    pub direction: Vec3,
+pub struct Ray<V = Vec3> {
+    pub origin: V,
+    pub direction: V,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -34,12 +35,18 @@ pub fn standalone_prim(prim_id: UVec2) -> u32 {
     if prim_id.x == 0 { prim_id.y } else { NO_INDEX }
 }
 
-pub fn point_to_local(q: &Primitive, p: Vec3) -> Vec3 {
-    vector_to_local(q, p - q.anchor) - q.middle
+#[inline(always)]
+pub fn point_to_local<V: Vector3>(q: &Primitive, p: V) -> V {
+    vector_to_local(q, p - p.broadcast(q.anchor)) - p.broadcast(q.middle)
 }
 
-pub fn vector_to_local(q: &Primitive, v: Vec3) -> Vec3 {
-    Vec3::new(dot(q.x, v), dot(q.y, v), dot(q.z, v))
+#[inline(always)]
+pub fn vector_to_local<V: Vector3>(q: &Primitive, v: V) -> V {
+    V::new(
+        dot(v.broadcast(q.x), v),
+        dot(v.broadcast(q.y), v),
+        dot(v.broadcast(q.z), v),
+    )
 }
 
 pub fn vector_to_world(q: &Primitive, v: Vec3) -> Vec3 {
@@ -47,18 +54,22 @@ pub fn vector_to_world(q: &Primitive, v: Vec3) -> Vec3 {
     sum / q.determinant
 }
 
-pub fn plane_distance(q: &Primitive, ray: Ray) -> f32 {
-    dot(q.z, q.anchor - ray.origin) / dot(q.z, ray.direction)
+#[inline(always)]
+pub fn plane_distance<V: Vector3>(q: &Primitive, ray: Ray<V>) -> V::Real {
+    let z = ray.origin.broadcast(q.z);
+    dot(z, ray.origin.broadcast(q.anchor) - ray.origin) / dot(z, ray.direction)
 }
 
-pub fn crosses_plane(o: Vec3, d: Vec3, t_max: f32) -> bool {
-    (o.z * d.z < 0.0) & (o.z.abs() < t_max * d.z.abs())
+#[inline(always)]
+pub fn crosses_plane<V: Vector3>(o: V, d: V, t_max: V::Real) -> <V::Real as Real>::Mask {
+    (o.z() * d.z()).lt(t_max.splat(0.0)) & o.z().abs().lt(t_max * d.z().abs())
 }
 
-pub fn scaled_crossing(o: Vec3, d: Vec3) -> Vec2 {
-    let a = d.z.abs();
-    let s = o.z.abs();
-    Vec2::new(o.x * a + s * d.x, o.y * a + s * d.y)
+#[inline(always)]
+pub fn scaled_crossing<V: Vector3>(o: V, d: V) -> <V::Real as Real>::Vec2 {
+    let a = d.z().abs();
+    let s = o.z().abs();
+    Vector2::new(o.x() * a + s * d.x(), o.y() * a + s * d.y())
 }
 
 pub fn closer(hit: Hit, t: f32, i: u32, origin_prim: u32) -> Hit {

@@ -1,26 +1,31 @@
 //! Twin of `shaders/rectangle.wgsl`.
 
-use glam::Vec3;
-
+use super::lanes::{Real, Vector2, Vector3, select};
 use super::math::dot;
 use super::ray::{Ray, crosses_plane, plane_distance, scaled_crossing};
 use crate::records::Primitive;
 
-pub fn intersect_rectangle(q: &Primitive, ray: Ray, limit: f32) -> f32 {
+#[inline(always)]
+pub fn intersect_rectangle<V: Vector3>(q: &Primitive, ray: Ray<V>, limit: V::Real) -> V::Real {
     let t = plane_distance(q, ray);
-    let p = ray.origin + ray.direction * t - q.anchor;
-    let inside = (dot(q.x, p).abs() <= 1.0) & (dot(q.y, p).abs() <= 1.0);
-    if (t > 0.0) & (t < limit) & inside { t } else { limit }
+    let p = ray.origin + ray.direction * t - ray.origin.broadcast(q.anchor);
+    let x = dot(p.broadcast(q.x), p);
+    let y = dot(p.broadcast(q.y), p);
+    let one = t.splat(1.0);
+    let inside = x.abs().le(one) & y.abs().le(one);
+    select(limit, t, t.gt(t.splat(0.0)) & t.lt(limit) & inside)
 }
 
-pub fn rectangle_occludes(o: Vec3, d: Vec3, t_max: f32) -> bool {
+#[inline(always)]
+pub fn rectangle_occludes<V: Vector3>(o: V, d: V, t_max: V::Real) -> <V::Real as Real>::Mask {
     let p = scaled_crossing(o, d);
-    crosses_plane(o, d, t_max) & (p.x.abs() <= d.z.abs()) & (p.y.abs() <= d.z.abs())
+    let depth = d.z().abs();
+    crosses_plane(o, d, t_max) & p.x().abs().le(depth) & p.y().abs().le(depth)
 }
 
 #[cfg(test)]
 mod tests {
-    use glam::{DMat3, DVec3};
+    use glam::{DMat3, DVec3, Vec3};
 
     use super::*;
     use crate::pack::primitive;
@@ -73,13 +78,13 @@ mod tests {
         assert_eq!(
             hit([-1000.0, 0.0, 0.0], [1000.0, 0.99, 0.0]),
             INFINITE_T,
-            "10 units behind the far edge"
+            "8 units beyond the far edge"
         );
     }
 
     #[test]
     fn segments_that_cross_the_rectangle_are_occluded() {
-        let occludes = |o: [f32; 3], d: [f32; 3], t_max| rectangle_occludes(o.into(), d.into(), t_max);
+        let occludes = |o: [f32; 3], d: [f32; 3], t_max| rectangle_occludes(Vec3::from(o), Vec3::from(d), t_max);
         assert!(occludes([0.9, 0.9, 1.0], [0.0, 0.0, -2.0], 1.0));
         assert!(occludes([-0.9, -0.9, -1.0], [0.0, 0.0, 2.0], 1.0), "from below");
         assert!(!occludes([1.1, 0.9, 1.0], [0.0, 0.0, -2.0], 1.0), "beside");

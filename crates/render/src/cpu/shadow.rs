@@ -2,6 +2,7 @@
 
 use glam::{UVec2, Vec2, Vec3};
 
+use super::lanes::{Real, Vector3};
 use super::light::{LightSegments, segments_to_light, segments_to_local};
 use super::math::dot;
 use super::primitive::{occludes, solid_levels};
@@ -38,12 +39,19 @@ pub fn occlusion_mask(kind: u32, q: &Primitive, p: Vec3, from_inside: bool, ligh
 }
 
 #[inline(always)] // compiled for each kind
-pub fn occludes_segment(kind: u32, q: &Primitive, p: Vec3, from_inside: bool, to_light: Vec3, t_max: f32) -> bool {
-    let from_anchor = vector_to_local(q, p - q.anchor);
+pub fn occludes_segment<V: Vector3>(
+    kind: u32,
+    q: &Primitive,
+    p: V,
+    from_inside: <V::Real as Real>::Mask,
+    to_light: V,
+    t_max: V::Real,
+) -> <V::Real as Real>::Mask {
+    let from_anchor = vector_to_local(q, p - p.broadcast(q.anchor));
     let levels = solid_levels(kind, q, from_anchor, from_inside);
     occludes(
         kind,
-        from_anchor - q.middle,
+        from_anchor - from_anchor.broadcast(q.middle),
         vector_to_local(q, to_light),
         levels,
         t_max,

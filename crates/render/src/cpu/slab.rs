@@ -2,21 +2,23 @@
 
 use glam::{Vec2, Vec3};
 
+use super::lanes::{Real, Vector2, Vector3, constant, select};
 use super::math::{max, min};
 use crate::records::INFINITE_T;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Slabs {
-    pub low_origin: Vec3,
-    pub high_origin: Vec3,
-    pub inverse: Vec3,
+pub struct Slabs<V = Vec3> {
+    pub low_origin: V,
+    pub high_origin: V,
+    pub inverse: V,
 }
 
-pub fn slabs(origin: Vec3, direction: Vec3, pad: f32) -> Slabs {
-    let inverse = Vec3::new(
-        inverse_of(direction.x),
-        inverse_of(direction.y),
-        inverse_of(direction.z),
+#[inline(always)]
+pub fn slabs<V: Vector3>(origin: V, direction: V, pad: V::Real) -> Slabs<V> {
+    let inverse = V::new(
+        inverse_of(direction.x()),
+        inverse_of(direction.y()),
+        inverse_of(direction.z()),
     );
     Slabs {
         low_origin: origin + pad,
@@ -25,21 +27,25 @@ pub fn slabs(origin: Vec3, direction: Vec3, pad: f32) -> Slabs {
     }
 }
 
-pub fn inverse_of(x: f32) -> f32 {
-    let smallest = if x < 0.0 { -7.888609e-31 } else { 7.888609e-31 };
-    1.0 / if x.abs() >= 7.888609e-31 { x } else { smallest }
+#[inline(always)]
+pub fn inverse_of<F: Real>(x: F) -> F {
+    let smallest = select(x.splat(7.888609e-31), x.splat(-7.888609e-31), x.lt(x.splat(0.0)));
+    constant(1.0) / select(smallest, x, x.abs().ge(x.splat(7.888609e-31)))
 }
 
-pub fn box_interval(low: Vec3, high: Vec3, s: Slabs) -> Vec2 {
+#[inline(always)]
+pub fn box_interval<V: Vector3>(low: V, high: V, s: Slabs<V>) -> <V::Real as Real>::Vec2 {
     let a = (low - s.low_origin) * s.inverse;
     let b = (high - s.high_origin) * s.inverse;
-    let near = max(max(min(a.x, b.x), min(a.y, b.y)), min(a.z, b.z));
-    let far = min(min(max(a.x, b.x), max(a.y, b.y)), max(a.z, b.z));
-    Vec2::new(near, far)
+    let near = max(max(min(a.x(), b.x()), min(a.y(), b.y())), min(a.z(), b.z()));
+    let far = min(min(max(a.x(), b.x()), max(a.y(), b.y())), max(a.z(), b.z()));
+    Vector2::new(near, far)
 }
 
-pub fn interval_hits(interval: Vec2, limit: f32) -> bool {
-    (interval.x <= interval.y) & (interval.y >= 0.0) & (interval.x <= limit)
+#[inline(always)]
+pub fn interval_hits<V: Vector2>(interval: V, limit: V::Real) -> <V::Real as Real>::Mask {
+    let (near, far) = (interval.x(), interval.y());
+    near.le(far) & far.ge(far.splat(0.0)) & near.le(limit)
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,28 +1,26 @@
 //! Twin of `shaders/solid.wgsl`.
 
-use glam::Vec2;
-
+use super::lanes::{Real, Vector2, select};
 use super::math::min;
 
-pub fn levels_on_surface(levels: Vec2, surface_level: f32) -> Vec2 {
-    if levels.x >= levels.y {
-        Vec2::new(surface_level, min(levels.y, surface_level))
-    } else {
-        Vec2::new(min(levels.x, surface_level), surface_level)
-    }
+#[inline(always)]
+pub fn levels_on_surface<V: Vector2>(levels: V, surface_level: V::Real) -> V {
+    let on_side = V::new(surface_level, min(levels.y(), surface_level));
+    let on_cap = V::new(min(levels.x(), surface_level), surface_level);
+    V::select(on_cap, on_side, levels.x().ge(levels.y()))
 }
 
-pub fn nearest_end(interval: Vec2, limit: f32) -> f32 {
-    let t = if interval.x > 0.0 { interval.x } else { interval.y };
-    if (interval.x < interval.y) & (t > 0.0) & (t < limit) {
-        t
-    } else {
-        limit
-    }
+#[inline(always)]
+pub fn nearest_end<V: Vector2>(interval: V, limit: V::Real) -> V::Real {
+    let (near, far, zero) = (interval.x(), interval.y(), limit.splat(0.0));
+    let t = select(far, near, near.gt(zero));
+    select(limit, t, near.lt(far) & t.gt(zero) & t.lt(limit))
 }
 
-pub fn interval_occludes(interval: Vec2, t_max: f32) -> bool {
-    let enters = (interval.x > 0.0) & (interval.x < t_max);
-    let leaves = (interval.y > 0.0) & (interval.y < t_max);
-    (interval.x < interval.y) & (enters | leaves)
+#[inline(always)]
+pub fn interval_occludes<V: Vector2>(interval: V, t_max: V::Real) -> <V::Real as Real>::Mask {
+    let (near, far, zero) = (interval.x(), interval.y(), t_max.splat(0.0));
+    let enters = near.gt(zero) & near.lt(t_max);
+    let leaves = far.gt(zero) & far.lt(t_max);
+    near.lt(far) & (enters | leaves)
 }

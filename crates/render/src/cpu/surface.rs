@@ -2,6 +2,7 @@
 
 use glam::{UVec2, Vec2, Vec3};
 
+use super::lanes::{Real, Vector3};
 use super::math::{dot, max, positive_zero};
 use super::primitive::{
     is_solid, local_tangents, primitive_gradient, primitive_height, primitive_normal, primitive_uv,
@@ -26,8 +27,9 @@ pub struct Surface {
     pub dv: Vec3,
 }
 
-pub fn largest(v: Vec3) -> f32 {
-    max(max(v.x.abs(), v.y.abs()), v.z.abs())
+#[inline(always)]
+pub fn largest<V: Vector3>(v: V) -> V::Real {
+    max(max(v.x().abs(), v.y().abs()), v.z().abs())
 }
 
 pub fn surface_at(q: &Primitive, i: u32, ray: Ray, t: f32, epsilon: f32) -> Surface {

@@ -1,28 +1,31 @@
 //! Twin of `shaders/triangle.wgsl`.
 
-use glam::Vec3;
-
+use super::lanes::{Real, Vector2, Vector3, select};
 use super::math::dot;
 use super::ray::{Ray, crosses_plane, plane_distance, scaled_crossing};
 use crate::records::Primitive;
 
-pub fn intersect_triangle(q: &Primitive, ray: Ray, limit: f32) -> f32 {
+#[inline(always)]
+pub fn intersect_triangle<V: Vector3>(q: &Primitive, ray: Ray<V>, limit: V::Real) -> V::Real {
     let t = plane_distance(q, ray);
-    let p = ray.origin + ray.direction * t - q.anchor;
-    let x = dot(q.x, p);
-    let y = dot(q.y, p);
-    let inside = (x >= 0.0) & (y >= 0.0) & (x + y <= 1.0);
-    if (t > 0.0) & (t < limit) & inside { t } else { limit }
+    let p = ray.origin + ray.direction * t - ray.origin.broadcast(q.anchor);
+    let x = dot(p.broadcast(q.x), p);
+    let y = dot(p.broadcast(q.y), p);
+    let zero = t.splat(0.0);
+    let inside = x.ge(zero) & y.ge(zero) & (x + y).le(t.splat(1.0));
+    select(limit, t, t.gt(zero) & t.lt(limit) & inside)
 }
 
-pub fn triangle_occludes(o: Vec3, d: Vec3, t_max: f32) -> bool {
+#[inline(always)]
+pub fn triangle_occludes<V: Vector3>(o: V, d: V, t_max: V::Real) -> <V::Real as Real>::Mask {
     let p = scaled_crossing(o, d);
-    crosses_plane(o, d, t_max) & (p.x >= 0.0) & (p.y >= 0.0) & (p.x + p.y <= d.z.abs())
+    let (x, y, zero) = (p.x(), p.y(), t_max.splat(0.0));
+    crosses_plane(o, d, t_max) & x.ge(zero) & y.ge(zero) & (x + y).le(d.z().abs())
 }
 
 #[cfg(test)]
 mod tests {
-    use glam::{DMat3, DVec3};
+    use glam::{DMat3, DVec3, Vec3};
 
     use super::*;
     use crate::cpu::primitive::primitive_normal;

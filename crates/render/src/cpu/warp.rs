@@ -2,6 +2,7 @@
 
 use glam::{Vec2, Vec3};
 
+use super::lanes::{Real, Vector2, Vector3, constant, select};
 use super::math::max;
 use super::primitive::Tangents;
 
@@ -10,46 +11,53 @@ use super::primitive::Tangents;
     clippy::excessive_precision,
     reason = "coefficients as the WGSL has them"
 )]
-pub fn disk_sample(u: Vec2) -> Vec2 {
-    let a = 2.0 * u.x - 1.0;
-    let b = 2.0 * u.y - 1.0;
-    let wide = a.abs() > b.abs();
-    let r = if wide { a } else { b };
-    let part = if wide { b } else { a } / if r == 0.0 { 1.0 } else { r };
+#[inline(always)]
+pub fn disk_sample<V: Vector2>(u: V) -> V {
+    let a = constant(2.0) * u.x() - 1.0;
+    let b = constant(2.0) * u.y() - 1.0;
+    let wide = a.abs().gt(b.abs());
+    let r = select(b, a, wide);
+    let part = select(a, b, wide) / select(r, r.splat(1.0), r.eq(r.splat(0.0)));
     let p2 = part * part;
-    let y_tail = 0.0024903945 - p2 * (0.000036576205 - p2 * 3.1336164e-7);
-    let y = part * (0.785_398_2 - p2 * (0.080745511 - p2 * y_tail));
-    let x_tail = 0.00032599189 - p2 * 3.5908605e-6;
-    let x = 1.0 - p2 * (0.30842513 - p2 * (0.015854344 - p2 * x_tail));
-    let unit = if wide { Vec2::new(x, y) } else { Vec2::new(y, x) };
-    unit * r
+    let y_tail = constant(0.0024903945) - p2 * (constant(0.000036576205) - p2 * 3.1336164e-7);
+    let y = part * (constant(0.785_398_2) - p2 * (constant(0.080745511) - p2 * y_tail));
+    let x_tail = constant(0.00032599189) - p2 * 3.5908605e-6;
+    let x = constant(1.0) - p2 * (constant(0.30842513) - p2 * (constant(0.015854344) - p2 * x_tail));
+    V::new(select(y, x, wide), select(x, y, wide)) * r
 }
 
-pub fn triangle_sample(u: Vec2) -> Vec2 {
-    let upper = u.y > u.x;
-    let x = if upper { 0.5 * u.x } else { u.x - 0.5 * u.y };
-    let y = if upper { u.y - 0.5 * u.x } else { 0.5 * u.y };
-    Vec2::new(x, y)
+#[inline(always)]
+pub fn triangle_sample<V: Vector2>(u: V) -> V {
+    let upper = u.y().gt(u.x());
+    let x = select(u.x() - constant(0.5) * u.y(), constant(0.5) * u.x(), upper);
+    let y = select(constant(0.5) * u.y(), u.y() - constant(0.5) * u.x(), upper);
+    V::new(x, y)
 }
 
-pub fn frame_around(n: Vec3) -> Tangents {
-    let sign = if n.z >= 0.0 { 1.0 } else { -1.0 };
-    let a = -1.0 / (sign + n.z);
-    let b = n.x * n.y * a;
+#[inline(always)]
+pub fn frame_around<V: Vector3>(n: V) -> Tangents<V> {
+    let (x, y, z) = (n.x(), n.y(), n.z());
+    let sign = select(z.splat(-1.0), z.splat(1.0), z.ge(z.splat(0.0)));
+    let a = constant(-1.0) / (sign + z);
+    let b = x * y * a;
     Tangents {
-        u: Vec3::new(1.0 + sign * n.x * n.x * a, sign * b, -sign * n.x),
-        v: Vec3::new(b, sign + n.y * n.y * a, -n.y),
+        u: V::new(constant(1.0) + sign * x * x * a, sign * b, -sign * x),
+        v: V::new(b, sign + y * y * a, -y),
     }
 }
 
-pub fn vector_around(n: Vec3, v: Vec3) -> Vec3 {
+#[inline(always)]
+pub fn vector_around<V: Vector3>(n: V, v: V) -> V {
     let frame = frame_around(n);
-    frame.u * v.x + frame.v * v.y + n * v.z
+    frame.u * v.x() + frame.v * v.y() + n * v.z()
 }
 
-pub fn hemisphere_sample(n: Vec3, u: Vec2) -> Vec3 {
+#[inline(always)]
+pub fn hemisphere_sample<V: Vector3>(n: V, u: <V::Real as Real>::Vec2) -> V {
     let p = disk_sample(u);
-    vector_around(n, p.extend(max(1.0 - p.x * p.x - p.y * p.y, 0.0).sqrt()))
+    let (x, y) = (p.x(), p.y());
+    let height2 = constant(1.0) - x * x - y * y;
+    vector_around(n, V::new(x, y, max(height2, height2.splat(0.0)).sqrt()))
 }
 
 pub fn cap_sample(p: Vec2, cap_height: f32) -> Vec3 {

@@ -12,6 +12,7 @@ use crate::cpu::environment::environment_mis;
 use crate::cpu::geometry::{
     closest_hit, fetch_hit_primitive, hit_differential, is_occluded, material_of, skip_camera_invisible, surface_of,
 };
+use crate::cpu::lanes::{Real, Vector2, Word, WordVector2, WordVector4};
 use crate::cpu::light_choice::{EmitterSelection, light_tree_pdf, light_tree_select};
 use crate::cpu::light_sample::power_heuristic;
 use crate::cpu::lobe::{LobeSample, vector_from_lobe, vector_to_lobe};
@@ -295,18 +296,19 @@ pub fn path_layers(state: &PathState) -> Layers {
 }
 
 #[inline(always)]
-pub fn decision_set(scene: &Packed, key: UVec2, sample: u32) -> UVec2 {
+pub fn decision_set<W: Word>(scene: &Packed, key: W::UVec2, sample: W) -> W::UVec2 {
     if scene.specialization.pixel_pattern == RANDOM {
-        let bits = hash4(UVec4::new(key.x, key.y, sample, 0));
-        return UVec2::new(bits.x, bits.y);
+        let bits = hash4(W::UVec4::from_words([key.x(), key.y(), sample, sample.splat(0)]));
+        let [x, y, ..] = bits.words();
+        return W::UVec2::new(x, y);
     }
     sobol_bits(sample, key)
 }
 
 #[inline(always)]
-pub fn decision(scene: &Packed, key: UVec2, sample: u32) -> Vec2 {
+pub fn decision<W: Word>(scene: &Packed, key: W::UVec2, sample: W) -> <W::Real as Real>::Vec2 {
     let bits = decision_set(scene, key, sample);
-    Vec2::new(unit_float(bits.x), unit_float(bits.y))
+    Vector2::new(unit_float(bits.x()), unit_float(bits.y()))
 }
 
 #[inline(always)]

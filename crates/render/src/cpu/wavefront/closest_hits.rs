@@ -1,18 +1,20 @@
 //! The stage that finds the closest hits of a batch of paths.
 
-use fearless_simd::{Simd, dispatch};
+use fearless_simd::dispatch;
+use fearless_simd::prelude::*;
 
 use super::super::bvh::{FEW_ITEMS, closest_mesh_ray, closest_of_primitive, item_pad, mesh_hit};
 use super::super::geometry::closest_hit;
 use super::super::integrators::path::PathState;
 use super::super::math::max;
 use super::super::path::Path;
-use super::super::ray::{Hit, nearer_hit, standalone_prim};
+use super::super::ray::{Hit, nearer_hit};
 use super::super::samples::LEVEL;
 use super::super::slab::{box_interval, interval_hits, slabs};
 use super::super::traversal::{BatchMesh, Line, MeshRay, Nearest, RAYS, RaySource, trace};
-use super::linear::LinearPrimitives;
+use super::linear::RayRows;
 use super::meshes::BatchMeshes;
+use super::rows::{F, LANES, Row, lane_mask, splat3};
 use super::scratch::{QueuedRay, RayLane, Scratch};
 use crate::records::{INSTANCE, NO_INDEX, Packed};
 
@@ -49,47 +51,53 @@ fn find<S: Simd>(
     hits.clear();
     scratch.clear();
     let has_bvh = scene.specialization.tlas_kinds != 0;
-    let primitives = LinearPrimitives::new(simd, scene);
-    for &i in active {
-        let Path {
-            ray,
-            origin_prim,
-            inside_prim,
-            ..
-        } = &paths[i as usize].path;
-        if !has_bvh {
-            hits.push(primitives.closest(simd, *ray, origin_prim.y, inside_prim.y));
-            continue;
-        }
-        let (origin, inside) = (standalone_prim(*origin_prim), standalone_prim(*inside_prim));
-        let mut hit = primitives.closest(simd, *ray, origin, inside);
-        let position = hits.len() as u32;
-        if scene.bvh.items.len() > FEW_ITEMS {
-            scratch.queue.push(QueuedRay {
-                position,
-                instance: NO_INDEX,
-                near: 0.0,
-            });
-            hits.push(hit);
-            continue;
-        }
-        let slabs = slabs(ray.origin, ray.direction, item_pad(scene, ray.origin));
-        for item in &scene.bvh.items {
-            let interval = box_interval(item.low, item.high, slabs);
-            if !interval_hits(interval, hit.t) {
-                continue;
+    let has_few_items = scene.bvh.items.len() <= FEW_ITEMS;
+    let mut rays = RayRows::default();
+    for active in active.chunks(LANES) {
+        rays.set(active.iter().map(|i| &paths[*i as usize].path));
+        let mut found = rays.closest(simd, scene);
+        let first = hits.len();
+        if has_bvh && has_few_items {
+            let (origin, direction) = rays.load(simd);
+            let slabs = slabs(origin, direction, item_pad(scene, origin));
+            for item in &scene.bvh.items {
+                let interval = box_interval(splat3(simd, item.low), splat3(simd, item.high), slabs);
+                let is_hit = interval_hits(interval, F::simd_from(simd, found.t));
+                let mut lanes = is_hit.to_bitmask() & lane_mask(active.len());
+                let near: Row = interval.x.into();
+                while lanes != 0 {
+                    let lane = lanes.trailing_zeros() as usize;
+                    lanes &= lanes - 1;
+                    if item.kind & 0xff == INSTANCE {
+                        scratch.queue.push(QueuedRay {
+                            position: (first + lane) as u32,
+                            instance: item.index,
+                            near: near[lane],
+                        });
+                        continue;
+                    }
+                    let Path {
+                        ray,
+                        origin_prim,
+                        inside_prim,
+                        ..
+                    } = paths[active[lane] as usize].path;
+                    let before = found.get(lane);
+                    let hit = closest_of_primitive(scene, before, item, ray, near[lane], origin_prim, inside_prim);
+                    found.set(lane, hit);
+                }
             }
-            if item.kind & 0xff == INSTANCE {
+        }
+        for lane in 0..active.len() {
+            hits.push(found.get(lane));
+            if has_bvh && !has_few_items {
                 scratch.queue.push(QueuedRay {
-                    position,
-                    instance: item.index,
-                    near: interval.x,
+                    position: (first + lane) as u32,
+                    instance: NO_INDEX,
+                    near: 0.0,
                 });
-            } else {
-                hit = closest_of_primitive(scene, hit, item, *ray, interval.x, *origin_prim, *inside_prim);
             }
         }
-        hits.push(hit);
     }
     if !scratch.queue.is_empty() {
         let mut rays = Rays {

@@ -2,22 +2,29 @@
 //! occlusion and compaction bounce by bounce. Shading is that of [`advance`](super::integrators::path::advance), so each
 //! path has the bits of its scalar version. Tracing whole batches is faster.
 
+mod begin;
 mod closest_hits;
 mod items;
 mod linear;
 mod meshes;
 mod occlusion;
+mod rows;
 mod scratch;
+mod shade;
+mod surfaces;
 
 use std::sync::Arc;
 
 use glam::UVec2;
 
+use self::begin::begin_paths;
 use self::closest_hits::closest_hits;
 pub use self::meshes::BatchMeshes;
 use self::occlusion::occluded_rays;
 use self::scratch::Scratch;
-use super::integrators::path::{PathState, add_radiance, begin_path, shade};
+pub use self::shade::LaneHits;
+use self::shade::{ShadingQueues, shade_hits};
+use super::integrators::path::{PathState, add_radiance};
 use super::ray::Hit;
 use super::shadow_ray::ShadowRay;
 use crate::records::Packed;
@@ -37,6 +44,8 @@ pub struct Wavefront {
     shadow_rays: Vec<QueuedShadowRay>,
     occluded: Vec<bool>,
     scratch: Scratch,
+    shading: ShadingQueues,
+    lane_hits: LaneHits,
 }
 
 /// A shadow ray of a path.
@@ -57,6 +66,8 @@ impl Wavefront {
             shadow_rays: Vec::new(),
             occluded: Vec::new(),
             scratch: Scratch::default(),
+            shading: ShadingQueues::default(),
+            lane_hits: LaneHits::default(),
         }
     }
 
@@ -72,13 +83,13 @@ impl Wavefront {
         &self.paths
     }
 
+    /// Returns the numbers of hits of all batches that were shaded in lanes.
+    pub fn lane_hits(&self) -> LaneHits {
+        self.lane_hits
+    }
+
     fn begin(&mut self, scene: &Packed, samples: impl Iterator<Item = (UVec2, u32)>) {
-        self.paths.clear();
-        self.pixels.clear();
-        for (pixel, sample) in samples {
-            self.paths.push(begin_path(scene, pixel, sample));
-            self.pixels.push(pixel);
-        }
+        begin_paths(scene, samples, &mut self.paths, &mut self.pixels);
         self.active.clear();
         self.active.extend(0..self.paths.len() as u32);
     }
@@ -96,13 +107,15 @@ impl Wavefront {
 
     /// Ends each active path or samples its next ray, and queues its shadow ray.
     fn shade(&mut self, scene: &Packed) {
-        self.shadow_rays.clear();
-        for (&path, &hit) in self.active.iter().zip(&self.hits) {
-            let i = path as usize;
-            if let Some(ray) = shade(scene, &mut self.paths[i], hit, self.pixels[i]) {
-                self.shadow_rays.push(QueuedShadowRay { path, ray });
-            }
-        }
+        self.lane_hits += shade_hits(
+            scene,
+            &mut self.paths,
+            &self.pixels,
+            &self.active,
+            &self.hits,
+            &mut self.shadow_rays,
+            &mut self.shading,
+        );
     }
 
     /// Adds the contribution of each shadow ray that is not occluded, before the path's next hit is shaded.

@@ -1,17 +1,18 @@
 //! The stage that finds out which shadow rays of a batch are occluded.
 
-use fearless_simd::{Simd, dispatch};
+use fearless_simd::dispatch;
+use fearless_simd::prelude::*;
 use glam::UVec2;
 
 use super::super::bvh::{FEW_ITEMS, is_occluded_by_primitive_item, item_pad, shadow_mesh_ray};
 use super::super::integrators::path::{PathState, is_shadow_ray_occluded};
 use super::super::samples::LEVEL;
-use super::super::shadow_ray::ShadowRay;
 use super::super::slab::{box_interval, interval_hits, slabs};
 use super::super::traversal::{BatchMesh, Line, MeshRay, Nearest, RAYS, RaySource, trace};
 use super::QueuedShadowRay;
-use super::linear::LinearPrimitives;
+use super::linear::ShadowRayRows;
 use super::meshes::BatchMeshes;
+use super::rows::{LANES, Row, lane_mask, splat3};
 use super::scratch::{QueuedRay, RayLane, Scratch};
 use crate::records::{CASTS_SHADOW, INSTANCE, NO_INDEX, Packed};
 
@@ -48,13 +49,22 @@ fn find<S: Simd>(
 ) {
     scratch.clear();
     let has_bvh = scene.specialization.tlas_kinds != 0;
-    let primitives = LinearPrimitives::new(simd, scene);
-    for QueuedShadowRay { ray, .. } in rays {
-        let mut is_occluded = primitives.is_occluded(simd, ray);
-        if has_bvh && !is_occluded {
-            is_occluded = queue_ray(scene, ray, occluded.len() as u32, &mut scratch.queue);
+    let mut rows = ShadowRayRows::default();
+    for rays in rays.chunks(LANES) {
+        rows.set(rays);
+        let mut is_occluded = rows.occluded(simd, scene);
+        if has_bvh {
+            is_occluded |= queue_rays(
+                simd,
+                scene,
+                rays,
+                &rows,
+                is_occluded,
+                occluded.len(),
+                &mut scratch.queue,
+            );
         }
-        occluded.push(is_occluded);
+        occluded.extend((0..rays.len()).map(|lane| is_occluded >> lane & 1 == 1));
     }
     if !scratch.queue.is_empty() {
         let mut rays = Rays {
@@ -69,35 +79,64 @@ fn find<S: Simd>(
     }
 }
 
-/// Queues a ray for the instances whose boxes it hits, or for the BVH of the scene. Returns true if a primitive among
-/// few items occludes the ray.
+/// Queues the rays that are not occluded for the instances whose boxes they hit, or for the BVH of the scene. Returns the
+/// mask of the rays that a primitive among few items occludes. `first` is the position of the first ray.
 #[inline(always)]
-fn queue_ray(scene: &Packed, ray: &ShadowRay, position: u32, queue: &mut Vec<QueuedRay>) -> bool {
-    if scene.bvh.items.len() > FEW_ITEMS {
+fn queue_rays<S: Simd>(
+    simd: S,
+    scene: &Packed,
+    rays: &[QueuedShadowRay],
+    rows: &ShadowRayRows,
+    already_occluded: u64,
+    first: usize,
+    queue: &mut Vec<QueuedRay>,
+) -> u64 {
+    let mut unoccluded = !already_occluded & lane_mask(rays.len());
+    let mut push = |lane: usize, instance, near| {
         queue.push(QueuedRay {
-            position,
-            instance: NO_INDEX,
-            near: 0.0,
+            position: (first + lane) as u32,
+            instance,
+            near,
         });
-        return false;
+    };
+    if scene.bvh.items.len() > FEW_ITEMS {
+        for lane in 0..rays.len() {
+            if unoccluded >> lane & 1 == 1 {
+                push(lane, NO_INDEX, 0.0);
+            }
+        }
+        return 0;
     }
-    let slabs = slabs(ray.origin, ray.to_light, item_pad(scene, ray.origin));
+    let (origin, to_light, t_max) = rows.load(simd);
+    let slabs = slabs(origin, to_light, item_pad(scene, origin));
+    let mut occluded = 0;
     for item in &scene.bvh.items {
-        let interval = box_interval(item.low, item.high, slabs);
-        if item.kind & CASTS_SHADOW == 0 || !interval_hits(interval, ray.t_max) {
+        if item.kind & CASTS_SHADOW == 0 {
             continue;
         }
-        if item.kind & 0xff == INSTANCE {
-            queue.push(QueuedRay {
-                position,
-                instance: item.index,
-                near: interval.x,
-            });
-        } else if is_occluded_by_primitive_item(scene, item, &ray.surface(), ray.to_light, ray.t_max, ray.target_prim) {
-            return true;
+        let interval = box_interval(splat3(simd, item.low), splat3(simd, item.high), slabs);
+        let mut lanes = interval_hits(interval, t_max).to_bitmask() & unoccluded;
+        let near: Row = interval.x.into();
+        while lanes != 0 {
+            let lane = lanes.trailing_zeros() as usize;
+            lanes &= lanes - 1;
+            let ray = &rays[lane].ray;
+            if item.kind & 0xff == INSTANCE {
+                push(lane, item.index, near[lane]);
+            } else if is_occluded_by_primitive_item(
+                scene,
+                item,
+                &ray.surface(),
+                ray.to_light,
+                ray.t_max,
+                ray.target_prim,
+            ) {
+                occluded |= 1 << lane;
+                unoccluded &= !(1 << lane);
+            }
         }
     }
-    false
+    occluded
 }
 
 /// The shadow rays, which traverse the BVH of the scene item by item, up to any hit.

@@ -1,0 +1,570 @@
+//! Numbers and vectors of the shared functions that run for a single path and for several paths in SIMD lanes: a
+//! [`Real`] is an `f32` or has an `f32` in each lane. Functions on them select values instead of branching, like the
+//! WGSL functions. Each lane has the bits of the `f32` version.
+
+use std::ops::{Add, BitAnd, BitOr, BitXor, Div, Mul, Neg, Not, Shl, Shr, Sub};
+
+use fearless_simd::prelude::*;
+use fearless_simd::{f32x8, i32x8, mask32x8, u32x8};
+use glam::{UVec2, UVec4, Vec2, Vec3};
+
+/// A floating-point number.
+pub trait Real:
+    Copy
+    + Neg<Output = Self>
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+    + Add<f32, Output = Self>
+    + Sub<f32, Output = Self>
+    + Mul<f32, Output = Self>
+{
+    /// A condition.
+    type Mask: Copy
+        + BitAnd<Output = Self::Mask>
+        + BitOr<Output = Self::Mask>
+        + BitXor<Output = Self::Mask>
+        + Not<Output = Self::Mask>;
+    type Vec2: Vector2<Real = Self>;
+    type Vec3: Vector3<Real = Self>;
+
+    /// Returns `value` in all lanes.
+    fn splat(self, value: f32) -> Self;
+
+    /// Returns a vector in all lanes.
+    #[inline(always)]
+    fn broadcast(self, value: Vec3) -> Self::Vec3 {
+        Vector3::new(self.splat(value.x), self.splat(value.y), self.splat(value.z))
+    }
+
+    fn abs(self) -> Self;
+    fn sqrt(self) -> Self;
+    fn lt(self, other: Self) -> Self::Mask;
+    fn le(self, other: Self) -> Self::Mask;
+    fn eq(self, other: Self) -> Self::Mask;
+    fn select(if_false: Self, if_true: Self, condition: Self::Mask) -> Self;
+
+    #[inline(always)]
+    fn gt(self, other: Self) -> Self::Mask {
+        other.lt(self)
+    }
+
+    #[inline(always)]
+    fn ge(self, other: Self) -> Self::Mask {
+        other.le(self)
+    }
+}
+
+/// A constant on the left of an operator.
+#[derive(Clone, Copy, Debug)]
+pub struct Constant(f32);
+
+/// Returns a constant on the left of an operator: `constant(1.0) - x`.
+#[inline(always)]
+pub fn constant(value: f32) -> Constant {
+    Constant(value)
+}
+
+/// Returns `if_true` where the condition is true, like the WGSL function.
+#[inline(always)]
+pub fn select<F: Real>(if_false: F, if_true: F, condition: F::Mask) -> F {
+    F::select(if_false, if_true, condition)
+}
+
+macro_rules! constant_operators {
+    ($($operator:ident $function:ident;)*) => {
+        $(impl<F: Real> $operator<F> for Constant {
+            type Output = F;
+
+            #[inline(always)]
+            fn $function(self, other: F) -> F {
+                $operator::$function(other.splat(self.0), other)
+            }
+        })*
+    };
+}
+
+constant_operators! { Add add; Sub sub; Mul mul; Div div; }
+
+/// An unsigned integer of 32 bits. Operators do not overflow in the shared functions.
+pub trait Word:
+    Copy
+    + BitAnd<Output = Self>
+    + BitOr<Output = Self>
+    + BitXor<Output = Self>
+    + BitAnd<u32, Output = Self>
+    + Shl<u32, Output = Self>
+    + Shr<u32, Output = Self>
+{
+    type Real: Real;
+    type UVec2: WordVector2<Word = Self>;
+    type UVec4: WordVector4<Word = Self>;
+
+    /// Returns `value` in all lanes.
+    fn splat(self, value: u32) -> Self;
+    fn wrapping_add(self, other: Self) -> Self;
+    fn wrapping_mul(self, other: Self) -> Self;
+    fn reverse_bits(self) -> Self;
+    /// Returns the nearest floating-point number. Values must be less than 2³¹.
+    fn to_real(self) -> Self::Real;
+}
+
+/// A vector of two floating-point numbers.
+pub trait Vector2: Copy + Mul<Self::Real, Output = Self> {
+    type Real: Real<Vec2 = Self>;
+
+    fn new(x: Self::Real, y: Self::Real) -> Self;
+    fn x(self) -> Self::Real;
+    fn y(self) -> Self::Real;
+
+    /// Returns `if_true` where the condition is true.
+    #[inline(always)]
+    fn select(if_false: Self, if_true: Self, condition: <Self::Real as Real>::Mask) -> Self {
+        Self::new(
+            select(if_false.x(), if_true.x(), condition),
+            select(if_false.y(), if_true.y(), condition),
+        )
+    }
+}
+
+/// A vector of three floating-point numbers.
+pub trait Vector3:
+    Copy
+    + Neg<Output = Self>
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Add<Self::Real, Output = Self>
+    + Sub<Self::Real, Output = Self>
+    + Mul<Self::Real, Output = Self>
+    + Div<Self::Real, Output = Self>
+{
+    type Real: Real<Vec3 = Self>;
+
+    fn new(x: Self::Real, y: Self::Real, z: Self::Real) -> Self;
+    fn x(self) -> Self::Real;
+    fn y(self) -> Self::Real;
+    fn z(self) -> Self::Real;
+
+    /// Returns `value` in all lanes.
+    #[inline(always)]
+    fn broadcast(self, value: Vec3) -> Self {
+        let x = self.x();
+        Self::new(x.splat(value.x), x.splat(value.y), x.splat(value.z))
+    }
+
+    /// Returns `if_true` where the condition is true.
+    #[inline(always)]
+    fn select(if_false: Self, if_true: Self, condition: <Self::Real as Real>::Mask) -> Self {
+        Self::new(
+            select(if_false.x(), if_true.x(), condition),
+            select(if_false.y(), if_true.y(), condition),
+            select(if_false.z(), if_true.z(), condition),
+        )
+    }
+}
+
+/// A vector of two integers.
+pub trait WordVector2: Copy {
+    type Word: Word<UVec2 = Self>;
+
+    fn new(x: Self::Word, y: Self::Word) -> Self;
+    fn x(self) -> Self::Word;
+    fn y(self) -> Self::Word;
+}
+
+/// A vector of four integers.
+pub trait WordVector4: Copy {
+    type Word: Word;
+
+    fn from_words(words: [Self::Word; 4]) -> Self;
+    fn words(self) -> [Self::Word; 4];
+}
+
+impl Real for f32 {
+    type Mask = bool;
+    type Vec2 = Vec2;
+    type Vec3 = Vec3;
+
+    #[inline(always)]
+    fn splat(self, value: f32) -> f32 {
+        value
+    }
+
+    #[inline(always)]
+    fn abs(self) -> f32 {
+        f32::abs(self)
+    }
+
+    #[inline(always)]
+    fn sqrt(self) -> f32 {
+        f32::sqrt(self)
+    }
+
+    #[inline(always)]
+    fn lt(self, other: f32) -> bool {
+        self < other
+    }
+
+    #[inline(always)]
+    fn le(self, other: f32) -> bool {
+        self <= other
+    }
+
+    #[inline(always)]
+    fn eq(self, other: f32) -> bool {
+        self == other
+    }
+
+    #[inline(always)]
+    fn select(if_false: f32, if_true: f32, condition: bool) -> f32 {
+        if condition { if_true } else { if_false }
+    }
+}
+
+impl Word for u32 {
+    type Real = f32;
+    type UVec2 = UVec2;
+    type UVec4 = UVec4;
+
+    #[inline(always)]
+    fn splat(self, value: u32) -> u32 {
+        value
+    }
+
+    #[inline(always)]
+    fn wrapping_add(self, other: u32) -> u32 {
+        u32::wrapping_add(self, other)
+    }
+
+    #[inline(always)]
+    fn wrapping_mul(self, other: u32) -> u32 {
+        u32::wrapping_mul(self, other)
+    }
+
+    #[inline(always)]
+    fn reverse_bits(self) -> u32 {
+        u32::reverse_bits(self)
+    }
+
+    #[inline(always)]
+    fn to_real(self) -> f32 {
+        self as f32
+    }
+}
+
+impl Vector2 for Vec2 {
+    type Real = f32;
+
+    #[inline(always)]
+    fn new(x: f32, y: f32) -> Vec2 {
+        Vec2::new(x, y)
+    }
+
+    #[inline(always)]
+    fn x(self) -> f32 {
+        self.x
+    }
+
+    #[inline(always)]
+    fn y(self) -> f32 {
+        self.y
+    }
+}
+
+impl Vector3 for Vec3 {
+    type Real = f32;
+
+    #[inline(always)]
+    fn new(x: f32, y: f32, z: f32) -> Vec3 {
+        Vec3::new(x, y, z)
+    }
+
+    #[inline(always)]
+    fn x(self) -> f32 {
+        self.x
+    }
+
+    #[inline(always)]
+    fn y(self) -> f32 {
+        self.y
+    }
+
+    #[inline(always)]
+    fn z(self) -> f32 {
+        self.z
+    }
+}
+
+impl WordVector2 for UVec2 {
+    type Word = u32;
+
+    #[inline(always)]
+    fn new(x: u32, y: u32) -> UVec2 {
+        UVec2::new(x, y)
+    }
+
+    #[inline(always)]
+    fn x(self) -> u32 {
+        self.x
+    }
+
+    #[inline(always)]
+    fn y(self) -> u32 {
+        self.y
+    }
+}
+
+impl WordVector4 for UVec4 {
+    type Word = u32;
+
+    #[inline(always)]
+    fn from_words(words: [u32; 4]) -> UVec4 {
+        UVec4::from_array(words)
+    }
+
+    #[inline(always)]
+    fn words(self) -> [u32; 4] {
+        self.to_array()
+    }
+}
+
+impl<S: Simd> Real for f32x8<S> {
+    type Mask = mask32x8<S>;
+    type Vec2 = Lanes2<Self>;
+    type Vec3 = Lanes3<Self>;
+
+    #[inline(always)]
+    fn splat(self, value: f32) -> Self {
+        SimdBase::splat(self.simd, value)
+    }
+
+    #[inline(always)]
+    fn abs(self) -> Self {
+        SimdBase::abs(self)
+    }
+
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        SimdFloat::sqrt(self)
+    }
+
+    #[inline(always)]
+    fn lt(self, other: Self) -> mask32x8<S> {
+        self.simd_lt(other)
+    }
+
+    #[inline(always)]
+    fn le(self, other: Self) -> mask32x8<S> {
+        self.simd_le(other)
+    }
+
+    #[inline(always)]
+    fn eq(self, other: Self) -> mask32x8<S> {
+        SimdBase::simd_eq(self, other)
+    }
+
+    #[inline(always)]
+    fn select(if_false: Self, if_true: Self, condition: mask32x8<S>) -> Self {
+        condition.select(if_true, if_false)
+    }
+}
+
+impl<S: Simd> Word for u32x8<S> {
+    type Real = f32x8<S>;
+    type UVec2 = Lanes2<Self>;
+    type UVec4 = [Self; 4];
+
+    #[inline(always)]
+    fn splat(self, value: u32) -> Self {
+        SimdBase::splat(self.simd, value)
+    }
+
+    #[inline(always)]
+    fn wrapping_add(self, other: Self) -> Self {
+        self + other
+    }
+
+    #[inline(always)]
+    fn wrapping_mul(self, other: Self) -> Self {
+        self * other
+    }
+
+    #[inline(always)]
+    fn reverse_bits(self) -> Self {
+        let x = swapped(self, 1, 0x5555_5555);
+        let x = swapped(x, 2, 0x3333_3333);
+        let x = swapped(x, 4, 0x0f0f_0f0f);
+        let x = swapped(x, 8, 0x00ff_00ff);
+        (x >> 16) | (x << 16)
+    }
+
+    #[inline(always)]
+    fn to_real(self) -> f32x8<S> {
+        f32x8::float_from(self.bitcast::<i32x8<S>>())
+    }
+}
+
+/// Swaps neighboring groups of `digits` bits. `mask` selects the lower groups.
+#[inline(always)]
+fn swapped<W: Word>(x: W, digits: u32, mask: u32) -> W {
+    ((x >> digits) & mask) | ((x & mask) << digits)
+}
+
+/// A vector of two numbers in each lane.
+#[derive(Clone, Copy, Debug)]
+pub struct Lanes2<T> {
+    pub x: T,
+    pub y: T,
+}
+
+/// A vector of three numbers in each lane.
+#[derive(Clone, Copy, Debug)]
+pub struct Lanes3<F> {
+    pub x: F,
+    pub y: F,
+    pub z: F,
+}
+
+impl<S: Simd> Vector2 for Lanes2<f32x8<S>> {
+    type Real = f32x8<S>;
+
+    #[inline(always)]
+    fn new(x: f32x8<S>, y: f32x8<S>) -> Self {
+        Lanes2 { x, y }
+    }
+
+    #[inline(always)]
+    fn x(self) -> f32x8<S> {
+        self.x
+    }
+
+    #[inline(always)]
+    fn y(self) -> f32x8<S> {
+        self.y
+    }
+}
+
+impl<S: Simd> WordVector2 for Lanes2<u32x8<S>> {
+    type Word = u32x8<S>;
+
+    #[inline(always)]
+    fn new(x: u32x8<S>, y: u32x8<S>) -> Self {
+        Lanes2 { x, y }
+    }
+
+    #[inline(always)]
+    fn x(self) -> u32x8<S> {
+        self.x
+    }
+
+    #[inline(always)]
+    fn y(self) -> u32x8<S> {
+        self.y
+    }
+}
+
+impl<S: Simd> WordVector4 for [u32x8<S>; 4] {
+    type Word = u32x8<S>;
+
+    #[inline(always)]
+    fn from_words(words: [u32x8<S>; 4]) -> Self {
+        words
+    }
+
+    #[inline(always)]
+    fn words(self) -> [u32x8<S>; 4] {
+        self
+    }
+}
+
+impl<S: Simd> Vector3 for Lanes3<f32x8<S>> {
+    type Real = f32x8<S>;
+
+    #[inline(always)]
+    fn new(x: f32x8<S>, y: f32x8<S>, z: f32x8<S>) -> Self {
+        Lanes3 { x, y, z }
+    }
+
+    #[inline(always)]
+    fn x(self) -> f32x8<S> {
+        self.x
+    }
+
+    #[inline(always)]
+    fn y(self) -> f32x8<S> {
+        self.y
+    }
+
+    #[inline(always)]
+    fn z(self) -> f32x8<S> {
+        self.z
+    }
+}
+
+impl<F: Real> Neg for Lanes3<F> {
+    type Output = Lanes3<F>;
+
+    #[inline(always)]
+    fn neg(self) -> Lanes3<F> {
+        Lanes3 {
+            x: -self.x,
+            y: -self.y,
+            z: -self.z,
+        }
+    }
+}
+
+macro_rules! vector_operators {
+    ($($operator:ident $function:ident;)*) => {
+        $(impl<F: Real> $operator for Lanes3<F> {
+            type Output = Lanes3<F>;
+
+            #[inline(always)]
+            fn $function(self, other: Lanes3<F>) -> Lanes3<F> {
+                Lanes3 {
+                    x: $operator::$function(self.x, other.x),
+                    y: $operator::$function(self.y, other.y),
+                    z: $operator::$function(self.z, other.z),
+                }
+            }
+        })*
+    };
+}
+
+vector_operators! { Add add; Sub sub; Mul mul; }
+
+macro_rules! scalar_operators {
+    ($($operator:ident $function:ident;)*) => {
+        $(impl<F: Real> $operator<F> for Lanes3<F> {
+            type Output = Lanes3<F>;
+
+            #[inline(always)]
+            fn $function(self, factor: F) -> Lanes3<F> {
+                Lanes3 {
+                    x: $operator::$function(self.x, factor),
+                    y: $operator::$function(self.y, factor),
+                    z: $operator::$function(self.z, factor),
+                }
+            }
+        })*
+    };
+}
+
+scalar_operators! { Add add; Sub sub; Mul mul; Div div; }
+
+impl<F: Real> Mul<F> for Lanes2<F> {
+    type Output = Lanes2<F>;
+
+    #[inline(always)]
+    fn mul(self, factor: F) -> Lanes2<F> {
+        Lanes2 {
+            x: self.x * factor,
+            y: self.y * factor,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,173 @@
+//! Each lane of a shared function has the bits of its `f32` version, with every instruction set.
+
+use fearless_simd::dispatch;
+use glam::{UVec2, UVec4, Vec2, Vec3};
+
+use super::*;
+use crate::cpu::diffuse::{angles_at, diffuse_pdf, diffuse_sample};
+use crate::cpu::light_sample::{power_heuristic, solid_angle_pdf};
+use crate::cpu::math::{cross, dot, max, min, normalize};
+use crate::cpu::mesh::{flipped_to, lift};
+use crate::cpu::rng::{hash4, unit_float};
+use crate::cpu::sequence::{scramble, shuffled_index, sobol_bits, sobol_reversed};
+use crate::cpu::surface::largest;
+use crate::cpu::traversal::levels;
+use crate::cpu::warp::{disk_sample, frame_around, hemisphere_sample, triangle_sample, vector_around};
+
+const LANES: usize = 8;
+
+/// Arguments of the functions.
+#[derive(Clone, Copy)]
+struct Arguments<W: Word> {
+    words: [W; 4],
+    /// From 0 to 1.
+    square: [W::Real; 2],
+    numbers: [W::Real; 9],
+}
+
+/// Returns the results of all functions, and appends their names.
+#[inline(always)]
+fn results<W, K>(a: Arguments<W>, results: &mut Vec<(&'static str, W::Real)>, words: &mut Vec<(&'static str, W)>)
+where
+    W: Word<UVec4 = K>,
+    K: WordVector4<Word = W>,
+{
+    let [i, j, k, l] = a.words;
+    let u: <W::Real as Real>::Vec2 = Vector2::new(a.square[0], a.square[1]);
+    let n = &a.numbers;
+    let vector = |first: usize| Vector3::new(n[first], n[first + 1], n[first + 2]);
+    let (p, q, r): (
+        <W::Real as Real>::Vec3,
+        <W::Real as Real>::Vec3,
+        <W::Real as Real>::Vec3,
+    ) = (vector(0), vector(3), vector(6));
+    let unit = normalize(p);
+    let angles = angles_at(p, q, r);
+    let scalars = [
+        ("dot", dot(p, q)),
+        ("max", max(n[0], n[1])),
+        ("min", min(n[0], n[1])),
+        ("largest", largest(p)),
+        ("unit_float", unit_float(i)),
+        ("solid_angle_pdf", solid_angle_pdf(n[8], p, q)),
+        ("power_heuristic", power_heuristic(n[0], n[1])),
+        ("angles_at wi", angles.wi),
+        ("angles_at wo", angles.wo),
+        ("angles_at between", angles.between),
+        ("diffuse_pdf", diffuse_pdf(angles)),
+    ];
+    results.extend(scalars);
+    for (name, v) in [("disk_sample", disk_sample(u)), ("triangle_sample", triangle_sample(u))] {
+        results.extend([(name, v.x()), (name, v.y())]);
+    }
+    let frame = frame_around(unit);
+    for (name, v) in [
+        ("cross", cross(p, q)),
+        ("normalize", unit),
+        ("flipped_to", flipped_to(p, q)),
+        ("lift", lift(unit, q, r)),
+        ("frame_around u", frame.u),
+        ("frame_around v", frame.v),
+        ("vector_around", vector_around(unit, q)),
+        ("hemisphere_sample", hemisphere_sample(unit, u)),
+        ("diffuse_sample", diffuse_sample(unit, u)),
+        ("select", Vector3::select(p, q, n[0].lt(n[1]))),
+    ] {
+        results.extend([(name, v.x()), (name, v.y()), (name, v.z())]);
+    }
+    let sobol: W::UVec2 = sobol_bits(i, WordVector2::new(j, k));
+    words.extend([
+        ("sobol_bits", sobol.x()),
+        ("sobol_bits", sobol.y()),
+        ("sobol_reversed", sobol_reversed(i)),
+        ("scramble", scramble(i, j)),
+        ("shuffled_index", shuffled_index(i, j)),
+    ]);
+    words.extend(hash4(K::from_words([i, j, k, l])).words().map(|word| ("hash4", word)));
+}
+
+struct Random(u64);
+
+impl Random {
+    fn word(&mut self) -> u32 {
+        self.0 = self
+            .0
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 32) as u32
+    }
+
+    /// Returns a number from -1 to 1, a special one, or any bits.
+    fn number(&mut self) -> f32 {
+        const SPECIAL: [f32; 8] = [0.0, -0.0, 1.0, -1.0, f32::INFINITY, f32::NEG_INFINITY, f32::NAN, 1e-40];
+        let word = self.word();
+        match self.word() % 8 {
+            0 => SPECIAL[word as usize % SPECIAL.len()],
+            1 => f32::from_bits(word),
+            _ => unit_float(word) * 2.0 - 1.0,
+        }
+    }
+}
+
+fn bits(x: f32) -> u32 {
+    if x.is_nan() { f32::NAN.to_bits() } else { x.to_bits() }
+}
+
+#[test]
+fn lanes_have_the_bits_of_single_numbers() {
+    let random = &mut Random(7);
+    let mut differing = 0;
+    for _ in 0..3000 {
+        let mut lanes = [(); LANES].map(|()| Arguments {
+            words: [(); 4].map(|()| random.word()),
+            square: [(); 2].map(|()| unit_float(random.word())),
+            numbers: [(); 9].map(|()| random.number()),
+        });
+        // Points on the edges of the square.
+        lanes[0].square = [[0.0, 0.5], [0.5, 0.5], [0.5, 0.0], [0.25, 0.75]][random.word() as usize % 4];
+        let expected = lanes.map(|arguments| {
+            let (mut reals, mut words) = (Vec::new(), Vec::new());
+            results(arguments, &mut reals, &mut words);
+            (reals, words)
+        });
+        for level in levels() {
+            dispatch!(level, simd => {
+                let word = |i: usize| u32x8::simd_from(simd, lanes.map(|a| a.words[i]));
+                let arguments = Arguments {
+                    words: [word(0), word(1), word(2), word(3)],
+                    square: [0, 1].map(|i| f32x8::simd_from(simd, lanes.map(|a: Arguments<u32>| a.square[i]))),
+                    numbers: [0, 1, 2, 3, 4, 5, 6, 7, 8]
+                        .map(|i| f32x8::simd_from(simd, lanes.map(|a: Arguments<u32>| a.numbers[i]))),
+                };
+                let (mut reals, mut words) = (Vec::new(), Vec::new());
+                results(arguments, &mut reals, &mut words);
+                assert_eq!((reals.len(), words.len()), (expected[0].0.len(), expected[0].1.len()));
+                for (i, (name, x)) in reals.iter().enumerate() {
+                    let x: [f32; LANES] = (*x).into();
+                    for lane in 0..LANES {
+                        assert_eq!(bits(x[lane]), bits(expected[lane].0[i].1), "{name}, {level:?}");
+                    }
+                }
+                for (i, (name, x)) in words.iter().enumerate() {
+                    let x: [u32; LANES] = (*x).into();
+                    for lane in 0..LANES {
+                        assert_eq!(x[lane], expected[lane].1[i].1, "{name}, {level:?}");
+                        differing += usize::from(x[lane] != expected[(lane + 1) % LANES].1[i].1);
+                    }
+                }
+            });
+        }
+    }
+    assert!(differing > 10_000, "the inputs of neighboring lanes differ");
+}
+
+#[test]
+fn single_numbers_have_vectors_of_glam() {
+    assert_eq!(dot(Vec3::X, Vec3::splat(2.0)), 2.0);
+    assert_eq!(disk_sample(Vec2::splat(0.5)), Vec2::ZERO);
+    assert_eq!(
+        sobol_bits(0, UVec2::ZERO),
+        sobol_bits(0u32, <u32 as Word>::UVec2::new(0, 0))
+    );
+    assert_ne!(hash4(UVec4::ZERO), UVec4::ZERO);
+}

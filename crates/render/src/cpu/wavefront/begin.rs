@@ -1,0 +1,108 @@
+//! The stage that starts paths at the camera. Rays of cameras without a lens are computed in SIMD lanes.
+
+use fearless_simd::prelude::*;
+use fearless_simd::{dispatch, u32x8};
+use glam::{UVec2, Vec2, Vec3};
+
+use super::super::camera::camera_ray;
+use super::super::integrators::path::{PathState, begin_path};
+use super::super::lanes::{Lanes2, Word};
+use super::super::path::Path;
+use super::super::pixel::{Layers, differential_at};
+use super::super::ray::Ray;
+use super::super::rng::hash4;
+use super::super::samples::LEVEL;
+use super::super::sequence::sobol_sample;
+use super::rows::{LANES, Row, get3, store3};
+use crate::records::{NO_PRIMITIVE, Packed, SOBOL};
+
+/// Starts the paths of camera samples, each given by its pixel and number, like `begin_path`.
+pub fn begin_paths(
+    scene: &Packed,
+    samples: impl Iterator<Item = (UVec2, u32)>,
+    paths: &mut Vec<PathState>,
+    pixels: &mut Vec<UVec2>,
+) {
+    paths.clear();
+    pixels.clear();
+    if !has_lane_camera(scene) {
+        for (pixel, sample) in samples {
+            paths.push(begin_path(scene, pixel, sample));
+            pixels.push(pixel);
+        }
+        return;
+    }
+    dispatch!(*LEVEL, simd => begin_in_lanes(simd, scene, samples, paths, pixels));
+}
+
+/// Returns true if camera rays depend only on a Sobol' point per sample.
+fn has_lane_camera(scene: &Packed) -> bool {
+    let s = &scene.specialization;
+    s.pixel_pattern == SOBOL && s.filter_bins == 0 && s.lens == 0 && s.panoramic == 0 && s.camera_invisible == 0
+}
+
+/// Like `camera_sample` and `begin_path`.
+#[inline(always)]
+fn begin_in_lanes<S: Simd>(
+    simd: S,
+    scene: &Packed,
+    mut samples: impl Iterator<Item = (UVec2, u32)>,
+    paths: &mut Vec<PathState>,
+    pixels: &mut Vec<UVec2>,
+) {
+    let s = &scene.specialization;
+    loop {
+        let (mut x, mut y, mut index, mut sample) = ([0; LANES], [0; LANES], [0; LANES], [0; LANES]);
+        let mut count = 0;
+        for (pixel, number) in samples.by_ref().take(LANES) {
+            (x[count], y[count], sample[count]) = (pixel.x, pixel.y, number);
+            let (round, first) = (number / s.pixel_samples, number % s.pixel_samples);
+            index[count] = round.wrapping_mul(s.pixel_side).wrapping_add(first);
+            pixels.push(pixel);
+            count += 1;
+        }
+        if count == 0 {
+            return;
+        }
+        let words = |words: [u32; LANES]| u32x8::simd_from(simd, words);
+        let (pixel_x, pixel_y) = (words(x), words(y));
+        let key = hash4([pixel_x, pixel_y, words([scene.camera.seed; LANES]), words([0; LANES])]);
+        let u = sobol_sample(words(index), Lanes2 { x: key[0], y: key[1] });
+        let raster = Lanes2 {
+            x: pixel_x.to_real() + u.x,
+            y: pixel_y.to_real() + u.y,
+        };
+        let ray = camera_ray(&scene.camera, raster);
+        let (origins, directions) = (store3(ray.origin), store3(ray.direction));
+        let (raster_x, raster_y): (Row, Row) = (raster.x.into(), raster.y.into());
+        for lane in 0..count {
+            paths.push(PathState {
+                path: Path {
+                    ray: Ray {
+                        origin: get3(&origins, lane),
+                        direction: get3(&directions, lane),
+                    },
+                    differential: differential_at(scene, Vec2::new(raster_x[lane], raster_y[lane])),
+                    throughput: Vec3::ONE,
+                    depth: 0,
+                    branch: 0,
+                    origin_prim: NO_PRIMITIVE,
+                    inside_prim: NO_PRIMITIVE,
+                },
+                radiance: Vec3::ZERO,
+                pdf: 0.0,
+                eta2: 1.0,
+                absorption: Vec3::ZERO,
+                sample: sample[lane],
+                weight: 1.0,
+                ended: false,
+                layers: Layers::default(),
+                albedo_recorded: false,
+                prev_position: Vec3::ZERO,
+                prev_normal: Vec3::ZERO,
+                skipped_distance: 0.0,
+                skips: 0,
+            });
+        }
+    }
+}
