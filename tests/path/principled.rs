@@ -221,7 +221,8 @@ fn chi_squares(m: &PrincipledLobes, wo: Vec3) -> [(f64, f64); 2] {
     const SAMPLES: u32 = 100_000;
     const HEIGHTS: usize = 24;
     const LONGITUDES: usize = 24;
-    const FINE: usize = 12;
+    /// Subcells per side of a cell, for integrating the PDF.
+    const SUBCELLS: usize = 12;
     let cell = |d: Vec3| {
         let height = ((f64::from(d.z) + 1.0) / 2.0 * HEIGHTS as f64) as usize;
         let longitude = f64::from(d.y).atan2(f64::from(d.x)) / TAU + 0.5;
@@ -237,11 +238,11 @@ fn chi_squares(m: &PrincipledLobes, wo: Vec3) -> [(f64, f64); 2] {
         }
     }
     let mut expected = [(); 2].map(|()| vec![0.0; HEIGHTS * LONGITUDES]);
-    let area = 4.0 * PI / (HEIGHTS * FINE * LONGITUDES * FINE) as f64;
-    for i in 0..HEIGHTS * FINE {
-        let z = (i as f64 + 0.5) / (HEIGHTS * FINE) as f64 * 2.0 - 1.0;
-        for j in 0..LONGITUDES * FINE {
-            let d = direction(z, TAU * ((j as f64 + 0.5) / (LONGITUDES * FINE) as f64 - 0.5));
+    let area = 4.0 * PI / (HEIGHTS * SUBCELLS * LONGITUDES * SUBCELLS) as f64;
+    for i in 0..HEIGHTS * SUBCELLS {
+        let z = (i as f64 + 0.5) / (HEIGHTS * SUBCELLS) as f64 * 2.0 - 1.0;
+        for j in 0..LONGITUDES * SUBCELLS {
+            let d = direction(z, TAU * ((j as f64 + 0.5) / (LONGITUDES * SUBCELLS) as f64 - 0.5));
             let count = f64::from(principled_pdf(m, wo, d, ALL_LOBES)) * area * f64::from(SAMPLES);
             expected[0][cell(d)] += count;
             expected[1][cell(d)] += count * if d.x > 0.0 { 1.1 } else { 0.9 };

@@ -13,7 +13,7 @@ use super::texel::{gaussian_weight, level_size, near_coordinate, unpacked_color,
 use super::texture::level_of_length;
 use crate::records::{FLOAT, LINEAR8, Packed, SRGB8, Texture};
 
-/// Returns the same color as `ewa_color`.
+/// Like [`super::texture::ewa_color`], with cached weights.
 pub fn color(scene: &Packed, t: &Texture, f: Footprint) -> Vec3 {
     CACHED.with_borrow_mut(|kernel| {
         let key = Key::of(t, f);

@@ -17,7 +17,7 @@ pub const LEAF: u32 = 1 << 31;
 pub struct BatchNode {
     /// Lower and upper sides of the children's boxes along x, y and z. Empty slots have an empty box.
     pub planes: [[[f32; 8]; 3]; 2],
-    /// Per child the index of the node, or [`LEAF`] and the index of the leaf.
+    /// For each child the index of its node, or [`LEAF`] | the index of its leaf.
     pub children: [u32; 8],
 }
 
@@ -25,7 +25,7 @@ pub struct BatchNode {
 #[repr(C, align(64))]
 #[derive(Clone, Copy, Debug)]
 pub struct Leaf {
-    /// Per vertex and axis the coordinates of the triangles.
+    /// Coordinates of the triangles, indexed by vertex, axis and lane.
     corners: [[[f32; 4]; 3]; 3],
     /// Indices of the triangles.
     pub triangles: [u32; 4],
