@@ -198,7 +198,7 @@ impl Rules {
             if samples.end > self.pilot_samples && pilot_total < film.region.pixels() * u64::from(self.pilot_samples) {
                 return Err(RenderError::PilotIncomplete {
                     samples: samples.clone(),
-                    first: self.pilot_samples,
+                    pilot_samples: self.pilot_samples,
                 });
             }
             film.pilot_total = pilot_total;

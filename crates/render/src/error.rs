@@ -152,14 +152,14 @@ pub enum RenderError {
     /// With adaptive sampling, further samples were requested before every pixel had its pilot samples, which determine
     /// the sample counts.
     #[error(
-        "samples {} to {} were requested too early: some pixels of the film lack some of their first {first} samples",
+        "samples {} to {} were requested too early: some pixels of the film lack some of their first {pilot_samples} samples",
         samples.start, samples.end
     )]
     PilotIncomplete {
         /// The requested samples.
         samples: Range<u32>,
         /// Pilot samples per pixel.
-        first: u32,
+        pilot_samples: u32,
     },
     /// An image of this size in bytes does not fit into memory.
     #[error("not enough memory: the image needs {} MiB; render a crop", .0 >> 20)]
