@@ -52,7 +52,7 @@ fn blacken(files: &Files) {
     files.edit(KERNEL, RADIANCE, &format!("({RADIANCE} * vec4f(0.0))"));
 }
 
-/// Waits for the finished image. Panics if any frame on the way is not black.
+/// Waits for the finished image. Panics if any frame is not black.
 #[track_caller]
 fn wait_for_black_image(session: &TestSession, after: u64) {
     let start = Instant::now();
@@ -102,7 +102,7 @@ fn the_cpu_renders_only_unedited_shaders() {
         session.inner.send(Command::ResetCamera);
         files.edit("scene.toml", "color = [0.1, 0.8, 0.1]", "color = [0.8, 0.1, 0.1]");
 
-        // A comment is no edit.
+        // A comment changes no code.
         files.write_shaders();
         files.edit(KERNEL, "\n", "\n// a comment\n");
         session.wait_for_rendered_image(&files);

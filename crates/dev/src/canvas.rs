@@ -136,6 +136,10 @@ impl Canvas {
 
     /// Starts to render a changed scene. If the scene needs a different kernel, does nothing and returns false.
     pub fn update(&mut self, scene: &Packed, view: View) -> Result<bool, RenderError> {
+        if scene.same_but_camera(&self.scene) {
+            self.restart(scene.camera, view)?;
+            return Ok(true);
+        }
         let same_kernel = self.engine.update(scene)?;
         if same_kernel {
             self.scene = scene.clone();

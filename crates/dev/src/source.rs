@@ -10,7 +10,7 @@ use super::diagnostic::Diagnostic;
 use super::picture::View;
 use wgray_render::gpu::compose::{self, Shaders};
 use wgray_render::output::AovSource;
-use wgray_render::pack::pack;
+use wgray_render::pack::{self, PackedShading, pack_with};
 use wgray_render::records::{Packed, Specialization};
 use wgray_scene::{
     CameraDescription, Description, Integrator, Overrides, PendingScene, Pieces, Places, Scene, folder_of, is_gltf,
@@ -39,14 +39,32 @@ pub struct Loaded {
     pub scene: Scene,
     /// The packed scene, as the backends read it.
     pub packed: Packed,
+    /// Packed materials, textures and environment map, which later scenes may share.
+    shading: Arc<PackedShading>,
     /// The locations of the pieces of the text, computed on first use.
     places: OnceLock<Places>,
 }
 
 impl Loaded {
-    pub fn new(text: String, scene: Scene, description: Description) -> Loaded {
-        let packed = pack(&scene).without_layers(); // layer views have their own kernels
+    /// Packs a scene. Parts that equal those of `former`, an earlier scene, are not packed again.
+    pub fn new(text: String, scene: Scene, description: Description, former: Option<&Loaded>) -> Loaded {
+        let shared = former.filter(|former| PackedShading::is_shared(&former.scene, &scene));
+        let shading = match (shared, former) {
+            (Some(former), _) => Arc::clone(&former.shading),
+            (None, Some(former)) => Arc::new(PackedShading::of_changed(&scene, (&former.scene, &former.shading))),
+            (None, None) => Arc::new(PackedShading::of(&scene)),
+        };
+        let packed = match shared.filter(|former| differ_only_in_camera(former, &scene)) {
+            Some(former) => {
+                let mut packed = former.packed.clone();
+                pack::set_camera(&mut packed, &scene);
+                packed
+            }
+            None => pack_with(&scene, &shading),
+        };
+        let packed = packed.without_layers(); // layer views have their own kernels
         Loaded {
+            shading,
             text,
             camera: description.camera.clone(),
             description,
@@ -66,6 +84,14 @@ impl Loaded {
     pub(crate) fn pieces(&self) -> Pieces<'_> {
         Pieces::with_places(&self.text, self.places.get_or_init(|| Places::of(&self.text)))
     }
+}
+
+/// Returns whether only the camera's record has to be packed again.
+fn differ_only_in_camera(former: &Loaded, scene: &Scene) -> bool {
+    let mut moved = former.scene.clone();
+    moved.camera = scene.camera;
+    (moved.camera_path, moved.view) = (scene.camera_path.clone(), scene.view);
+    moved == *scene && former.packed.origin == pack::origin(&scene.camera)
 }
 
 /// The properties of a scene and a view that determine a kernel.
@@ -130,6 +156,8 @@ pub struct Snapshot {
     pub durations: [Duration; 2],
     /// All files of the scene, and their states: the scene is read again if a state changes.
     pub files: Vec<(PathBuf, FileStamp)>,
+    /// The last valid scene, if `scene` is an error.
+    last_valid: Option<Arc<Loaded>>,
 }
 
 /// The state of a file: the content of a scene file; for other files, which may be large, the length and modification
@@ -176,7 +204,7 @@ impl Sources {
 
     /// Reads the shaders and the scene.
     pub fn read(&self) -> Snapshot {
-        self.read_scene(self.read_shaders())
+        self.read_scene(self.read_shaders(), None)
     }
 
     /// Reads the files that have changed since a snapshot, if any. Calls `begin` before reading a scene.
@@ -201,7 +229,7 @@ impl Sources {
             }),
             (false, _) => {
                 begin();
-                let mut new = self.read_scene(shaders);
+                let mut new = self.read_scene(shaders, last.scene.as_ref().ok().or(last.last_valid.as_ref()));
                 if new.files.len() == 1 {
                     // The scene file may be incomplete, so the files of the last scene are still watched.
                     new.files.extend(
@@ -226,7 +254,8 @@ impl Sources {
         Ok(Arc::new(shaders))
     }
 
-    fn read_scene(&self, shaders: Result<Arc<Shaders>, Box<Diagnostic>>) -> Snapshot {
+    /// Reads the scene. `former` is the last valid scene.
+    fn read_scene(&self, shaders: Result<Arc<Shaders>, Box<Diagnostic>>, former: Option<&Arc<Loaded>>) -> Snapshot {
         let start = Instant::now();
         // The states are determined before the files are read, so that a file that changes meanwhile is read again.
         let mut files = vec![(self.scene.clone(), self.stamp(&self.scene))];
@@ -252,13 +281,14 @@ impl Sources {
         let scene = match scene {
             Ok((scene, description)) => {
                 let start = Instant::now();
-                let loaded = Loaded::new(text, scene, description);
+                let loaded = Loaded::new(text, scene, description, former.map(|former| &**former));
                 durations[1] = start.elapsed();
                 Ok(Arc::new(loaded))
             }
             Err(error) => Err(Diagnostic::scene(&error, &text)),
         };
         Snapshot {
+            last_valid: former.filter(|_| scene.is_err()).cloned(),
             scene,
             shaders,
             durations,
@@ -283,5 +313,106 @@ impl Sources {
     pub fn shader_files(&self) -> impl Iterator<Item = PathBuf> {
         let folder = self.shaders.iter();
         folder.flat_map(|folder| compose::built_in().map(move |(name, _)| folder.join(name)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use wgray_render::pack::pack;
+
+    const SCENE: &str = "
+        image = { width = 8, height = 8 }
+        camera = { position = [0, -4, 0], look_at = [0, 0, 0], fov = 40 }
+        render = { integrator = 'path', seed = 1 }
+        environment = { file = 'map.hdr' }
+        textures.t = { type = 'image', file = 'texture.hdr' }
+        materials.m = { type = 'diffuse', color = [0.5, 0.5, 0.5] }
+        materials.glass = { type = 'dielectric', ior = 1.5, roughness = 0.2 }
+        shapes = [
+            { type = 'sphere', material = 'm', center = [0, 0, 0], radius = 1 },
+            { type = 'sphere', material = 'glass', center = [2, 0, 0], radius = 1 },
+        ]
+    ";
+
+    /// Returns a Radiance file.
+    fn hdr(width: usize, height: usize) -> Vec<u8> {
+        let mut file = format!("#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y {height} +X {width}\n").into_bytes();
+        file.extend((0..width * height).flat_map(|i| [10 * i as u8 + 5, 40, 90, 128]));
+        file
+    }
+
+    struct Files {
+        _folder: tempfile::TempDir,
+        sources: Sources,
+    }
+
+    impl Files {
+        fn new() -> Files {
+            let folder = tempfile::tempdir().unwrap();
+            fs::write(folder.path().join("map.hdr"), hdr(6, 3)).unwrap();
+            fs::write(folder.path().join("texture.hdr"), hdr(2, 2)).unwrap();
+            let sources = Sources {
+                scene: folder.path().join("scene.toml"),
+                overrides: Overrides::default(),
+                shaders: None,
+            };
+            Files {
+                _folder: folder,
+                sources,
+            }
+        }
+
+        fn read(&self, text: &str, last: Option<&Snapshot>) -> Snapshot {
+            fs::write(&self.sources.scene, text).unwrap();
+            match last {
+                None => self.sources.read(),
+                Some(last) => self.sources.reread(last, || ()).expect("a changed scene"),
+            }
+        }
+    }
+
+    fn edited(old: &str, new: &str) -> String {
+        assert!(SCENE.contains(old), "{old}");
+        SCENE.replacen(old, new, 1)
+    }
+
+    #[test]
+    fn changed_scenes_are_packed_like_new_ones_and_share_equal_texels() {
+        let files = Files::new();
+        let first = files.read(SCENE, None);
+        let loaded = first.scene.clone().unwrap();
+        assert!(!loaded.packed.textures.texels.is_empty());
+        for (old, new, is_shared) in [
+            ("fov = 40", "fov = 50", true),
+            ("fov = 40", "fov = 40, aperture = 0.1", true),
+            ("look_at = [0, 0, 0]", "look_at = [900, 0, 0]", true),
+            ("width = 8", "width = 9", true),
+            ("seed = 1", "seed = 2", true),
+            ("radius = 1", "radius = 2", true),
+            ("[0.5, 0.5, 0.5]", "[0.5, 0.5, 0.2]", true),
+            ("color = [0.5, 0.5, 0.5]", "color = { texture = 't' }", false),
+            ("roughness = 0.2", "roughness = 0.3", false),
+            ("file = 'map.hdr'", "file = 'map.hdr', scale = 2", false),
+            ("file = 'map.hdr'", "color = [1, 1, 1]", false),
+        ] {
+            let changed = files.read(&edited(old, new), Some(&first)).scene.unwrap();
+            assert!(changed.packed == pack(&changed.scene).without_layers(), "{new}");
+            assert!(changed.packed != loaded.packed, "{new}");
+            let [a, b] = [&changed, &loaded].map(|loaded| &loaded.packed.textures.texels);
+            assert_eq!(Arc::ptr_eq(a, b), is_shared, "{new}");
+        }
+    }
+
+    #[test]
+    fn a_scene_whose_error_is_fixed_shares_the_texels_of_the_last_valid_scene() {
+        let files = Files::new();
+        let first = files.read(SCENE, None);
+        let broken = files.read(&edited("radius = 1", "radius = -1"), Some(&first));
+        assert!(broken.scene.is_err());
+        let still_broken = files.read(&edited("radius = 1", "radius = -2"), Some(&broken));
+        let fixed = files.read(&edited("radius = 1", "radius = 3"), Some(&still_broken));
+        let [a, b] = [first, fixed].map(|snapshot| Arc::clone(&snapshot.scene.unwrap().packed.textures.texels));
+        assert!(Arc::ptr_eq(&a, &b));
     }
 }

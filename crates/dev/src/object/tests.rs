@@ -11,7 +11,7 @@ fn scene_view(text: &str, name: &Path, overrides: Overrides) -> SceneView {
     let origin = name.display().to_string();
     let pending = PendingScene::read(text, &origin, wgray_scene::folder_of(name), &overrides).unwrap();
     let (scene, description) = pending.check(&mut Default::default()).unwrap();
-    let loaded = Loaded::new(text.to_owned(), scene, description);
+    let loaded = Loaded::new(text.to_owned(), scene, description, None);
     SceneView {
         camera: loaded.packed.camera,
         loaded: Arc::new(loaded),

@@ -162,18 +162,21 @@ impl Painter {
             let (errors, _) = error.each();
             format!("fix the file first: {}", errors.first().unwrap_or(&error))
         })?;
-        Ok(Arc::new(Loaded::new(text.to_owned(), scene, description)))
+        let former = self.loaded.as_deref();
+        Ok(Arc::new(Loaded::new(text.to_owned(), scene, description, former)))
     }
 
     /// Returns the scene for a text that differs from the text of the `old` scene only inside one table.
     fn read_change(&self, old: &Loaded, table: &KeyPath, text: String) -> Result<Arc<Loaded>, String> {
         let origin = self.sources.scene.display().to_string();
         let folder = folder_of(&self.sources.scene);
-        let old = (&old.description, table);
-        let pending = PendingScene::change(&text, &origin, folder, &self.sources.overrides, old);
+        let change = (&old.description, table);
+        let pending = PendingScene::change(&text, &origin, folder, &self.sources.overrides, change);
         let checked = pending.and_then(|(pending, places)| Ok((pending.check(&mut BTreeSet::new())?, places)));
         let ((scene, description), places) = checked.map_err(|error| error.to_string())?;
-        Ok(Arc::new(Loaded::new(text, scene, description).with_places(places)))
+        Ok(Arc::new(
+            Loaded::new(text, scene, description, Some(old)).with_places(places),
+        ))
     }
 
     fn write(&mut self, file: &Path, (old, before): (&Loaded, &str), after: String, step: Step) -> Result<(), String> {

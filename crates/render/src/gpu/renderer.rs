@@ -175,7 +175,7 @@ impl Gpu {
             sliders,
         };
         let render = kernels.compile(device, kernel_of(packed.sampling.adaptive))?;
-        let scene = SceneBuffers::upload(device, packed, texels, &kernels.layouts)?;
+        let scene = SceneBuffers::upload(device, packed, texels, &kernels.layouts, None)?;
         let params = device.buffer(
             size_of::<DispatchParams>() as u64,
             BufferUsages::UNIFORM | BufferUsages::COPY_DST,
@@ -252,7 +252,7 @@ impl Gpu {
         &self.device
     }
 
-    /// Uploads a changed scene and discards the film. Returns false and changes nothing if the scene needs a different
+    /// Uploads a changed scene, except texels that are already uploaded, and discards the film. Returns false and changes nothing if the scene needs a different
     /// kernel.
     ///
     /// # Errors
@@ -266,7 +266,8 @@ impl Gpu {
             && (self.kernels.integrator, self.kernels.texels) == (packed.integrator, texels);
         if same_kernel {
             self.film = None;
-            self.scene = SceneBuffers::upload(&self.device, packed, texels, &self.kernels.layouts)?;
+            let former = Some(&self.scene);
+            self.scene = SceneBuffers::upload(&self.device, packed, texels, &self.kernels.layouts, former)?;
             self.samples_per_dispatch = samples_per_dispatch(packed, false);
             self.rules = Rules::of(packed);
         }

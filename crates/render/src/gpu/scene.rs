@@ -1,5 +1,7 @@
 //! GPU buffers of a scene.
 
+use std::sync::{Arc, Weak};
+
 use bytemuck::bytes_of;
 use glam::{UVec4, Vec4};
 use wgpu::BufferUsages;
@@ -31,15 +33,19 @@ pub struct SceneBuffers {
     pub groups: [wgpu::BindGroup; 2],
     /// Memory in bytes.
     pub bytes: u64,
+    /// The uploaded texels.
+    texels: (Weak<Vec<u32>>, Vec<wgpu::Buffer>),
 }
 
 impl SceneBuffers {
-    /// Uploads a scene. `texels` is the division of the scene's texels into storage buffers.
+    /// Uploads a scene. `texels` is the division of the scene's texels into storage buffers. The buffers of `former` are
+    /// used again if it has the same texels in the same division.
     pub fn upload(
         device: &Device,
         packed: &Packed,
         texels: TexelParts,
         layouts: &[wgpu::BindGroupLayout],
+        former: Option<&SceneBuffers>,
     ) -> Result<SceneBuffers, RenderError> {
         let storage = BufferUsages::STORAGE;
         let (rows, nodes, meshes) = (rows(packed), node_rows(packed), mesh_rows(packed));
@@ -47,9 +53,15 @@ impl SceneBuffers {
         filter_table.resize(FILTER_BINS_MAX as usize, Vec4::ZERO);
         let bytes = bytes_of_scene(packed);
         let upload = || {
-            let texels = texels.split(&packed.textures.texels);
-            let texels = texels.map(|part| device.checked(|| device.upload(storage, part)));
-            let texels: Vec<wgpu::Buffer> = texels.collect::<Result<_, _>>()?;
+            let shared = former.and_then(|former| former.buffers_of(&packed.textures.texels));
+            let texels: Vec<wgpu::Buffer> = match shared {
+                Some(buffers) => buffers.to_vec(),
+                None => {
+                    let parts = texels.split(&packed.textures.texels);
+                    let buffers = parts.map(|part| device.checked(|| device.upload(storage, part)));
+                    buffers.collect::<Result<_, _>>()?
+                }
+            };
             device.checked(|| {
                 let camera = device.upload(BufferUsages::UNIFORM | BufferUsages::COPY_DST, &[packed.camera]);
                 let buffers = [
@@ -67,10 +79,21 @@ impl SceneBuffers {
                     bind_group(device, &layouts[1], &scene_buffers),
                     bind_group(device, &layouts[2], &[&primitives, &bounds, &nodes, &meshes]),
                 ];
-                SceneBuffers { camera, groups, bytes }
+                SceneBuffers {
+                    camera,
+                    groups,
+                    bytes,
+                    texels: (Arc::downgrade(&packed.textures.texels), texels),
+                }
             })
         };
         upload().map_err(|error| MemoryUse::default().explain(error, Some(&("the scene".to_string(), bytes))))
+    }
+
+    /// Returns the buffers of these texels, if they are uploaded.
+    fn buffers_of(&self, texels: &Arc<Vec<u32>>) -> Option<&[wgpu::Buffer]> {
+        let (uploaded, buffers) = &self.texels;
+        std::ptr::eq(uploaded.as_ptr(), Arc::as_ptr(texels)).then_some(buffers)
     }
 
     pub fn set_camera(&self, device: &Device, camera: &Camera) {

@@ -23,7 +23,7 @@ const BIN_RADIUS: f64 = 0.06;
 #[derive(Debug, Default)]
 pub struct EnvironmentMap(Option<PackedMap>);
 
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 struct PackedMap {
     rows: [Vec3; 3],
     width: u32,
@@ -44,6 +44,16 @@ impl EnvironmentMap {
             .as_ref()
             .and_then(|environment| environment.image.as_ref());
         EnvironmentMap(image.and_then(|image| pack_map(image, texels)))
+    }
+
+    /// Returns the map with texels and sampling tables that start at another offset.
+    pub fn with_start(&self, start: usize) -> EnvironmentMap {
+        EnvironmentMap(self.0.as_ref().map(|map| PackedMap {
+            texels: start,
+            cells: map.cells - map.texels + start,
+            blocks: map.blocks - map.texels + start,
+            ..map.clone()
+        }))
     }
 
     pub fn sum(&self) -> Option<f64> {

@@ -55,6 +55,7 @@ pub fn pack_with(scene: &Scene, shading: &PackedShading) -> Packed {
         appearances,
         environment_map,
         texels,
+        ..
     } = shading;
     let _span = tracing::debug_span!("pack").entered();
     let origin = origin::origin(&scene.camera);

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::environment_map::EnvironmentMap;
 use super::materials::Appearances;
-use wgray_scene::{Environment, Scene};
+use wgray_scene::{EnvironmentImage, Scene};
 
 /// Packed materials, textures and environment map. A session reuses them while only shapes, lights or the camera change,
 /// because computing texels (mip pyramids, and tables of the environment and of materials) takes most of the time of packing.
@@ -12,7 +12,9 @@ use wgray_scene::{Environment, Scene};
 pub struct PackedShading {
     pub(super) appearances: Appearances,
     pub(super) environment_map: EnvironmentMap,
+    /// Texels of the textures, followed by those of the environment map.
     pub(super) texels: Arc<Vec<u32>>,
+    texture_texels: usize,
 }
 
 impl PackedShading {
@@ -22,20 +24,42 @@ impl PackedShading {
         let mut texels = std::mem::take(&mut appearances.texels);
         PackedShading {
             appearances,
+            texture_texels: texels.len(),
             environment_map: EnvironmentMap::of(scene, &mut texels),
             texels: Arc::new(texels),
         }
     }
 
+    /// Packs materials, textures and environment map. An environment map that equals the map of `former`, packed for
+    /// another scene, is not packed again. All texels are shared with `former` if they are equal.
+    pub fn of_changed(scene: &Scene, (former_scene, former): (&Scene, &PackedShading)) -> PackedShading {
+        if environment_image(scene) != environment_image(former_scene) {
+            return PackedShading::of(scene);
+        }
+        let mut appearances = Appearances::of(scene);
+        let texels = std::mem::take(&mut appearances.texels);
+        let (former_texels, map_texels) = former.texels.split_at(former.texture_texels);
+        PackedShading {
+            appearances,
+            texture_texels: texels.len(),
+            environment_map: former.environment_map.with_start(texels.len()),
+            texels: match texels == former_texels {
+                true => Arc::clone(&former.texels),
+                false => Arc::new([&texels, map_texels].concat()),
+            },
+        }
+    }
+
     /// Returns true if both scenes are packed to the same materials, textures and environment map.
     pub fn is_shared(a: &Scene, b: &Scene) -> bool {
-        let map = |scene: &'_ Scene| {
-            scene
-                .environment
-                .as_ref()
-                .and_then(|Environment { image, .. }| image.clone())
-        };
         (a.render.integrator, &a.materials, &a.textures) == (b.render.integrator, &b.materials, &b.textures)
-            && map(a) == map(b)
+            && environment_image(a) == environment_image(b)
     }
+}
+
+fn environment_image(scene: &Scene) -> Option<&EnvironmentImage> {
+    scene
+        .environment
+        .as_ref()
+        .and_then(|environment| environment.image.as_ref())
 }
