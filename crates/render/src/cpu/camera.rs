@@ -86,7 +86,7 @@ mod tests {
             ((0.0, 0.0), (-2.0, 1.0, 1.0)),
             ((8.0, 4.0), (2.0, 1.0, -1.0)),
         ] {
-            let ray = camera_ray(&camera, raster.into());
+            let ray = camera_ray(&camera, Vec2::from(raster));
             assert_eq!(ray.origin, camera.position);
             assert!(
                 (ray.direction - Vec3::from(direction).normalize()).length() < 1e-6,
@@ -104,7 +104,7 @@ mod tests {
             ((0.0, 0.0), (-1.0, 2.0, 4.0)),
             ((8.0, 4.0), (3.0, 2.0, 2.0)),
         ] {
-            let ray = camera_ray(&camera, raster.into());
+            let ray = camera_ray(&camera, Vec2::from(raster));
             assert_eq!((ray.origin, ray.direction), (origin.into(), Vec3::Y), "{raster:?}");
         }
     }

@@ -261,7 +261,7 @@ mod tests {
         let q = cylinder(DVec3::ZERO, 1.0, 2.0);
         let occludes = |p: [f32; 3], d: [f32; 3], from_inside| {
             let levels = solid_levels(CYLINDER, &q, vector_to_local(&q, Vec3::from(p) - q.anchor), from_inside);
-            cylinder_occludes(p.into(), d.into(), levels, 1.0)
+            cylinder_occludes(Vec3::from(p), Vec3::from(d), levels, 1.0)
         };
         assert!(occludes([-3.0, 0.0, 0.0], [6.0, 0.0, 0.0], false), "through");
         assert!(occludes([-3.0, 0.0, 0.0], [3.0, 0.0, 0.0], false), "into");

@@ -84,7 +84,7 @@ mod tests {
 
     #[test]
     fn segments_that_cross_the_rectangle_are_occluded() {
-        let occludes = |o: [f32; 3], d: [f32; 3], t_max| rectangle_occludes(o.into(), d.into(), t_max);
+        let occludes = |o: [f32; 3], d: [f32; 3], t_max| rectangle_occludes(Vec3::from(o), Vec3::from(d), t_max);
         assert!(occludes([0.9, 0.9, 1.0], [0.0, 0.0, -2.0], 1.0));
         assert!(occludes([-0.9, -0.9, -1.0], [0.0, 0.0, 2.0], 1.0), "from below");
         assert!(!occludes([1.1, 0.9, 1.0], [0.0, 0.0, -2.0], 1.0), "beside");

@@ -144,7 +144,7 @@ impl ShadowRayRows {
                 let from_inside = inside_prim.simd_eq(index);
                 let q = &scene.primitives[i];
                 let occludes = occludes_segment(kind, q, origin, from_inside, to_light, t_max);
-                is_occluded = is_occluded | (occludes & !is_excluded);
+                is_occluded |= occludes & !is_excluded;
             });
         }
         is_occluded.to_bitmask()
