@@ -265,7 +265,7 @@ fn generic_signatures_have_wgsl_types() {
     }
     let masks = functions("fn f<V: Vector2>(x: V::Real) -> <V::Real as Real>::Mask {}");
     assert_eq!(masks, functions("fn f(x: f32) -> bool {}"));
-    // A type parameter hides the type of the same name, and a bound that is no number matches no WGSL type.
+    // A type parameter hides the type of the same name, and a bound other than numbers matches no WGSL type.
     assert_ne!(functions("fn f<Vec3: Real>(n: Vec3) {}"), functions("fn f(n: Vec3) {}"));
     assert_ne!(functions("fn f<F: Copy>(x: F) {}"), functions("fn f(x: f32) {}"));
     assert_eq!(records("struct R<V = Vec3> { u: V }"), records("struct R { u: Vec3 }"));

@@ -20,7 +20,7 @@ pub trait Real:
     + Sub<f32, Output = Self>
     + Mul<f32, Output = Self>
 {
-    /// A condition.
+    /// The result of a comparison: a `bool`, or one in each lane.
     type Mask: Copy
         + BitAnd<Output = Self::Mask>
         + BitOr<Output = Self::Mask>
@@ -43,7 +43,7 @@ pub trait Real:
     fn lt(self, other: Self) -> Self::Mask;
     fn le(self, other: Self) -> Self::Mask;
     fn eq(self, other: Self) -> Self::Mask;
-    fn select(if_false: Self, if_true: Self, condition: Self::Mask) -> Self;
+    fn select(if_false: Self, if_true: Self, mask: Self::Mask) -> Self;
 
     #[inline(always)]
     fn gt(self, other: Self) -> Self::Mask {
@@ -66,10 +66,10 @@ pub fn constant(value: f32) -> Constant {
     Constant(value)
 }
 
-/// Returns `if_true` where the condition is true, like the WGSL function.
+/// Returns `if_true` where the mask is set, like the WGSL function.
 #[inline(always)]
-pub fn select<F: Real>(if_false: F, if_true: F, condition: F::Mask) -> F {
-    F::select(if_false, if_true, condition)
+pub fn select<F: Real>(if_false: F, if_true: F, mask: F::Mask) -> F {
+    F::select(if_false, if_true, mask)
 }
 
 macro_rules! constant_operators {
@@ -118,12 +118,12 @@ pub trait Vector2: Copy + Mul<Self::Real, Output = Self> {
     fn x(self) -> Self::Real;
     fn y(self) -> Self::Real;
 
-    /// Returns `if_true` where the condition is true.
+    /// Returns `if_true` where the mask is set.
     #[inline(always)]
-    fn select(if_false: Self, if_true: Self, condition: <Self::Real as Real>::Mask) -> Self {
+    fn select(if_false: Self, if_true: Self, mask: <Self::Real as Real>::Mask) -> Self {
         Self::new(
-            select(if_false.x(), if_true.x(), condition),
-            select(if_false.y(), if_true.y(), condition),
+            select(if_false.x(), if_true.x(), mask),
+            select(if_false.y(), if_true.y(), mask),
         )
     }
 }
@@ -154,13 +154,13 @@ pub trait Vector3:
         Self::new(x.splat(value.x), x.splat(value.y), x.splat(value.z))
     }
 
-    /// Returns `if_true` where the condition is true.
+    /// Returns `if_true` where the mask is set.
     #[inline(always)]
-    fn select(if_false: Self, if_true: Self, condition: <Self::Real as Real>::Mask) -> Self {
+    fn select(if_false: Self, if_true: Self, mask: <Self::Real as Real>::Mask) -> Self {
         Self::new(
-            select(if_false.x(), if_true.x(), condition),
-            select(if_false.y(), if_true.y(), condition),
-            select(if_false.z(), if_true.z(), condition),
+            select(if_false.x(), if_true.x(), mask),
+            select(if_false.y(), if_true.y(), mask),
+            select(if_false.z(), if_true.z(), mask),
         )
     }
 }
@@ -218,8 +218,8 @@ impl Real for f32 {
     }
 
     #[inline(always)]
-    fn select(if_false: f32, if_true: f32, condition: bool) -> f32 {
-        if condition { if_true } else { if_false }
+    fn select(if_false: f32, if_true: f32, mask: bool) -> f32 {
+        if mask { if_true } else { if_false }
     }
 }
 
@@ -366,8 +366,8 @@ impl<S: Simd> Real for f32x8<S> {
     }
 
     #[inline(always)]
-    fn select(if_false: Self, if_true: Self, condition: mask32x8<S>) -> Self {
-        condition.select(if_true, if_false)
+    fn select(if_false: Self, if_true: Self, mask: mask32x8<S>) -> Self {
+        mask.select(if_true, if_false)
     }
 }
 

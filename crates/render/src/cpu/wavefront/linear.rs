@@ -144,7 +144,7 @@ impl ShadowRayRows {
                 let from_inside = inside_prim.simd_eq(index);
                 let q = &scene.primitives[i];
                 let occludes = occludes_segment(kind, q, origin, from_inside, to_light, t_max);
-                is_occluded = is_occluded | (occludes & !is_excluded);
+                is_occluded |= occludes & !is_excluded;
             });
         }
         is_occluded.to_bitmask()
@@ -159,7 +159,7 @@ mod tests {
     use super::*;
     use crate::cpu::traversal::levels;
     use crate::pack::primitive;
-    use crate::records::KINDS;
+    use crate::records::PRIMITIVE_KINDS;
 
     struct Random(u64);
 
@@ -185,7 +185,7 @@ mod tests {
 
     #[test]
     fn rays_in_lanes_equal_single_rays() {
-        for kind in 0..KINDS {
+        for kind in 0..PRIMITIVE_KINDS.len() as u32 {
             let (hits, occluded) = test_kind(kind);
             assert!(hits > 1000 && occluded > 1000, "{kind}: {hits} {occluded}");
         }

@@ -129,7 +129,7 @@ pub fn shade_hits(
     lane_hits
 }
 
-/// How the surface of a hit is found.
+/// The queue of a hit.
 #[derive(Clone, Copy)]
 enum SurfaceKind {
     Flat,
