@@ -46,17 +46,17 @@ pub struct Loaded {
 }
 
 impl Loaded {
-    /// Packs a scene. Parts that equal those of `former`, an earlier scene, are not packed again.
-    pub fn new(text: String, scene: Scene, description: Description, former: Option<&Loaded>) -> Loaded {
-        let shared = former.filter(|former| PackedShading::is_shared(&former.scene, &scene));
-        let shading = match (shared, former) {
-            (Some(former), _) => Arc::clone(&former.shading),
-            (None, Some(former)) => Arc::new(PackedShading::of_changed(&scene, (&former.scene, &former.shading))),
+    /// Packs a scene. Parts that equal those of `previous`, an earlier scene, are not packed again.
+    pub fn new(text: String, scene: Scene, description: Description, previous: Option<&Loaded>) -> Loaded {
+        let shared = previous.filter(|previous| PackedShading::is_shared(&previous.scene, &scene));
+        let shading = match (shared, previous) {
+            (Some(previous), _) => Arc::clone(&previous.shading),
+            (None, Some(previous)) => Arc::new(PackedShading::of_changed(&scene, (&previous.scene, &previous.shading))),
             (None, None) => Arc::new(PackedShading::of(&scene)),
         };
-        let packed = match shared.filter(|former| differ_only_in_camera(former, &scene)) {
-            Some(former) => {
-                let mut packed = former.packed.clone();
+        let packed = match shared.filter(|previous| differ_only_in_camera(previous, &scene)) {
+            Some(previous) => {
+                let mut packed = previous.packed.clone();
                 pack::set_camera(&mut packed, &scene);
                 packed
             }
@@ -87,11 +87,11 @@ impl Loaded {
 }
 
 /// Returns whether only the camera's record has to be packed again.
-fn differ_only_in_camera(former: &Loaded, scene: &Scene) -> bool {
-    let mut moved = former.scene.clone();
+fn differ_only_in_camera(previous: &Loaded, scene: &Scene) -> bool {
+    let mut moved = previous.scene.clone();
     moved.camera = scene.camera;
     (moved.camera_path, moved.view) = (scene.camera_path.clone(), scene.view);
-    moved == *scene && former.packed.origin == pack::origin(&scene.camera)
+    moved == *scene && previous.packed.origin == pack::origin(&scene.camera)
 }
 
 /// The properties of a scene and a view that determine a kernel.
@@ -254,8 +254,8 @@ impl Sources {
         Ok(Arc::new(shaders))
     }
 
-    /// Reads the scene. `former` is the last valid scene.
-    fn read_scene(&self, shaders: Result<Arc<Shaders>, Box<Diagnostic>>, former: Option<&Arc<Loaded>>) -> Snapshot {
+    /// Reads the scene. `previous` is the last valid scene.
+    fn read_scene(&self, shaders: Result<Arc<Shaders>, Box<Diagnostic>>, previous: Option<&Arc<Loaded>>) -> Snapshot {
         let start = Instant::now();
         // The states are determined before the files are read, so that a file that changes meanwhile is read again.
         let mut files = vec![(self.scene.clone(), self.stamp(&self.scene))];
@@ -281,14 +281,14 @@ impl Sources {
         let scene = match scene {
             Ok((scene, description)) => {
                 let start = Instant::now();
-                let loaded = Loaded::new(text, scene, description, former.map(|former| &**former));
+                let loaded = Loaded::new(text, scene, description, previous.map(|previous| &**previous));
                 durations[1] = start.elapsed();
                 Ok(Arc::new(loaded))
             }
             Err(error) => Err(Diagnostic::scene(&error, &text)),
         };
         Snapshot {
-            last_valid: former.filter(|_| scene.is_err()).cloned(),
+            last_valid: previous.filter(|_| scene.is_err()).cloned(),
             scene,
             shaders,
             durations,

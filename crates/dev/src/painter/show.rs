@@ -106,7 +106,7 @@ impl Painter {
         self.last_frame = Instant::now();
         self.frame_cost = start.elapsed();
         if !self.is_on_cpu() {
-            self.failures = 0; // the CPU's image is no success of the device
+            self.failures = 0; // an image of the CPU does not show that the device works
         }
         self.problems.truncated = None;
         if let Some(running) = self.running.as_ref().filter(|_| done || is_complete) {

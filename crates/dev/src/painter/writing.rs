@@ -162,8 +162,8 @@ impl Painter {
             let (errors, _) = error.each();
             format!("fix the file first: {}", errors.first().unwrap_or(&error))
         })?;
-        let former = self.loaded.as_deref();
-        Ok(Arc::new(Loaded::new(text.to_owned(), scene, description, former)))
+        let previous = self.loaded.as_deref();
+        Ok(Arc::new(Loaded::new(text.to_owned(), scene, description, previous)))
     }
 
     /// Returns the scene for a text that differs from the text of the `old` scene only inside one table.

@@ -266,8 +266,8 @@ impl Gpu {
             && (self.kernels.integrator, self.kernels.texels) == (packed.integrator, texels);
         if same_kernel {
             self.film = None;
-            let former = Some(&self.scene);
-            self.scene = SceneBuffers::upload(&self.device, packed, texels, &self.kernels.layouts, former)?;
+            let previous = Some(&self.scene);
+            self.scene = SceneBuffers::upload(&self.device, packed, texels, &self.kernels.layouts, previous)?;
             self.samples_per_dispatch = samples_per_dispatch(packed, false);
             self.rules = Rules::of(packed);
         }

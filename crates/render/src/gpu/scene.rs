@@ -38,14 +38,14 @@ pub struct SceneBuffers {
 }
 
 impl SceneBuffers {
-    /// Uploads a scene. `texels` is the division of the scene's texels into storage buffers. The buffers of `former` are
+    /// Uploads a scene. `texels` is the division of the scene's texels into storage buffers. The buffers of `previous` are
     /// used again if it has the same texels in the same division.
     pub fn upload(
         device: &Device,
         packed: &Packed,
         texels: TexelParts,
         layouts: &[wgpu::BindGroupLayout],
-        former: Option<&SceneBuffers>,
+        previous: Option<&SceneBuffers>,
     ) -> Result<SceneBuffers, RenderError> {
         let storage = BufferUsages::STORAGE;
         let (rows, nodes, meshes) = (rows(packed), node_rows(packed), mesh_rows(packed));
@@ -53,7 +53,7 @@ impl SceneBuffers {
         filter_table.resize(FILTER_BINS_MAX as usize, Vec4::ZERO);
         let bytes = bytes_of_scene(packed);
         let upload = || {
-            let shared = former.and_then(|former| former.buffers_of(&packed.textures.texels));
+            let shared = previous.and_then(|previous| previous.buffers_of(&packed.textures.texels));
             let texels: Vec<wgpu::Buffer> = match shared {
                 Some(buffers) => buffers.to_vec(),
                 None => {

@@ -30,21 +30,21 @@ impl PackedShading {
         }
     }
 
-    /// Packs materials, textures and environment map. An environment map that equals the map of `former`, packed for
-    /// another scene, is not packed again. All texels are shared with `former` if they are equal.
-    pub fn of_changed(scene: &Scene, (former_scene, former): (&Scene, &PackedShading)) -> PackedShading {
-        if environment_image(scene) != environment_image(former_scene) {
+    /// Packs materials, textures and environment map. An environment map that equals the map of `previous`, packed for
+    /// another scene, is not packed again. All texels are shared with `previous` if they are equal.
+    pub fn of_changed(scene: &Scene, (previous_scene, previous): (&Scene, &PackedShading)) -> PackedShading {
+        if environment_image(scene) != environment_image(previous_scene) {
             return PackedShading::of(scene);
         }
         let mut appearances = Appearances::of(scene);
         let texels = std::mem::take(&mut appearances.texels);
-        let (former_texels, map_texels) = former.texels.split_at(former.texture_texels);
+        let (previous_texels, map_texels) = previous.texels.split_at(previous.texture_texels);
         PackedShading {
             appearances,
             texture_texels: texels.len(),
-            environment_map: former.environment_map.with_start(texels.len()),
-            texels: match texels == former_texels {
-                true => Arc::clone(&former.texels),
+            environment_map: previous.environment_map.with_start(texels.len()),
+            texels: match texels == previous_texels {
+                true => Arc::clone(&previous.texels),
                 false => Arc::new([&texels, map_texels].concat()),
             },
         }
