@@ -1,4 +1,5 @@
-//! Each row of `docs/gltf.md` names an existing test, and each known extension has a row.
+//! Each feature in `docs/gltf.md` has an existing test in `docs/decisions/gltf-import.md`, and each known extension has a
+//! row.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -13,9 +14,25 @@ fn quoted(line: &str) -> Vec<&str> {
     line.split('`').skip(1).step_by(2).collect()
 }
 
+/// Returns the first cells of the tables after a heading.
+fn first_cells<'a>(page: &'a str, heading: &str) -> BTreeSet<&'a str> {
+    let section = page.split(heading).nth(1).unwrap();
+    let rows = section.lines().filter(|line| line.starts_with("| "));
+    rows.map(|row| row.split(" | ").next().unwrap()).collect()
+}
+
+#[test]
+fn every_feature_has_a_row_of_tests() {
+    let (page, tests) = (read("docs/gltf.md"), read("docs/decisions/gltf-import.md"));
+    assert_eq!(
+        first_cells(&page, "\n## Supported features\n"),
+        first_cells(&tests, "\n## Tests\n")
+    );
+}
+
 #[test]
 fn every_row_names_an_existing_test() {
-    let page = read("docs/gltf.md");
+    let page = read("docs/decisions/gltf-import.md");
     let rows = page
         .lines()
         .filter(|line| line.starts_with("| ") && line.contains(".rs`"));
