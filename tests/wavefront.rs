@@ -77,10 +77,15 @@ fn differing(a: &[PathBits], b: &[PathBits]) -> usize {
 }
 
 /// Changes most materials to diffuse ones, which are shaded in lanes, most of them without textures and emission. Paths
-/// have at least three bounces.
+/// have at least three bounces. A third of the scenes have a pinhole camera with Sobol' points.
 fn with_diffuse_materials(mut packed: Packed, scene: usize) -> Packed {
     packed.specialization.absorption = 0;
     packed.specialization.bounces = packed.specialization.bounces.max(3);
+    if scene % 3 == 0 {
+        let s = &mut packed.specialization;
+        (s.pixel_pattern, s.pixel_side, s.filter_bins) = (SOBOL, s.pixel_samples, 0);
+        (s.lens, s.panoramic, s.camera_invisible) = (0, 0, 0);
+    }
     for (i, material) in packed.materials.iter_mut().enumerate() {
         if material.kind == EMITTER || (scene + i) % 4 == 3 {
             continue;
