@@ -9,7 +9,7 @@
 @group(1) @binding(0) var<uniform> camera: Camera;
 @group(1) @binding(1) var<uniform> environment: Environment;
 @group(1) @binding(2) var<uniform> counts: Counts;
-@group(1) @binding(3) var<uniform> filter_table: array<vec4f, FILTER_BINS_MAX>;
+@group(1) @binding(3) var<uniform> filter_table: array<vec4f, FILTER_TABLE_SIZE>;
 @group(1) @binding(4) var<storage, read> records: array<vec4u>; // records of materials, textures and lights
 @group(1) @binding(5) var<storage, read> texels: array<u32>;
 

@@ -20,7 +20,7 @@ enum Slot<T> {
     Empty,
 }
 
-/// Reports the end of the work, also if the work panics.
+/// Reports the end of the work, even by a panic.
 struct Finish<T>(Arc<Mutex<Slot<T>>>);
 
 impl<T> Finish<T> {
@@ -80,7 +80,7 @@ impl<T> Future for Task<T> {
                 Poll::Pending
             }
             Slot::Finished(result) => Poll::Ready(result),
-            Slot::Empty => panic!("the thread of the render panicked"),
+            Slot::Empty => panic!("the render thread panicked"),
         }
     }
 }

@@ -43,7 +43,8 @@ fn software_rounding_of_imprecise_operations() -> String {
     text + NUDGED
 }
 
-/// Returns functions of the same names that use imprecise device operations without software rounding.
+/// Returns replacements of the functions with software rounding, with equal names, which use only imprecise device
+/// operations.
 fn imprecise_operations() -> String {
     "fn quotient(a: f32, b: f32) -> f32 { return nudged(a / b); }
     fn quotient2(a: vec2f, b: vec2f) -> vec2f { return vec2f(quotient(a.x, b.x), quotient(a.y, b.y)); }

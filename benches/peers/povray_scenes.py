@@ -2,8 +2,8 @@
 """Converts a wgray scene to a scene of POV-Ray 3.7 on standard output: povray_scenes.py SCENE.toml LIGHT_SAMPLES [SIZE]
 
 Shading is Phong without distance falloff; lights are invisible to the camera. POV-Ray's Phong highlight has the light's
-colour, so the image is that of a scene whose materials have a white `specular`; ambient and diffuse colours must be
-equal.
+colour, so `specular` is treated as white. A POV-Ray pigment has one colour, so the ambient and diffuse colours of a
+material must be equal.
 
 An area light is converted in one of two ways. POV-Ray's `area_light` is faster and is used for timing. POV-Ray then
 multiplies the mean visibility by the mean shading, `mean(V) * mean(f)`, whereas wgray computes `mean(V * f)`: the images

@@ -38,6 +38,7 @@ CORNELL, ELLIPSOIDS = str(install.ROOT / "scenes/cornell.toml"), str(install.HER
 CORNELL_PATH = str(install.ROOT / "scenes/cornell-path.toml")
 NO_POVRAY = ALL[:-1]
 PATHS = ("lavapipe", "mesa-backports", "cpu", "mitsuba", "cycles")
+WITHOUT_CYCLES = PATHS[:-1]
 
 
 def large(title, scene, renderers=NO_POVRAY):
@@ -77,7 +78,7 @@ PATH = {
     "path-rock70k": path("paths around a rock of 69,312 triangles", "path-rock70k", 400),
     "path-cold": path("paths in the assignment scene, whole process, caches empty", CORNELL_PATH, 400, "cold"),
 }
-MATERIALS = {name: dataclasses.replace(workload, renderers=NO_POVRAY) for name, workload in {  # cycles_scenes.py does not support these scenes
+MATERIALS = {name: dataclasses.replace(workload, renderers=WITHOUT_CYCLES) for name, workload in {  # cycles_scenes.py does not support these scenes
     "spheres": path("a rough metal and a rough glass sphere under a map", "path-spheres", 400),
     "lamps1": path("a room with one area light", "path-lamps1", 400),
     "lamps1000": path("a room with 1,000 area lights", "path-lamps1000", 400),

@@ -3,12 +3,12 @@
 mod bad_input;
 mod bounds;
 mod damage;
-pub mod forms;
 mod in_code;
-mod made;
+mod make_mesh_example;
 mod materials;
 mod model;
 mod polygons;
+pub mod procedural;
 mod readers;
 mod sphere;
 mod tangents;

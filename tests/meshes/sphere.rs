@@ -4,7 +4,7 @@ use glam::DVec3;
 use wgray_render::cpu::camera::camera_ray;
 use wgray_render::records::Packed;
 
-use super::forms::{TriangleMesh, scene};
+use super::procedural::{TriangleMesh, scene};
 use crate::pictures::{RenderMode, first_hits, reference, render};
 
 const CENTER: DVec3 = DVec3::new(0.0, 0.0, 1.3);

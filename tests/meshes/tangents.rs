@@ -13,7 +13,7 @@ use wgray_render::cpu::ray::{Hit, Ray};
 use wgray_render::cpu::texture::evaluate_material;
 use wgray_render::records::{NO_INDEX, Packed};
 
-use super::forms::{HEAD, Sheet, scene};
+use super::procedural::{HEAD, Sheet, scene};
 use crate::pictures::reference;
 use crate::textures::write_exr;
 

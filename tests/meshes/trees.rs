@@ -21,7 +21,7 @@ use wgray_render::records::{
     SAMPLE_BLOCK,
 };
 
-use super::forms::{HEAD, TriangleMesh, scene};
+use super::procedural::{HEAD, TriangleMesh, scene};
 use crate::random::Random;
 use crate::random_scenes::any_scene;
 use crate::scenes;

@@ -8,7 +8,7 @@ use wgray_render::cpu::shadow::SampleBlock;
 use wgray_render::cpu::surface::Surface;
 use wgray_render::records::{CASTS_SHADOW, GRID, INFINITE_T, Instance, Light, NO_INDEX, NO_PRIMITIVE, Packed};
 
-use super::forms::{HEAD, TriangleMesh, scene};
+use super::procedural::{HEAD, TriangleMesh, scene};
 use crate::random::Random;
 use crate::sources;
 

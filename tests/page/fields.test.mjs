@@ -272,7 +272,7 @@ test("on a narrow or zoomed-in screen, the focus is never behind the image", asy
   }
 });
 
-test("an error disappears with its value, and an emptied box shows its value again", async () => {
+test("an error disappears when its invalid value is replaced, and an input left empty shows the last value again", async () => {
   const page = await open(browser, studio);
   await choose(page, "shapes[0]");
   const radius = box(page, "shapes[0].radius", 1);

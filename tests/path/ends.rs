@@ -170,8 +170,8 @@ fn reflectances_above_one_are_clamped() {
 fn glass_with_shading_normals_creates_no_energy() {
     // White furnace: a cube and a coarse sphere of glass with smooth normals.
     let folder = tempfile::tempdir().expect("a folder");
-    let cube = crate::meshes::forms::TriangleMesh::cube();
-    let ball = crate::meshes::forms::TriangleMesh::icosphere(1);
+    let cube = crate::meshes::procedural::TriangleMesh::cube();
+    let ball = crate::meshes::procedural::TriangleMesh::icosphere(1);
     for (name, triangle_mesh) in [("cube", cube), ("ball", ball)] {
         let normals: Vec<_> = triangle_mesh.points.iter().map(|p| p.normalize()).collect();
         std::fs::write(

@@ -259,7 +259,7 @@ fn a_hundred_thousand_lights_render() {
 #[test]
 fn emissive_meshes_are_in_the_light_tree() {
     let folder = tempfile::tempdir().expect("a folder");
-    let ball = crate::meshes::forms::TriangleMesh::icosphere(1);
+    let ball = crate::meshes::procedural::TriangleMesh::icosphere(1);
     std::fs::write(folder.path().join("ball.obj"), ball.obj(None, None)).expect("a mesh");
     let text = |shapes: &str, samples: u32| {
         format!(

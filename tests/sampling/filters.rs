@@ -6,7 +6,7 @@ use wgray_render::cpu::pixel::filtered;
 use wgray_render::cpu::sequence::sobol_sample;
 use wgray_render::film::mean;
 use wgray_render::pack::filter::{height, table};
-use wgray_render::records::{FILTER_BINS_MAX, Packed};
+use wgray_render::records::{FILTER_TABLE_SIZE, Packed};
 
 use super::cornell;
 use crate::pictures::{RenderMode, differing, exact_modes, render};
@@ -83,9 +83,9 @@ fn tables_have_the_moments_of_their_filters() {
     for kind in KINDS {
         for radius in [0.3, 1.0, 2.5] {
             let table = table(valid_filter(kind, radius));
-            assert_eq!(table.len(), FILTER_BINS_MAX as usize);
+            assert_eq!(table.len(), FILTER_TABLE_SIZE as usize);
             assert_eq!(
-                (table[0].x, table[FILTER_BINS_MAX as usize - 1].y),
+                (table[0].x, table[FILTER_TABLE_SIZE as usize - 1].y),
                 (0.0, radius as f32)
             );
             assert!(table.iter().all(|bin| bin.x < bin.y), "{kind:?}");
@@ -145,7 +145,7 @@ fn the_box_filter_needs_no_table_and_a_table_gives_equal_samples() {
     );
     let mut with_table = filtered_scene(PixelFilterKind::Box, 0.51);
     with_table.sampling.filter_table = table(valid_filter(PixelFilterKind::Box, 0.5));
-    assert_eq!(with_table.specialization.filter_bins, FILTER_BINS_MAX);
+    assert_eq!(with_table.specialization.filter_bins, FILTER_TABLE_SIZE);
     for i in 0..1000 {
         let u = sobol_sample(i, [5, 6].into());
         let (plain, with_table) = (filtered(&plain, u), filtered(&with_table, u));

@@ -8,7 +8,7 @@ use wgray_render::job::WorkSplit;
 use wgray_render::records::Packed;
 
 use super::{cpu_picture, scene, write_exr, write_png};
-use crate::meshes::forms::Sheet;
+use crate::meshes::procedural::Sheet;
 use crate::pictures::{RenderMode, backend, film, reference, whole};
 use crate::render::compare;
 use crate::{adapter, sources};

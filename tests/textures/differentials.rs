@@ -16,7 +16,7 @@ use wgray_render::cpu::surface::{Surface, with_coordinates};
 use wgray_render::records::{NO_INDEX, NO_PRIMITIVE, Packed, Primitive};
 
 use super::scene;
-use crate::meshes::forms::Sheet;
+use crate::meshes::procedural::Sheet;
 
 const PERSPECTIVE: &str = "camera = { position = [0.3, -4, 1.6], look_at = [0, 0, 0.6], fov = 40 }";
 const ORTHOGRAPHIC: &str =

@@ -305,7 +305,8 @@ mod tests {
         .unwrap();
         let (first, expected) = finished(&session, 0);
 
-        // The device is lost while idle: the session detects the loss at the next move, and shows the moved image.
+        // The device is lost while the session is idle. The session detects the loss at the next move, and shows the image of
+        // the moved camera.
         session.events.send(Event::Lose).unwrap();
         session.send(Command::Move(Move::Orbit(0.1, 0.0)));
         let (second, _) = finished(&session, first);

@@ -196,7 +196,7 @@ pub fn words(width: u32, height: u32, levels: u32, is_float: bool) -> u64 {
 }
 
 /// Returns the maximum size of an environment map in 32-bit words: three words per texel (including two additional
-/// rows), two words per cell between texels, and the tables of blocks.
+/// rows), two words per cell (a square between four texels), and the tables of blocks of cells.
 pub(crate) fn environment_words(width: u32, height: u32) -> u64 {
     // The reciprocal of the power of each of at most 32 x 32 blocks, and 33 cumulative distributions of 33 words for
     // each bin of normals (17 x 17 bins, and one bin for all normals).

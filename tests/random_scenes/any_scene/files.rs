@@ -6,7 +6,7 @@ use std::sync::OnceLock;
 
 use glam::DVec3;
 
-use crate::meshes::forms::TriangleMesh;
+use crate::meshes::procedural::TriangleMesh;
 use crate::random::Random;
 use crate::textures::write_exr;
 

@@ -13,7 +13,7 @@ use wgray_render::gpu::compose::Shaders;
 use wgray_render::gpu::{Gpu, GpuInfo};
 
 impl Painter {
-    /// Returns the constants of the kernel for the selected view. They state whether the CPU renders without a kernel.
+    /// Returns what determines the kernel of the selected view, and whether the CPU renders the view without a kernel.
     pub(super) fn constants(&self, loaded: &Loaded, shaders: &Shaders) -> Constants {
         let on_cpu = self.is_faster_on_cpu(loaded) && self.is_unedited(shaders) && !self.view.is_rendered_twice();
         Constants::of(&loaded.packed, self.view, on_cpu)

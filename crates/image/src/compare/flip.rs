@@ -505,7 +505,7 @@ fn add(to: &mut [f32], from: &[f32], weight: f32) {
     }
 }
 
-/// Converts a display value to a linear value. The 256 values of an 8-bit image, also if rounded to `f32`, are looked
+/// Converts a display value to a linear value. The 256 values of an 8-bit image, even if rounded to `f32`, are looked
 /// up in the table.
 fn screen_to_linear(curve: &[f64; 256], value: f64) -> f64 {
     let step = (value * 255.0 + 0.5) as u8;

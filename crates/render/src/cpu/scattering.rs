@@ -24,7 +24,7 @@ use crate::records::{
 };
 
 /// Placeholder for the lobes of materials that are not [`PRINCIPLED`].
-pub static NO_MIXTURE: PrincipledLobes = PrincipledLobes {
+pub static NO_LOBES: PrincipledLobes = PrincipledLobes {
     diffuse: Vec3::ZERO,
     alpha: Vec2::ZERO,
     f0: Vec3::ZERO,

@@ -170,7 +170,10 @@ impl Shaders {
             }
         }
         source.append("(the functions that load BVH records)", &bvh_loaders());
-        source.append("(the tests of items of the BVH)", &dispatch::item_tests());
+        source.append(
+            "(the intersections of items of the BVH)",
+            &dispatch::item_intersections(),
+        );
         match texels {
             Some(text) => source.append("(the texels' buffers)", text),
             None => self.append(&mut source, TEXELS),

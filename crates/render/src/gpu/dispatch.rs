@@ -34,9 +34,9 @@ pub fn linear_loops() -> String {
     )
 }
 
-/// Returns the WGSL tests of a BVH item's primitive in `bvh.wgsl`: closest hit, occlusion of light samples and of a
-/// segment. Loops replace `if`, because software Vulkan skips a loop that no lane enters.
-pub fn item_tests() -> String {
+/// Returns the WGSL source of the functions with which `bvh.wgsl` intersects the primitive of a BVH item: closest hit,
+/// occlusion of light samples, and occlusion of a segment. Loops replace `if`, because software Vulkan skips a loop that no lane enters.
+pub fn item_intersections() -> String {
     functions(
         false,
         &[

@@ -75,11 +75,11 @@ mod tests {
             film: 64 << 20,
             copies: 0,
         };
-        let failed = ("a copy of it".to_string(), 64 << 20);
+        let failed = ("a copy of the film".to_string(), 64 << 20);
         let error_with_use = memory.explain(error(), Some(&failed));
         let advice = "render a crop or a smaller image, or use the CPU";
         let line = format!(
-            "gpu: out of memory: the driver cannot allocate 64.0 MiB for a copy of it in addition to 1.5 MiB for the \
+            "gpu: out of memory: the driver cannot allocate 64.0 MiB for a copy of the film in addition to 1.5 MiB for the \
              scene, 64.0 MiB for the film; {advice}"
         );
         assert_eq!(error_with_use.to_string(), line);

@@ -12,7 +12,7 @@ use super::memory::MemoryUse;
 use super::pipeline::bind_group;
 use super::texels::TexelParts;
 use crate::error::RenderError;
-use crate::records::{Camera, FILTER_BINS_MAX, Packed};
+use crate::records::{Camera, FILTER_TABLE_SIZE, Packed};
 
 /// Returns a scene's memory on a device, in bytes.
 pub fn bytes_of_scene(packed: &Packed) -> u64 {
@@ -22,7 +22,7 @@ pub fn bytes_of_scene(packed: &Packed) -> u64 {
         row_count * size_of::<UVec4>(),
         size_of_val(packed.primitives.as_slice()),
         size_of_val(packed.bounds.as_slice()),
-        FILTER_BINS_MAX as usize * size_of::<Vec4>(),
+        FILTER_TABLE_SIZE as usize * size_of::<Vec4>(),
     ];
     sizes.iter().map(|size| *size as u64).sum()
 }
@@ -50,7 +50,7 @@ impl SceneBuffers {
         let storage = BufferUsages::STORAGE;
         let (rows, nodes, meshes) = (rows(packed), node_rows(packed), mesh_rows(packed));
         let mut filter_table = packed.sampling.filter_table.clone();
-        filter_table.resize(FILTER_BINS_MAX as usize, Vec4::ZERO);
+        filter_table.resize(FILTER_TABLE_SIZE as usize, Vec4::ZERO);
         let bytes = bytes_of_scene(packed);
         let upload = || {
             let shared = previous.and_then(|previous| previous.buffers_of(&packed.textures.texels));

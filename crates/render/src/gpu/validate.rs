@@ -296,7 +296,7 @@ mod tests {
                 ("bindings.wgsl", "", rows),
                 (
                     "bindings.wgsl",
-                    "filter_table: array<vec4f, FILTER_BINS_MAX>",
+                    "filter_table: array<vec4f, FILTER_TABLE_SIZE>",
                     "filter_table: array<vec4f, 64>",
                 ),
             ],

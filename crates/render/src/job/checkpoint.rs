@@ -92,7 +92,7 @@ pub struct Checkpoint<'a> {
 const MAX_REPLACED_BYTES: u64 = 64 << 20;
 /// Interval between attempts to lock a file in use.
 const RETRY_INTERVAL: Duration = Duration::from_millis(50);
-/// Attempts before waiting is reported.
+/// Number of failed attempts after which the wait is reported.
 const QUIET_RETRIES: u32 = 20;
 
 impl<'a> Checkpoint<'a> {

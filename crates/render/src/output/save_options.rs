@@ -129,10 +129,10 @@ impl ExrCompression {
     }
 }
 
-/// Metadata of an image file: names and texts, in order.
+/// Metadata of an image file: pairs of key and text, in order.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Metadata {
-    /// [`Metadata::SOFTWARE`] names the program. Other names are 1 to 79 ASCII characters, without leading or trailing
+    /// The text of the key [`Metadata::SOFTWARE`] is the program's name. Other keys are 1 to 79 ASCII characters, without leading or trailing
     /// spaces.
     pub pairs: Vec<(String, String)>,
 }

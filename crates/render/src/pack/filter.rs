@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use glam::{DVec4, Vec4};
 
-use super::FILTER_BINS_MAX;
+use super::FILTER_TABLE_SIZE;
 use wgray_scene::{PixelFilter, PixelFilterKind};
 
 /// Quadrature steps per lobe.
@@ -41,16 +41,16 @@ fn mitchell(x: f64) -> f64 {
     value_times_6 / 6.0
 }
 
-/// Returns the [`FILTER_BINS_MAX`] equally likely bins of a filter: inner edge, outer edge, weight, 0. The bins of a
+/// Returns the [`FILTER_TABLE_SIZE`] equally likely bins of a filter: inner edge, outer edge, weight, 0. The bins of a
 /// lobe have equal integrals. The weight of the bins corrects for rounding to whole bins, and is close to 1, or to -1
 /// in a negative lobe.
 pub fn table(filter: PixelFilter) -> Vec<Vec4> {
     let lobes = lobes(filter);
     let total: f64 = lobes.iter().map(|lobe| lobe.integral().abs()).sum();
     let mut table = Vec::new();
-    let mut remaining = FILTER_BINS_MAX;
+    let mut remaining = FILTER_TABLE_SIZE;
     for (i, lobe) in lobes.iter().enumerate() {
-        let exact_count = f64::from(FILTER_BINS_MAX) * lobe.integral().abs() / total;
+        let exact_count = f64::from(FILTER_TABLE_SIZE) * lobe.integral().abs() / total;
         let bins = match i + 1 == lobes.len() {
             true => remaining,
             false => exact_count.round() as u32,

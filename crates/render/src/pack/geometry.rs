@@ -102,7 +102,8 @@ fn meshes_with_tangents(scene: &Scene) -> HashSet<*const Mesh> {
 }
 
 impl PackedBvh {
-    /// Sets the first buffer rows of the meshes in the instances. The nodes of meshes come last in the first buffer.
+    /// Stores in each instance the rows at which the lists of its mesh start. The nodes of meshes are at the end of the
+    /// buffer `nodes`; all other lists are in the buffer `meshes`.
     fn set_mesh_rows(&mut self) {
         let mut node_row = self.mesh_nodes_row();
         let mut row = 0;

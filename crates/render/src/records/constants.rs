@@ -209,8 +209,8 @@ constants! {
     /// [`Pattern::Sobol`].
     pub const SOBOL: u32 = 5;
 
-    /// Number of bins between the center and the radius of a pixel filter.
-    pub const FILTER_BINS_MAX: u32 = 128;
+    /// Number of bins of a tabulated pixel filter, from its center to its radius.
+    pub const FILTER_TABLE_SIZE: u32 = 128;
 
     /// Maximum hit distance; also the distance stored for a miss.
     pub const INFINITE_T: f32 = f32::MAX;

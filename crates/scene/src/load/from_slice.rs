@@ -115,7 +115,7 @@ impl LoadOptions {
         self
     }
 
-    /// Adds a mesh. Shapes with this file name use the mesh instead of a file.
+    /// Adds a mesh. Shapes whose `file` is `name` use the mesh instead of a file.
     #[must_use]
     pub fn with_mesh(mut self, name: impl Into<String>, mesh: impl Into<Arc<Mesh>>) -> LoadOptions {
         self.meshes.insert(name.into(), mesh.into());

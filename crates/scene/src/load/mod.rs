@@ -216,9 +216,9 @@ impl<'a> PendingScene<'a> {
         pending.with_overrides()
     }
 
-    /// Parses a text that differs from the text of `before` only in the table at the first two segments of `path`.
-    /// Parses only this table if it has its own header. Also returns the locations of the parts, unless the full text
-    /// is parsed.
+    /// Parses a text that differs from the text of `before` only in one table, which the first two segments of `path`
+    /// name. Parses only this table if it has its own header. Also returns where the tables are in the text, unless the
+    /// full text is parsed.
     pub fn change(
         text: &'a str,
         origin: &'a str,

@@ -264,7 +264,7 @@ impl FieldList<'_> {
     fn add_list(&mut self, schema: &Json, path: &mut Vec<Segment>, context: &FieldContext) {
         let Some(items) = schema.get("items") else { return };
         if let Some("number" | "integer") = items.get("type").and_then(Json::as_str) {
-            let is_color = kind_of(schema).0.starts_with(COLOR_LABEL);
+            let is_color = label_and_range(schema).0.starts_with(COLOR_LABEL);
             let kind = if is_color { Kind::Color } else { Kind::Vector };
             return self.add_field(kind, schema, path, context);
         }
@@ -457,14 +457,14 @@ fn choose<'a>(branches: &[&'a Json], context: &FieldContext) -> Option<&'a Json>
 /// Start of the label of a color kind.
 const COLOR_LABEL: &str = "linear red";
 
-/// Returns the label and the range in the title of a kind's schema.
-fn kind_of(schema: &Json) -> (&str, &str) {
+/// Splits the title of a schema into a label and a range.
+fn label_and_range(schema: &Json) -> (&str, &str) {
     let title = schema.get("title").and_then(Json::as_str).unwrap_or_default();
     title.split_once(TITLE_SEPARATOR).unwrap_or((title, ""))
 }
 
 fn unit_of(schema: &Json) -> Option<&'static str> {
-    let (label, _) = kind_of(schema);
+    let (label, _) = label_and_range(schema);
     let units = [
         ("degrees", "°"),
         ("pixels", "px"),

@@ -27,7 +27,7 @@ use crate::cpu::principled::{PrincipledLobes, principled_sample};
 use crate::cpu::ray::{Hit, Ray};
 use crate::cpu::rng::{hash4, unit_float};
 use crate::cpu::scattering::{
-    NO_MIXTURE, absorption_after, albedo, bounded, direction_allowed, facet_frame, facet_sample, facets_of, flipped,
+    NO_LOBES, absorption_after, albedo, bounded, direction_allowed, facet_frame, facet_sample, facets_of, flipped,
     has_facets, has_inside, is_delta, is_transmissive, lit_normal, local_wo, mixture_at, plain_reflection, reflection,
     shaded_normal,
 };
@@ -185,7 +185,7 @@ pub fn shade(scene: &Packed, state: &mut PathState, hit: Hit, pixel: UVec2) -> O
         principled_lobes = mixture_at(scene, &surface, material, coat_normal);
         &principled_lobes
     } else {
-        &NO_MIXTURE
+        &NO_LOBES
     };
     if s.layers != 0 {
         record_first_hit_layers(state, surface, material);

@@ -35,7 +35,7 @@ fn keys_that_the_path_tracer_ignores_cause_notes() {
         let text = VALID.replace("[render]", &format!("[render]\n{default}"));
         assert_eq!(notes(&text), Vec::<String>::new());
     }
-    // The override causes one warning, independent of its value.
+    // The override causes one warning, whatever its value.
     for count in [16, 9] {
         let overrides = Overrides {
             light_samples: Some(count),
