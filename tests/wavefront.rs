@@ -1,4 +1,4 @@
-//! The wavefront of the CPU backend traces bit-identical paths to those of the scalar integrator.
+//! Tests that the wavefront of the CPU backend and the scalar integrator trace bit-identical paths.
 
 use std::fmt::Write as _;
 use std::sync::Arc;
@@ -43,20 +43,20 @@ fn samples(packed: &Packed, step: u32, count: u32) -> Vec<(UVec2, u32)> {
         .collect()
 }
 
-fn wavefront(packed: &Packed, samples: &[(UVec2, u32)], batch: usize) -> Vec<PathBits> {
-    wavefront_with(BatchMeshes::new(packed), packed, samples, batch).0
+fn wavefront(packed: &Packed, samples: &[(UVec2, u32)], batch_size: usize) -> Vec<PathBits> {
+    wavefront_with(BatchMeshes::new(packed), packed, samples, batch_size).0
 }
 
-/// Returns the paths, and the numbers of hits shaded in lanes.
+/// Returns the bits of the paths, and the numbers of hits shaded in lanes.
 fn wavefront_with(
     meshes: BatchMeshes,
     packed: &Packed,
     samples: &[(UVec2, u32)],
-    batch: usize,
+    batch_size: usize,
 ) -> (Vec<PathBits>, LaneHits) {
     let mut wavefront = Wavefront::new(Arc::new(meshes));
     let mut paths = Vec::new();
-    for samples in samples.chunks(batch) {
+    for samples in samples.chunks(batch_size) {
         let traced = wavefront.trace(packed, samples.iter().copied());
         paths.extend(traced.iter().map(|path| bits(path_value(path), path_layers(path))));
     }
@@ -71,23 +71,24 @@ fn scalar(packed: &Packed, samples: &[(UVec2, u32)]) -> Vec<PathBits> {
     samples.iter().map(path).collect()
 }
 
-fn differing(a: &[PathBits], b: &[PathBits]) -> usize {
-    assert_eq!(a.len(), b.len());
-    a.iter().zip(b).filter(|(a, b)| a != b).count()
+fn count_differing(paths: &[PathBits], expected: &[PathBits]) -> usize {
+    assert_eq!(paths.len(), expected.len());
+    paths.iter().zip(expected).filter(|(a, b)| a != b).count()
 }
 
-/// Changes most materials to diffuse ones, which are shaded in lanes, most of them without textures and emission. Paths
-/// have at least three bounces. A third of the scenes have a pinhole camera with Sobol' points.
-fn with_diffuse_materials(mut packed: Packed, scene: usize) -> Packed {
+/// Makes most materials diffuse, so that their hits are shaded in lanes. Half of these materials get no emission, and
+/// two thirds get no textures. The maximum number of bounces is at least 3. A third of the scenes get a pinhole camera
+/// with Sobol' points.
+fn with_diffuse_materials(mut packed: Packed, scene_index: usize) -> Packed {
     packed.specialization.absorption = 0;
     packed.specialization.bounces = packed.specialization.bounces.max(3);
-    if scene % 3 == 0 {
+    if scene_index % 3 == 0 {
         let s = &mut packed.specialization;
         (s.pixel_pattern, s.pixel_side, s.filter_bins) = (SOBOL, s.pixel_samples, 0);
         (s.lens, s.panoramic, s.camera_invisible) = (0, 0, 0);
     }
     for (i, material) in packed.materials.iter_mut().enumerate() {
-        if material.kind == EMITTER || (scene + i) % 4 == 3 {
+        if material.kind == EMITTER || (scene_index + i) % 4 == 3 {
             continue;
         }
         material.kind = DIFFUSE;
@@ -97,7 +98,7 @@ fn with_diffuse_materials(mut packed: Packed, scene: usize) -> Packed {
         if i % 2 == 0 {
             material.density = 0.0;
         }
-        if (scene + i) % 4 != 2 {
+        if (scene_index + i) % 4 != 2 {
             material.lookups.y = 0;
             material.vertex_colors = NO_COLORS;
         }
@@ -105,9 +106,9 @@ fn with_diffuse_materials(mut packed: Packed, scene: usize) -> Packed {
     packed
 }
 
-/// Numbers of scenes with hits shaded in lanes, by feature.
+/// For each feature, the number of scenes that have hits shaded in lanes and the feature.
 #[derive(Debug, Default)]
-struct Lanes {
+struct LaneCoverage {
     camera: usize,
     flat: usize,
     faces: usize,
@@ -124,10 +125,10 @@ struct Lanes {
     layers: usize,
 }
 
-impl Lanes {
+impl LaneCoverage {
     fn add(&mut self, packed: &Packed, hits: LaneHits) {
         let s = &packed.specialization;
-        // Rays of other cameras are computed one by one.
+        // SIMD lanes compute only the rays of these cameras.
         let has_pinhole = s.lens == 0 && s.panoramic == 0 && s.camera_invisible == 0;
         let has_lane_camera = has_pinhole && s.pixel_pattern == SOBOL && s.filter_bins == 0;
         if hits == LaneHits::default() {
@@ -154,7 +155,7 @@ impl Lanes {
     }
 
     fn assert_all_covered(&self) {
-        let Lanes {
+        let LaneCoverage {
             camera,
             flat,
             faces,
@@ -170,17 +171,21 @@ impl Lanes {
             alpha,
             layers,
         } = *self;
-        let single = [
+        let features = [
             camera,
             one_emitter,
             several_emitters,
             light_tree,
             environment_map,
             roulette,
+            without_lights,
+            random_pattern,
+            textures,
+            alpha,
+            layers,
         ];
-        let more = [without_lights, random_pattern, textures, alpha, layers];
         assert!(flat > 30 && faces > 20 && evaluated > 30, "{self:?}");
-        assert!(single.into_iter().chain(more).all(|count| count > 5), "{self:?}");
+        assert!(features.into_iter().all(|count| count > 5), "{self:?}");
     }
 }
 
@@ -193,7 +198,7 @@ fn random_path_scenes() -> impl Iterator<Item = Packed> {
     scenes.filter(|packed| packed.integrator == Integrator::Path)
 }
 
-/// Returns a scene with a BVH over eight instances of two meshes and many spheres, in a box.
+/// Returns a scene of eight instances of a mesh and 80 spheres on a floor. The items are in a BVH.
 fn scene_with_many_items() -> Packed {
     let mut text = String::from(
         r#"
@@ -259,29 +264,32 @@ fn scene_with_many_items() -> Packed {
 #[test]
 fn random_scenes_have_the_paths_of_the_scalar_integrator() {
     let (mut scenes, mut meshes, mut alpha) = (0, 0, 0);
-    let mut lanes = Lanes::default();
+    let mut coverage = LaneCoverage::default();
     for (i, packed) in random_path_scenes().enumerate() {
         let packed = if i % 2 == 0 { packed.with_layers() } else { packed };
-        let batch = [1, 7, 64, 1024][i % 4];
+        let batch_size = [1, 7, 64, 1024][i % 4];
         let diffuse = with_diffuse_materials(packed.clone(), i);
         for (packed, step) in [(&packed, 2), (&diffuse, 3)] {
             let samples = samples(packed, step, 3);
-            let (paths, lane_hits) = wavefront_with(BatchMeshes::new(packed), packed, &samples, batch);
-            let differ = differing(&paths, &scalar(packed, &samples));
+            let (paths, lane_hits) = wavefront_with(BatchMeshes::new(packed), packed, &samples, batch_size);
+            let differing = count_differing(&paths, &scalar(packed, &samples));
             assert_eq!(
-                differ,
+                differing,
                 0,
-                "number of differing paths, of {} in scene {i}, {lane_hits:?}",
+                "differing paths of {} in scene {i}; {lane_hits:?}",
                 samples.len()
             );
-            lanes.add(packed, lane_hits);
+            coverage.add(packed, lane_hits);
         }
         scenes += 1;
         meshes += usize::from(!packed.bvh.meshes.is_empty());
         alpha += usize::from(packed.specialization.alpha_surfaces != 0);
     }
-    assert!(scenes > 100 && meshes > 20 && alpha > 5, "{scenes} {meshes} {alpha}");
-    lanes.assert_all_covered();
+    assert!(
+        scenes > 100 && meshes > 20 && alpha > 5,
+        "{scenes} scenes: {meshes} with meshes, {alpha} with alpha"
+    );
+    coverage.assert_all_covered();
 }
 
 #[test]
@@ -292,22 +300,22 @@ fn scenes_have_the_paths_of_the_scalar_integrator() {
     scenes.push(("many items".into(), scene_with_many_items()));
     for (name, packed) in scenes {
         let samples = samples(&packed, packed.camera.width.div_ceil(48), 4);
-        let differ = differing(&wavefront(&packed, &samples, 1024), &scalar(&packed, &samples));
-        assert_eq!(differ, 0, "number of differing paths, of {} in {name}", samples.len());
+        let differing = count_differing(&wavefront(&packed, &samples, 1024), &scalar(&packed, &samples));
+        assert_eq!(differing, 0, "differing paths of {} in {name}", samples.len());
     }
 }
 
 #[test]
-fn meshes_that_are_too_large_are_traced_one_by_one() {
+fn paths_do_not_depend_on_the_limit_of_triangles() {
     let packed = scene_with_many_items();
     let triangles = packed.bvh.meshes.iter().map(|mesh| mesh.triangles.len()).sum::<usize>();
     let samples = samples(&packed, 2, 2);
     let expected = scalar(&packed, &samples);
-    for (limit, is_missing) in [(triangles, false), (triangles - 1, true)] {
+    for (limit, are_missing) in [(triangles, false), (triangles - 1, true)] {
         let meshes = BatchMeshes::with_limit(&packed, limit);
-        assert_eq!(meshes.are_missing(&packed), is_missing);
+        assert_eq!(meshes.are_missing(&packed), are_missing);
         assert_eq!(
-            differing(&wavefront_with(meshes, &packed, &samples, 256).0, &expected),
+            count_differing(&wavefront_with(meshes, &packed, &samples, 256).0, &expected),
             0
         );
     }
@@ -320,13 +328,13 @@ fn changed_scenes_are_detected() {
     let samples = samples(&packed, 1, 2);
     let expected = scalar(&packed, &samples);
     let (paths, lane_hits) = wavefront_with(BatchMeshes::new(&packed), &packed, &samples, 256);
-    assert_eq!(differing(&paths, &expected), 0);
+    assert_eq!(count_differing(&paths, &expected), 0);
     let LaneHits { flat, faces, evaluated } = lane_hits;
     assert!(flat > 50 && faces > 50 && evaluated > 50, "{lane_hits:?}");
     let changed = |change: fn(&mut Packed)| {
         let mut packed = packed.clone();
         change(&mut packed);
-        differing(&wavefront(&packed, &samples, 256), &expected)
+        count_differing(&wavefront(&packed, &samples, 256), &expected)
     };
     let found = [
         changed(|packed| packed.camera.seed += 1),
@@ -341,5 +349,5 @@ fn changed_scenes_are_detected() {
         }),
         changed(|packed| packed.lighting.lights[0].center.x += 1e-5),
     ];
-    assert!(found.iter().all(|differ| *differ > 0), "{found:?}");
+    assert!(found.iter().all(|count| *count > 0), "{found:?}");
 }

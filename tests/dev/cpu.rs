@@ -1,5 +1,5 @@
-//! Scenes with a BVH: without a GPU, the CPU renders them as long as the shaders are unedited, with the bits of the
-//! kernel. While a kernel is compiled, the CPU shows the image.
+//! Rendering on the CPU in the development mode, for scenes with a BVH: without a GPU while the shaders are unedited,
+//! and on any device while a kernel is compiled. The CPU computes the bits of the kernel.
 
 use std::time::Instant;
 
@@ -54,10 +54,10 @@ fn blacken(files: &Files) {
 
 /// Waits for the finished image. Panics if any frame is not black.
 #[track_caller]
-fn wait_for_black_image(session: &TestSession, after: u64) {
+fn wait_for_black_image(session: &TestSession, old_revision: u64) {
     let start = Instant::now();
     loop {
-        if let Some(frame) = session.frame().filter(|frame| frame.header.revision > after) {
+        if let Some(frame) = session.frame().filter(|frame| frame.header.revision > old_revision) {
             assert!(
                 is_black(color(&frame.content)),
                 "the image of the unedited shaders was shown"
@@ -92,7 +92,7 @@ fn the_cpu_renders_only_unedited_shaders() {
         wait_for_black_image(&session, before);
         assert!(!is_on_cpu(&session.state()), "{}", session.state().device);
 
-        // An edit of the scene does not bring the CPU back, nor does a move of the camera.
+        // After an edit of the scene and after a move of the camera, the edited shaders still run.
         let before = session.revision();
         files.edit("scene.toml", "color = [0.8, 0.1, 0.1]", "color = [0.1, 0.8, 0.1]");
         wait_for_black_image(&session, before);
@@ -102,7 +102,7 @@ fn the_cpu_renders_only_unedited_shaders() {
         session.inner.send(Command::ResetCamera);
         files.edit("scene.toml", "color = [0.1, 0.8, 0.1]", "color = [0.8, 0.1, 0.1]");
 
-        // A comment changes no code.
+        // A comment is not an edit of the code, so the CPU renders again.
         files.write_shaders();
         files.edit(KERNEL, "\n", "\n// a comment\n");
         session.wait_for_rendered_image(&files);
@@ -134,7 +134,7 @@ fn an_error_in_the_shaders_at_the_start_leaves_the_page_without_an_image() {
 }
 
 #[test]
-fn an_error_in_the_shaders_keeps_the_last_image_which_follows_the_scene() {
+fn after_an_error_in_the_shaders_the_last_good_shaders_render_changed_scenes() {
     let files = files();
     let session = files.start();
     session.wait_for_rendered_image(&files);
@@ -145,17 +145,17 @@ fn an_error_in_the_shaders_keeps_the_last_image_which_follows_the_scene() {
     let before = session.revision();
     files.edit("scene.toml", "color = [0.8, 0.1, 0.1]", "color = [0.1, 0.8, 0.1]");
     session.wait_for_complete_image(before);
-    let with_error = session.colors();
-    assert!(!session.state().problems.is_empty(), "the error was hidden");
+    let image_with_error = session.colors();
+    assert!(!session.state().problems.is_empty(), "the error is no longer listed");
     files.write_shaders();
     session.wait_for_no_problem();
     session.wait_for_rendered_image(&files);
-    assert_eq!(session.colors(), with_error);
-    assert_ne!(with_error, unedited);
+    assert_eq!(session.colors(), image_with_error);
+    assert_ne!(image_with_error, unedited);
 }
 
 #[test]
-fn the_cpu_shows_the_image_while_the_kernel_of_a_chosen_device_is_compiled() {
+fn with_a_chosen_device_the_cpu_renders_until_the_kernel_is_compiled() {
     for integrator in ["phong", "path"] {
         let files = Files::new(&spheres(integrator));
         let session = TestSession::start_on(files.sources(), None, AdapterChoice::Gpu);
@@ -164,29 +164,29 @@ fn the_cpu_shows_the_image_while_the_kernel_of_a_chosen_device_is_compiled() {
             (is_interim && session.state().compiling && session.frame().is_some()).then_some(())
         });
         session.wait_for_rendered_image(&files);
-        session.wait("the adapter", |session| (!is_on_cpu(&session.state())).then_some(()));
+        session.wait("the kernel", |session| (!is_on_cpu(&session.state())).then_some(()));
         session.wait_for_rendered_image(&files);
-        assert_eq!(session.revision(), 1, "the kernel continues the image of the CPU");
+        assert_eq!(session.revision(), 1, "the kernel restarted the image of the CPU");
         assert!(session.state().compile_seconds.is_some());
     }
 }
 
 #[test]
-fn moved_cameras_have_the_same_bits_on_the_cpu_and_with_a_kernel() {
+fn after_a_camera_move_the_cpu_and_a_kernel_render_the_same_bits() {
     for integrator in ["phong", "path"] {
         let files = Files::new(&spheres(integrator));
         let images = [AdapterChoice::Auto, AdapterChoice::Gpu].map(|device| {
             let session = TestSession::start_on(files.sources(), None, device);
-            session.wait("the adapter", |session| {
+            session.wait("the kernel", |session| {
                 (session.frame().is_some() && !session.state().compiling).then_some(())
             });
             session.wait_for_rendered_image(&files);
             let (before, file_image) = (session.revision(), session.colors());
             session.inner.send(Command::Move(Move::Orbit(0.4, 0.1)));
             session.wait_for_complete_image(before);
-            let moved = session.colors();
-            assert_ne!(moved, file_image);
-            moved
+            let moved_image = session.colors();
+            assert_ne!(moved_image, file_image);
+            moved_image
         });
         assert_eq!(images[0], images[1]);
     }
@@ -209,7 +209,7 @@ fn the_comparison_with_the_cpu_runs_a_kernel() {
         Content::Compare(gpu, cpu) => assert_eq!([gpu, cpu], [&image; 2]),
         other => panic!("{other:?}"),
     }
-    // The image of the CPU is shown again, without being rendered again.
+    // After the comparison, the color view has the same pixels and the same device as before.
     session.inner.send(Command::View(View::Color));
     session.wait("the image", |session| {
         let frame = session.frame()?;

@@ -7,7 +7,7 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use super::source::Constants;
+use super::source::KernelChoice;
 use super::times::Times;
 use wgray_render::error::{RenderError, ShaderErrors};
 use wgray_render::gpu::compose::Shaders;
@@ -24,7 +24,7 @@ pub struct Request {
     pub shaders: Arc<Shaders>,
     /// The last shaders without errors, which are used if `shaders` have errors.
     pub fallback: Option<Arc<Shaders>>,
-    pub constants: Constants,
+    pub kernel_choice: KernelChoice,
     /// The time when the change was noticed.
     pub noticed_at: Instant,
 }
@@ -34,7 +34,7 @@ pub type Ready = (Box<Gpu>, Arc<Shaders>);
 
 pub struct BuildResult {
     pub id: u64,
-    pub constants: Constants,
+    pub kernel_choice: KernelChoice,
     pub noticed_at: Instant,
     /// `None` if the shaders have errors and no fallback exists.
     pub result: Option<Result<Ready, RenderError>>,
@@ -99,7 +99,7 @@ fn build(choice: &AdapterChoice, times: &Times, request: Request) -> BuildResult
         packed,
         shaders,
         fallback,
-        constants,
+        kernel_choice,
         noticed_at,
     } = request;
     let start = Instant::now();
@@ -131,7 +131,7 @@ fn build(choice: &AdapterChoice, times: &Times, request: Request) -> BuildResult
     });
     BuildResult {
         id,
-        constants,
+        kernel_choice,
         noticed_at,
         result,
         shader_errors,

@@ -9,8 +9,7 @@ use wgray_scene::CameraDescription;
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Move {
-    /// Orbits around the look-at point. The angles, in radians to the right and upwards, are those by which the scene
-    /// appears to rotate.
+    /// Orbits around the look-at point: the scene appears to rotate to the right and upwards, by angles in radians.
     Orbit(f64, f64),
     /// Pans: the scene appears to move to the right and upwards by these distances, in image heights.
     Pan(f64, f64),
@@ -56,7 +55,7 @@ impl Viewpoint {
     }
 }
 
-/// Returns a camera of the same kind with another viewpoint.
+/// Returns the camera with another viewpoint.
 ///
 /// # Errors
 ///
@@ -84,7 +83,7 @@ pub fn with_viewpoint(camera: &CameraDescription, viewpoint: Viewpoint) -> Resul
     }
 }
 
-/// Returns a camera that sees the full sphere from the same direction, and whose look-at point is the center of the
+/// Returns a camera that keeps the view direction of `camera`, looks at the center of a sphere, and shows the full
 /// sphere.
 pub fn framed(camera: &CameraDescription, center: DVec3, radius: f64) -> CameraDescription {
     let Pose { position, look_at, .. } = pose(camera);
@@ -104,7 +103,7 @@ pub fn framed(camera: &CameraDescription, center: DVec3, radius: f64) -> CameraD
     with_viewpoint(camera, viewpoint).unwrap_or_else(|_| camera.clone())
 }
 
-/// Minimum angle between the view direction and the vertical, in radians.
+/// Minimum angle between the view direction and the up direction or its opposite, in radians.
 const MIN_POLE_ANGLE: f64 = 0.02;
 /// Significant digits of camera coordinates, relative to the distance. Further digits have no visible effect and make
 /// the text hard to read.
@@ -159,7 +158,7 @@ pub fn moved(camera: &CameraDescription, camera_move: Move) -> CameraDescription
             let rotated_offset = DQuat::from_axis_angle(up, -x) * offset;
             let right = DQuat::from_axis_angle(up, -x) * right;
             let angle = rotated_offset.angle_between(up);
-            // A higher viewpoint has a smaller angle to the vertical.
+            // A higher viewpoint has a smaller angle to the up direction.
             let new_angle = (angle - y).clamp(MIN_POLE_ANGLE, std::f64::consts::PI - MIN_POLE_ANGLE);
             position = look_at + DQuat::from_axis_angle(right, new_angle - angle) * rotated_offset;
         }
@@ -204,11 +203,11 @@ pub fn moved(camera: &CameraDescription, camera_move: Move) -> CameraDescription
     if new.validate().is_ok() { new } else { camera.clone() }
 }
 
-/// Minimum and maximum distance to the look-at point after a dolly move, relative to the distance in the file's camera.
+/// Minimum and maximum distance to the look-at point after a dolly move, as factors of the file camera's distance.
 const DOLLY_RANGE: [f64; 2] = [0.01, 1000.0];
 
-/// Dollies like [`moved`], but within bounds. At the near bound, the look-at point moves together with the camera; at
-/// the far bound, the camera stops.
+/// Dollies like [`moved`], but within [`DOLLY_RANGE`]. At the near bound, the look-at point moves together with the
+/// camera; at the far bound, the camera stops.
 pub fn dollied(camera: &CameraDescription, amount: f64, file: &CameraDescription) -> CameraDescription {
     let extent = |camera: &CameraDescription| match camera {
         CameraDescription::Orthographic(c) => c.height,
@@ -228,7 +227,8 @@ pub fn dollied(camera: &CameraDescription, amount: f64, file: &CameraDescription
     dollied
 }
 
-/// Applies the edits of the file's camera to a moved camera; returns `None` if the result equals the file's camera.
+/// Applies the edits of the file's camera, from `old` to `new`, to a moved camera. Returns `None` if the result equals
+/// `new` or is invalid, or if the kind of camera changed.
 pub fn merged(
     moved: &CameraDescription,
     old: &CameraDescription,
@@ -312,7 +312,7 @@ pub fn entries(camera: &CameraDescription) -> Vec<(&'static str, Entry)> {
     }
 }
 
-/// Returns the settings that moves do not change, such as the lens.
+/// Returns the lens settings that differ from the defaults; moves do not change these settings.
 fn settings(camera: &CameraDescription) -> Vec<(&'static str, f64)> {
     let CameraDescription::Perspective(c) = camera else {
         return Vec::new();
@@ -331,6 +331,7 @@ fn settings(camera: &CameraDescription) -> Vec<(&'static str, f64)> {
         .collect()
 }
 
+/// The value of a camera key.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Entry {
     Number(f64),
@@ -388,8 +389,8 @@ mod tests {
             for camera in [perspective(), orthographic()] {
                 let (old, new) = (pose(&camera), pose(&moved(&camera, Move::Orbit(x, y))));
                 assert_eq!(old.look_at, new.look_at);
-                let (a, b) = (old.position.distance(old.look_at), new.position.distance(new.look_at));
-                assert!((a - b).abs() < 1e-4 * a, "{x} {y}: {a} {b}");
+                let [before, after] = [&old, &new].map(|pose| pose.position.distance(pose.look_at));
+                assert!((before - after).abs() < 1e-4 * before, "{x} {y}: {before} {after}");
                 assert_ne!(old.position, new.position);
             }
         }
@@ -480,15 +481,15 @@ mod tests {
                     "{radius}: {}",
                     new_pose.look_at
                 );
-                let (a, b) = (
-                    old_pose.look_at - old_pose.position,
-                    new_pose.look_at - new_pose.position,
+                let [old_offset, new_offset] = [&old_pose, &new_pose].map(|pose| pose.look_at - pose.position);
+                assert!(
+                    old_offset.angle_between(new_offset) < 1e-2,
+                    "{radius}: the view direction changed"
                 );
-                assert!(a.angle_between(b) < 1e-2, "{radius}: the view direction changed");
                 match new {
                     CameraDescription::Perspective(c) => {
-                        let half = (radius / b.length()).asin().to_degrees();
-                        assert!(2.0 * half < c.fov && 2.0 * half > 0.6 * c.fov, "{radius}: {half}");
+                        let angle = 2.0 * (radius / new_offset.length()).asin().to_degrees();
+                        assert!(angle < c.fov && angle > 0.6 * c.fov, "{radius}: {angle}");
                     }
                     CameraDescription::Orthographic(c) => assert_eq!(c.height, 2.5 * radius),
                     CameraDescription::Panorama(_) => unreachable!(),

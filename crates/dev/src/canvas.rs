@@ -23,7 +23,7 @@ use super::pixel_values::means;
 const DISPATCH_DURATION: Duration = Duration::from_millis(30);
 /// Target render time of a coarse image; including the display time, about 20 images are shown per second.
 const COARSE_DURATION: Duration = Duration::from_millis(30);
-/// Pixels of a coarse image while the speed is unknown.
+/// Number of pixels of a coarse image while the speed is unknown.
 const COARSE_PIXELS: f64 = 10_000.0;
 /// Maximum scale of a coarse image.
 const MAX_SCALE: u32 = 32;
@@ -39,15 +39,15 @@ pub struct Canvas {
     scene: Packed,
     /// The camera of the full-size image.
     camera: Camera,
-    /// The scale of the finished film; above 1 if the image is too large to display.
+    /// The scale of the finished film; above 1 for a scaled preview, or if the image is too large to display.
     final_scale: u32,
     /// True if the CPU also renders the image, for [`View::Compare`].
     compare: bool,
     stage: Stage,
     steps: Steps,
-    /// The most recent lower-resolution films: of the GPU, and, for [`View::Compare`], of the CPU.
+    /// The most recent films of a lower resolution: the engine's film and, for [`View::Compare`], the CPU's film.
     coarser: Option<(Film, Option<Film>)>,
-    /// The CPU's film of this stage.
+    /// For [`View::Compare`], the CPU's film of this stage.
     cpu: Film,
     /// The first hits of the rows rendered so far, top row first.
     hits: Vec<FirstHit>,
@@ -115,8 +115,8 @@ impl Canvas {
         self.engine.is_cpu()
     }
 
-    /// Continues the image of the CPU on an adapter that computes the same bits and that has this scene. If the film
-    /// does not fit the adapter, renders the image again.
+    /// Continues the image of the CPU on an adapter that already has this scene and computes the bits of the CPU. If
+    /// the adapter needs a different scale of the finished film, restarts the image.
     pub fn continue_on(&mut self, gpu: Box<Gpu>, view: View) -> Result<(), RenderError> {
         let film = self.engine.backend().film()?;
         self.engine = Engine::Gpu(gpu);
@@ -181,7 +181,7 @@ impl Canvas {
         let shows_film = self.hit_layer(view).is_none();
         let is_empty = self.stage.scale == self.final_scale && self.steps.samples() == 0;
         let backends_change = self.compare != view.is_rendered_twice();
-        // The film already contains this view.
+        // The film may already contain a result for this view.
         self.has_result = shows_film && self.stage.scale == self.final_scale && !is_empty;
         if shows_film && (backends_change || is_empty) {
             self.restart(self.camera, view)
@@ -300,7 +300,7 @@ impl Canvas {
     }
 
     fn step_film(&mut self) -> Result<bool, RenderError> {
-        let passes = self.steps.samples();
+        let samples_before = self.steps.samples();
         if self.compare {
             let film = std::mem::replace(&mut self.cpu, Film::new(Region::whole(0, 0)));
             let mut cpu = Cpu::new(&self.scene);
@@ -317,13 +317,13 @@ impl Canvas {
         }
         self.stage.has_result = true;
         if self.stage.scale > self.final_scale && self.steps.is_done() {
-            let gpu = self.engine.backend().film()?;
-            self.coarser = Some((gpu, self.compare.then(|| self.cpu.clone())));
+            let film = self.engine.backend().film()?;
+            self.coarser = Some((film, self.compare.then(|| self.cpu.clone())));
             self.begin((self.stage.scale / 4).max(self.final_scale))?;
             return Ok(true);
         }
-        let first_pass = passes == 0 && self.steps.samples() > 0;
-        Ok(first_pass || self.steps.is_done())
+        let is_first_sample = samples_before == 0 && self.steps.samples() > 0;
+        Ok(is_first_sample || self.steps.is_done())
     }
 
     /// Returns the current image with its width and height.
@@ -342,27 +342,31 @@ impl Canvas {
             };
             return Ok((Content::Samples(counts, self.scene.sampling.pixel_samples), size));
         }
-        let film;
+        let stage_film;
         let coarser = self.coarser.as_ref();
-        // Until the stage has a result, the lower-resolution film is sent.
-        let (gpu, cpu, coarser) = match coarser.filter(|_| !self.stage.has_result) {
-            Some((gpu, cpu)) => (gpu, cpu.as_ref(), None),
+        // Until the stage has a result, the film of the lower resolution is shown.
+        let (film, cpu_film, coarser) = match coarser.filter(|_| !self.stage.has_result) {
+            Some((film, cpu_film)) => (film, cpu_film.as_ref(), None),
             None => {
-                film = self.engine.backend().film()?;
-                (&film, self.compare.then_some(&self.cpu), coarser)
+                stage_film = self.engine.backend().film()?;
+                (&stage_film, self.compare.then_some(&self.cpu), coarser)
             }
         };
-        let size = [gpu.region.width(), gpu.region.height()];
+        let size = [film.region.width(), film.region.height()];
         let has_samples = |y| self.steps.samples_of_row(y) > 0;
-        let coarser_gpu = coarser.map(|(gpu, _)| gpu);
+        let coarser_film = coarser.map(|(film, _)| film);
         if let Some(aov) = view.film_layer(self.scene.integrator) {
-            return Ok((Content::Film(FilmLayer::of(aov, gpu, coarser_gpu, &has_samples)), size));
+            return Ok((
+                Content::Film(FilmLayer::of(aov, film, coarser_film, &has_samples)),
+                size,
+            ));
         }
-        let colors = means(gpu, coarser_gpu, &has_samples);
-        Ok(match cpu.filter(|_| view.is_rendered_twice()) {
-            Some(cpu) => {
-                let coarser = coarser.and_then(|(_, cpu)| cpu.as_ref());
-                (Content::Compare(colors, means(cpu, coarser, &has_samples)), size)
+        let colors = means(film, coarser_film, &has_samples);
+        Ok(match cpu_film.filter(|_| view.is_rendered_twice()) {
+            Some(cpu_film) => {
+                let coarser_cpu_film = coarser.and_then(|(_, cpu_film)| cpu_film.as_ref());
+                let cpu_colors = means(cpu_film, coarser_cpu_film, &has_samples);
+                (Content::Compare(colors, cpu_colors), size)
             }
             None => (Content::Color(colors), size),
         })
@@ -379,7 +383,7 @@ impl Canvas {
         Content::Hits(aov, hits)
     }
 
-    /// Returns width and height of the full-size image.
+    /// Returns the width and height of the full-size image.
     pub fn size(&self) -> [u32; 2] {
         [self.camera.width, self.camera.height]
     }

@@ -1,4 +1,4 @@
-//! Errors in the form in which the terminal and the page show them.
+//! Errors, as the terminal and the page show them.
 
 use std::path::{Path, absolute};
 

@@ -15,7 +15,7 @@ pub struct DisplayOverrides {
     pub exposure: Option<f64>,
     /// The view transform.
     pub transform: Option<ViewTransform>,
-    /// Displays the luminance as false colors.
+    /// True if the luminance is displayed as false colors.
     pub false_color: bool,
 }
 
@@ -48,7 +48,7 @@ pub struct DisplaySettings {
     pub allow_negative: bool,
     /// The view transform and the exposure.
     pub view: ViewSettings,
-    /// Displays the luminance as false colors.
+    /// True if the luminance is displayed as false colors.
     pub false_color: bool,
 }
 

@@ -44,15 +44,15 @@ pub fn exr_file(frame: &Frame) -> io::Result<Vec<u8>> {
             .channels()
             .iter()
             .filter_map(|channel| {
-                let samples = match channel {
+                let values = match channel {
                     Channel::Float(_, value) => FlatSamples::F32(hits.iter().map(value).collect()),
                     Channel::Integer(_, value) => FlatSamples::U32(hits.iter().map(value).collect()),
-                    Channel::ShadingNormal(_, part) => {
-                        FlatSamples::F32(hits.iter().map(|hit| hit.shading_normal[*part]).collect())
+                    Channel::ShadingNormal(_, component) => {
+                        FlatSamples::F32(hits.iter().map(|hit| hit.shading_normal[*component]).collect())
                     }
                     Channel::Mean(..) | Channel::Count(_) | Channel::Variance(..) => return None, // channels of films
                 };
-                Some(AnyChannel::new(channel.name(), samples))
+                Some(AnyChannel::new(channel.name(), values))
             })
             .collect(),
     };
@@ -90,7 +90,7 @@ mod tests {
     use wgray_render::output::Aov;
 
     #[test]
-    fn a_layer_of_the_film_has_the_channels_of_a_render() {
+    fn a_downloaded_film_layer_has_the_channels_of_a_rendered_file() {
         for (aov, names) in [
             (Aov::Direct, ["direct.B", "direct.G", "direct.R"]),
             (

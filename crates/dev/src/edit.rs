@@ -50,7 +50,7 @@ pub fn edited_in(pieces: &Pieces, path: &KeyPath, value: Option<&Value>) -> Resu
 pub struct Layout<'a>(Document<&'a str>);
 
 impl<'a> Layout<'a> {
-    /// Parses a source; returns `None` if it is not TOML.
+    /// Parses a text; returns `None` if the text is not TOML.
     pub fn of(text: &'a str) -> Option<Layout<'a>> {
         Document::parse(text).ok().map(Layout)
     }
@@ -71,6 +71,7 @@ impl<'a> Layout<'a> {
         found
     }
 
+    /// Returns the range of the value at a path.
     pub fn value(&self, path: &KeyPath) -> Option<Range<usize>> {
         let node_path = NodePath::along(self.0.as_table(), &path.0);
         match node_path.nodes.last()? {

@@ -98,7 +98,7 @@ mod tests {
     }
 
     #[test]
-    fn every_pixel_is_counted_once() {
+    fn every_positive_value_is_counted_once() {
         let mut colors = vec![[1.0, 0.0, 0.25]; 200_000];
         colors.push([f32::NAN, 2.0, 0.25]);
         let histogram = Histogram::of(&colors, 0.5);

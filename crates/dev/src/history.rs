@@ -62,6 +62,7 @@ pub struct History {
 }
 
 impl History {
+    /// Adds a step that changed the text from `before` to `after`. Merges the steps of a gesture that change one key.
     pub fn add(&mut self, step: Step, before: &str, after: &str) {
         self.undone.clear();
         let is_same = |last: &Step| last.gesture.is_some() && last.gesture == step.gesture && last.key == step.key;

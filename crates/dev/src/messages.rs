@@ -226,7 +226,7 @@ pub struct State {
 pub struct Notice {
     /// The number of the notice.
     pub number: u64,
-    /// The command that the notice answers, as a count like [`State::executed`].
+    /// The number of the command that the notice answers, as counted by [`State::executed`].
     pub command: u64,
     /// The text; empty if the previous notice no longer applies.
     pub text: String,

@@ -1,4 +1,5 @@
-//! The object at a pixel or with a name, and its part of the scene file: source lines, values, and allowed values.
+//! Queries for the object at a pixel or with a name: the tables of the object in the scene file, with their source
+//! lines, values and allowed values.
 
 use std::sync::Arc;
 
@@ -16,7 +17,7 @@ use wgray_scene::{Description, Field, KeyPath, Names, Pieces, Segment, ShapeDesc
 const MAX_LINES: usize = 40;
 /// Maximum number of listed objects.
 const MAX_LISTED: usize = 50;
-/// Maximum number of tables that are shown with an object: materials, textures, a mesh.
+/// Maximum number of tables of an object, including its materials, textures and mesh.
 const MAX_GROUPS: usize = 12;
 
 /// The scene and the camera, for queries about objects.
@@ -67,7 +68,7 @@ pub struct Group {
     pub fields: Vec<Field>,
 }
 
-/// The objects whose names contain a query.
+/// The objects whose name, type, file or material contains a query.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct ObjectList {
     /// The query.
@@ -215,7 +216,7 @@ impl SceneView {
                 (Value::Array(mut list), Segment::Index(i)) if *i < list.len() => Some(list.swap_remove(*i)),
                 _ => None,
             });
-        let table = table.unwrap_or(Value::Table(Table::new())); // a section that the file does not have
+        let table = table.unwrap_or(Value::Table(Table::new())); // the section is not in the file
         let layout = Layout::of(&piece.text)?;
         let lines = layout.extent(&piece.path).map(|range| {
             let start = piece.place(range.start);
@@ -257,18 +258,18 @@ impl SceneView {
         })
     }
 
-    /// Returns the objects whose names contain a string, in the order of the file's sections.
-    pub fn objects(&self, part: &str) -> ObjectList {
+    /// Returns the objects whose name, type, file or material contains the query, section by section.
+    pub fn objects(&self, query: &str) -> ObjectList {
         let description = &self.loaded.description;
-        let lowercase_part = part.to_lowercase();
+        let lowercase_query = query.to_lowercase();
         let mut list = ObjectList {
-            part: part.to_owned(),
+            part: query.to_owned(),
             objects: Vec::new(),
             more: 0,
         };
         let mut add = |name: &dyn Fn() -> String, details: String| {
             let name = name();
-            if format!("{name} {details}").to_lowercase().contains(&lowercase_part) {
+            if format!("{name} {details}").to_lowercase().contains(&lowercase_query) {
                 match list.objects.len() < MAX_LISTED {
                     true => list.objects.push((name, details)),
                     false => list.more += 1,
@@ -302,7 +303,7 @@ impl SceneView {
     }
 }
 
-/// Returns the number of path segments of the object that contains a field, whose path has `path_len` segments.
+/// Returns the length of the path of the object that contains a field. `path_len` is the length of the field's path.
 fn object_path_len(path_len: usize, field: &Field) -> usize {
     let name_len = field.name.parse::<KeyPath>().map_or(0, |name| name.0.len());
     path_len.saturating_sub(name_len)
@@ -344,7 +345,7 @@ fn exists(description: &Description, path: &KeyPath) -> bool {
     }
 }
 
-/// Returns the paths of the objects that a table refers to: materials, textures, a mesh.
+/// Returns the paths of the tables that a table refers to: materials, textures, a mesh.
 fn references(group: &Group) -> Vec<KeyPath> {
     let mut paths = Vec::new();
     for field in &group.fields {
@@ -384,7 +385,8 @@ fn lines(text: &str, start: usize, end: usize) -> (usize, String, usize) {
     )
 }
 
-/// Returns the name of the object in the file that contains the scene's shape with this index, and a note.
+/// Returns the name of the object in the file that contains the scene's shape, instance or light with this index, and
+/// a note if the object is a glTF file.
 fn name_of_shape(loaded: &Loaded, index: usize) -> (String, Option<String>) {
     let description = &loaded.description;
     let gltf: Vec<(usize, bool)> = (description.shapes.iter().enumerate())

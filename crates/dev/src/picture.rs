@@ -39,7 +39,7 @@ pub enum View {
     Albedo,
     /// Light after one reflection.
     Direct,
-    /// Light after more reflections.
+    /// Light after two or more reflections.
     Indirect,
     /// Light without reflections.
     Emission,
@@ -85,12 +85,12 @@ impl View {
         self.aov().filter(|aov| aov.source(integrator) == AovSource::FirstHit)
     }
 
-    /// Returns the film layer that the view shows, if it is not color.
+    /// Returns the film layer that the view shows, if any.
     pub fn film_layer(self, integrator: Integrator) -> Option<Aov> {
         self.aov().filter(|aov| aov.source(integrator) != AovSource::FirstHit)
     }
 
-    /// Returns the layer of `wgray render --aov`.
+    /// Returns the layer of `wgray render --aov` that the view shows, if any.
     pub fn aov(self) -> Option<Aov> {
         match self {
             View::Normal => Some(Aov::Normal),
@@ -118,7 +118,7 @@ impl View {
 /// The values of a frame.
 #[derive(Clone, Debug)]
 pub enum Content {
-    /// [`View::Color`]
+    /// [`View::Color`]: the linear colors.
     Color(Pixels),
     /// [`View::Samples`]: the sample counts, and the final number of samples.
     Samples(Vec<u32>, u32),
@@ -150,7 +150,7 @@ impl Content {
 pub struct Header {
     /// The number of the frame.
     pub number: u64,
-    /// The number of changes of scene, shaders and camera up to this frame.
+    /// Number of changes of the image up to this frame, for example of the scene, the camera or the view.
     pub revision: u64,
     /// The view.
     pub view: View,
@@ -160,7 +160,8 @@ pub struct Header {
     pub height: u32,
     /// Width and height of the transmitted images.
     pub sent: [u32; 2],
-    /// Width and height of the finished image; smaller than the full size if the full size is too large to display.
+    /// Width and height of the finished image; less than the full size for a scaled preview, or if the full size is too
+    /// large to display.
     pub finest: [u32; 2],
     /// Current number of samples per pixel.
     pub samples: u32,
@@ -193,17 +194,17 @@ pub struct Header {
 pub struct Frame {
     /// The metadata and statistics of the images.
     pub header: Header,
-    /// PNG files, one for each part of the header.
+    /// PNG files, one for each entry of [`Header::parts`].
     pub pictures: Vec<Vec<u8>>,
     /// The pixel values of the images.
     pub content: Content,
-    /// The names of the shapes and materials that the values refer to by index.
+    /// The shapes and materials that the values refer to by index.
     pub names: Names,
     /// The display settings.
     pub display: DisplaySettings,
 }
 
-/// The names of shapes and materials in the scene file, for display.
+/// The numbers of shapes and instances and the names of materials, to name what a pixel shows.
 #[derive(Clone, Debug, Default)]
 pub struct Names {
     /// Number of shapes; the indices of mesh instances follow.
@@ -333,12 +334,12 @@ impl Frame {
             (_, Some(light)) => format!("lights[{light}]"),
         };
         let mut values = match aov {
-            Aov::Normal => values("normal", hit.normal.into()),
-            Aov::ShadingNormal => values("shading normal", hit.shading_normal.into()),
-            Aov::Depth => values("depth", [hit.depth]),
-            Aov::Barycentric => values("barycentric", hit.barycentric.into()),
+            Aov::Normal => value_and_bits("normal", hit.normal.into()),
+            Aov::ShadingNormal => value_and_bits("shading normal", hit.shading_normal.into()),
+            Aov::Depth => value_and_bits("depth", [hit.depth]),
+            Aov::Barycentric => value_and_bits("barycentric", hit.barycentric.into()),
             Aov::Primitive if hit.primitive != hit.shape => vec![("triangle", hit.primitive.to_string())],
-            Aov::Uv => values("uv", hit.uv.into()),
+            Aov::Uv => value_and_bits("uv", hit.uv.into()),
             _ => Vec::new(),
         };
         values.push(("on", shape));
@@ -352,11 +353,11 @@ impl Frame {
     }
 }
 
-fn values<const N: usize>(name: &'static str, values: [f32; N]) -> Vec<(&'static str, String)> {
+fn value_and_bits<const N: usize>(name: &'static str, values: [f32; N]) -> Vec<(&'static str, String)> {
     vec![(name, numbers(values)), ("bits", bits(values))]
 }
 
-/// Returns the differences multiplied by `gain`; any difference yields at least a visible minimum.
+/// Returns the differences multiplied by `gain`, as RGB bytes. Small differences are raised to a visible minimum.
 fn amplified(first: &Pixels, second: &Pixels, gain: f32) -> Vec<u8> {
     const MIN_DIFFERENCE: f32 = 0.2;
     let pairs: Vec<_> = first

@@ -28,7 +28,7 @@ impl Reference {
     ///
     /// # Errors
     ///
-    /// The message for the sender.
+    /// A message for the viewer who uploaded the file.
     pub fn decode(name: String, bytes: Vec<u8>, view: ViewSettings) -> Result<Reference, String> {
         let picture = Picture::decode(bytes, MAX_PIXELS).map_err(|error| format!("{name}: {error}"))?;
         let colors = picture
@@ -56,10 +56,14 @@ impl Reference {
         })
     }
 
-    /// Returns the pixels at a displayed size; `None` if the size of the reference is not `full_size`.
-    pub fn at(&self, full_size: [u32; 2], size: [u32; 2]) -> Option<Pixels> {
-        let Pixels { width, height, .. } = *self.pixels;
-        if [width, height] != full_size {
+    /// Returns the width and height.
+    pub fn size(&self) -> [u32; 2] {
+        [self.pixels.width, self.pixels.height]
+    }
+
+    /// Returns the pixels scaled to the displayed `size`; `None` if the size of the reference is not `full_size`.
+    pub fn scaled(&self, full_size: [u32; 2], size: [u32; 2]) -> Option<Pixels> {
+        if self.size() != full_size {
             return None;
         }
         if size == full_size {
@@ -96,7 +100,7 @@ pub struct ErrorMeasures {
     pub frame: u64,
     /// The root mean square error of the linear values; `None` if the error is not finite.
     pub rmse: Option<f64>,
-    /// HDR-FLIP, as measured by `wgray diff`.
+    /// The mean HDR-FLIP error, as in `wgray diff`; `None` if the error is not finite.
     pub flip: Option<f64>,
 }
 
@@ -146,18 +150,18 @@ mod tests {
     }
 
     #[test]
-    fn a_png_is_decoded_to_the_displayed_light() {
+    fn a_decoded_png_keeps_its_bytes_and_invalid_files_are_rejected() {
         for transform in [ViewTransform::Gamma22, ViewTransform::Srgb] {
             let view = ViewSettings {
                 transform,
                 ..ViewSettings::default()
             };
-            let light = [[0.0, 0.001, 0.18], [0.5, 0.75, 1.0]];
-            let bytes: Vec<u8> = light.iter().flat_map(|color| view.rgb8(*color)).collect();
+            let colors = [[0.0, 0.001, 0.18], [0.5, 0.75, 1.0]];
+            let bytes: Vec<u8> = colors.iter().flat_map(|color| view.rgb8(*color)).collect();
             let file = image::in_memory(2, 1, &bytes).unwrap();
             let reference = Reference::decode("a.png".to_owned(), file, view).unwrap();
-            let colors = reference.pixels.colors.iter();
-            let displayed: Vec<u8> = colors.flat_map(|color| view.rgb8(*color)).collect();
+            let decoded = reference.pixels.colors.iter();
+            let displayed: Vec<u8> = decoded.flat_map(|color| view.rgb8(*color)).collect();
             assert_eq!(displayed, bytes, "{transform:?}");
         }
         let error = Reference::decode("a.png".to_owned(), b"not an image".to_vec(), ViewSettings::default());
@@ -177,13 +181,13 @@ mod tests {
             name: "r".to_owned(),
             pixels: Arc::new(pixels(colors, 4)),
         };
-        assert_eq!(reference.at([4, 4], [4, 4]).unwrap(), *reference.pixels);
-        let half = reference.at([4, 4], [2, 2]).unwrap();
+        assert_eq!(reference.scaled([4, 4], [4, 4]).unwrap(), *reference.pixels);
+        let half = reference.scaled([4, 4], [2, 2]).unwrap();
         assert_eq!(
             half.colors.iter().map(|color| color[0]).collect::<Vec<_>>(),
             [0.0, 2.0, 8.0, 10.0]
         );
-        assert!(reference.at([4, 5], [4, 5]).is_none());
+        assert!(reference.scaled([4, 5], [4, 5]).is_none());
     }
 
     #[test]

@@ -140,7 +140,7 @@ mod tests {
     }
 
     #[test]
-    fn inline_tables_and_absent_keys_are_written_too() {
+    fn inline_tables_and_absent_keys_are_written() {
         let text =
             "image = { width = 4, height = 4 }\ncamera = { position = [0, 1, 0], look_at = [0, 0, 0], fov = 40 } # c\n";
         let new = camera("position = [0, 1, 2]\nlook_at = [0, 0, 0]\nup = [0, 1, 0]\nfov = 40");

@@ -53,7 +53,7 @@ impl Listener {
     ///
     /// # Errors
     ///
-    /// Addresses that do not exist, are not on this machine or are in use.
+    /// The address does not exist, is not on this machine or is in use.
     pub fn open(address: &str) -> io::Result<Listener> {
         let with_address = |error: io::Error| io::Error::new(error.kind(), format!("{address}: {error}"));
         let addresses: Vec<SocketAddr> = address.to_socket_addrs().map_err(with_address)?.collect();
@@ -72,7 +72,7 @@ impl Listener {
         self.listener.local_addr()
     }
 
-    /// Serves a session; only returns on errors.
+    /// Serves a session; returns only on errors.
     ///
     /// # Errors
     ///
@@ -98,7 +98,7 @@ impl Listener {
 }
 
 /// A connection on which no complete request header has arrived yet.
-struct Waiting {
+struct WaitingConnection {
     task: AbortHandle,
     has_header: Arc<AtomicBool>,
 }
@@ -107,7 +107,7 @@ struct Waiting {
 /// connection replaces the connection that has waited longest for a request.
 async fn answer_all(listener: &tokio::net::TcpListener, routes: Router) -> io::Result<()> {
     let requests = Arc::new(Semaphore::new(MAX_REQUESTS));
-    let mut waiting: VecDeque<Waiting> = VecDeque::new();
+    let mut waiting: VecDeque<WaitingConnection> = VecDeque::new();
     loop {
         let Ok((stream, _)) = listener.accept().await else {
             tokio::time::sleep(Duration::from_millis(50)).await; // too many open files, or the client disconnected
@@ -137,7 +137,7 @@ async fn answer_all(listener: &tokio::net::TcpListener, routes: Router) -> io::R
             drop(permit);
         });
         let task = task.abort_handle();
-        waiting.push_back(Waiting { task, has_header });
+        waiting.push_back(WaitingConnection { task, has_header });
     }
 }
 

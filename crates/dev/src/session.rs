@@ -70,7 +70,7 @@ impl Viewers {
     /// Adds a viewer.
     pub fn enter(&self) -> Viewer {
         self.count.fetch_add(1, Ordering::SeqCst);
-        let _ = self.events.try_send(Event::Viewers); // a full inbox wakes the painter as well
+        let _ = self.events.try_send(Event::Viewers); // if the queue is full, its events wake the painter
         Viewer(self.clone())
     }
 }
@@ -231,7 +231,7 @@ fn run(mut painter: Painter, inbox: Receiver<Event>) {
             None => painter.render_step(),
         }
     }
-    // Dropped before the painter, which waits for other threads: they may wait for a free slot in the inbox.
+    // The inbox is dropped first: the painter waits for its threads, which may be waiting for a free slot in the inbox.
     drop(inbox);
 }
 
@@ -266,12 +266,12 @@ mod tests {
         panic!("timeout while waiting for {name}");
     }
 
-    fn finished(session: &Session, after: u64) -> (u64, Pixels) {
+    fn finished(session: &Session, old_revision: u64) -> (u64, Pixels) {
         wait("an image", || {
             let frame = session.frames.borrow().clone()?;
             let header = &frame.header;
             match &frame.content {
-                Content::Color(pixels) if header.done && header.revision > after => {
+                Content::Color(pixels) if header.done && header.revision > old_revision => {
                     Some((header.revision, pixels.clone()))
                 }
                 _ => None,
@@ -305,8 +305,8 @@ mod tests {
         .unwrap();
         let (first, expected) = finished(&session, 0);
 
-        // The device is lost while the session is idle. The session detects the loss at the next move, and shows the image of
-        // the moved camera.
+        // The device is lost while the session is idle. The session detects the loss at the next move, and shows the
+        // image of the moved camera.
         session.events.send(Event::Lose).unwrap();
         session.send(Command::Move(Move::Orbit(0.1, 0.0)));
         let (second, _) = finished(&session, first);

@@ -56,7 +56,7 @@ impl Sliders {
             .unwrap_or(slider.default)
     }
 
-    /// Returns the values as bits, in the form that a kernel reads.
+    /// Returns the values as the bits that a kernel reads.
     pub fn bits(&self, sliders: &[Slider]) -> Vec<u32> {
         sliders.iter().map(|slider| slider.bits(self.value(slider))).collect()
     }

@@ -46,7 +46,7 @@ pub struct Loaded {
 }
 
 impl Loaded {
-    /// Packs a scene. Parts that equal those of `previous`, an earlier scene, are not packed again.
+    /// Packs a scene. Reuses the packed data of `previous`, an earlier scene, where the two scenes are equal.
     pub fn new(text: String, scene: Scene, description: Description, previous: Option<&Loaded>) -> Loaded {
         let shared = previous.filter(|previous| PackedShading::is_shared(&previous.scene, &scene));
         let shading = match (shared, previous) {
@@ -94,25 +94,25 @@ fn differ_only_in_camera(previous: &Loaded, scene: &Scene) -> bool {
     moved == *scene && previous.packed.origin == pack::origin(&scene.camera)
 }
 
-/// The properties of a scene and a view that determine a kernel.
+/// The properties of a scene and a view that determine the kernel, and whether the CPU renders instead.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Constants {
-    /// The override constants.
+pub struct KernelChoice {
+    /// The values of the kernel's override constants.
     pub specialization: Specialization,
     pub integrator: Integrator,
     /// True if sampling is adaptive.
     pub adaptive: bool,
-    /// True if the CPU renders the scene, without a kernel.
+    /// True if the CPU renders the scene instead of a kernel.
     pub on_cpu: bool,
 }
 
-impl Constants {
-    pub fn of(packed: &Packed, view: View, on_cpu: bool) -> Constants {
+impl KernelChoice {
+    pub fn of(packed: &Packed, view: View, on_cpu: bool) -> KernelChoice {
         let integrator = packed.integrator;
         let is_sample_layer = view
             .aov()
             .is_some_and(|aov| aov.source(integrator) == AovSource::Samples);
-        Constants {
+        KernelChoice {
             specialization: Specialization {
                 layers: (is_sample_layer && integrator.has_layers()).into(),
                 ..packed.specialization
@@ -123,7 +123,7 @@ impl Constants {
         }
     }
 
-    /// Returns the view that this kernel shows if `view` is selected: the color view if `view` needs a different kernel.
+    /// Returns the view to show if `view` is selected: the color view if `view` needs a different kernel.
     pub fn supported_view(&self, view: View) -> View {
         match view.aov().map(|aov| aov.source(self.integrator)) {
             Some(AovSource::Samples) if self.specialization.layers == 0 => View::Color,
@@ -133,15 +133,15 @@ impl Constants {
         }
     }
 
-    /// Returns whether two kernels of a scene differ only in the views that they support.
-    pub fn differ_only_in_view(&self, other: &Constants) -> bool {
-        let without_view = |constants: &Constants| Constants {
+    /// Returns whether two kernel choices differ only in the supported views. Ignores whether the CPU renders.
+    pub fn differs_only_in_views(&self, other: &KernelChoice) -> bool {
+        let without_view = |kernel_choice: &KernelChoice| KernelChoice {
             specialization: Specialization {
                 layers: 0,
-                ..constants.specialization
+                ..kernel_choice.specialization
             },
             on_cpu: false,
-            ..*constants
+            ..*kernel_choice
         };
         without_view(self) == without_view(other)
     }
@@ -335,7 +335,7 @@ mod tests {
         ]
     ";
 
-    /// Returns a Radiance file.
+    /// Returns an image file in the Radiance format.
     fn hdr(width: usize, height: usize) -> Vec<u8> {
         let mut file = format!("#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y {height} +X {width}\n").into_bytes();
         file.extend((0..width * height).flat_map(|i| [10 * i as u8 + 5, 40, 90, 128]));
@@ -378,7 +378,7 @@ mod tests {
     }
 
     #[test]
-    fn changed_scenes_are_packed_like_new_ones_and_share_equal_texels() {
+    fn changed_scenes_are_packed_like_new_scenes_and_share_equal_texels() {
         let files = Files::new();
         let first = files.read(SCENE, None);
         let loaded = first.scene.clone().unwrap();
@@ -399,8 +399,8 @@ mod tests {
             let changed = files.read(&edited(old, new), Some(&first)).scene.unwrap();
             assert!(changed.packed == pack(&changed.scene).without_layers(), "{new}");
             assert!(changed.packed != loaded.packed, "{new}");
-            let [a, b] = [&changed, &loaded].map(|loaded| &loaded.packed.textures.texels);
-            assert_eq!(Arc::ptr_eq(a, b), is_shared, "{new}");
+            let [new_texels, old_texels] = [&changed, &loaded].map(|loaded| &loaded.packed.textures.texels);
+            assert_eq!(Arc::ptr_eq(new_texels, old_texels), is_shared, "{new}");
         }
     }
 
@@ -412,7 +412,8 @@ mod tests {
         assert!(broken.scene.is_err());
         let still_broken = files.read(&edited("radius = 1", "radius = -2"), Some(&broken));
         let fixed = files.read(&edited("radius = 1", "radius = 3"), Some(&still_broken));
-        let [a, b] = [first, fixed].map(|snapshot| Arc::clone(&snapshot.scene.unwrap().packed.textures.texels));
-        assert!(Arc::ptr_eq(&a, &b));
+        let [first_texels, fixed_texels] =
+            [first, fixed].map(|snapshot| Arc::clone(&snapshot.scene.unwrap().packed.textures.texels));
+        assert!(Arc::ptr_eq(&first_texels, &fixed_texels));
     }
 }

@@ -10,7 +10,7 @@ use wgray_render::gpu::Dispatch;
 
 /// Number of measurements over which the median is computed.
 const MEDIAN_COUNT: usize = 33;
-/// The period over which `Time::share` is computed.
+/// The period over which [`Time::share`] is computed.
 const WINDOW: Duration = Duration::from_secs(1);
 /// Maximum number of measurements within this period.
 const MAX_RECENT: usize = 2048;

@@ -47,7 +47,7 @@ enum Query {
     Pixel([u32; 2]),
     Object([u32; 2]),
     Inspect(Inspect),
-    /// Requests the objects whose names contain the string.
+    /// Requests the objects whose name, type, file or material contains the string.
     Objects(String),
 }
 
@@ -77,7 +77,7 @@ impl Request {
         };
         let name =
             name.ok_or("a message must be the name of a command, or an object with that name as its only key")?;
-        // The text is parsed, because a JSON value hides duplicate keys.
+        // The text is parsed again, because the JSON value does not contain duplicate keys.
         let parsed = match name.as_str() {
             "shown" => serde_json::from_str(message).map(|Acknowledgement { shown }| Request::Acknowledge(shown)),
             name if QUERIES.contains(&name) => serde_json::from_str(message).map(Request::Query),
@@ -231,8 +231,8 @@ async fn answer(query: Query, shared: &Shared) -> Reply<'static> {
             let object = query_scene(shared, default, query).await;
             Reply::Object(Box::new(object))
         }
-        Query::Objects(part) => {
-            Reply::Objects(query_scene(shared, ObjectList::default, move |view| view.objects(&part)).await)
+        Query::Objects(name) => {
+            Reply::Objects(query_scene(shared, ObjectList::default, move |view| view.objects(&name)).await)
         }
     }
 }

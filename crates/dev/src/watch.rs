@@ -92,9 +92,9 @@ impl Watch {
             .name("watch".to_string())
             .spawn(move || {
                 let first = sources.read();
-                let is_wanted = report(Event::Files(Box::new(first.clone()), started, 0));
+                let session_runs = report(Event::Files(Box::new(first.clone()), started, 0));
                 folders.follow(&sources, &first);
-                if is_wanted {
+                if session_runs {
                     run(&receiver, &mut folders, &sources, first, &writes, report);
                 }
             })
@@ -124,8 +124,8 @@ fn run(
     mut report: impl FnMut(Event) -> bool,
 ) {
     let mut reading_reported = false; // true between reports of the start and the end of reading
-    // The event during a possibly incomplete save, and the time of the save's first change. At first the files are
-    // compared with their states at the start, because they have been watched only since they were read.
+    // The event during a possibly incomplete save, and the time of the save's first change. The initial value starts a
+    // comparison with the states at the start, because the files were not watched while they were read.
     let mut deferred = Some((Wake::Content, Instant::now()));
     let mut has_errors = last.scene.is_err(); // whether the last scene that was read has errors, reported or not
     loop {
@@ -164,7 +164,7 @@ fn run(
             }
         }
         if names_changed {
-            folders.forget(); // a folder may have been replaced by a new one of the same name
+            folders.forget(); // a folder may have been replaced by a new folder of the same name
         }
         folders.follow(sources, &last);
         let count = {
@@ -184,7 +184,7 @@ fn run(
                 deferred = Some((wake, noticed_at));
                 continue;
             }
-            // The scene may now use different files. Changes since the recorded states are noticed.
+            // The scene may now use files in other folders.
             folders.follow(sources, &new);
             last = new.clone();
             reading_reported = false;
@@ -208,7 +208,7 @@ fn wait_settled(wakes: &Receiver<Wake>, mut old: Vec<FileStamp>, stamps: impl Fn
             Ok(Wake::Names) => names_changed = true,
             Ok(Wake::Content) | Err(RecvTimeoutError::Timeout) => {}
         }
-        // An event may come from a different file in these folders.
+        // An event may come from a different file in these folders, so the states are compared.
         let new = stamps();
         if new != old {
             (old, last_change) = (new, Instant::now());
@@ -256,14 +256,14 @@ impl Folders {
 }
 
 /// Returns the folders to watch, by canonical path: the shader folder including its subfolders, and the folders of all
-/// files and link targets. Subfolders of the scene's folder are not watched, because it may be a home folder.
+/// files and link targets. Subfolders of the scene's folder are not watched, because this folder may be a home folder.
 fn folders_to_watch(sources: &Sources, snapshot: &Snapshot) -> BTreeMap<PathBuf, RecursiveMode> {
     let files = snapshot
         .files
         .iter()
         .map(|(path, _)| path.clone())
         .chain(sources.shader_files());
-    // The parent of the shader folder is watched as well, to notice if the folder is renamed.
+    // The parent of the shader folder is also watched, to detect a rename of the shader folder.
     let paths = files.chain(sources.shaders.clone());
     let paths = paths
         .flat_map(|path| [fs::canonicalize(&path).ok(), Some(path)])

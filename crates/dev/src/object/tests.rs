@@ -199,7 +199,7 @@ tangent = [1, 0, 0]
 color = [4, 4, 4]
 ";
 
-fn small() -> SceneView {
+fn small_view() -> SceneView {
     scene_view(SCENE, Path::new("s.toml"), Overrides::default())
 }
 
@@ -236,8 +236,8 @@ fn sample_counts_of_grid_patterns_are_squares() {
 }
 
 #[test]
-fn other_layouts_can_be_set_too() {
-    assert!(set_all(&small()) > 60);
+fn values_in_other_layouts_can_be_set() {
+    assert!(set_all(&small_view()) > 60);
     // Checks that `with_value` changes a document only if the value differs.
     let document = with_floats(&table(SCENE));
     let path: KeyPath = "shapes[0].radius".parse().unwrap();
@@ -247,7 +247,7 @@ fn other_layouts_can_be_set_too() {
 
 #[test]
 fn picks_have_names_lines_and_references() {
-    let view = small();
+    let view = small_view();
     let ball = view.at([20, 15]);
     assert_eq!(
         (ball.name.as_str(), ball.at, &ball.gone),
@@ -283,7 +283,7 @@ fn picks_have_names_lines_and_references() {
     assert_eq!(view.at([29, 10]).name, "lights[0]");
     let sky = view.at([0, 0]);
     assert_eq!((sky.name.as_str(), sky.note.is_some()), ("render", true));
-    for (object, case) in [
+    for (object, expected_reason) in [
         (view.at([40, 0]), "is outside the image"),
         (view.object("shapes[2]", None), "shapes[2] is not in the scene"),
         (view.object("environment", None), "environment is not in the scene"),
@@ -292,7 +292,11 @@ fn picks_have_names_lines_and_references() {
         (view.object("", None), "is not in the scene"),
     ] {
         assert!(
-            object.groups.is_empty() && object.gone.as_ref().is_some_and(|reason| reason.contains(case)),
+            object.groups.is_empty()
+                && object
+                    .gone
+                    .as_ref()
+                    .is_some_and(|reason| reason.contains(expected_reason)),
             "{object:?}"
         );
     }
@@ -300,30 +304,30 @@ fn picks_have_names_lines_and_references() {
 
 #[test]
 fn picks_equal_the_first_hits() {
-    let view = small();
-    let moved = Scene::parse(&SCENE.replace("[0, -4, 0.5]", "[1, -4, 2]"), "s.toml").unwrap();
+    let view = small_view();
+    let moved_scene = Scene::parse(&SCENE.replace("[0, -4, 0.5]", "[1, -4, 2]"), "s.toml").unwrap();
     let moved_view = SceneView {
-        camera: pack(&moved).camera,
+        camera: pack(&moved_scene).camera,
         ..view.clone()
     };
-    let mut different = 0;
+    let mut different_picks = 0;
     for y in (0..30).step_by(3) {
         for x in (0..40).step_by(3) {
-            let hit = pixel_first_hit(&pack(&moved), UVec2::new(x, y));
+            let hit = pixel_first_hit(&pack(&moved_scene), UVec2::new(x, y));
             let expected = match hit.shape {
                 NO_INDEX => "render".to_owned(),
                 2 => "lights[0]".to_owned(),
                 shape => format!("shapes[{shape}]"),
             };
             assert_eq!(moved_view.at([x, y]).name, expected);
-            different += usize::from(view.at([x, y]).name != expected);
+            different_picks += usize::from(view.at([x, y]).name != expected);
         }
     }
-    assert!(different > 5, "the camera makes no difference");
+    assert!(different_picks > 5, "the camera makes no difference");
 }
 
 #[test]
-fn names_and_files_are_read_only() {
+fn files_are_read_only_and_choices_accept_only_listed_names() {
     let view = scene_view(
         &std::fs::read_to_string("../../scenes/twisted-tube.toml").unwrap(),
         Path::new("../../scenes/twisted-tube.toml"),
@@ -372,8 +376,8 @@ fn overridden_values_are_read_only() {
 }
 
 #[test]
-fn objects_are_found_by_a_part_of_their_names() {
-    let view = small();
+fn objects_are_found_by_a_substring() {
+    let view = small_view();
     let list = view.objects("RED");
     let names: Vec<&str> = list.objects.iter().map(|(name, _)| name.as_str()).collect();
     assert_eq!(

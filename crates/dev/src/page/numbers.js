@@ -12,8 +12,8 @@ let typing = null; // the box with an unfinished input, if any
 export const digits = (x, count) => Number(x.toPrecision(count));
 export const format = (x) => (x === undefined || x === null ? "" : String(x));
 
-// Returns the valid value of a field that is nearest to `x`. Values in the gap, and non-squares if only squares are
-// valid, are skipped in the direction of the change from the `old` value.
+// Returns the valid value of a field that is nearest to `x`. Invalid values (inside `gap`, or not square if `squares`
+// is set) are skipped in the direction of the change from the `old` value.
 export function fit({ kind, range, gap, squares }, x, old) {
   let value = kind === "whole" ? Math.round(x) : digits(x, 12);
   if (squares) value = (x < old ? Math.floor : Math.ceil)(Math.sqrt(Math.max(value, 0))) ** 2;
@@ -34,7 +34,7 @@ function stepOf({ kind, unit, range }, list) {
   return range && range[1] - range[0] <= 2 ? 0.01 : 0.1;
 }
 
-// Makes a box the editor of a field's number. `numbers()` returns the list that contains the number. `onValue(x)` is
+// Lets the user edit a field's number in a box. `numbers()` returns the list that contains the number. `onValue(x)` is
 // called with a new value on Enter or when the box loses the focus, unless the text is empty or not a number. Returns a
 // function that shows a value unless the user is typing.
 export function numberField(box, field, numbers, onValue) {
@@ -61,9 +61,9 @@ export function numberField(box, field, numbers, onValue) {
   };
 }
 
-// Discards an unfinished input in `part`, an element of the page.
-export function forget(part) {
-  if (typing && part.contains(typing)) typing = null;
+// Discards unfinished input inside an element.
+export function forget(element) {
+  if (typing && element.contains(typing)) typing = null;
 }
 
 // By default, the wheel changes the value of a focused number box. This handler makes the wheel scroll instead.
@@ -104,9 +104,9 @@ function addSteps(box, field, numbers, onValue) {
   box.addEventListener("pointerdown", (event) => {
     // In a focused box, the pointer selects text.
     if (event.button !== 0 || box.disabled || document.activeElement === box) return;
-    const size = stepOf(field, [...numbers(), current()]) / PIXELS_PER_STEP;
+    const stepPerPixel = stepOf(field, [...numbers(), current()]) / PIXELS_PER_STEP;
     box.setPointerCapture(event.pointerId); // a fast drag leaves the box immediately
-    press = { id: event.pointerId, left: event.clientX, top: event.clientY, lastX: event.clientX, start: current(), moved: 0, size, dragged: false };
+    press = { id: event.pointerId, left: event.clientX, top: event.clientY, lastX: event.clientX, start: current(), moved: 0, stepPerPixel, dragged: false };
   });
   // Prevents a drag from selecting text. On touch screens, `mousedown` is fired after the release.
   box.addEventListener("mousedown", (event) => press && event.preventDefault());
@@ -118,7 +118,7 @@ function addSteps(box, field, numbers, onValue) {
       press.dragged = true;
       window.addEventListener("keydown", cancelByKey, true);
     }
-    press.moved += (event.clientX - press.lastX) * press.size * (event.shiftKey ? FINE_FACTOR : 1);
+    press.moved += (event.clientX - press.lastX) * press.stepPerPixel * (event.shiftKey ? FINE_FACTOR : 1);
     press.lastX = event.clientX;
     show(press.start + press.moved, press.start);
   });

@@ -72,17 +72,17 @@ export function setUpObject() {
 }
 
 function setUpSearch() {
-  const find = element("object-find");
+  const searchBox = element("object-find");
   let timer = 0;
-  const list = () => sendQuery({ objects: find.value });
-  find.addEventListener("input", () => {
+  const queryNames = () => sendQuery({ objects: searchBox.value });
+  searchBox.addEventListener("input", () => {
     clearTimeout(timer);
-    const isKnown = [...element("object-names").children].some((option) => option.value === find.value);
-    if (isKnown) inspect(find.value);
-    else timer = setTimeout(list, SEARCH_DELAY);
+    const isListed = [...element("object-names").children].some((option) => option.value === searchBox.value);
+    if (isListed) inspect(searchBox.value);
+    else timer = setTimeout(queryNames, SEARCH_DELAY);
   });
-  find.addEventListener("focus", list);
-  find.addEventListener("change", () => find.value && inspect(find.value));
+  searchBox.addEventListener("focus", queryNames);
+  searchBox.addEventListener("change", () => searchBox.value && inspect(searchBox.value));
   onMessage("objects", ({ objects, more }) => {
     const options = objects.map(([value, label]) => make("option", { value, label }));
     element("object-names").replaceChildren(...options);
@@ -162,7 +162,7 @@ function showNote() {
   if (element("object-note").textContent !== text) element("object-note").textContent = text;
 }
 
-// Makes the view of a table of the scene file: its source lines, the keys in the file, and the keys that the file omits.
+// Creates the view of a table of the scene file: source lines, the keys in the file, and the keys that the file omits.
 function makeGroup({ name }) {
   const pre = make("pre", { tabIndex: 0 });
   const kind = new Text();

@@ -13,7 +13,7 @@ function outline(context, widths, path) {
   }
 }
 
-// Draws a frame around a pixel. `distance` is in CSS pixels.
+// Draws a frame around a pixel, at a distance in CSS pixels.
 export function frame(context, pixel, scale, distance) {
   context.lineWidth = 1;
   for (const [color, inset] of [["#000", -distance], ["#fff", 1 - distance]]) {

@@ -28,11 +28,9 @@ export class Picture {
     this.swapped = false; // whether a flicker shows the second image
     this.motion = new Motion();
     this.lastWheelTime = 0; // time of the last wheel event
-    // Scale in screen pixels per image pixel, or null to fit the image to the panel; and the image point at a panel's
-    // center.
-    this.scale = null;
-    this.middle = [0, 0];
-    this.cursor = null;
+    this.scale = null; // CSS pixels per image pixel; null fits the image to the panel
+    this.middle = [0, 0]; // the image point at the center of a panel
+    this.cursor = null; // the last read pixel
     this.scheduled = false;
     for (const panel of this.panels) {
       this.#listen(panel);
@@ -185,7 +183,8 @@ export class Picture {
       context.clearRect(0, 0, w, h);
       const ratio = devicePixelRatio;
       context.setTransform(ratio, 0, 0, ratio, view.left * ratio, view.top * ratio);
-      // Pixels are drawn as squares if they are large or a whole number of screen pixels wide. A coarse image is smoothed.
+      // Pixels are drawn as squares if they are large or a whole number of screen pixels wide. Coarse images are
+      // smoothed.
       const side = view.scale * ratio;
       context.imageSmoothingEnabled = sent[0] < width || (side < 4 && !Number.isInteger(side));
       context.imageSmoothingQuality = "high";
@@ -318,8 +317,8 @@ export class Picture {
     this.#drag(panel, "pan", (position[0] - last[0]) / 2, (position[1] - last[1]) / 2);
   }
 
-  // The wheel dollies the camera. With Ctrl, the wheel zooms the image. Browsers report a pinch on a touchpad as a wheel
-  // event with Ctrl.
+  // The wheel dollies the camera. With Ctrl, the wheel zooms the image. Browsers report a pinch on a touchpad as a
+  // wheel event with Ctrl.
   #wheel(panel, event) {
     event.preventDefault();
     const position = [event.offsetX, event.offsetY];

@@ -65,7 +65,7 @@ function add(pixel, picture) {
 async function refresh(pin, { revision, samples, view }) {
   const answer = await queryPixel(pin.pixel);
   if (!answer || !pins.includes(pin)) return;
-  // Only the newest value of each revision is kept.
+  // Only the newest value of each revision and view is kept.
   const entry = { revision, samples, view: JSON.stringify(view), values: answer.values };
   const last = pin.history.at(-1);
   if (last && last.revision === revision && last.view === entry.view) pin.history.pop();

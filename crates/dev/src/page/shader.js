@@ -6,7 +6,7 @@ import { numberField } from "/numbers.js";
 import { enable, make, reuse, setChildren } from "/parts.js";
 
 let rows = new Map(); // the rows of the sliders, by file, name and kind
-let rowCount = 0; // number of rows made so far, for the ids of the rows
+let rowCount = 0; // number of rows created so far, for the ids of the rows
 let [isSending, waiting] = [false, new Map()]; // whether a value is being sent, and the next values by file and name
 
 const keyOf = ({ file, name }) => JSON.stringify([file, name]);

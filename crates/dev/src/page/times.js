@@ -1,4 +1,4 @@
-// Timings of the kernels and of the parts of a frame.
+// Timings of the kernels and of the stages of a frame.
 
 import { element, onMessage } from "/link.js";
 
@@ -25,9 +25,9 @@ export function setUpTimes() {
   let last = [];
   const show = () => {
     if (!section.open) return;
-    const [kernels, parts] = [true, false].map((kernel) => last.filter((time) => time.kernel === kernel));
+    const [kernels, stages] = [true, false].map((kernel) => last.filter((time) => time.kernel === kernel));
     element("times-kernels").replaceChildren(...kernels.map(row));
-    element("times-parts").replaceChildren(...parts.map(row));
+    element("times-parts").replaceChildren(...stages.map(row));
     const source = kernels.every((time) => time.by_device) ? "Kernel times from GPU timestamps." : "Kernel times from submission to completion.";
     element("times-clock").textContent = kernels.length ? source : "";
   };

@@ -8,7 +8,7 @@ use crate::build::guarded;
 use crate::canvas::Limits;
 use crate::messages::{Command, Notice};
 use crate::picture::View;
-use crate::source::{Constants, Loaded};
+use crate::source::{KernelChoice, Loaded};
 use wgray_render::pack::pack_camera;
 use wgray_render::records::{Camera, Packed};
 
@@ -114,7 +114,7 @@ impl Painter {
 
     /// Returns the packed scene with the current camera, for the selected view.
     pub(super) fn packed(&self, loaded: &Loaded) -> Packed {
-        let Constants { specialization, .. } = Constants::of(&loaded.packed, self.view, false);
+        let KernelChoice { specialization, .. } = KernelChoice::of(&loaded.packed, self.view, false);
         Packed {
             camera: self.packed_camera(loaded),
             specialization,

@@ -76,19 +76,21 @@ impl Painter {
         }
     }
 
-    /// Returns the content together with the image to compare with, and the names of both images.
+    /// Adds the second image to the content if the view is a comparison. Also returns the names of both images.
     pub(super) fn with_counterpart(&self, content: Content, full_size: [u32; 2]) -> (Content, Option<[String; 2]>) {
         let View::Compare(against) = self.view else {
             return (content, None);
         };
         match (content, self.comparison.counterpart(against)) {
-            (Content::Color(pixels), Some(reference)) => match reference.at(full_size, [pixels.width, pixels.height]) {
-                Some(second) => {
-                    let names = ["picture".to_string(), reference.name.clone()];
-                    (Content::Compare(pixels, second), Some(names))
+            (Content::Color(pixels), Some(reference)) => {
+                match reference.scaled(full_size, [pixels.width, pixels.height]) {
+                    Some(second) => {
+                        let names = ["picture".to_string(), reference.name.clone()];
+                        (Content::Compare(pixels, second), Some(names))
+                    }
+                    None => (Content::Color(pixels), None),
                 }
-                None => (Content::Color(pixels), None),
-            },
+            }
             (content @ Content::Compare(..), _) => (content, Some(["GPU".to_string(), "CPU".to_string()])),
             (content, _) => (content, None),
         }
@@ -113,14 +115,14 @@ impl Painter {
     pub(super) fn set_errors(&mut self, errors: ErrorMeasures) {
         self.comparison.measuring = false;
         self.comparison.errors = Some(errors);
-        // A different image may be shown by now.
+        // Meanwhile, a newer frame may have replaced the measured frame.
         let newest = self.frame_sender.borrow().clone();
         if let Some(frame) = newest.filter(|frame| frame.header.number != errors.frame) {
             self.measure(&frame);
         }
     }
 
-    /// Returns the error measures of the current frame, if they are measured.
+    /// Returns the error measures of the current frame, if the frame has been measured.
     pub(super) fn errors(&self) -> Option<ErrorMeasures> {
         self.comparison.errors.filter(|errors| errors.frame == self.frames)
     }
@@ -136,11 +138,10 @@ impl Painter {
         };
         match self.comparison.counterpart(against) {
             None => Some(missing.to_string()),
-            Some(reference) if reference.at(size, [1, 1]).is_none() => {
-                let Pixels { width, height, .. } = *reference.pixels;
-                let [w, h] = size;
+            Some(reference) if reference.size() != size => {
+                let ([width, height], [image_width, image_height]) = (reference.size(), size);
                 Some(format!(
-                    "{} is {width} × {height}, but the image is {w} × {h}",
+                    "{} is {width} × {height}, but the image is {image_width} × {image_height}",
                     reference.name
                 ))
             }

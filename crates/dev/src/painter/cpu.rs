@@ -1,5 +1,5 @@
-//! Rendering on the CPU: in place of software Vulkan, which traverses BVHs more slowly, and while a kernel is compiled.
-//! The CPU computes the bits of the built-in shaders, so it never renders for edited shaders.
+//! Rendering on the CPU: instead of software Vulkan, which traverses BVHs more slowly, and while a kernel is compiled.
+//! Only the built-in shaders have twins on the CPU, so edited shaders never run on the CPU.
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -8,15 +8,15 @@ use super::{Painter, Running};
 use crate::build::guarded;
 use crate::canvas::Canvas;
 use crate::engine::Engine;
-use crate::source::{Constants, Loaded};
+use crate::source::{KernelChoice, Loaded};
 use wgray_render::gpu::compose::Shaders;
 use wgray_render::gpu::{Gpu, GpuInfo};
 
 impl Painter {
-    /// Returns what determines the kernel of the selected view, and whether the CPU renders the view without a kernel.
-    pub(super) fn constants(&self, loaded: &Loaded, shaders: &Shaders) -> Constants {
+    /// Returns the kernel choice for the selected view.
+    pub(super) fn kernel_choice(&self, loaded: &Loaded, shaders: &Shaders) -> KernelChoice {
         let on_cpu = self.is_faster_on_cpu(loaded) && self.is_unedited(shaders) && !self.view.is_rendered_twice();
-        Constants::of(&loaded.packed, self.view, on_cpu)
+        KernelChoice::of(&loaded.packed, self.view, on_cpu)
     }
 
     /// Returns whether the CPU renders the scene faster than the adapter.
@@ -37,19 +37,19 @@ impl Painter {
         &mut self,
         loaded: &Loaded,
         shaders: Arc<Shaders>,
-        constants: Constants,
+        kernel_choice: KernelChoice,
         change: (Instant, bool),
     ) {
         let (packed, limits) = (self.packed(loaded), self.limits);
-        let view = constants.supported_view(self.view);
-        self.park(&shaders, &constants);
+        let view = kernel_choice.supported_view(self.view);
+        self.park(&shaders, &kernel_choice);
         match guarded(|| Canvas::new(Engine::cpu(&packed), packed, view, limits)) {
             Ok(canvas) => {
                 self.running = Some(Running {
                     canvas,
                     halted: false,
                     shaders,
-                    constants,
+                    kernel_choice,
                     sliders: Vec::new(),
                     slider_values: Vec::new(),
                 });
@@ -59,28 +59,29 @@ impl Painter {
         }
     }
 
-    /// Renders on the CPU while the kernel is compiled, unless an earlier kernel still shows its image. Kernels of scenes
-    /// without a BVH are compiled in less than a second.
-    pub(super) fn show_on_cpu_meanwhile(
+    /// Renders on the CPU while the kernel is compiled, unless an earlier kernel still shows its image. Scenes without
+    /// a BVH wait for their kernels, which are compiled in less than a second.
+    pub(super) fn render_on_cpu_while_compiling(
         &mut self,
         loaded: &Loaded,
         shaders: Arc<Shaders>,
-        constants: Constants,
+        kernel_choice: KernelChoice,
         change: (Instant, bool),
     ) {
-        let is_free = self.running.as_ref().is_none_or(|running| self.is_interim(running));
-        if !is_free || !has_bvh(loaded) || !self.is_unedited(&shaders) {
+        let is_replaceable = self.running.as_ref().is_none_or(|running| self.is_interim(running));
+        if !is_replaceable || !has_bvh(loaded) || !self.is_unedited(&shaders) {
             return;
         }
-        let constants = Constants {
+        let kernel_choice = KernelChoice {
             on_cpu: true,
-            ..constants
+            ..kernel_choice
         };
-        let is_same = |running: &Running| running.shaders == shaders && running.constants == constants;
-        if self.running.as_ref().is_some_and(is_same) {
+        let is_on_cpu_already =
+            |running: &Running| running.shaders == shaders && running.kernel_choice == kernel_choice;
+        if self.running.as_ref().is_some_and(is_on_cpu_already) {
             self.draw_scene(change);
         } else {
-            self.run_on_cpu(loaded, shaders, constants, change);
+            self.run_on_cpu(loaded, shaders, kernel_choice, change);
         }
     }
 
@@ -90,40 +91,41 @@ impl Painter {
         running.canvas.is_on_cpu() && !is_faster_on_cpu
     }
 
-    /// Drops the CPU's image if it was shown only until a kernel is compiled.
+    /// Stops rendering on the CPU if the CPU renders only until a kernel is compiled.
     pub(super) fn drop_interim(&mut self) {
         if self.running.as_ref().is_some_and(|running| self.is_interim(running)) {
             self.stop_running();
         }
     }
 
-    /// Continues the CPU's image with a new kernel, if the kernel computes the same image. Otherwise returns the kernel.
+    /// Continues the CPU's image with a new kernel if the kernel computes the image of the CPU. Otherwise, returns
+    /// `gpu`.
     pub(super) fn continue_on(
         &mut self,
         gpu: Gpu,
         shaders: &Arc<Shaders>,
-        constants: &Constants,
+        kernel_choice: &KernelChoice,
         loaded: &Loaded,
     ) -> Option<Gpu> {
         let packed = self.packed(loaded);
-        let view = constants.supported_view(self.view);
-        let is_same = |running: &Running| {
+        let view = kernel_choice.supported_view(self.view);
+        let computes_same_image = |running: &Running| {
             let same_kernel = running.shaders == *shaders
-                && *constants
-                    == Constants {
+                && *kernel_choice
+                    == KernelChoice {
                         on_cpu: false,
-                        ..running.constants
+                        ..running.kernel_choice
                     };
             same_kernel && gpu.device().info.exact && !view.is_rendered_twice() && running.canvas.renders(&packed)
         };
         let is_continued = self
             .running
             .as_ref()
-            .is_some_and(|running| self.is_interim(running) && is_same(running));
+            .is_some_and(|running| self.is_interim(running) && computes_same_image(running));
         let Some(running) = self.running.as_mut().filter(|_| is_continued) else {
             return Some(gpu);
         };
-        running.constants = *constants;
+        running.kernel_choice = *kernel_choice;
         running.sliders = gpu.sliders().to_vec();
         running.slider_values = self.sliders.bits(&running.sliders);
         let result = guarded(|| {

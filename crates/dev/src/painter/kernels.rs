@@ -1,4 +1,4 @@
-//! The life cycle of a kernel: it runs, may be rejected, truncated by the driver or lost, and is replaced.
+//! The life cycle of a kernel: its start, its rejection after an error, the loss of its device, and its replacement.
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -8,7 +8,7 @@ use crate::build::{BuildResult, guarded};
 use crate::canvas::Canvas;
 use crate::diagnostic::Diagnostic;
 use crate::engine::Engine;
-use crate::source::Constants;
+use crate::source::KernelChoice;
 use wgray_render::error::{RenderError, ShaderError};
 use wgray_render::gpu::Gpu;
 use wgray_render::gpu::compose::Shaders;
@@ -25,12 +25,12 @@ impl Painter {
                 .iter()
                 .map(|error| self.shader_diagnostic(error, &shaders))
                 .collect();
-            self.reject((pending.shaders.clone(), pending.constants), problems);
+            self.reject((pending.shaders.clone(), pending.kernel_choice), problems);
         }
         match built.result {
             Some(Ok((gpu, shaders))) => {
                 self.state.compile_seconds = Some(built.duration.as_secs_f64());
-                self.run(*gpu, shaders, pending.constants, built.noticed_at);
+                self.run(*gpu, shaders, pending.kernel_choice, built.noticed_at);
             }
             None => {
                 self.change = None;
@@ -41,7 +41,7 @@ impl Painter {
                     Some(_) => self.last_good.clone().unwrap_or(pending.shaders),
                     None => pending.shaders,
                 };
-                self.reject_truncated((shaders, pending.constants), &error);
+                self.reject_truncated((shaders, pending.kernel_choice), &error);
             }
             Some(Err(error)) => {
                 let (view, running) = (self.shown_view(), &mut self.running);
@@ -51,7 +51,7 @@ impl Painter {
                     self.lose_device(&error); // the CPU's image does not show whether the device works
                 } else if is_on_cpu || running.as_mut().is_some_and(is_alive) {
                     // The driver rejected the kernel although naga accepted it; the device still works.
-                    self.reject((pending.shaders, pending.constants), Vec::new());
+                    self.reject((pending.shaders, pending.kernel_choice), Vec::new());
                     self.problems.device = Some((&error).into());
                     self.change = None;
                     self.synchronize((Instant::now(), true));
@@ -62,19 +62,20 @@ impl Painter {
         }
     }
 
-    /// Handles a kernel although a newer kernel was requested. If the outdated kernel fits the scene, it renders until
-    /// the newer kernel is compiled.
+    /// Handles the result of an outdated request. If the kernel fits the scene, the kernel renders until a newer kernel
+    /// is compiled.
     fn handle_outdated_build(&mut self, built: BuildResult) {
-        let constants = self
+        let kernel_choice = self
             .loaded
             .as_ref()
-            .map(|loaded| Constants::of(&loaded.packed, self.view, false));
-        let is_useful =
-            self.pending.is_some() && built.id >= self.first_valid_request && constants == Some(built.constants);
+            .map(|loaded| KernelChoice::of(&loaded.packed, self.view, false));
+        let is_useful = self.pending.is_some()
+            && built.id >= self.first_valid_request
+            && kernel_choice == Some(built.kernel_choice);
         match built.result {
             Some(Ok((gpu, shaders))) if is_useful && built.shader_errors.is_none() => {
                 self.state.compile_seconds = Some(built.duration.as_secs_f64());
-                self.run(*gpu, shaders, built.constants, built.noticed_at);
+                self.run(*gpu, shaders, built.kernel_choice, built.noticed_at);
             }
             result => {
                 let _ = guarded(|| {
@@ -86,20 +87,20 @@ impl Painter {
     }
 
     /// Starts to render with a new kernel.
-    fn run(&mut self, gpu: Gpu, shaders: Arc<Shaders>, constants: Constants, noticed_at: Instant) {
+    fn run(&mut self, gpu: Gpu, shaders: Arc<Shaders>, kernel_choice: KernelChoice, noticed_at: Instant) {
         let Some(loaded) = self.loaded.clone() else { return };
         self.adapter = gpu.device().info.clone();
         self.device = Some(gpu.device().clone());
-        let Some(mut gpu) = self.continue_on(gpu, &shaders, &constants, &loaded) else {
+        let Some(mut gpu) = self.continue_on(gpu, &shaders, &kernel_choice, &loaded) else {
             return;
         };
         self.compiled = self.state.compile_seconds;
         self.drop_interim();
         let (packed, limits) = (self.packed(&loaded), self.limits);
-        let view = constants.supported_view(self.view);
+        let view = kernel_choice.supported_view(self.view);
         let sliders = gpu.sliders().to_vec();
         let slider_values = self.sliders.bits(&sliders);
-        self.park(&shaders, &constants);
+        self.park(&shaders, &kernel_choice);
         let canvas = guarded(|| {
             self.times.measure("upload", || gpu.update(&packed))?; // the scene may have changed since the upload
             gpu.set_sliders(&slider_values)?;
@@ -111,7 +112,7 @@ impl Painter {
                     canvas,
                     halted: false,
                     shaders,
-                    constants,
+                    kernel_choice,
                     sliders,
                     slider_values,
                 });
@@ -122,17 +123,17 @@ impl Painter {
         }
     }
 
-    /// Records that the shaders have errors with these constants.
-    fn reject(&mut self, shaders: (Arc<Shaders>, Constants), problems: Vec<Diagnostic>) {
-        self.rejected.push(shaders);
+    /// Records that the shaders have errors with this kernel choice.
+    fn reject(&mut self, kernel: (Arc<Shaders>, KernelChoice), problems: Vec<Diagnostic>) {
+        self.rejected.push(kernel);
         self.problems.shader = problems;
     }
 
     /// Rejects shaders whose loops the driver truncates, until the scene or the shaders change.
-    fn reject_truncated(&mut self, shaders: (Arc<Shaders>, Constants), error: &RenderError) {
+    fn reject_truncated(&mut self, kernel: (Arc<Shaders>, KernelChoice), error: &RenderError) {
         let problem = self.render_diagnostic(error);
-        self.truncated = Some(shaders.clone());
-        self.reject(shaders, vec![problem]);
+        self.truncated = Some(kernel.clone());
+        self.reject(kernel, vec![problem]);
         self.change = None;
         self.synchronize((Instant::now(), true));
     }
@@ -176,9 +177,9 @@ impl Painter {
                 .as_ref()
                 .is_some_and(|shaders| *shaders != running.shaders)
             {
-                let shaders = (running.shaders.clone(), running.constants);
+                let kernel = (running.shaders.clone(), running.kernel_choice);
                 self.stop_running();
-                self.reject_truncated(shaders, error);
+                self.reject_truncated(kernel, error);
             } else {
                 running.halted = true;
                 self.problems.truncated = Some(self.render_diagnostic(error));
@@ -190,7 +191,7 @@ impl Painter {
         self.publish();
     }
 
-    /// Opens a device again, up to a maximum number of attempts.
+    /// Drops the lost device. Renders on a new device or on the CPU, up to a maximum number of attempts.
     fn lose_device(&mut self, error: &RenderError) {
         drop_guarded(self.parked.take());
         self.problems.device = Some(error.into());
@@ -201,10 +202,10 @@ impl Painter {
         self.failures += 1;
         let change = (Instant::now(), true);
         match self.target().filter(|_| self.failures <= MAX_ATTEMPTS) {
-            Some((loaded, shaders, constants)) if constants.on_cpu => {
-                self.run_on_cpu(&loaded, shaders, constants, change);
+            Some((loaded, shaders, kernel_choice)) if kernel_choice.on_cpu => {
+                self.run_on_cpu(&loaded, shaders, kernel_choice, change);
             }
-            Some((loaded, shaders, constants)) => self.request(&loaded, shaders, constants, change),
+            Some((loaded, shaders, kernel_choice)) => self.request(&loaded, shaders, kernel_choice, change),
             None => {}
         }
     }
@@ -213,11 +214,12 @@ impl Painter {
         drop_guarded(self.running.take());
     }
 
-    /// Keeps the running kernel if only its views differ from the new kernel, because viewers often switch back.
-    pub(super) fn park(&mut self, shaders: &Arc<Shaders>, constants: &Constants) {
+    /// Keeps the running kernel if it differs from the new kernel only in the supported views, because viewers often
+    /// switch back.
+    pub(super) fn park(&mut self, shaders: &Arc<Shaders>, kernel_choice: &KernelChoice) {
         let is_reusable = |kernel: &Running| {
-            let same_scene = kernel.constants.differ_only_in_view(constants);
-            kernel.shaders == *shaders && same_scene && kernel.constants != *constants
+            let only_views_differ = kernel.kernel_choice.differs_only_in_views(kernel_choice);
+            kernel.shaders == *shaders && only_views_differ && kernel.kernel_choice != *kernel_choice
         };
         for kernel in [self.parked.take(), self.running.take()].into_iter().flatten() {
             let dropped = match is_reusable(&kernel) {

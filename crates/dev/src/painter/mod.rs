@@ -31,7 +31,7 @@ use super::messages::{Event, Report, State};
 use super::object::SceneView;
 use super::picture::{Frame, View};
 use super::sliders::Sliders;
-use super::source::{Constants, FileStamp, Loaded, Snapshot, Sources};
+use super::source::{FileStamp, KernelChoice, Loaded, Snapshot, Sources};
 use super::times::Times;
 use super::watch::Writes;
 use wgray_render::gpu::compose::Shaders;
@@ -49,7 +49,7 @@ pub struct Painter {
     sources: Sources,
     builder: Builder,
     out: Option<PathBuf>,
-    /// Number of viewers; `None` renders even without viewers.
+    /// Number of viewers; rendering pauses at 0. `None` never pauses rendering.
     viewers: Option<Arc<AtomicUsize>>,
     /// The revision that was last written to the output file.
     written: Option<u64>,
@@ -65,16 +65,16 @@ pub struct Painter {
     shaders: Option<Arc<Shaders>>,
     /// The last shaders that rendered a complete image.
     last_good: Option<Arc<Shaders>>,
-    /// Shaders with errors, and the constants with which the errors occur.
-    rejected: Vec<(Arc<Shaders>, Constants)>,
+    /// Shaders with errors, each with the kernel choice for which the errors occur.
+    rejected: Vec<(Arc<Shaders>, KernelChoice)>,
     /// The last shaders whose loops the driver truncated. In a different scene, the loops may be shorter.
-    truncated: Option<(Arc<Shaders>, Constants)>,
+    truncated: Option<(Arc<Shaders>, KernelChoice)>,
     device: Option<Device>,
     /// The adapter of the last device.
     adapter: GpuInfo,
     /// True if the CPU may replace software Vulkan.
     may_use_cpu: bool,
-    /// The shaders whose bits the CPU computes.
+    /// The built-in shaders, which have twins on the CPU.
     built_in: Shaders,
     running: Option<Running>,
     /// The color kernel while a layer kernel runs; otherwise the last layer kernel.
@@ -89,7 +89,7 @@ pub struct Painter {
     /// The camera, if it differs from the camera in the file.
     camera: Option<CameraDescription>,
     sliders: Sliders,
-    /// True if the camera or a slider was moved since the image was started.
+    /// True if the image must be restarted, for example after a move of the camera or a slider.
     restart_pending: bool,
     history: History,
     /// The changes that this session made to the scene file. The watcher does not read these changes again.
@@ -111,13 +111,13 @@ pub struct Painter {
 
     executed: u64,
     frames: u64,
-    /// Number of images started so far.
+    /// Number of changes of the image so far, for example of the scene, the camera or the view.
     revision: u64,
     /// The oldest change that is not displayed yet: the time when it was noticed, and whether it was a save.
     change: Option<(Instant, bool)>,
     /// Seconds from the last change to its first image.
     latency: Option<f64>,
-    /// Seconds spent on compiling for the next frame.
+    /// Seconds spent on compiling the kernel of the next frame.
     compiled: Option<f64>,
     /// The time when the first image after a save was shown; `None` once the image is finished.
     first_frame: Option<Instant>,
@@ -125,23 +125,25 @@ pub struct Painter {
     frame_cost: Duration,
 }
 
+/// A canvas that renders, and the kernel of the canvas.
 struct Running {
     canvas: Canvas,
     /// True after the driver truncated loops of the kernel, or a shader failed to compile, without earlier shaders to
     /// use instead. Rendering resumes when the scene, the view, the limits or a slider changes.
     halted: bool,
     shaders: Arc<Shaders>,
-    constants: Constants,
+    kernel_choice: KernelChoice,
     /// The sliders of the kernel, as declared in the current shaders.
     sliders: Vec<Slider>,
     /// The slider values as bits.
     slider_values: Vec<u32>,
 }
 
+/// A requested kernel.
 struct Pending {
     id: u64,
     shaders: Arc<Shaders>,
-    constants: Constants,
+    kernel_choice: KernelChoice,
 }
 
 pub struct SessionChannels {
@@ -338,47 +340,47 @@ impl Painter {
         }
     }
 
-    /// Returns the scene, the shaders and the constants to render: the newest shaders, or the last good shaders if the
-    /// newest shaders have errors.
-    fn target(&self) -> Option<(Arc<Loaded>, Arc<Shaders>, Constants)> {
+    /// Returns the scene, the shaders and the kernel choice to render: the newest shaders, or the last good shaders if
+    /// the newest shaders have errors.
+    fn target(&self) -> Option<(Arc<Loaded>, Arc<Shaders>, KernelChoice)> {
         let (loaded, newest) = (self.loaded.clone()?, self.shaders.clone()?);
         let candidates = [Some(newest), self.last_good.clone()].into_iter().flatten();
         let mut kernels = candidates.map(|shaders| {
-            let constants = self.constants(&loaded, &shaders);
-            (shaders, constants)
+            let kernel_choice = self.kernel_choice(&loaded, &shaders);
+            (shaders, kernel_choice)
         });
-        let (shaders, constants) = kernels.find(|kernel| !self.rejected.contains(kernel))?;
-        Some((loaded, shaders, constants))
+        let (shaders, kernel_choice) = kernels.find(|kernel| !self.rejected.contains(kernel))?;
+        Some((loaded, shaders, kernel_choice))
     }
 
     /// Makes the rendering match the current scene and shaders.
     fn synchronize(&mut self, change: (Instant, bool)) {
-        let Some((loaded, shaders, constants)) = self.target() else {
+        let Some((loaded, shaders, kernel_choice)) = self.target() else {
             return;
         };
         if self.shaders.as_ref() == Some(&shaders) {
             self.problems.shader.clear();
         }
         let matches =
-            |other_shaders: &Arc<Shaders>, other_constants| *other_shaders == shaders && constants == other_constants;
+            |other_shaders: &Arc<Shaders>, other_choice| *other_shaders == shaders && kernel_choice == other_choice;
         let running = self.running.as_ref();
-        let is_running = running.is_some_and(|running| matches(&running.shaders, running.constants));
-        if is_running || self.unpark(&shaders, &constants) {
+        let is_running = running.is_some_and(|running| matches(&running.shaders, running.kernel_choice));
+        if is_running || self.unpark(&shaders, &kernel_choice) {
             self.pending = None;
             self.first_valid_request = self.requests + 1;
             if !is_running {
                 self.show_parked(change);
             }
             self.draw_scene(change);
-        } else if constants.on_cpu {
+        } else if kernel_choice.on_cpu {
             self.pending = None;
             self.first_valid_request = self.requests + 1;
-            self.run_on_cpu(&loaded, shaders, constants, change);
-        } else if !(self.pending.as_ref()).is_some_and(|pending| matches(&pending.shaders, pending.constants)) {
+            self.run_on_cpu(&loaded, shaders, kernel_choice, change);
+        } else if !(self.pending.as_ref()).is_some_and(|pending| matches(&pending.shaders, pending.kernel_choice)) {
             self.change.get_or_insert(change);
-            self.request(&loaded, shaders, constants, change);
+            self.request(&loaded, shaders, kernel_choice, change);
         } else {
-            self.show_on_cpu_meanwhile(&loaded, shaders, constants, change);
+            self.render_on_cpu_while_compiling(&loaded, shaders, kernel_choice, change);
         }
     }
 
@@ -386,12 +388,12 @@ impl Painter {
         &mut self,
         loaded: &Loaded,
         shaders: Arc<Shaders>,
-        constants: Constants,
+        kernel_choice: KernelChoice,
         (noticed_at, is_save): (Instant, bool),
     ) {
         let running = self.running.as_ref();
-        let can_show_scene = running.is_some_and(|running| running.constants == constants);
-        let needs_kernel = |shaders: &Arc<Shaders>| !self.constants(loaded, shaders).on_cpu;
+        let can_show_scene = running.is_some_and(|running| running.kernel_choice == kernel_choice);
+        let needs_kernel = |shaders: &Arc<Shaders>| !self.kernel_choice(loaded, shaders).on_cpu;
         let fallback = self
             .last_good
             .clone()
@@ -403,15 +405,15 @@ impl Painter {
             packed: self.packed(loaded),
             shaders: shaders.clone(),
             fallback,
-            constants,
+            kernel_choice,
             noticed_at,
         });
         self.pending = Some(Pending {
             id: self.requests,
             shaders: Arc::clone(&shaders),
-            constants,
+            kernel_choice,
         });
-        self.show_on_cpu_meanwhile(loaded, shaders, constants, (noticed_at, is_save));
+        self.render_on_cpu_while_compiling(loaded, shaders, kernel_choice, (noticed_at, is_save));
     }
 
     fn draw_scene(&mut self, change: (Instant, bool)) {
@@ -460,7 +462,7 @@ impl Painter {
             .is_some_and(|running| {
                 let is_unfinished = !running.canvas.is_done(self.shown_view());
                 let is_first = running.canvas.is_new();
-                // While a kernel is compiled, only camera moves are rendered, and on the CPU the first samples.
+                // While a kernel is compiled, only camera moves are rendered; on the CPU, also the first samples.
                 let needs_samples = running.canvas.is_on_cpu() && !running.canvas.is_complete(self.shown_view());
                 let may_refine = !self.paused && (self.pending.is_none() || needs_samples);
                 self.restart_pending || (is_unfinished && (is_first || may_refine))

@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use super::{Painter, Running};
 use crate::build::guarded;
-use crate::source::Constants;
+use crate::source::KernelChoice;
 use wgray_render::gpu::compose::Shaders;
 use wgray_render::gpu::sliders::{Value, sliders};
 
@@ -23,9 +23,9 @@ impl Painter {
         // A kernel with unchanged code keeps running, but errors and sliders refer to the new text.
         let kernels = [&mut self.running, &mut self.parked].into_iter().flatten();
         for kernel in kernels.filter(|kernel| kernel.shaders.has_same_code(&shaders)) {
-            let Constants {
+            let KernelChoice {
                 integrator, adaptive, ..
-            } = kernel.constants;
+            } = kernel.kernel_choice;
             kernel.sliders = sliders(&shaders, integrator, adaptive);
             kernel.shaders = shaders.clone();
         }
@@ -64,9 +64,10 @@ impl Painter {
         }
     }
 
-    /// Switches to the parked kernel if it has these shaders and constants. Returns whether the kernel was switched.
-    pub(super) fn unpark(&mut self, shaders: &Arc<Shaders>, constants: &Constants) -> bool {
-        let matches = |parked: &Running| parked.shaders == *shaders && parked.constants == *constants;
+    /// Switches to the parked kernel if it has these shaders and this kernel choice. Returns whether the kernel was
+    /// switched.
+    pub(super) fn unpark(&mut self, shaders: &Arc<Shaders>, kernel_choice: &KernelChoice) -> bool {
+        let matches = |parked: &Running| parked.shaders == *shaders && parked.kernel_choice == *kernel_choice;
         let is_parked = self.parked.as_ref().is_some_and(matches);
         if is_parked {
             std::mem::swap(&mut self.running, &mut self.parked);
@@ -84,7 +85,7 @@ impl Painter {
             running.canvas.set_limits(limits, view)?;
             running.canvas.change_view(view)
         });
-        // If the scene or the camera changed, the image restarts immediately.
+        // If the scene or the camera changed, the caller restarts the image, and the old image is not shown.
         let is_current = packed.is_some_and(|packed| running.canvas.renders(&packed));
         match result {
             Ok(()) => {

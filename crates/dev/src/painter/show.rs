@@ -21,7 +21,7 @@ pub struct Problems {
     pub scene: Vec<Diagnostic>,
     pub files: Option<Diagnostic>,
     pub shader: Vec<Diagnostic>,
-    /// The driver truncates loops of the kernel, so the image cannot be rendered completely.
+    /// An error because the driver truncates loops of the kernel, which leaves the image incomplete.
     pub truncated: Option<Diagnostic>,
     pub device: Option<Diagnostic>,
     pub out: Option<Diagnostic>,
@@ -88,14 +88,14 @@ impl Painter {
             instances: loaded.scene.instances as u32,
             materials: loaded.scene.material_names.clone(),
         });
-        let bins = self
+        let filter_bins = self
             .loaded
             .iter()
             .flat_map(|loaded| &loaded.packed.sampling.filter_table);
         let display = DisplaySettings {
             gain: self.gain,
             marks: self.marks,
-            allow_negative: bins.into_iter().any(|bin| bin.z < 0.0),
+            allow_negative: filter_bins.into_iter().any(|bin| bin.z < 0.0),
             view: self.display_overrides.apply_to(settings),
             false_color: self.display_overrides.false_color,
         };
@@ -130,7 +130,7 @@ impl Painter {
         self.publish();
     }
 
-    /// Replaces the file of `--out` when each pixel has a sample, and when the image is finished.
+    /// Replaces the file of `--out` once every pixel has a sample, and again when the image is finished.
     fn write_out(&mut self, png: impl FnOnce() -> Vec<u8>, done: bool) {
         let Some(out) = &self.out else { return };
         if done || self.written != Some(self.revision) {

@@ -8,7 +8,7 @@ use crate::picture::View;
 
 impl Painter {
     pub(super) fn choose_view(&mut self, view: View) {
-        let kernel = |painter: &Painter| painter.target().map(|(_, _, constants)| constants);
+        let kernel = |painter: &Painter| painter.target().map(|(_, _, kernel_choice)| kernel_choice);
         let before = kernel(self);
         self.view = view;
         self.replace_unavailable_view();
@@ -60,7 +60,7 @@ impl Painter {
     /// Returns the view that is shown: the selected view, unless it needs a different kernel.
     pub(super) fn shown_view(&self) -> View {
         match &self.running {
-            Some(running) => running.constants.supported_view(self.view),
+            Some(running) => running.kernel_choice.supported_view(self.view),
             None => View::Color,
         }
     }

@@ -112,10 +112,10 @@ impl Painter {
         if hit.shape == NO_INDEX {
             return None;
         }
-        let number = hit.shape as usize;
-        match scene.shapes.get(number) {
+        let index = hit.shape as usize;
+        match scene.shapes.get(index) {
             Some(shape) => shape.geometry.bounds(),
-            None => match scene.lights.get(number - scene.shapes.len())? {
+            None => match scene.lights.get(index - scene.shapes.len())? {
                 Light::Rectangle { rectangle, .. } => Geometry::Rectangle(*rectangle).bounds(),
                 Light::Point { position, .. } | Light::Spot { position, .. } => {
                     Some((*position - DVec3::ONE, *position + DVec3::ONE))

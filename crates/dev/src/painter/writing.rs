@@ -201,7 +201,8 @@ impl Painter {
             .map_err(|error| format!("{origin}: cannot be written: {error}"))
     }
 
-    /// Sets a scene that this session has written, so that the file is not read again.
+    /// Sets a scene that this session has written, so that the file is not read again. Returns true if the display
+    /// settings changed.
     fn adopt_written(&mut self, written: Arc<Loaded>) -> bool {
         if let Some((_, stamp)) = self.files.first_mut() {
             *stamp = FileStamp::Content(written.text.clone().into_bytes());
@@ -215,7 +216,8 @@ impl Painter {
     }
 }
 
-/// Changes one number of a list; returns the path, the field and the new value of the list.
+/// If `path` leads to an element of a list, returns the path and the field of the list, and the list with `new` as that
+/// element.
 fn with_element(view: &SceneView, path: &KeyPath, new: &Json) -> Option<(KeyPath, Field, Json)> {
     let (Segment::Index(i), list) = path.0.split_last()? else {
         return None;

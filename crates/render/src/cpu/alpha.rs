@@ -16,7 +16,7 @@ use crate::records::{FOR_OPACITY, MASK, MAX_ALPHA_SKIPS, Material, NO_INDEX, OPA
 pub const RAY_BSDF: u32 = 0;
 pub const RAY_SHADOW: u32 = 1;
 
-#[expect(clippy::too_many_arguments, reason = "the twin of a WGSL function has its arguments")]
+#[expect(clippy::too_many_arguments, reason = "a twin has the arguments of its WGSL function")]
 pub fn alpha_accepts(
     scene: &Packed,
     material: &Material,
@@ -71,7 +71,7 @@ pub fn opacity_at(scene: &Packed, before: &Material, prim: &HitPrimitive, hit: H
     }
 }
 
-#[expect(clippy::too_many_arguments, reason = "the twin of a WGSL function has its arguments")]
+#[expect(clippy::too_many_arguments, reason = "a twin has the arguments of its WGSL function")]
 pub fn is_occluded_alpha(
     scene: &Packed,
     already_occluded: bool,

@@ -70,7 +70,7 @@ fn closest_of_item(
     }
 }
 
-/// Returns the closer one of `before` and the hit of a ray with an item that is a primitive. `near` is the distance to
+/// Returns the closer hit of `before` and the hit of a ray with an item that is a primitive. `near` is the distance to
 /// the item's box.
 pub fn closest_of_primitive(
     scene: &Packed,
@@ -129,7 +129,8 @@ pub fn closest_mesh_ray(
     let i = &scene.bvh.instances[instance_index as usize];
     let direction = vector_to_mesh(i, ray.direction);
     let origin = point_to_mesh(i, ray.origin) + direction * start;
-    // At equal distance, the larger triangle index loses: this instance wins only over instances with larger indices.
+    // At equal distance, a hit wins if its triangle index is smaller than `best.triangle`. Instances must win only over
+    // instances with larger indices.
     let best = Nearest {
         t: before.t,
         triangle: if instance_index + 1 < before.instance {
@@ -151,7 +152,7 @@ fn instance_mesh(scene: &Packed, instance_index: u32) -> traversal::Mesh<'_> {
     traversal_mesh(&scene.bvh.meshes[scene.bvh.instances[instance_index as usize].mesh as usize])
 }
 
-/// Returns the hit of a ray of [`closest_mesh_ray`].
+/// Returns the hit that a ray of [`closest_mesh_ray`] has found.
 #[inline(always)]
 pub fn mesh_hit(scene: &Packed, instance_index: u32, line: &Line, found: Nearest) -> Hit {
     let mesh = instance_mesh(scene, instance_index);
@@ -170,7 +171,7 @@ pub fn mesh_hit(scene: &Packed, instance_index: u32, line: &Line, found: Nearest
     }
 }
 
-/// Returns the index of the triangle that a ray or segment from `origin_prim` does not hit.
+/// Returns the index of the instance's triangle that a ray or segment from `origin_prim` must not hit, if any.
 #[inline(always)]
 fn excluded_triangle(origin_prim: UVec2, instance_index: u32) -> u32 {
     if origin_prim.x == instance_index + 1 {
@@ -360,7 +361,7 @@ fn is_occluded_by_item(
     }
 }
 
-/// Returns true if an item that is a primitive occludes the segment.
+/// Like [`is_occluded_by_bvh`], for a single item that is a primitive.
 pub fn is_occluded_by_primitive_item(
     scene: &Packed,
     item: &BvhItem,

@@ -79,7 +79,7 @@ mod tests {
     }
 
     #[test]
-    fn perspective_rays_leave_one_point() {
+    fn perspective_rays_start_at_the_camera() {
         let camera = camera(PERSPECTIVE);
         for (raster, direction) in [
             ((4.0, 2.0), (0.0, 1.0, 0.0)),

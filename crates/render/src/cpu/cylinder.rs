@@ -166,7 +166,7 @@ mod tests {
         }
     }
 
-    /// Returns distance and normal; INFINITE_T for a miss.
+    /// Returns the distance of the hit and the normal. The distance of a miss is `INFINITE_T`.
     fn hit(q: &Primitive, ray: Ray) -> (f32, Vec3) {
         let t = intersect_cylinder(q, false, ray, INFINITE_T);
         (
@@ -186,7 +186,7 @@ mod tests {
             // From inside.
             ([1.0, 2.0, 3.0], [0.0, -1.0, 0.0], 2.0, Vec3::NEG_Y),
             ([1.0, 2.0, 3.0], [0.0, 0.0, 1.0], 3.0, Vec3::Z),
-            // Just below the rim, and just inside the rim.
+            // Just below the rim of the upper cap, and just inside the rim.
             ([-2.0, 2.0, 6.5], [1.0, 0.0, -1.0], 2.0f32.sqrt(), Vec3::NEG_X),
             ([-0.9, 2.0, 7.0], [1.0, 0.0, -1.0], 2.0f32.sqrt(), Vec3::Z),
         ] {
@@ -238,7 +238,7 @@ mod tests {
 
     #[test]
     fn a_huge_cylinder_is_precise_near_the_origin() {
-        // On the side of a horizontal cylinder, and the cap of a vertical one.
+        // Rays down to the side of a horizontal cylinder, and to the cap of a vertical cylinder.
         let pipe = primitive(
             CYLINDER,
             DVec3::NEG_Z * 1e6,

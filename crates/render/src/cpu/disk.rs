@@ -55,8 +55,8 @@ mod tests {
         let occludes = |x: f32, y: f32, t_max| disk_occludes(Vec3::new(x, y, 1.0), Vec3::new(0.0, 0.0, -3.0), t_max);
         assert!(occludes(0.0, 0.0, 1.0) && occludes(0.7, -0.7, 1.0) && occludes(-1.0, 0.0, 1.0));
         assert!(!occludes(0.72, 0.72, 1.0) && !occludes(1.01, 0.0, 1.0));
-        assert!(!occludes(0.0, 0.0, 0.3), "ends before");
+        assert!(!occludes(0.0, 0.0, 0.3), "ends above the disk");
         let slanted = |x: f32| disk_occludes(Vec3::new(x, 0.0, 1.0), Vec3::new(2.0, 0.0, -2.0), 1.0);
-        assert!(slanted(-0.1) && !slanted(0.1), "crosses at x + 1");
+        assert!(slanted(-0.1) && !slanted(0.1), "the segment crosses the plane at x + 1");
     }
 }

@@ -103,7 +103,7 @@ mod tests {
         );
     }
 
-    /// Hits lie on the quadric |M (p - c)|^2 = 1, with its gradient as normal.
+    /// Tests that hits lie on the quadric |M (p - c)|^2 = 1, and that normals are its gradients.
     #[test]
     fn hits_of_an_ellipsoid_lie_on_its_quadric() {
         let center = DVec3::new(0.5, 0.4, 0.4);
@@ -114,7 +114,7 @@ mod tests {
             let origin = Vec3::new(0.0, -3.0, 1.3);
             let ray = ray(origin.into(), (Vec3::from(target) - origin).into());
             let t = intersect_ellipsoid(&q, false, ray, INFINITE_T);
-            assert!(t < INFINITE_T, "the ray to {target:?}, inside the ellipsoid, missed");
+            assert!(t < INFINITE_T, "the ray to {target:?}, inside the ellipsoid, misses");
             let p = ray.origin + ray.direction * t;
             assert!(quadric(p.as_dvec3()).abs() < 1e-5, "{}", quadric(p.as_dvec3()));
             let step = 1e-4;
@@ -126,7 +126,7 @@ mod tests {
     }
 
     #[test]
-    fn from_inside_the_far_side_is_hit() {
+    fn rays_from_inside_hit_the_far_side() {
         let t = intersect_ellipsoid(
             &unit_sphere(),
             false,

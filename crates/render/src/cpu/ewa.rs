@@ -1,6 +1,6 @@
-//! Elliptical weighted average with cached weights. Textures of the same size that a material looks up at the same
-//! point share the weights. Usually all textures of a material have the same size, and computing the weights takes most
-//! of the time. The results are bit-identical to [`super::texture::ewa_color`].
+//! Elliptical weighted average (EWA) with cached weights. Computing the weights takes most of the time of a lookup.
+//! Textures of equal size share the weights if a material looks them up at the same point. Usually all textures of a
+//! material have the same size. The results are bit-identical to [`super::texture::ewa_color`].
 
 use std::cell::RefCell;
 use std::sync::LazyLock;
@@ -62,7 +62,7 @@ struct Weights {
     /// Indices of the texels within the level.
     texels: Vec<u32>,
     weights: Vec<f32>,
-    /// First texel with a positive weight; differences from this texel are summed.
+    /// Position of the first texel with a positive weight. Differences from this texel are summed.
     base: usize,
     /// 1 / (sum of the weights), or 0.
     scale: f32,
@@ -192,7 +192,7 @@ impl Weights {
 static SRGB: LazyLock<Table> = LazyLock::new(|| Table::new(SRGB8));
 static LINEAR: LazyLock<Table> = LazyLock::new(|| Table::new(LINEAR8));
 
-/// Table of [`unpacked_color`], indexed by the exponent and nine binary digits of a component.
+/// Table of [`unpacked_color`], indexed by the exponent and the nine bits of a component.
 struct Table(Box<[f32; 1 << 14]>);
 
 impl Table {

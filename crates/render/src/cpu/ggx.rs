@@ -91,7 +91,7 @@ mod tests {
     use super::*;
     use crate::cpu::rng::{hash4, unit_float};
 
-    /// (alpha_x, alpha_y).
+    /// Pairs (alpha_x, alpha_y).
     const ALPHAS: [(f64, f64); 8] = [
         (0.001, 0.001),
         (0.02, 0.02),
@@ -112,8 +112,8 @@ mod tests {
         DVec3::new(sine * longitude.cos(), sine * longitude.sin(), cosine).as_vec3()
     }
 
-    /// Integrates over microfacet normals. The slopes are x = ax tan(angle) cos(longitude) and y = ay tan(angle)
-    /// sin(longitude); thus steps are dense where the distribution is large.
+    /// Integrates over microfacet normals with slopes x = ax tan(angle) cos(longitude) and y = ay tan(angle)
+    /// sin(longitude). Steps in angle and longitude are dense where the distribution is large.
     fn over_normals((ax, ay): (f64, f64), mut f: impl FnMut(DVec3) -> f64) -> f64 {
         let (rings, spokes) = (400, 400);
         let mut sum = 0.0;
@@ -121,8 +121,8 @@ mod tests {
             let angle = (f64::from(i) + 0.5) / f64::from(rings) * PI / 2.0;
             for j in 0..spokes {
                 let longitude = (f64::from(j) + 0.5) / f64::from(spokes) * TAU;
-                let slope = DVec3::new(ax * longitude.cos(), ay * longitude.sin(), 0.0) * angle.tan() + DVec3::Z;
-                let m = slope.normalize();
+                let slopes = DVec3::new(ax * longitude.cos(), ay * longitude.sin(), 0.0) * angle.tan();
+                let m = (slopes + DVec3::Z).normalize();
                 // d(slopes) = ax ay tan(angle) / cos(angle)^2 d(angle) d(longitude), d(solid angle) = m.z^3 d(slopes).
                 let step = ax * ay * angle.tan() / angle.cos().powi(2);
                 sum += f(m) * step * m.z.powi(3);
@@ -145,7 +145,8 @@ mod tests {
         for alpha in ALPHAS {
             for (cosine, longitude) in [(1.0, 0.0), (0.7, 0.3), (0.3, 1.5), (0.05, 2.9)] {
                 let wo = unit(cosine, longitude);
-                // G1 times the projected area of all normals that face the viewer is the projected area of the surface.
+                // G1 times the projected area of all microfacets that face the viewer equals the projected area of the
+                // surface.
                 let facing = over_normals(alpha, |m| {
                     f64::from(ggx_d(pair(alpha), m.as_vec3())) * m.dot(wo.as_dvec3()).max(0.0)
                 });
@@ -165,7 +166,7 @@ mod tests {
                 let g2 = ggx_g2(alpha, wo, wi);
                 let (o, i) = (ggx_g1(alpha, wo), ggx_g1(alpha, wi));
                 assert!(g2 <= o.min(i) * 1.000_001 && g2 >= o * i * 0.999_999);
-                // Heitz, equation 99, from two values of Lambda.
+                // Heitz, JCGT 3(2), 2014, equation 99.
                 let lambda = |g: f32| (1.0 - f64::from(g)) / f64::from(g);
                 let expected = 1.0 / (1.0 + lambda(o) + lambda(i));
                 assert!((f64::from(g2) / expected - 1.0).abs() < 1e-5, "{g2} {expected}");
@@ -199,26 +200,26 @@ mod tests {
             let density = f64::from(ggx_pdf(pair(alpha), wo, m.as_vec3()))
                 * if m.x > 0.0 { pdf_factor } else { 2.0 - pdf_factor };
             let slope = (m.x / ax / m.z).hypot(m.y / ay / m.z);
-            // The step of `over_normals`.
+            // Solid angle of a step of `over_normals`.
             let step = ax * ay * slope * (1.0 + slope * slope) * m.z.powi(3) * (PI / 2.0 / 400.0) * (TAU / 400.0);
             expected[cell(m)] += density * step * f64::from(SAMPLES);
             0.0
         });
-        let (mut sum, mut freedom, mut pooled) = (0.0, -1.0, (0.0, 0.0));
+        let (mut sum, mut degrees_of_freedom, mut pooled) = (0.0, -1.0, (0.0, 0.0));
         for (count, expected) in counts.iter().zip(&expected) {
             if *expected < 10.0 {
                 pooled = (pooled.0 + count, pooled.1 + expected);
             } else {
                 sum += (count - expected) * (count - expected) / expected;
-                freedom += 1.0;
+                degrees_of_freedom += 1.0;
             }
         }
         if pooled.1 > 10.0 {
             sum += (pooled.0 - pooled.1) * (pooled.0 - pooled.1) / pooled.1;
-            freedom += 1.0;
+            degrees_of_freedom += 1.0;
         }
-        assert!(freedom > 20.0, "{freedom}");
-        (sum - freedom) / (2.0 * freedom).sqrt()
+        assert!(degrees_of_freedom > 20.0, "{degrees_of_freedom}");
+        (sum - degrees_of_freedom) / (2.0 * degrees_of_freedom).sqrt()
     }
 
     #[test]
@@ -230,7 +231,7 @@ mod tests {
                 let incorrect = chi_square(alpha, wo, 1.06);
                 assert!(
                     incorrect > 6.0,
-                    "{alpha:?}, {wo}: a wrong density was not detected: {incorrect}"
+                    "{alpha:?}, {wo}: a wrong pdf is not detected: {incorrect}"
                 );
             }
         }

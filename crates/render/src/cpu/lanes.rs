@@ -1,6 +1,6 @@
-//! Numbers and vectors of the shared functions that run for a single path and for several paths in SIMD lanes: a
-//! [`Real`] is an `f32` or has an `f32` in each lane. Functions on them select values instead of branching, like the
-//! WGSL functions. Each lane has the bits of the `f32` version.
+//! Number and vector types of the shared functions that run for a single path and for several paths in SIMD lanes: a
+//! [`Real`] is an `f32`, or a vector with an `f32` in each lane. Generic functions over these types select values
+//! instead of branching, like the WGSL functions. Each lane gives the bits of the `f32` version.
 
 use std::ops::{Add, BitAnd, BitOr, BitXor, Div, Mul, Neg, Not, Shl, Shr, Sub};
 
@@ -29,10 +29,10 @@ pub trait Real:
     type Vec2: Vector2<Real = Self>;
     type Vec3: Vector3<Real = Self>;
 
-    /// Returns `value` in all lanes.
+    /// Returns `value` in all lanes. The value of `self` is not used.
     fn splat(self, value: f32) -> Self;
 
-    /// Returns a vector in all lanes.
+    /// Returns the vector `value` in all lanes. The value of `self` is not used.
     #[inline(always)]
     fn broadcast(self, value: Vec3) -> Self::Vec3 {
         Vector3::new(self.splat(value.x), self.splat(value.y), self.splat(value.z))
@@ -56,17 +56,17 @@ pub trait Real:
     }
 }
 
-/// A constant on the left of an operator.
+/// A constant as the left operand of an operator. Rust does not allow operators of `f32` and any [`Real`].
 #[derive(Clone, Copy, Debug)]
 pub struct Constant(f32);
 
-/// Returns a constant on the left of an operator: `constant(1.0) - x`.
+/// Returns a constant for the left side of an operator, as in `constant(1.0) - x`.
 #[inline(always)]
 pub fn constant(value: f32) -> Constant {
     Constant(value)
 }
 
-/// Returns `if_true` where the mask is set, like the WGSL function.
+/// Returns `if_true` where the mask is set, else `if_false`, like `select` of WGSL.
 #[inline(always)]
 pub fn select<F: Real>(if_false: F, if_true: F, mask: F::Mask) -> F {
     F::select(if_false, if_true, mask)
@@ -87,7 +87,7 @@ macro_rules! constant_operators {
 
 constant_operators! { Add add; Sub sub; Mul mul; Div div; }
 
-/// An unsigned integer of 32 bits. Operators do not overflow in the shared functions.
+/// An unsigned 32-bit integer. Sums and products wrap, as in WGSL.
 pub trait Word:
     Copy
     + BitAnd<Output = Self>
@@ -101,7 +101,7 @@ pub trait Word:
     type UVec2: WordVector2<Word = Self>;
     type UVec4: WordVector4<Word = Self>;
 
-    /// Returns `value` in all lanes.
+    /// Returns `value` in all lanes. The value of `self` is not used.
     fn splat(self, value: u32) -> Self;
     fn wrapping_add(self, other: Self) -> Self;
     fn wrapping_mul(self, other: Self) -> Self;
@@ -118,7 +118,7 @@ pub trait Vector2: Copy + Mul<Self::Real, Output = Self> {
     fn x(self) -> Self::Real;
     fn y(self) -> Self::Real;
 
-    /// Returns `if_true` where the mask is set.
+    /// Returns `if_true` where the mask is set, else `if_false`.
     #[inline(always)]
     fn select(if_false: Self, if_true: Self, mask: <Self::Real as Real>::Mask) -> Self {
         Self::new(
@@ -147,14 +147,14 @@ pub trait Vector3:
     fn y(self) -> Self::Real;
     fn z(self) -> Self::Real;
 
-    /// Returns `value` in all lanes.
+    /// Returns `value` in all lanes. The value of `self` is not used.
     #[inline(always)]
     fn broadcast(self, value: Vec3) -> Self {
         let x = self.x();
         Self::new(x.splat(value.x), x.splat(value.y), x.splat(value.z))
     }
 
-    /// Returns `if_true` where the mask is set.
+    /// Returns `if_true` where the mask is set, else `if_false`.
     #[inline(always)]
     fn select(if_false: Self, if_true: Self, mask: <Self::Real as Real>::Mask) -> Self {
         Self::new(
@@ -406,10 +406,10 @@ impl<S: Simd> Word for u32x8<S> {
     }
 }
 
-/// Swaps neighboring groups of `digits` bits. `mask` selects the lower groups.
+/// Swaps neighboring groups of `width` bits. `mask` selects the lower group of each pair.
 #[inline(always)]
-fn swapped<W: Word>(x: W, digits: u32, mask: u32) -> W {
-    ((x >> digits) & mask) | ((x & mask) << digits)
+fn swapped<W: Word>(x: W, width: u32, mask: u32) -> W {
+    ((x >> width) & mask) | ((x & mask) << width)
 }
 
 /// A vector of two numbers in each lane.
@@ -541,11 +541,11 @@ macro_rules! scalar_operators {
             type Output = Lanes3<F>;
 
             #[inline(always)]
-            fn $function(self, factor: F) -> Lanes3<F> {
+            fn $function(self, scalar: F) -> Lanes3<F> {
                 Lanes3 {
-                    x: $operator::$function(self.x, factor),
-                    y: $operator::$function(self.y, factor),
-                    z: $operator::$function(self.z, factor),
+                    x: $operator::$function(self.x, scalar),
+                    y: $operator::$function(self.y, scalar),
+                    z: $operator::$function(self.z, scalar),
                 }
             }
         })*

@@ -1,5 +1,5 @@
-//! Intersection and occlusion by the primitives outside of the BVH, with the results of `shaders/buffers.wgsl` and
-//! `shaders/linear_primitives.wgsl`.
+//! Closest-hit and occlusion queries over the primitives outside of the BVH, with the results of `shaders/buffers.wgsl`
+//! and `shaders/linear_primitives.wgsl`.
 
 use std::ops::Range;
 

@@ -9,7 +9,8 @@ use super::surface::Surface;
 use super::traversal::{Directions, MAX_SEGMENTS};
 use crate::records::Material;
 
-/// Sets bit i if direction i lights the surface ([`is_lit`](super::phong::is_lit)).
+/// Returns a mask in which bit i is set if light from direction i reaches the surface
+/// ([`is_lit`](super::phong::is_lit)).
 pub fn lit_bits(level: Level, surface: &Surface, directions: &Directions) -> u32 {
     dispatch!(level, simd => {
         let mut bits = 0;
@@ -20,7 +21,8 @@ pub fn lit_bits(level: Level, surface: &Surface, directions: &Directions) -> u32
     })
 }
 
-/// Returns [`phong_lobes`](super::phong::phong_lobes) in all directions: diffuse lobes, then specular lobes.
+/// Returns the values of [`phong_lobes`](super::phong::phong_lobes) for all directions: diffuse lobes, then specular
+/// lobes.
 pub fn lobes_of_all(
     level: Level,
     surface: &Surface,
@@ -88,7 +90,7 @@ fn dot_vector<S: Simd>(a: Vec3, [x, y, z]: &[S::f32s; 3]) -> S::f32s {
     *x * a.x + *y * a.y + *z * a.z
 }
 
-/// Returns a SIMD vector of directions, starting at index i.
+/// Returns SIMD vectors of the components of directions, starting at index i.
 #[inline(always)]
 fn components<S: Simd>(simd: S, directions: &Directions, i: usize) -> [S::f32s; 3] {
     let [x, y, z] = &directions.components;

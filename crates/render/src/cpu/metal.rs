@@ -98,14 +98,14 @@ mod tests {
         }
     }
 
-    fn reflectance_by_amplitudes(eta: f64, k: f64, c: f64) -> f64 {
+    fn reflectance_by_amplitudes(eta: f64, k: f64, cosine: f64) -> f64 {
         let n = Complex(eta, k);
         let n2 = n.times(n);
-        // The index times the refracted cosine: sqrt(n^2 - sin^2).
-        let nt = n2.add_scaled(Complex(1.0 - c * c, 0.0), -1.0).root();
-        let s = Complex(c, 0.0);
+        // Refractive index times cosine of the refracted direction: sqrt(n^2 - sin^2).
+        let nt = n2.add_scaled(Complex(1.0 - cosine * cosine, 0.0), -1.0).root();
+        let s = Complex(cosine, 0.0);
         let s_ratio = s.add_scaled(nt, -1.0).norm_squared() / s.add_scaled(nt, 1.0).norm_squared();
-        let p = n2.times(Complex(c, 0.0));
+        let p = n2.times(Complex(cosine, 0.0));
         let p_ratio = p.add_scaled(nt, -1.0).norm_squared() / p.add_scaled(nt, 1.0).norm_squared();
         (s_ratio + p_ratio) / 2.0
     }
@@ -121,16 +121,16 @@ mod tests {
             (100.0, 100.0),
             (0.001, 0.0),
         ] {
-            for c in [1.0, 0.9, 0.5, 0.2, 0.03, 1e-4, 0.0] {
-                let found = f64::from(conductor_fresnel(eta as f32, k as f32, c as f32));
-                let expected = reflectance_by_amplitudes(eta, k, c);
+            for cosine in [1.0, 0.9, 0.5, 0.2, 0.03, 1e-4, 0.0] {
+                let found = f64::from(conductor_fresnel(eta as f32, k as f32, cosine as f32));
+                let expected = reflectance_by_amplitudes(eta, k, cosine);
                 assert!(
                     (found - expected).abs() < 2e-5,
-                    "{eta} + {k} i, {c}: {found} {expected}"
+                    "{eta} + {k} i, {cosine}: {found} {expected}"
                 );
             }
         }
-        // k = 0 is a dielectric.
+        // With k = 0, the metal is a dielectric.
         let glass =
             crate::cpu::specular::fresnel(0.6, crate::cpu::specular::refracted_cosine(0.6, 1.0 / 1.5), 1.0 / 1.5);
         assert!((conductor_fresnel(1.5, 0.0, 0.6) - glass).abs() < 1e-6);

@@ -170,7 +170,7 @@ mod tests {
     use crate::records::NO_PRIMITIVE;
 
     #[test]
-    fn unusable_normal_falls_back_to_smooth_normal() {
+    fn unusable_normals_fall_back_to_the_smooth_or_the_geometric_normal() {
         let zero = Vec3::ZERO;
         let smooth_normal = normalize(Vec3::new(0.1, 0.0, 1.0));
         let surface = |x: f32| Surface {
@@ -189,11 +189,11 @@ mod tests {
             dv: zero,
         };
         let tilted = normalize(Vec3::new(1.0, 0.0, 1.0));
-        // Seen from above, a normal tilted by 45 degrees reflects along the triangle or below. Seen from the side
-        // towards which the normal tilts, it is usable.
+        // For a viewer above the triangle, a normal tilted by 45 degrees reflects rays along the triangle or below it.
+        // For a viewer on the side to which the normal tilts, the normal is usable.
         assert_eq!(usable_normal(surface(-0.1), tilted), smooth_normal);
         assert_eq!(usable_normal(surface(0.5), tilted), tilted);
-        // At a grazing angle the smooth normal would also reflect below the plane.
+        // For a viewer at a grazing angle, the smooth normal also reflects rays below the triangle.
         assert_eq!(usable_normal(surface(-8.0), tilted), Vec3::Z);
     }
 }

@@ -23,7 +23,7 @@ mod tests {
     use crate::pack::primitive;
     use crate::records::{INFINITE_T, PLANE};
 
-    /// Returns the t of the hit with the plane z = 1.
+    /// Returns the distance of the hit with the plane z = 1.
     fn hit(origin: [f32; 3], direction: [f32; 3]) -> f32 {
         let plane = primitive(PLANE, DVec3::new(7.0, -3.0, 1.0), DMat3::IDENTITY, 0, 0);
         let ray = Ray {

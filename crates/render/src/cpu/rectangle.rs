@@ -59,20 +59,28 @@ mod tests {
             "beside the second edge"
         );
         assert_eq!(hit([1.9, 4.0, 0.9], [0.0, -1.0, 0.0]), 3.0, "from the other side");
-        assert_eq!(hit([1.9, 4.0, 0.9], [0.0, 1.0, 0.0]), INFINITE_T, "behind");
+        assert_eq!(
+            hit([1.9, 4.0, 0.9], [0.0, 1.0, 0.0]),
+            INFINITE_T,
+            "away from the rectangle"
+        );
         let slanted = hit([-1.0, 0.0, 0.0], [1.0, 1.0, 0.0]);
         assert!((slanted - 2.0f32.sqrt()).abs() < 1e-6, "{slanted}");
     }
 
     #[test]
-    fn a_ray_in_its_plane_hits_nothing() {
+    fn rays_parallel_to_the_plane_hit_nothing() {
         assert_eq!(hit([-5.0, 1.0, 0.0], [1.0, 0.0, 0.0]), INFINITE_T);
-        assert_eq!(hit([0.0, 1.0, 0.0], [0.0, 0.0, 1.0]), INFINITE_T, "from within");
-        assert_eq!(hit([-5.0, 1.5, 0.0], [1.0, 0.0, 0.0]), INFINITE_T, "beside the plane");
+        assert_eq!(
+            hit([0.0, 1.0, 0.0], [0.0, 0.0, 1.0]),
+            INFINITE_T,
+            "from inside the rectangle"
+        );
+        assert_eq!(hit([-5.0, 1.5, 0.0], [1.0, 0.0, 0.0]), INFINITE_T, "above the plane");
     }
 
     #[test]
-    fn a_grazing_ray_hits_where_it_reaches_the_plane() {
+    fn grazing_rays_hit_where_they_cross_the_plane() {
         let found = hit([-1000.0, 0.0, 0.0], [1000.0, 1.0, 0.0]);
         assert!((f64::from(found) - 1_000_001f64.sqrt()).abs() < 0.01, "{found}");
         assert_eq!(

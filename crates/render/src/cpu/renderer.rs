@@ -24,7 +24,7 @@ pub struct Cpu<P> {
     rules: Rules,
     film: Option<(Film, FilmState)>,
     pending: Option<(Region, Range<u32>)>,
-    /// The meshes of the scene, from the first samples on.
+    /// The meshes of the scene for batches of rays, converted when the first samples are rendered.
     meshes: OnceLock<Arc<BatchMeshes>>,
 }
 
@@ -59,7 +59,7 @@ impl<P: Deref<Target = Packed>> Cpu<P> {
         self.film.map(|(film, _)| film)
     }
 
-    fn idle(&self) -> Result<(), RenderError> {
+    fn check_idle(&self) -> Result<(), RenderError> {
         match self.pending {
             Some(_) => Err(RenderError::Pending),
             None => Ok(()),
@@ -68,33 +68,33 @@ impl<P: Deref<Target = Packed>> Cpu<P> {
 }
 
 impl<P: DerefMut<Target = Packed>> Cpu<P> {
-    /// Changes the camera and discards the film. Keeps the meshes in their form for batches of rays.
+    /// Changes the camera and discards the film. Keeps the converted meshes.
     pub fn set_camera(&mut self, camera: &Camera) {
         self.scene.camera = *camera;
         (self.rules, self.film, self.pending) = (Rules::of(&self.scene), None, None);
     }
 }
 
-/// Maximum number of pixels of a row per task.
+/// Maximum number of pixels in the row segment of a task.
 const MAX_RUN: usize = 32;
 
 impl<P: Deref<Target = Packed>> Backend for Cpu<P> {
     fn begin(&mut self, region: Region) -> Result<(), RenderError> {
-        self.idle()?;
+        self.check_idle()?;
         let state = self.rules.begin(region)?;
         self.film = Some((self.rules.empty_film(region), state));
         Ok(())
     }
 
     fn resume(&mut self, film: Film) -> Result<(), RenderError> {
-        self.idle()?;
+        self.check_idle()?;
         let state = self.rules.resume(&film)?;
         self.film = Some((film, state));
         Ok(())
     }
 
     fn submit(&mut self, tile: Region, samples: Range<u32>) -> Result<(), RenderError> {
-        self.idle()?;
+        self.check_idle()?;
         let (_, state) = self.film.as_mut().ok_or(RenderError::NoFilm)?;
         if self.rules.call(state, tile, &samples)? {
             self.pending = Some((tile, samples));
@@ -123,13 +123,13 @@ impl<P: Deref<Target = Packed>> Backend for Cpu<P> {
     }
 
     fn film(&mut self) -> Result<Film, RenderError> {
-        self.idle()?;
+        self.check_idle()?;
         let (film, _) = self.film.as_ref().ok_or(RenderError::NoFilm)?;
         Ok(film.clone())
     }
 
     fn first_hits(&mut self, region: Region) -> Result<Vec<FirstHit>, RenderError> {
-        self.idle()?;
+        self.check_idle()?;
         self.rules.in_picture(region)?;
         let scene: &Packed = &self.scene;
         let rows = (region.y0..region.y1).into_par_iter();
@@ -150,7 +150,7 @@ impl<P: Deref<Target = Packed>> Backend for Cpu<P> {
     }
 }
 
-/// Adds samples to a tile: with adaptive sampling either pilot samples or later ones.
+/// Adds samples to a tile. With adaptive sampling, the samples are either pilot samples or further samples.
 fn add_samples(scene: &Packed, meshes: &Arc<BatchMeshes>, film: &mut Film, tile: Region, samples: Range<u32>) {
     let Film {
         region,
@@ -167,7 +167,7 @@ fn add_samples(scene: &Packed, meshes: &Arc<BatchMeshes>, film: &mut Film, tile:
     };
     let runs = |records| runs(region, records, tile).into_iter();
     let sums = runs(sums);
-    let mut parts: Vec<Run> = sums
+    let mut segments: Vec<Run> = sums
         .map(|(first, sums)| Run {
             first,
             sums,
@@ -176,15 +176,15 @@ fn add_samples(scene: &Packed, meshes: &Arc<BatchMeshes>, film: &mut Film, tile:
             layers: Default::default(),
         })
         .collect();
-    for (part, (_, moments)) in parts.iter_mut().zip(runs(moments)) {
-        part.moments = moments;
+    for (run, (_, moments)) in segments.iter_mut().zip(runs(moments)) {
+        run.moments = moments;
     }
-    for (part, (_, pilot_sums)) in parts.iter_mut().zip(runs(pilot_to_write)) {
-        part.pilot_sums = pilot_sums;
+    for (run, (_, pilot_sums)) in segments.iter_mut().zip(runs(pilot_to_write)) {
+        run.pilot_sums = pilot_sums;
     }
     for (i, layer) in layers.iter_mut().enumerate() {
-        for (part, (_, layer)) in parts.iter_mut().zip(runs(layer)) {
-            part.layers[i] = layer;
+        for (run, (_, layer)) in segments.iter_mut().zip(runs(layer)) {
+            run.layers[i] = layer;
         }
     }
     let statistics = match is_pilot {
@@ -192,7 +192,7 @@ fn add_samples(scene: &Packed, meshes: &Arc<BatchMeshes>, film: &mut Film, tile:
         true => Statistics::Pilot,
         false => Statistics::Further,
     };
-    parts.into_par_iter().for_each_init(
+    segments.into_par_iter().for_each_init(
         || Wavefront::new(Arc::clone(meshes)),
         |wavefront, mut run| {
             let (first, width) = (run.first, run.sums.len());
@@ -232,15 +232,15 @@ fn add_samples(scene: &Packed, meshes: &Arc<BatchMeshes>, film: &mut Film, tile:
 /// The statistics of samples that adaptive sampling needs. See `shaders/kernels/adaptive.wgsl`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Statistics {
-    /// None: sampling is not adaptive.
+    /// No statistics, because sampling is not adaptive.
     None,
-    /// Those of the pilot samples.
+    /// Statistics of the pilot samples.
     Pilot,
-    /// Those of the samples after the pilot samples.
+    /// Statistics of the samples after the pilot samples.
     Further,
 }
 
-/// A segment of a film row. Lists that are missing or read-only are empty.
+/// A segment of a film row. Slices that the film lacks or that are not written are empty.
 struct Run<'a> {
     first: UVec2,
     sums: &'a mut [Vec4],
@@ -298,7 +298,7 @@ fn runs(region: Region, records: &mut [Vec4], tile: Region) -> Vec<(UVec2, &mut 
     .collect()
 }
 
-/// Returns the end of a pixel's samples after the pilot samples. The neighbors' pilot statistics determine it.
+/// Returns the end of the range of a pixel's samples, from the pilot statistics of its neighbors.
 fn further_samples_end(scene: &Packed, pilot_sums: &[Vec4], region: Region, pixel: UVec2, end: u32) -> u32 {
     let s = &scene.specialization;
     let pilot_sums = neighbor_pilot_sum(pilot_sums, region, pixel);

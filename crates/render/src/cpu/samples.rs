@@ -9,7 +9,7 @@ use super::shadow::{SampleBlock, block_sample};
 use super::traversal::{Directions, MAX_SEGMENTS};
 use crate::records::GRID;
 
-/// Instruction set of this processor.
+/// Best instruction set of this processor.
 pub static LEVEL: LazyLock<Level> = LazyLock::new(Level::new);
 
 /// Samples on the unit square. Unused lanes repeat the first sample.
@@ -49,7 +49,7 @@ impl Samples {
         samples
     }
 
-    /// Returns the vectors to the samples.
+    /// Returns the vectors to the samples on a light.
     pub fn segments(&self, level: Level, segments: LightSegments) -> Directions {
         dispatch!(level, _simd => {
             let mut components = [[0.0; MAX_SEGMENTS]; 3];

@@ -4,12 +4,12 @@ use glam::{UVec2, Vec2, Vec3};
 
 use super::surface::Surface;
 
-/// A segment from a surface towards an emitter.
+/// A segment from a surface towards a light sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ShadowRay {
     /// Start of the segment.
     pub origin: Vec3,
-    /// Direction; the segment ends at `origin + t_max * to_light`.
+    /// Direction of the segment, which ends at `origin + t_max * to_light`.
     pub to_light: Vec3,
     pub t_max: f32,
     /// Primitives at the start that do not occlude, as in [`Surface`].
@@ -19,12 +19,12 @@ pub struct ShadowRay {
     pub target_prim: u32,
     /// Radiance added to the path if the segment is not occluded.
     pub contribution: Vec3,
-    /// Number of bounces after which the contribution arrives.
+    /// Number of bounces of the path that the contribution arrives along, as in `add_radiance`.
     pub bounces: u32,
 }
 
 impl ShadowRay {
-    /// Returns a surface with the start of the segment, for occlusion queries.
+    /// Returns a surface at the start of the segment. Only the fields that occlusion queries read are set.
     #[inline(always)]
     pub fn surface(&self) -> Surface {
         Surface {

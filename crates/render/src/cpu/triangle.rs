@@ -44,6 +44,7 @@ mod tests {
         primitive(TRIANGLE, v0, DMat3::from_cols(v1 - v0, v2 - v0, normal), 0, 0)
     }
 
+    /// Returns the distance from (x, y, 5) down to the triangle.
     fn from_above(x: f32, y: f32) -> f32 {
         let ray = Ray {
             origin: Vec3::new(x, y, 5.0),
@@ -53,7 +54,7 @@ mod tests {
     }
 
     #[test]
-    fn hits_are_between_the_corners() {
+    fn hits_are_inside_the_edges() {
         for inside in [(1.01, 1.01), (2.9, 1.01), (1.01, 3.9), (1.9, 2.4), (1.5, 2.0)] {
             let found = from_above(inside.0, inside.1);
             assert!((found - 3.0).abs() < 1e-6, "{inside:?}: {found}");
@@ -75,7 +76,7 @@ mod tests {
         assert!(!occludes(-0.01, 0.5) && !occludes(0.5, -0.01) && !occludes(0.55, 0.5));
         assert!(
             !triangle_occludes(Vec3::new(0.2, 0.2, 1.0), Vec3::new(0.0, 0.0, -3.0), 0.3),
-            "ends before"
+            "ends above the triangle"
         );
     }
 }

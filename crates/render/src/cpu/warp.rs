@@ -9,7 +9,7 @@ use super::primitive::Tangents;
 #[expect(
     clippy::approx_constant,
     clippy::excessive_precision,
-    reason = "coefficients as the WGSL has them"
+    reason = "coefficients are written as in WGSL"
 )]
 #[inline(always)]
 pub fn disk_sample<V: Vector2>(u: V) -> V {

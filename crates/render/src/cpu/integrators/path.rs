@@ -105,8 +105,8 @@ pub fn advance(scene: &Packed, state: &mut PathState, pixel: UVec2) {
     }
 }
 
-/// The part of [`advance`] after the closest hit: ends the path or samples its next ray. Returns the shadow ray, which
-/// must be traced before the next hit is shaded.
+/// The part of [`advance`] after the closest hit: ends the path or samples its next ray. Returns the shadow ray, if
+/// any. It must be traced before the next hit is shaded.
 #[inline(never)] // compiled once, for `advance` and the wavefront
 pub fn shade(scene: &Packed, state: &mut PathState, hit: Hit, pixel: UVec2) -> Option<ShadowRay> {
     let s = &scene.specialization;
@@ -431,7 +431,7 @@ pub fn sample_delta_bsdf(
     state.path = path;
 }
 
-#[expect(clippy::too_many_arguments, reason = "the twin of a WGSL function has its arguments")]
+#[expect(clippy::too_many_arguments, reason = "a twin has the arguments of its WGSL function")]
 #[inline(always)]
 fn sample_direct_light(
     scene: &Packed,
@@ -487,7 +487,7 @@ fn sample_direct_light(
     })
 }
 
-#[expect(clippy::too_many_arguments, reason = "the twin of a WGSL function has its arguments")]
+#[expect(clippy::too_many_arguments, reason = "a twin has the arguments of its WGSL function")]
 #[inline(always)]
 pub fn sample_bsdf(
     scene: &Packed,

@@ -127,7 +127,7 @@ pub fn radiance_from(scene: &Packed, prim: &HitPrimitive, hit: Hit, path: Path, 
     sum
 }
 
-#[expect(clippy::too_many_arguments, reason = "the twin of a WGSL function has its arguments")]
+#[expect(clippy::too_many_arguments, reason = "a twin has the arguments of its WGSL function")]
 pub fn lobes_of_light(
     scene: &Packed,
     prim: &HitPrimitive,

@@ -1,4 +1,4 @@
-//! Each lane of a shared function has the bits of its `f32` version, with every instruction set.
+//! Tests that each lane of a shared function has the bits of the `f32` version, with every instruction set.
 
 use fearless_simd::dispatch;
 use glam::{UVec2, UVec4, Vec2, Vec3};
@@ -20,14 +20,14 @@ const LANES: usize = 8;
 #[derive(Clone, Copy)]
 struct Arguments<W: Word> {
     words: [W; 4],
-    /// From 0 to 1.
+    /// Point on the unit square.
     square: [W::Real; 2],
     numbers: [W::Real; 9],
 }
 
-/// Returns the results of all functions, and appends their names.
+/// Calls all functions, and appends the name and the result of each call to `reals` or `words`.
 #[inline(always)]
-fn results<W, K>(a: Arguments<W>, results: &mut Vec<(&'static str, W::Real)>, words: &mut Vec<(&'static str, W)>)
+fn append_results<W, K>(a: Arguments<W>, reals: &mut Vec<(&'static str, W::Real)>, words: &mut Vec<(&'static str, W)>)
 where
     W: Word<UVec4 = K>,
     K: WordVector4<Word = W>,
@@ -56,9 +56,9 @@ where
         ("angles_at between", angles.between),
         ("diffuse_pdf", diffuse_pdf(angles)),
     ];
-    results.extend(scalars);
+    reals.extend(scalars);
     for (name, v) in [("disk_sample", disk_sample(u)), ("triangle_sample", triangle_sample(u))] {
-        results.extend([(name, v.x()), (name, v.y())]);
+        reals.extend([(name, v.x()), (name, v.y())]);
     }
     let frame = frame_around(unit);
     for (name, v) in [
@@ -73,7 +73,7 @@ where
         ("diffuse_sample", diffuse_sample(unit, u)),
         ("select", Vector3::select(p, q, n[0].lt(n[1]))),
     ] {
-        results.extend([(name, v.x()), (name, v.y()), (name, v.z())]);
+        reals.extend([(name, v.x()), (name, v.y()), (name, v.z())]);
     }
     let sobol: W::UVec2 = sobol_bits(i, WordVector2::new(j, k));
     words.extend([
@@ -97,7 +97,7 @@ impl Random {
         (self.0 >> 32) as u32
     }
 
-    /// Returns a number from -1 to 1, a special one, or any bits.
+    /// Returns a number from -1 to 1, a special number, or a number with arbitrary bits.
     fn number(&mut self) -> f32 {
         const SPECIAL: [f32; 8] = [0.0, -0.0, 1.0, -1.0, f32::INFINITY, f32::NEG_INFINITY, f32::NAN, 1e-40];
         let word = self.word();
@@ -114,7 +114,7 @@ fn bits(x: f32) -> u32 {
 }
 
 #[test]
-fn lanes_have_the_bits_of_single_numbers() {
+fn lanes_are_bit_identical_to_scalar_results() {
     let random = &mut Random(7);
     let mut differing = 0;
     for _ in 0..3000 {
@@ -123,11 +123,11 @@ fn lanes_have_the_bits_of_single_numbers() {
             square: [(); 2].map(|()| unit_float(random.word())),
             numbers: [(); 9].map(|()| random.number()),
         });
-        // Points on the edges of the square.
+        // Points where `disk_sample` switches between its cases.
         lanes[0].square = [[0.0, 0.5], [0.5, 0.5], [0.5, 0.0], [0.25, 0.75]][random.word() as usize % 4];
         let expected = lanes.map(|arguments| {
             let (mut reals, mut words) = (Vec::new(), Vec::new());
-            results(arguments, &mut reals, &mut words);
+            append_results(arguments, &mut reals, &mut words);
             (reals, words)
         });
         for level in levels() {
@@ -140,7 +140,7 @@ fn lanes_have_the_bits_of_single_numbers() {
                         .map(|i| f32x8::simd_from(simd, lanes.map(|a: Arguments<u32>| a.numbers[i]))),
                 };
                 let (mut reals, mut words) = (Vec::new(), Vec::new());
-                results(arguments, &mut reals, &mut words);
+                append_results(arguments, &mut reals, &mut words);
                 assert_eq!((reals.len(), words.len()), (expected[0].0.len(), expected[0].1.len()));
                 for (i, (name, x)) in reals.iter().enumerate() {
                     let x: [f32; LANES] = (*x).into();
@@ -158,11 +158,14 @@ fn lanes_have_the_bits_of_single_numbers() {
             });
         }
     }
-    assert!(differing > 10_000, "the inputs of neighboring lanes differ");
+    assert!(
+        differing > 10_000,
+        "results that differ between neighboring lanes: {differing}"
+    );
 }
 
 #[test]
-fn single_numbers_have_vectors_of_glam() {
+fn scalar_functions_accept_glam_vectors() {
     assert_eq!(dot(Vec3::X, Vec3::splat(2.0)), 2.0);
     assert_eq!(disk_sample(Vec2::splat(0.5)), Vec2::ZERO);
     assert_eq!(

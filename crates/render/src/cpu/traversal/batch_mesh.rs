@@ -1,5 +1,5 @@
-//! A mesh and its BVH in a form for traversal by batches of rays: boxes as floats, and the triangles of a leaf as a
-//! structure of arrays. It takes about 130 bytes per triangle.
+//! A mesh and its BVH for traversal by batches of rays: boxes are decoded to floats, and the triangles of a leaf are a
+//! structure of arrays. A mesh takes about 130 bytes per triangle.
 
 use fearless_simd::f32x4;
 use fearless_simd::prelude::*;
@@ -8,7 +8,7 @@ use super::four::intersect;
 use super::{Line, Mesh};
 use crate::bvh::Node;
 
-/// Bit of the children that are leaves.
+/// Bit of [`BatchNode::children`] that is set for leaves.
 pub const LEAF: u32 = 1 << 31;
 
 /// A node with decoded boxes.
@@ -17,7 +17,7 @@ pub const LEAF: u32 = 1 << 31;
 pub struct BatchNode {
     /// Lower and upper sides of the children's boxes along x, y and z. Empty slots have an empty box.
     pub planes: [[[f32; 8]; 3]; 2],
-    /// For each child the index of its node, or [`LEAF`] | the index of its leaf.
+    /// For each child, the index of its node, or [`LEAF`] | index of its leaf.
     pub children: [u32; 8],
 }
 
@@ -35,7 +35,7 @@ pub struct Leaf {
     used: u32,
 }
 
-/// A mesh with its BVH.
+/// A mesh with its BVH, for batches of rays.
 #[derive(Clone, Debug)]
 pub struct BatchMesh {
     pub nodes: Vec<BatchNode>,

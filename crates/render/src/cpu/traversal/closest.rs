@@ -1,4 +1,4 @@
-//! Traversal of a BVH along a ray: leaves from front to back, closest hit, and any hit.
+//! Traversal of a BVH by a single ray, for the closest hit, any hit, or the leaves approximately from front to back.
 
 use std::ops::Range;
 
@@ -88,7 +88,7 @@ pub fn leaves<S: Simd>(
     mut limit: f32,
     mut visit: impl FnMut(Range<usize>, f32) -> f32,
 ) {
-    // Per axis: 1 for a negative direction; origins for near and far sides; reciprocals of the direction.
+    // For each axis: 1 for a negative direction, origins for near and far sides, and reciprocal of the direction.
     let mut is_negative = [0; 3];
     let mut origins = [[0.0; 3]; 2];
     let mut inverse = [0.0; 3];
@@ -100,14 +100,14 @@ pub fn leaves<S: Simd>(
         origins[1 - is_negative[k]][k] = line.o_high[i];
         inverse[k] = line.inverse[i];
     }
-    // The children of a node are sorted, with the nearest on top.
+    // Distances and indices of nodes. The children of a node are sorted, with the nearest on top.
     let mut stack: ArrayVec<(f32, u32), STACK> = ArrayVec::new();
     stack.push((f32::NEG_INFINITY, 0));
-    while let Some((entry, number)) = stack.pop() {
-        if entry > limit {
+    while let Some((node_distance, node_index)) = stack.pop() {
+        if node_distance > limit {
             continue;
         }
-        let node = &nodes[number as usize];
+        let node = &nodes[node_index as usize];
         let scale = node.scale().to_array();
         let planes = [&node.low, &node.high];
         let mut near = f32x8::splat(simd, f32::NEG_INFINITY);

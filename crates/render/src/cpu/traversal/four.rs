@@ -51,9 +51,9 @@ impl<S: Simd> Four<S> {
     }
 }
 
-/// Returns hits and distances, equal to [`Line::triangle`] of each triangle. Distances may be negative, down to minus
-/// the padding of boxes. `coordinates` returns a coordinate of a corner of the triangles, `used` is the mask of the
-/// used lanes.
+/// Returns the mask of the triangles that the ray hits, and the distances, like [`Line::triangle`] for each triangle.
+/// Unlike there, hits may have negative distances, because boxes are padded. `coordinates(i, axis)` returns a
+/// coordinate of corner i of each triangle. `used` is the mask of the used lanes.
 #[inline(always)]
 pub fn intersect<S: Simd>(
     simd: S,
@@ -93,7 +93,7 @@ pub fn intersect<S: Simd>(
         near = near.max(first.min(second));
         far = far.min(first.max(second));
     }
-    // This order of operands preserves NaN.
+    // This order of operands preserves a NaN of `t`.
     let t = near.simd_gt(t).select(near, t);
     let t = far.simd_lt(t).select(far, t);
     let hits = inside & determinant.simd_ne(zero) & near.simd_le(far) & far.simd_ge(zero);

@@ -1,4 +1,4 @@
-//! Traversal of meshes by several rays in turn: while the processor waits for a ray's next node, it advances the others.
+//! Traversal of meshes by several rays in turn: while the next node of a ray is loaded, other rays advance.
 
 use fearless_simd::prelude::*;
 
@@ -8,7 +8,7 @@ use super::mesh_stack::MeshStack;
 use super::stack::BoxRay;
 use super::{Line, Nearest, remaining_t_max};
 
-/// Number of interleaved rays. With 4 or 16 the rays take longer.
+/// Number of interleaved rays. Traversal with 4 or 16 is slower.
 pub const RAYS: usize = 8;
 
 /// A ray in the object space of a mesh, with the arguments of [`closest`](super::closest).
@@ -47,10 +47,11 @@ static NO_MESH: BatchMesh = BatchMesh {
 
 /// The rays of a batch.
 pub trait RaySource<'a, S> {
-    /// Takes a traced ray and its result, if any, and returns the next ray of the lane, if any.
+    /// Stores the result of the ray that the lane has traced, if any. Returns the next ray of the lane, if any.
     fn next(&mut self, simd: S, lane: usize, traced: Option<(&Line, Nearest)>) -> Option<(&'a BatchMesh, MeshRay)>;
 }
 
+/// One of the interleaved rays.
 struct Lane<'a, 's> {
     mesh: &'a BatchMesh,
     ray: MeshRay,
@@ -82,7 +83,7 @@ impl<'a> Lane<'a, '_> {
         self.state = LaneState::Tracing;
     }
 
-    /// Visits a node or a leaf.
+    /// Visits the node or leaf `next`.
     #[inline(always)]
     fn step<S: Simd, const ANY: bool>(&mut self, simd: S) {
         if self.next & LEAF == 0 {
@@ -148,8 +149,8 @@ fn prefetch<T>(items: &[T], index: usize) {
     let _ = (items, index);
 }
 
-/// Traces the rays of a batch: like [`closest`](super::closest), or if `ANY` is true, up to any hit nearer than
-/// `best.t`, like [`any`](super::any). The stacks are empty, before and after.
+/// Traces the rays of a batch: to the closest hit, like [`closest`](super::closest), or if `ANY` is true, to any hit
+/// nearer than `best.t`, like [`any`](super::any). The stacks must be empty, and are empty again at the end.
 #[inline(always)]
 pub fn trace<'a, S: Simd, const ANY: bool>(simd: S, stacks: &mut [MeshStack; RAYS], rays: &mut impl RaySource<'a, S>) {
     let mut lanes = stacks.each_mut().map(

@@ -13,13 +13,14 @@ pub struct Line {
     pub o: [f32; 3],
     /// Origin for tests of lower sides, offset to pad the boxes.
     pub o_low: [f32; 3],
-    /// Origin for tests of upper sides, likewise offset.
+    /// Origin for tests of upper sides, offset to pad the boxes.
     pub o_high: [f32; 3],
     pub inverse: [f32; 3],
     /// Shear and scale that map the direction to the last axis.
     pub shear: [f32; 3],
 }
 
+/// Returns `x`, with a magnitude of at least [`MIN_COMPONENT`].
 #[inline(always)]
 pub fn away_from_zero(x: f32) -> f32 {
     match () {
@@ -29,6 +30,7 @@ pub fn away_from_zero(x: f32) -> f32 {
     }
 }
 
+/// Returns the permutation of axes whose last axis is that of the largest component of `d`.
 #[inline(always)]
 pub fn axes(d: Vec3) -> [usize; 3] {
     let [x, y, z] = d.abs().to_array();
@@ -67,7 +69,7 @@ impl Line {
         }
     }
 
-    /// Returns the interval inside a box, with axes permuted by `self.axes`.
+    /// Returns the ray's interval inside a box, whose coordinates are permuted by `self.axes`.
     #[inline(always)]
     pub fn slab(&self, low: [f32; 3], high: [f32; 3]) -> [f32; 2] {
         let mut interval = [f32::NEG_INFINITY, f32::INFINITY];
@@ -101,8 +103,8 @@ impl Line {
         [v / sum, w / sum]
     }
 
-    /// Returns the distance of the hit with a triangle, if any: Woop, Benthin and Wald, "Watertight Ray/Triangle
-    /// Intersection", JCGT 2(1), 2013. The ray must also hit the triangle's box.
+    /// Returns the distance of the hit with a triangle, if any (Woop, Benthin and Wald, "Watertight Ray/Triangle
+    /// Intersection", JCGT 2(1), 2013). Hits outside the triangle's box do not count.
     #[inline(always)]
     pub fn triangle(&self, vertices: [&[f32; 4]; 3]) -> Option<f32> {
         let corners = [
@@ -132,7 +134,7 @@ impl Line {
             }
         }
         let [near, far] = self.slab(low, high);
-        // This order of operands preserves NaN.
+        // This order of operands preserves a NaN of `t`.
         let t = minimum(far, maximum(near, t));
         (near <= far && t > 0.0).then_some(t)
     }

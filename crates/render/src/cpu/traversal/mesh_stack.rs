@@ -1,4 +1,5 @@
-//! The stack of a ray of a batch: nodes and leaves of a mesh, approximately with the nearest on top.
+//! The stack of a ray in a batch: nodes and leaves of a mesh, approximately in order of distance, with the nearest on
+//! top.
 
 use fearless_simd::prelude::*;
 use fearless_simd::{f32x8, u8x32, u32x8};
@@ -8,7 +9,7 @@ use super::closest::STACK;
 use super::stack::BoxRay;
 
 /// Nodes and leaves to visit, as values of `BatchNode::children`. Visiting a node removes an entry and adds up to 8,
-/// so that there are at most `STACK` entries. Eight are written at a time.
+/// so that there are at most `STACK` entries. The arrays have 8 spare elements, because 8 are written at a time.
 #[derive(Clone, Debug)]
 pub struct MeshStack {
     near: Box<[f32; STACK + 8]>,
@@ -26,8 +27,8 @@ impl Default for MeshStack {
     }
 }
 
-/// Per octant of a ray's direction the bytes that reverse the children from front to back: slot c is meant for octant
-/// c of the node.
+/// For each octant of a ray's direction, byte indices that sort the children of a node back to front. The BVH is built
+/// so that the child in slot c is approximately in octant c of the node.
 static BACK_TO_FRONT: [[u8; 32]; 8] = {
     let mut table = [[0; 32]; 8];
     let mut i = 0;
@@ -40,7 +41,7 @@ static BACK_TO_FRONT: [[u8; 32]; 8] = {
 };
 
 impl MeshStack {
-    /// Removes entries up to one that is nearer than `limit`, and returns it.
+    /// Removes entries from the top, down to the first whose distance is at most `limit`. Returns this entry.
     #[inline(always)]
     pub fn pop(&mut self, limit: f32) -> Option<u32> {
         while self.depth > 0 {
@@ -52,7 +53,8 @@ impl MeshStack {
         None
     }
 
-    /// Adds the children of a node whose boxes the ray hits before `limit`, in front-to-back order if `SORTED`.
+    /// Adds those children of a node whose boxes the ray hits before `limit`. Sorts them if `SORTED`, with the nearest
+    /// on top.
     #[inline(always)]
     pub fn push_children<S: Simd, const SORTED: bool>(&mut self, simd: S, node: &BatchNode, ray: &BoxRay, limit: f32) {
         let mut near = f32x8::splat(simd, 0.0);

@@ -1,15 +1,15 @@
 //! Closest-hit and occlusion queries over a BVH of triangles or other items.
 //!
-//! The results do not depend on the BVH and equal those of testing every triangle with [`Line::triangle`]: a ray hits a
-//! triangle only where it hits the triangle's box; every step of the box test is monotone, so that a ray that hits a
-//! box also hits every enclosing box; at equal distance, the smallest index wins.
+//! The results do not depend on the BVH: they equal those of testing every triangle with [`Line::triangle`]. A ray hits
+//! a triangle only where it hits the triangle's box. Every step of the box test is monotone, so that a ray that hits a
+//! box also hits every enclosing box. At equal distance, the smallest index wins.
 //!
 //! Each function is compiled for several instruction sets (`fearless_simd`). All versions give the same bits, since no
 //! operation is contracted to a fused multiply-add.
 //!
-//! Measured with `benches/trees.rs` (a bumpy sphere of 70,000 triangles on a floor) on an AMD EPYC with AVX-512 and
-//! other load, in CPU time of one thread: 157 ns per camera ray, 665 ns per 16 shadow segments. Plain loops instead of
-//! `fearless_simd` made rays 8 % slower with AVX-512 and 30 % with AVX2.
+//! Measured with `benches/trees.rs` (a bumpy sphere of 70,000 triangles on a floor) on a loaded AMD EPYC with AVX-512,
+//! in CPU time of one thread: 157 ns per camera ray, 665 ns per query of 16 shadow segments. With plain loops instead
+//! of `fearless_simd`, queries by rays took 8 % longer with AVX-512 and 30 % longer with AVX2.
 
 mod batch_mesh;
 mod closest;
@@ -33,7 +33,7 @@ pub use self::mesh_stack::MeshStack;
 pub use self::stack::{BoxRay, Stack};
 use crate::bvh::{Aabb, Node};
 
-/// The triangles of a BVH.
+/// The BVH of a mesh, and its triangles.
 #[derive(Clone, Copy, Debug)]
 pub struct Mesh<'a> {
     pub nodes: &'a [Node],
@@ -43,14 +43,14 @@ pub struct Mesh<'a> {
     pub triangles: &'a [[u32; 4]],
 }
 
-/// The closest hit so far, or the bounds of a search.
+/// The closest hit so far, or the upper bound of a search.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Nearest {
     /// Distance, as a multiple of the length of the ray's direction.
     pub t: f32,
     /// Index of the triangle.
     pub triangle: u32,
-    /// Position in leaf order.
+    /// Position of the triangle in leaf order.
     pub slot: u32,
 }
 
@@ -60,8 +60,8 @@ pub fn remaining_t_max(start: f32, t: f32) -> f32 {
 }
 
 /// Returns the closest hit nearer than `best`, except on the triangle with index `skip`; `best` if there is no such
-/// hit. The distance of a hit is positive: `start` plus the nonnegative distance from the ray's origin. At equal
-/// distance, the smallest index wins.
+/// hit. The distance of a hit is `start` plus the distance from the ray's origin, clamped to at least 0. Hits at
+/// distance 0 do not count. At equal distance, the smallest index wins.
 pub fn closest(level: Level, mesh: &Mesh, line: &Line, start: f32, skip: u32, best: Nearest) -> Nearest {
     dispatch!(level, simd => closest::closest(simd, mesh, line, start, skip, best))
 }
@@ -71,8 +71,8 @@ pub fn any(level: Level, mesh: &Mesh, line: &Line, skip: u32, t_max: f32) -> boo
     dispatch!(level, simd => closest::any(simd, mesh, line, skip, t_max))
 }
 
-/// Visits the leaves hit before `limit`, approximately front to back. `visit` gets a leaf's items and the limit, and
-/// returns the new limit, which must not be larger.
+/// Visits the leaves that the ray hits before `limit`, approximately front to back. `visit` gets a leaf's items and the
+/// limit, and returns the new limit, which must not be larger.
 pub fn leaves(level: Level, nodes: &[Node], line: &Line, limit: f32, visit: impl FnMut(Range<usize>, f32) -> f32) {
     dispatch!(level, simd => closest::leaves(simd, nodes, line, limit, visit))
 }
@@ -146,11 +146,11 @@ pub fn occluded_items(
     dispatch!(level, simd => occluded::items(simd, nodes, segments, mask, bounds, visit))
 }
 
-/// Returns all instruction sets of this processor.
+/// Returns the instruction sets that this processor supports.
 #[cfg(test)]
 pub(crate) fn levels() -> Vec<Level> {
     let best = Level::new();
-    #[allow(unused_mut, reason = "only some processors have several")]
+    #[allow(unused_mut, reason = "changed only on x86")]
     let mut levels = vec![best];
     #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
     {

@@ -12,19 +12,19 @@ use super::line::{MIN_COMPONENT, axes_from, in_order, maximum, minimum};
 use super::{Directions, Line, MAX_SEGMENTS, Mesh, Segments};
 use crate::bvh::{Aabb, Node};
 
-/// Maximum number of segments that are tested one by one, each against all boxes of a node or four triangles of a leaf
-/// at once.
+/// Maximum number of segments that are tested one by one. Each of them is tested against all boxes of a node, or
+/// against four triangles of a leaf, at a time.
 const FEW_SEGMENTS: u32 = 6;
 
-/// Maximum number of SIMD vectors: the narrowest vectors have four lanes.
-const MAX_LANES: usize = MAX_SEGMENTS / 4;
+/// Maximum number of SIMD vectors of segments: the narrowest vectors have four lanes.
+const MAX_VECTORS: usize = MAX_SEGMENTS / 4;
 
 /// A SIMD vector of segments.
 #[derive(Clone, Copy)]
 struct Lanes<S: Simd> {
     /// Permutation of axes as in [`Line`](super::Line), if all segments share it.
     axes: Option<[usize; 3]>,
-    /// Masks of the segments whose direction has its largest component along x, and along y.
+    /// Masks of the segments whose direction has the largest component along x, and along y.
     largest: [S::mask32s; 2],
     /// Shear as in [`Line`](super::Line).
     shear: [S::f32s; 3],
@@ -70,8 +70,8 @@ pub fn occluded<S: Simd>(simd: S, mesh: &Mesh, segments: &Segments, mask: u32) -
                     }
                     continue;
                 }
-                for [a, b, c, number] in triangles {
-                    if *number == segments.skip {
+                for [a, b, c, index] in triangles {
+                    if *index == segments.skip {
                         continue;
                     }
                     let vertices = [
@@ -115,7 +115,7 @@ pub fn items<S: Simd>(
                 let candidates = in_lanes(
                     lanes,
                     #[inline(always)]
-                    |lanes| passing_box(simd, lanes, &o, segments, &item_bounds),
+                    |lanes| hitting_box(simd, lanes, &o, segments, &item_bounds),
                 ) & leaf_mask
                     & !occluded;
                 if candidates != 0 {
@@ -163,19 +163,19 @@ fn traverse<S: Simd>(
     if pending == 0 {
         return 0;
     }
-    let requested = pending;
+    let tested = pending;
     let mut lanes = ArrayVec::new();
     let slopes = prepare(simd, segments, &mut lanes);
     let zero = f32x8::splat(simd, 0.0);
     let t_max = f32x8::splat(simd, segments.t_max);
     let mut stack: ArrayVec<(u32, u32), STACK> = ArrayVec::new();
     stack.push((0, pending));
-    while let Some((number, mask)) = stack.pop() {
+    while let Some((node_index, mask)) = stack.pop() {
         let mask = mask & pending;
         if mask == 0 {
             continue;
         }
-        let node = &nodes[number as usize];
+        let node = &nodes[node_index as usize];
         let scale = node.scale().to_array();
         let planes = [&node.low, &node.high];
         let mut planes_from_origin = [[zero; 3]; 2];
@@ -185,7 +185,7 @@ fn traverse<S: Simd>(
                     side(simd, node, planes[slopes[k].sides[i]], k, scale[k]) - slopes[k].origins[i];
             }
         }
-        // Segments that hit each child's box, and children that any segment hits.
+        // For each child, the mask of the segments that hit its box; mask of the children that any segment hits.
         let mut children = [0u32; 8];
         let mut hit_children = 0;
         if mask.count_ones() <= FEW_SEGMENTS {
@@ -243,7 +243,7 @@ fn traverse<S: Simd>(
             }
         }
     }
-    requested & !pending
+    tested & !pending
 }
 
 #[inline(always)]
@@ -273,7 +273,7 @@ fn line_at<S: Simd>(lanes: &[Lanes<S>], segment: usize, o: &[f32; 3], pad: f32) 
 
 /// Arranges the segments in vectors, and returns bounds on the directions of all segments.
 #[inline(always)]
-fn prepare<S: Simd>(simd: S, segments: &Segments, lanes: &mut ArrayVec<Lanes<S>, MAX_LANES>) -> [Slope; 3] {
+fn prepare<S: Simd>(simd: S, segments: &Segments, lanes: &mut ArrayVec<Lanes<S>, MAX_VECTORS>) -> [Slope; 3] {
     let one = S::f32s::splat(simd, 1.0);
     let mut bounds = [
         [S::f32s::splat(simd, f32::INFINITY); 3],
@@ -373,9 +373,9 @@ impl<S: Simd> Lanes<S> {
     }
 }
 
-/// Returns the mask of segments that hit an item's box, like `interval_hits` in `slab.rs`.
+/// Returns the mask of the segments that hit an item's box, like `interval_hits` in `slab.rs`.
 #[inline(always)]
-fn passing_box<S: Simd>(simd: S, lanes: &Lanes<S>, o: &[f32; 3], segments: &Segments, bounds: &Aabb) -> u64 {
+fn hitting_box<S: Simd>(simd: S, lanes: &Lanes<S>, o: &[f32; 3], segments: &Segments, bounds: &Aabb) -> u64 {
     let [near, far] = line_intervals(
         simd,
         lanes,
@@ -436,7 +436,7 @@ fn segments_hitting_child<S: Simd>(
     (near.simd_le(far) & far.simd_gt(zero)).to_bitmask()
 }
 
-/// Returns the mask of segments that a triangle occludes, like [`Line::triangle`](super::Line::triangle).
+/// Returns the mask of the segments that a triangle occludes, like [`Line::triangle`](super::Line::triangle).
 #[inline(always)]
 fn occluded_by_triangle<S: Simd>(
     simd: S,
@@ -471,7 +471,7 @@ fn occluded_by_triangle<S: Simd>(
         high[k] = maximum(maximum(a, b), c);
     }
     let [near, far] = line_intervals(simd, lanes, o, segments.pad, low, high);
-    // This order of operands preserves NaN.
+    // This order of operands preserves a NaN of `t`.
     let t = near.simd_gt(t).select(near, t);
     let t = far.simd_lt(t).select(far, t);
     let is_hit = inside

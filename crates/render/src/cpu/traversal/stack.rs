@@ -11,7 +11,7 @@ use crate::bvh::Node;
 /// A ray with precomputed values for tests against boxes.
 #[derive(Clone, Copy, Debug)]
 pub struct BoxRay {
-    /// Per axis: 1 for a negative direction.
+    /// For each axis, 1 if the direction is negative, else 0.
     pub(super) is_negative: [usize; 3],
     /// Origins for tests of near and far sides.
     pub(super) origins: [[f32; 3]; 2],
@@ -76,7 +76,7 @@ impl Entry {
     };
 }
 
-/// Nodes and leaves to visit. Visiting a node removes an entry and adds up to 8, as in `STACK`.
+/// Nodes and leaves to visit. Visiting a node removes an entry and adds up to 8, so that there are at most `STACK`.
 #[derive(Clone, Debug, Default)]
 pub struct Stack {
     entries: ArrayVec<Entry, STACK>,
@@ -88,7 +88,7 @@ impl Stack {
         self.entries.push(Entry::ROOT);
     }
 
-    /// Removes entries up to one that is nearer than `limit`, and returns it.
+    /// Removes entries from the top, down to the first whose distance is at most `limit`. Returns this entry.
     #[inline(always)]
     pub fn pop(&mut self, limit: f32) -> Option<Entry> {
         while let Some(entry) = self.entries.pop() {
@@ -99,7 +99,7 @@ impl Stack {
         None
     }
 
-    /// Adds the children of a node whose boxes the ray hits before `limit`.
+    /// Adds those children of a node whose boxes the ray hits before `limit`.
     #[inline(always)]
     pub fn push_children<S: Simd>(&mut self, simd: S, node: &Node, ray: &BoxRay, limit: f32) {
         let scale = node.scale().to_array();
@@ -119,7 +119,7 @@ impl Stack {
             let leaf = u32::from(node.leaves[slot as usize]);
             let lower_slots = u32::from(node.inner) & ((1 << slot) - 1);
             let is_inner = u32::from(node.inner) >> slot & 1 == 1;
-            // A large padding turns the inverted box of an empty slot into a box.
+            // A large padding turns the inverted box of an empty slot into a box that rays hit.
             if !is_inner && leaf == 0 {
                 continue;
             }

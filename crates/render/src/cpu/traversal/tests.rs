@@ -115,21 +115,21 @@ impl Scene {
 
 /// Counts of outcomes, to show that a test covers all cases.
 #[derive(Debug, Default)]
-struct Visits {
+struct Outcomes {
     hits: u32,
     misses: u32,
     occluded: u32,
     unoccluded: u32,
 }
 
-/// Compares queries by rays and segments with brute force. `random_ray` returns an origin and a direction.
+/// Compares queries of rays and of groups of segments with brute force. `random_ray` returns an origin and a direction.
 fn compare(
     scene: &Scene,
     random: &mut Random,
     count: usize,
     mut random_ray: impl FnMut(&mut Random) -> (Vec3, Vec3),
-) -> Visits {
-    let mut visits = Visits::default();
+) -> Outcomes {
+    let mut outcomes = Outcomes::default();
     let levels = levels();
     for i in 0..count {
         let pad = [0.0, 1e-6, 1e-3][i % 3];
@@ -156,12 +156,12 @@ fn compare(
             assert_eq!(found.t.to_bits(), expected.t.to_bits());
         }
         if expected == best {
-            visits.misses += 1
+            outcomes.misses += 1
         } else {
-            visits.hits += 1
+            outcomes.hits += 1
         }
 
-        // Segments to nearby points, or in any direction.
+        // Segments close to the direction of the ray, or in any direction.
         let spread = [0.0, 0.01, 0.3, 10.0][i / 2 % 4];
         let directions: Vec<Vec3> = (0..random.below(33))
             .map(|_| {
@@ -186,10 +186,10 @@ fn compare(
             let bits = occluded(*level, &scene.mesh(), &segments, mask);
             assert_eq!(bits, expected, "{level:?} {segments:?}");
         }
-        visits.occluded += expected.count_ones();
-        visits.unoccluded += (mask & !expected).count_ones();
+        outcomes.occluded += expected.count_ones();
+        outcomes.unoccluded += (mask & !expected).count_ones();
     }
-    visits
+    outcomes
 }
 
 /// Returns triangles of a given size at random points, with coordinates from -1 to 1.
@@ -204,21 +204,21 @@ fn soup(random: &mut Random, count: usize, size: f32) -> Scene {
 }
 
 #[test]
-fn soups() {
+fn random_triangles_match_brute_force() {
     let random = &mut Random(1);
     for (count, size) in [(1, 1.0), (2, 1.0), (9, 0.8), (300, 0.1), (2000, 0.05), (500, 0.5)] {
         let scene = soup(random, count, size);
         let rays = 400_000 / (count + 100);
-        let visits = compare(&scene, random, rays, |random| (random.vector() * 1.5, random.vector()));
+        let outcomes = compare(&scene, random, rays, |random| (random.vector() * 1.5, random.vector()));
         assert!(
-            visits.hits > 5 && visits.misses > 5 && visits.occluded > 50 && visits.unoccluded > 50,
-            "{visits:?}"
+            outcomes.hits > 5 && outcomes.misses > 5 && outcomes.occluded > 50 && outcomes.unoccluded > 50,
+            "{outcomes:?}"
         );
     }
 }
 
 #[test]
-fn an_empty_scene() {
+fn empty_scenes_and_empty_masks_have_no_hits() {
     let scene = Scene::new(&[], &[], 4);
     let line = Line::new(Vec3::ZERO, Vec3::X, 0.0);
     assert_eq!(closest(Level::new(), &scene.mesh(), &line, 0.0, u32::MAX, NONE), NONE);
@@ -234,7 +234,7 @@ fn an_empty_scene() {
     assert_eq!(occluded(Level::new(), &scene.mesh(), &segments, 0), 0);
 }
 
-/// Returns a grid of squares, two triangles each, in z = 0 or rising by `slope` per square along x.
+/// Returns a grid of squares of two triangles each, in the plane z = slope * (x + 1).
 fn grid(side: u32, slope: f32) -> Scene {
     let vertex =
         |x: u32, y: u32| Vec3::new(x as f32, y as f32, slope * x as f32) / side as f32 * 2.0 - Vec3::new(1.0, 1.0, 0.0);
@@ -251,7 +251,7 @@ fn grid(side: u32, slope: f32) -> Scene {
 }
 
 #[test]
-fn edges_and_corners_of_a_grid() {
+fn edges_and_corners_of_a_grid_match_brute_force() {
     let random = &mut Random(3);
     for slope in [0.0, 0.25, -1.0] {
         let scene = grid(16, slope);
@@ -259,7 +259,7 @@ fn edges_and_corners_of_a_grid() {
         let grid_point = |random: &mut Random| {
             Vec3::new(random.below(33) as f32, random.below(33) as f32, 0.0) / 16.0 - Vec3::new(1.0, 1.0, 0.0)
         };
-        let visits = compare(&scene, random, 300, |random| {
+        let outcomes = compare(&scene, random, 300, |random| {
             let height = [0.0, 1.0, 0.125, -0.5][random.below(4)];
             let (from, to) = (grid_point(random) + Vec3::Z * height, grid_point(random));
             let axis = Vec3::AXES[random.below(3)];
@@ -271,8 +271,8 @@ fn edges_and_corners_of_a_grid() {
             }
         });
         assert!(
-            visits.hits > 20 && visits.misses > 20 && visits.occluded > 20 && visits.unoccluded > 20,
-            "{visits:?}"
+            outcomes.hits > 20 && outcomes.misses > 20 && outcomes.occluded > 20 && outcomes.unoccluded > 20,
+            "{outcomes:?}"
         );
     }
 }
@@ -298,7 +298,7 @@ fn no_ray_passes_between_adjacent_triangles() {
 }
 
 #[test]
-fn degenerate_triangles() {
+fn degenerate_triangles_match_brute_force() {
     let random = &mut Random(5);
     let mut corners: Vec<Vec3> = (0..60).map(|_| random.vector()).collect();
     corners.push(Vec3::ZERO);
@@ -311,18 +311,18 @@ fn degenerate_triangles() {
     }
     let scene = Scene::new(&corners, &triangles, 4);
     let points = corners.clone();
-    let visits = compare(&scene, random, 400, |random| {
+    let outcomes = compare(&scene, random, 400, |random| {
         let from = points[random.below(count)];
         (from, points[random.below(count)] - from * [1.0, 0.0][random.below(2)])
     });
     assert!(
-        visits.hits > 20 && visits.misses > 20 && visits.occluded > 20 && visits.unoccluded > 20,
-        "{visits:?}"
+        outcomes.hits > 20 && outcomes.misses > 20 && outcomes.occluded > 20 && outcomes.unoccluded > 20,
+        "{outcomes:?}"
     );
 }
 
 #[test]
-fn huge_and_tiny() {
+fn huge_and_tiny_scenes_match_brute_force() {
     let random = &mut Random(6);
     for scale in [1e-30, 1e-18, 1e-6, 1e9, 1e15, 1e30] {
         let mut scene = soup(random, 200, 0.3);
@@ -348,38 +348,38 @@ fn huge_and_tiny() {
     }
     let triangles: Vec<[u32; 3]> = (0..300).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
     let scene = Scene::new(&corners, &triangles, 4);
-    let visits = compare(&scene, random, 400, |random| {
+    let outcomes = compare(&scene, random, 400, |random| {
         let from = random.vector() * 2.0 + [Vec3::ZERO, Vec3::splat(1000.0)][random.below(2)];
         (from, random.vector())
     });
     assert!(
-        visits.hits > 20 && visits.occluded > 20 && visits.unoccluded > 20,
-        "{visits:?}"
+        outcomes.hits > 20 && outcomes.occluded > 20 && outcomes.unoccluded > 20,
+        "{outcomes:?}"
     );
 }
 
 #[test]
-fn directions_with_zeros() {
+fn directions_with_zeros_match_brute_force() {
     let random = &mut Random(7);
     let scene = soup(random, 300, 0.3);
     let component = |random: &mut Random| {
         let x = random.number();
         [0.0, -0.0, 1e-38, -1e-42, x, x, 1.0, -1.0][random.below(8)]
     };
-    let visits = compare(&scene, random, 400, |random| {
+    let outcomes = compare(&scene, random, 400, |random| {
         (
             random.vector(),
             Vec3::new(component(random), component(random), component(random)),
         )
     });
     assert!(
-        visits.hits > 20 && visits.misses > 20 && visits.occluded > 20 && visits.unoccluded > 20,
-        "{visits:?}"
+        outcomes.hits > 20 && outcomes.misses > 20 && outcomes.occluded > 20 && outcomes.unoccluded > 20,
+        "{outcomes:?}"
     );
 }
 
 #[test]
-fn leaves_are_visited_until_the_limit() {
+fn visits_up_to_the_limit_find_the_hits_of_brute_force() {
     let random = &mut Random(8);
     let scene = soup(random, 500, 0.1);
     for level in levels() {
@@ -442,7 +442,7 @@ struct Batch<'a> {
     mesh: &'a BatchMesh,
     rays: &'a [MeshRay],
     next: usize,
-    /// Per lane the index of its ray.
+    /// For each lane, the index of its ray.
     traced: [usize; RAYS],
     found: Vec<Option<Nearest>>,
 }
@@ -511,7 +511,7 @@ fn batches_have_the_hits_of_brute_force() {
             }
         }
     }
-    assert!(hits > 500 && misses > 500, "{hits} {misses}");
+    assert!(hits > 500 && misses > 500, "{hits} hits, {misses} misses");
 }
 
 /// Returns the distance and the smallest barycentric coordinate, in f64.
@@ -527,7 +527,7 @@ fn moller_trumbore_f64(o: DVec3, d: DVec3, [a, b, c]: [DVec3; 3]) -> Option<(f64
 }
 
 #[test]
-fn single_triangles() {
+fn single_triangles_match_the_moller_trumbore_test() {
     let random = &mut Random(9);
     let (mut hits, mut misses) = (0, 0);
     for _ in 0..10_000 {
@@ -548,5 +548,5 @@ fn single_triangles() {
             _ => {}
         }
     }
-    assert!(hits > 100 && misses > 100);
+    assert!(hits > 100 && misses > 100, "{hits} hits, {misses} misses");
 }

@@ -1,4 +1,5 @@
-//! The stage that starts paths at the camera. Rays of cameras without a lens are computed in SIMD lanes.
+//! The stage that begins paths with their camera rays. SIMD lanes compute the rays of perspective and orthographic
+//! cameras without a lens, if the samples of a pixel are Sobol' points.
 
 use fearless_simd::prelude::*;
 use fearless_simd::{dispatch, u32x8};
@@ -16,7 +17,7 @@ use super::super::sequence::sobol_sample;
 use super::rows::{LANES, Row, get3, store3};
 use crate::records::{NO_PRIMITIVE, Packed, SOBOL};
 
-/// Starts the paths of camera samples, each given by its pixel and number, like `begin_path`.
+/// Begins a path for each camera sample, like `begin_path`. A camera sample is a pixel and a sample number.
 pub fn begin_paths(
     scene: &Packed,
     samples: impl Iterator<Item = (UVec2, u32)>,
@@ -35,13 +36,13 @@ pub fn begin_paths(
     dispatch!(*LEVEL, simd => begin_in_lanes(simd, scene, samples, paths, pixels));
 }
 
-/// Returns true if camera rays depend only on a Sobol' point per sample.
+/// Returns true if `begin_in_lanes` can compute the camera rays: each depends only on its pixel and a Sobol' point.
 fn has_lane_camera(scene: &Packed) -> bool {
     let s = &scene.specialization;
     s.pixel_pattern == SOBOL && s.filter_bins == 0 && s.lens == 0 && s.panoramic == 0 && s.camera_invisible == 0
 }
 
-/// Like `camera_sample` and `begin_path`.
+/// Begins paths in SIMD lanes, with the results of `camera_sample` and `begin_path`.
 #[inline(always)]
 fn begin_in_lanes<S: Simd>(
     simd: S,
@@ -56,8 +57,8 @@ fn begin_in_lanes<S: Simd>(
         let mut count = 0;
         for (pixel, number) in samples.by_ref().take(LANES) {
             (x[count], y[count], sample[count]) = (pixel.x, pixel.y, number);
-            let (round, first) = (number / s.pixel_samples, number % s.pixel_samples);
-            index[count] = round.wrapping_mul(s.pixel_side).wrapping_add(first);
+            let (round, round_index) = (number / s.pixel_samples, number % s.pixel_samples);
+            index[count] = round.wrapping_mul(s.pixel_side).wrapping_add(round_index);
             pixels.push(pixel);
             count += 1;
         }

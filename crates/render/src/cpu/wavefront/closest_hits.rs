@@ -18,7 +18,7 @@ use super::rows::{F, LANES, Row, lane_mask, splat3};
 use super::scratch::{QueuedRay, RayLane, Scratch};
 use crate::records::{INSTANCE, NO_INDEX, Packed};
 
-/// Finds the closest hits of the active paths, equal to `closest_hit`.
+/// Finds the closest hit of each active path, like `closest_hit`.
 pub fn closest_hits(
     scene: &Packed,
     paths: &[PathState],
@@ -35,11 +35,11 @@ pub fn closest_hits(
         }));
         return;
     }
-    dispatch!(*LEVEL, simd => find(simd, scene, paths, active, hits, scratch, meshes))
+    dispatch!(*LEVEL, simd => closest_hits_in_lanes(simd, scene, paths, active, hits, scratch, meshes))
 }
 
 #[inline(always)]
-fn find<S: Simd>(
+fn closest_hits_in_lanes<S: Simd>(
     simd: S,
     scene: &Packed,
     paths: &[PathState],
@@ -113,7 +113,7 @@ fn find<S: Simd>(
     }
 }
 
-/// The rays of the active paths, which traverse the BVH of the scene item by item.
+/// The queued rays of the active paths. A ray traverses a single instance, or the BVH of the scene item by item.
 struct Rays<'a, 'h> {
     scene: &'a Packed,
     meshes: &'a BatchMeshes,
@@ -132,7 +132,7 @@ impl<'a, S: Simd> RaySource<'a, S> for Rays<'a, '_> {
         if let Some((line, found)) = traced
             && found.slot != NO_INDEX
         {
-            // Another lane may have found a hit of the same ray.
+            // Another lane may have traced the ray through another instance.
             let hit = &mut self.hits[lane.position];
             *hit = nearer_hit(*hit, mesh_hit(scene, lane.instance, line, found));
         }

@@ -1,4 +1,4 @@
-//! The items of the scene's BVH along a ray, approximately front to back.
+//! Iteration over the items of the scene's BVH along a ray, approximately front to back.
 
 use std::ops::Range;
 
@@ -14,7 +14,7 @@ use crate::records::Packed;
 pub struct Items {
     box_ray: BoxRay,
     stack: Stack,
-    leaf: Range<usize>,
+    leaf_items: Range<usize>,
 }
 
 impl Default for Items {
@@ -22,16 +22,16 @@ impl Default for Items {
         Items {
             box_ray: BoxRay::new([0.0; 3], [0.0; 3], [1.0; 3]),
             stack: Stack::default(),
-            leaf: 0..0,
+            leaf_items: 0..0,
         }
     }
 }
 
 impl Items {
-    /// Starts again with another ray.
+    /// Restarts with another ray, given by its slabs.
     #[inline(always)]
     pub fn start(&mut self, slabs: Slabs) {
-        self.leaf = 0..0;
+        self.leaf_items = 0..0;
         self.box_ray = BoxRay::new(
             slabs.low_origin.to_array(),
             slabs.high_origin.to_array(),
@@ -40,11 +40,11 @@ impl Items {
         self.stack.start();
     }
 
-    /// Returns the next item. Omits items of leaves that are farther away than `limit`.
+    /// Returns the index of the next item. Skips nodes and leaves that are farther away than `limit`.
     #[inline(always)]
     pub fn next<S: Simd>(&mut self, simd: S, scene: &Packed, limit: f32) -> Option<usize> {
         loop {
-            if let Some(item) = self.leaf.next() {
+            if let Some(item) = self.leaf_items.next() {
                 return Some(item);
             }
             let entry = self.stack.pop(limit)?;
@@ -53,7 +53,7 @@ impl Items {
                 self.stack
                     .push_children(simd, &nodes[entry.first as usize], &self.box_ray, limit);
             } else {
-                self.leaf = entry.first as usize..(entry.first + entry.count) as usize;
+                self.leaf_items = entry.first as usize..(entry.first + entry.count) as usize;
             }
         }
     }

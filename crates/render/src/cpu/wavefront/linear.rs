@@ -1,5 +1,5 @@
-//! Queries of a batch of rays on the primitives outside of the BVH. Each primitive is tested against several rays at a
-//! time.
+//! Closest-hit and occlusion queries of a batch of rays over the primitives outside of the BVH. Each primitive is
+//! tested against [`LANES`] rays at a time.
 
 use fearless_simd::prelude::*;
 use fearless_simd::u32x8;
@@ -18,12 +18,13 @@ use crate::records::{INFINITE_T, NO_INDEX, Packed, with_primitive_kind};
 pub struct RayRows {
     origin: Rows3,
     direction: Rows3,
-    /// Primitives outside of meshes that the rays start on, as in [`Path`].
+    /// Primitives outside of meshes that the rays cannot hit again, as in [`Path`].
     origin_prim: [u32; LANES],
+    /// Solids that the rays start on and pass through, as in [`Path`].
     inside_prim: [u32; LANES],
 }
 
-/// Hits of rays with primitives outside of meshes.
+/// Closest hits of up to [`LANES`] rays with primitives outside of meshes.
 pub struct HitRows {
     pub t: Row,
     pub primitive: [u32; LANES],
@@ -48,7 +49,7 @@ impl HitRows {
 }
 
 impl RayRows {
-    /// Arranges the next rays of paths.
+    /// Stores the next ray of each path in a lane.
     #[inline(always)]
     pub fn set<'a>(&mut self, paths: impl Iterator<Item = &'a Path>) {
         for (lane, path) in paths.enumerate() {
@@ -98,9 +99,9 @@ pub struct ShadowRayRows {
     origin: Rows3,
     to_light: Rows3,
     t_max: Row,
-    /// Primitives outside of meshes at the start.
+    /// Primitives outside of meshes that the segments start on.
     origin_prim: [u32; LANES],
-    /// Solids that the segments enter, as in [`Surface`](super::super::surface::Surface).
+    /// Solids that the segments start on, as `exclude_back` in [`Surface`](super::super::surface::Surface).
     inside_prim: [u32; LANES],
     target_prim: [u32; LANES],
 }
@@ -136,7 +137,7 @@ impl ShadowRayRows {
             u32x8::simd_from(simd, self.target_prim),
         );
         let inside_prim = u32x8::simd_from(simd, self.inside_prim);
-        let mut is_occluded = t_max.lt(t_max);
+        let mut is_occluded = t_max.lt(t_max); // false in all lanes
         for (kind, range) in scene.shadow_casters() {
             with_primitive_kind!(kind, |kind| for i in range {
                 let index = u32x8::simd_from(simd, i as u32);
@@ -164,7 +165,8 @@ mod tests {
     struct Random(u64);
 
     impl Random {
-        /// Returns a number from -1 to 1; often a small multiple of 1/2, so that rays meet edges and planes exactly.
+        /// Returns a number from -1 to 1. Half of the numbers are multiples of 1/2, so that rays hit edges and planes
+        /// exactly.
         fn number(&mut self) -> f64 {
             self.0 = self
                 .0
@@ -184,14 +186,17 @@ mod tests {
     }
 
     #[test]
-    fn rays_in_lanes_equal_single_rays() {
+    fn lanes_are_bit_identical_to_single_rays() {
         for kind in 0..PRIMITIVE_KINDS.len() as u32 {
             let (hits, occluded) = test_kind(kind);
-            assert!(hits > 500 && occluded > 500, "{kind}: {hits} {occluded}");
+            assert!(
+                hits > 500 && occluded > 500,
+                "kind {kind}: {hits} hits, {occluded} occluded"
+            );
         }
     }
 
-    /// Returns the numbers of hits and of occluded segments.
+    /// Compares lanes with single rays, and returns the numbers of hits and of occluded segments.
     fn test_kind(kind: u32) -> (usize, usize) {
         let random = &mut Random(1);
         let (mut hits, mut occluded) = (0, 0);
@@ -204,28 +209,28 @@ mod tests {
                 origin: random.vector().as_vec3(),
                 direction: random.vector().as_vec3(),
             });
-            let inside = random.0 >> 40 & 0xff;
+            let inside_mask = random.0 >> 40 & 0xff;
             let (mut origins, mut directions) = (Rows3::default(), Rows3::default());
             for (lane, ray) in rays.iter().enumerate() {
                 set3(&mut origins, lane, ray.origin);
                 set3(&mut directions, lane, ray.direction);
             }
             for level in levels() {
-                let (t, occluding) = dispatch!(level, simd => {
+                let (t, occluded_mask) = dispatch!(level, simd => {
                     let (origin, direction) = (load3(simd, &origins), load3(simd, &directions));
                     let limit: F<_> = SimdBase::splat(simd, limit);
-                    let from_inside = SimdMask::from_bitmask(simd, inside);
+                    let from_inside = SimdMask::from_bitmask(simd, inside_mask);
                     let t = intersect(kind, q, from_inside, Ray { origin, direction }, limit);
-                    let occluding = occludes_segment(kind, q, origin, from_inside, direction, limit);
+                    let occludes = occludes_segment(kind, q, origin, from_inside, direction, limit);
                     let t: Row = t.into();
-                    (t, occluding.to_bitmask())
+                    (t, occludes.to_bitmask())
                 });
                 for (lane, ray) in rays.into_iter().enumerate() {
-                    let from_inside = inside >> lane & 1 == 1;
+                    let from_inside = inside_mask >> lane & 1 == 1;
                     let expected = intersect(kind, q, from_inside, ray, limit);
                     assert_eq!(t[lane].to_bits(), expected.to_bits(), "kind {kind}");
                     let is_occluded = occludes_segment(kind, q, ray.origin, from_inside, ray.direction, limit);
-                    assert_eq!(occluding >> lane & 1 == 1, is_occluded, "kind {kind}");
+                    assert_eq!(occluded_mask >> lane & 1 == 1, is_occluded, "kind {kind}");
                     hits += usize::from(expected < limit);
                     occluded += usize::from(is_occluded);
                 }

@@ -1,4 +1,4 @@
-//! The meshes of a scene in the form for batches of rays.
+//! The meshes of a scene, converted for traversal by batches of rays.
 
 use rayon::prelude::*;
 
@@ -6,13 +6,13 @@ use super::super::bvh::traversal_mesh;
 use super::super::traversal::BatchMesh;
 use crate::records::Packed;
 
-/// Maximum number of triangles of all meshes, which limits the memory to about 0.5 GB.
+/// Maximum total number of triangles. It limits the memory of the converted meshes to about 0.5 GB.
 const MAX_TRIANGLES: usize = 4_000_000;
 
-/// The meshes of a scene.
+/// The converted meshes of a scene.
 #[derive(Clone, Debug, Default)]
 pub struct BatchMeshes {
-    /// Empty if the meshes are too large.
+    /// Empty if the scene has too many triangles.
     meshes: Vec<BatchMesh>,
 }
 
@@ -21,8 +21,8 @@ impl BatchMeshes {
         BatchMeshes::with_limit(scene, MAX_TRIANGLES)
     }
 
-    /// Converts the meshes of a scene with at most `max_triangles` triangles. Rays in larger scenes are traced one by
-    /// one.
+    /// Converts the meshes of a scene with at most `max_triangles` triangles. Meshes of larger scenes are not
+    /// converted; their rays are traced one by one.
     pub fn with_limit(scene: &Packed, max_triangles: usize) -> BatchMeshes {
         let meshes = &scene.bvh.meshes;
         if meshes.iter().map(|mesh| mesh.triangles.len()).sum::<usize>() > max_triangles {
@@ -34,7 +34,7 @@ impl BatchMeshes {
         }
     }
 
-    /// Returns true if the meshes of the scene are too large.
+    /// Returns true if the meshes were not converted because the scene has too many triangles.
     pub fn are_missing(&self, scene: &Packed) -> bool {
         self.meshes.len() < scene.bvh.meshes.len()
     }

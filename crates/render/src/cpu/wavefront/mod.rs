@@ -1,6 +1,7 @@
-//! The wavefront: paths of the integrator `path` in batches, which pass through the stages closest hits, shading,
-//! occlusion and compaction bounce by bounce. Shading is that of [`advance`](super::integrators::path::advance), so each
-//! path has the bits of its scalar version. Tracing whole batches is faster.
+//! Wavefront path tracing: the integrator `path` for batches of paths. In each bounce, a batch passes through four
+//! stages: closest hits, shading, occlusion of shadow rays, and compaction. Each path has the bits of the scalar
+//! [`advance`](super::integrators::path::advance). Batches are faster, because their rays are traced interleaved and
+//! their hits are shaded in SIMD lanes.
 
 mod begin;
 mod closest_hits;
@@ -29,7 +30,7 @@ use super::ray::Hit;
 use super::shadow_ray::ShadowRay;
 use crate::records::Packed;
 
-/// Maximum number of paths of a batch. Their states fit into a core's level-2 cache.
+/// Maximum number of paths in a batch. Their states fit into a core's level-2 cache.
 pub const MAX_PATHS: usize = 1024;
 
 /// A batch of paths with the queues of its stages. The memory is reused from batch to batch.
@@ -48,14 +49,14 @@ pub struct Wavefront {
     lane_hits: LaneHits,
 }
 
-/// A shadow ray of a path.
+/// A shadow ray and the index of its path.
 struct QueuedShadowRay {
     path: u32,
     ray: ShadowRay,
 }
 
 impl Wavefront {
-    /// Creates an empty batch for a scene with these meshes.
+    /// Creates an empty batch for the scene that `meshes` were converted from.
     pub fn new(meshes: Arc<BatchMeshes>) -> Wavefront {
         Wavefront {
             meshes,
@@ -71,7 +72,8 @@ impl Wavefront {
         }
     }
 
-    /// Traces the paths of camera samples, each given by its pixel and number, and returns the paths in this order.
+    /// Traces a path for each camera sample, and returns the ended paths in the order of the samples. A camera sample
+    /// is a pixel and a sample number.
     pub fn trace(&mut self, scene: &Packed, samples: impl Iterator<Item = (UVec2, u32)>) -> &[PathState] {
         self.begin(scene, samples);
         while !self.active.is_empty() {
@@ -83,7 +85,7 @@ impl Wavefront {
         &self.paths
     }
 
-    /// Returns the numbers of hits of all batches that were shaded in lanes.
+    /// Returns the numbers of hits that were shaded in lanes, summed over all batches.
     pub fn lane_hits(&self) -> LaneHits {
         self.lane_hits
     }
@@ -105,7 +107,7 @@ impl Wavefront {
         );
     }
 
-    /// Ends each active path or samples its next ray, and queues its shadow ray.
+    /// Ends each active path or samples its next ray, and queues its shadow ray, if any.
     fn shade(&mut self, scene: &Packed) {
         self.lane_hits += shade_hits(
             scene,
@@ -140,6 +142,7 @@ impl Wavefront {
         }
     }
 
+    /// Removes ended paths from the active paths.
     fn compact(&mut self) {
         let paths = &self.paths;
         self.active.retain(|path| !paths[*path as usize].ended);

@@ -1,4 +1,4 @@
-//! The stage that finds out which shadow rays of a batch are occluded.
+//! The stage that determines which shadow rays of a batch are occluded.
 
 use fearless_simd::dispatch;
 use fearless_simd::prelude::*;
@@ -16,7 +16,7 @@ use super::rows::{LANES, Row, lane_mask, splat3};
 use super::scratch::{QueuedRay, RayLane, Scratch};
 use crate::records::{CASTS_SHADOW, INSTANCE, NO_INDEX, Packed};
 
-/// Finds out which shadow rays are occluded, like `is_shadow_ray_occluded`.
+/// Determines which shadow rays are occluded, like `is_shadow_ray_occluded`.
 pub fn occluded_rays(
     scene: &Packed,
     paths: &[PathState],
@@ -27,7 +27,7 @@ pub fn occluded_rays(
     meshes: &BatchMeshes,
 ) {
     occluded.clear();
-    // With alpha, a ray continues from hit to hit.
+    // A shadow ray may continue through surfaces with alpha, so it is traced alone.
     if scene.specialization.alpha_surfaces != 0 || meshes.are_missing(scene) {
         occluded.extend(rays.iter().map(|QueuedShadowRay { path, ray }| {
             let i = *path as usize;
@@ -35,11 +35,11 @@ pub fn occluded_rays(
         }));
         return;
     }
-    dispatch!(*LEVEL, simd => find(simd, scene, rays, occluded, scratch, meshes))
+    dispatch!(*LEVEL, simd => occluded_rays_in_lanes(simd, scene, rays, occluded, scratch, meshes))
 }
 
 #[inline(always)]
-fn find<S: Simd>(
+fn occluded_rays_in_lanes<S: Simd>(
     simd: S,
     scene: &Packed,
     rays: &[QueuedShadowRay],
@@ -79,8 +79,9 @@ fn find<S: Simd>(
     }
 }
 
-/// Queues the rays that are not occluded for the instances whose boxes they hit, or for the BVH of the scene. Returns the
-/// mask of the rays that a primitive among few items occludes. `first` is the position of the first ray.
+/// Queues each unoccluded ray: in a scene with few items for the instances whose boxes the ray hits, else for the BVH
+/// of the scene. Returns the mask of the rays that primitives among the few items occlude. `first` is the position of
+/// the first ray in the batch.
 #[inline(always)]
 fn queue_rays<S: Simd>(
     simd: S,
@@ -139,7 +140,7 @@ fn queue_rays<S: Simd>(
     occluded
 }
 
-/// The shadow rays, which traverse the BVH of the scene item by item, up to any hit.
+/// The queued shadow rays. A ray traverses a single instance, or the BVH of the scene item by item, up to any hit.
 struct Rays<'a, 'o> {
     scene: &'a Packed,
     meshes: &'a BatchMeshes,

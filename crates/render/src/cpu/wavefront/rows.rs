@@ -1,4 +1,4 @@
-//! Numbers and vectors of several paths, from their records to SIMD lanes and back.
+//! Conversion of numbers and vectors between the records of several paths and SIMD lanes.
 
 use fearless_simd::f32x8;
 use fearless_simd::prelude::*;
@@ -9,16 +9,16 @@ use super::super::lanes::Lanes3;
 /// Number of paths or rays processed at a time.
 pub const LANES: usize = 8;
 
-/// A number of each path.
+/// One number per path.
 pub type Row = [f32; LANES];
-/// A vector of each path.
+/// One vector per path, stored as rows of x, y and z.
 pub type Rows3 = [Row; 3];
-/// A number in each lane.
+/// One number per lane.
 pub type F<S> = f32x8<S>;
-/// A vector in each lane.
+/// One vector per lane.
 pub type V<S> = Lanes3<f32x8<S>>;
 
-/// Stores the vector of a lane.
+/// Stores `v` as the vector of a lane.
 #[inline(always)]
 pub fn set3(rows: &mut Rows3, lane: usize, v: Vec3) {
     rows[0][lane] = v.x;
@@ -46,7 +46,7 @@ pub fn store3<S: Simd>(v: V<S>) -> Rows3 {
     [v.x.into(), v.y.into(), v.z.into()]
 }
 
-/// Returns a vector in all lanes.
+/// Returns `v` in all lanes.
 #[inline(always)]
 pub fn splat3<S: Simd>(simd: S, v: Vec3) -> V<S> {
     let [x, y, z] = v.to_array();
@@ -57,7 +57,7 @@ pub fn splat3<S: Simd>(simd: S, v: Vec3) -> V<S> {
     }
 }
 
-/// Returns the mask of the first lanes.
+/// Returns the mask of the first `count` lanes.
 #[inline(always)]
 pub fn lane_mask(count: usize) -> u64 {
     (1 << count) - 1

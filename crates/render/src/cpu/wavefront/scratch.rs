@@ -6,7 +6,7 @@ use super::super::slab::{Slabs, slabs};
 use super::super::traversal::{MeshStack, RAYS};
 use super::items::Items;
 
-/// Stacks of the interleaved rays.
+/// Stacks and states of the interleaved rays, and the queue that they are taken from.
 #[derive(Default)]
 pub struct Scratch {
     pub stacks: [MeshStack; RAYS],
@@ -21,11 +21,11 @@ pub struct QueuedRay {
     pub position: u32,
     /// Index of the instance; [`NO_INDEX`](crate::records::NO_INDEX) for the BVH of the scene.
     pub instance: u32,
-    /// Distance to the box of the instance.
+    /// Distance to the box of the instance; 0 for the BVH of the scene.
     pub near: f32,
 }
 
-/// A ray of a batch that traverses the scene's BVH.
+/// State of an interleaved ray: one that traverses the BVH of the scene, or a single instance.
 pub struct RayLane {
     /// Position of the ray in its batch.
     pub position: usize,

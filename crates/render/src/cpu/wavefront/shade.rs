@@ -1,5 +1,5 @@
-//! The stage that shades the hits of a batch of paths. Hits on diffuse surfaces are shaded several at a time in SIMD
-//! lanes, with the bits of the scalar [`shade`], which shades all other hits.
+//! The stage that shades the hits of a batch of paths. Hits on opaque diffuse surfaces are shaded in SIMD lanes, with
+//! the bits of the scalar function [`shade`]. That function shades all other hits.
 
 use std::ops::AddAssign;
 
@@ -51,11 +51,11 @@ pub struct ShadingQueues {
 /// Numbers of hits shaded in lanes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LaneHits {
-    /// On flat primitives.
+    /// Hits on flat primitives.
     pub flat: usize,
-    /// On triangles of meshes.
+    /// Hits on triangles of meshes.
     pub faces: usize,
-    /// On solids and on materials with textures or vertex colors, evaluated one by one.
+    /// Hits on solids, and on materials with textures or vertex colors. Their surfaces are evaluated one by one.
     pub evaluated: usize,
 }
 
@@ -67,7 +67,7 @@ impl AddAssign for LaneHits {
     }
 }
 
-/// A hit of a path.
+/// A hit, with the indices of its path and its material.
 #[derive(Clone, Copy)]
 struct QueuedHit {
     path: u32,
@@ -75,8 +75,8 @@ struct QueuedHit {
     hit: Hit,
 }
 
-/// Shades the hits of the active paths, like [`shade`], and queues their shadow rays. Returns the numbers of hits shaded
-/// in lanes.
+/// Shades the hits of the active paths, like [`shade`], and queues their shadow rays. Returns the numbers of hits
+/// shaded in lanes.
 pub fn shade_hits(
     scene: &Packed,
     paths: &mut [PathState],
@@ -129,7 +129,7 @@ pub fn shade_hits(
     lane_hits
 }
 
-/// The queue of a hit.
+/// The kind of surface of a hit, which selects the hit's queue.
 #[derive(Clone, Copy)]
 enum SurfaceKind {
     Flat,
@@ -137,7 +137,7 @@ enum SurfaceKind {
     Evaluated,
 }
 
-/// Returns the surface and the material of a hit that can be shaded in lanes.
+/// Returns the kind of surface and the material index of a hit, if the hit can be shaded in lanes.
 #[inline(always)]
 fn lane_material(scene: &Packed, state: &PathState, hit: Hit) -> Option<(SurfaceKind, u32)> {
     let (surface, index) = if is_on_mesh(hit) {
@@ -151,7 +151,7 @@ fn lane_material(scene: &Packed, state: &PathState, hit: Hit) -> Option<(Surface
         };
         (surface, q.material)
     };
-    // Layers are recorded one by one.
+    // Only the scalar `shade` records layers.
     if scene.specialization.layers != 0 && (state.path.depth == 0 || !state.albedo_recorded) {
         return None;
     }
@@ -167,7 +167,7 @@ fn lane_material(scene: &Packed, state: &PathState, hit: Hit) -> Option<(Surface
     has_constant_roughness.then_some((SurfaceKind::Evaluated, index))
 }
 
-/// Returns true for diffuse materials without roughness, emission and alpha.
+/// Returns true for diffuse materials that have no roughness, emission or alpha.
 #[inline(always)]
 fn is_opaque_diffuse(material: &Material) -> bool {
     let is_smooth = !(material.roughness > 0.0);
@@ -194,7 +194,7 @@ fn evaluate(scene: &Packed, path: &Path, hit: Hit) -> (HitPrimitive, Surface, Ve
     (prim, surface, bounded(shading.material).diffuse)
 }
 
-/// The paths of a batch.
+/// The paths of a batch, and the queue of their shadow rays.
 struct Batch<'a> {
     scene: &'a Packed,
     paths: &'a mut [PathState],
@@ -202,7 +202,7 @@ struct Batch<'a> {
     shadow_rays: &'a mut Vec<QueuedShadowRay>,
 }
 
-/// States of paths before a bounce.
+/// Path states before a bounce, with the diffuse reflectance at each hit.
 #[derive(Default)]
 struct PathRows {
     throughput: Rows3,
@@ -216,9 +216,9 @@ struct PathRows {
     exclude_back: [UVec2; LANES],
 }
 
-/// Light samples of paths.
+/// One light sample per path.
 struct LightRows {
-    to: Rows3,
+    to_light: Rows3,
     radiance: Rows3,
     pdf: Row,
     is_delta: Row,
@@ -227,10 +227,10 @@ struct LightRows {
 }
 
 impl LightRows {
-    /// Returns samples of the only light, whose other rows are set by its formulas.
+    /// Creates the rows. `light` is the only light, if any: all of its samples have the same `t_max` and `primitive`.
     fn new(light: Option<&Light>) -> LightRows {
         LightRows {
-            to: Default::default(),
+            to_light: Default::default(),
             radiance: Default::default(),
             pdf: Default::default(),
             is_delta: Default::default(),
@@ -240,7 +240,7 @@ impl LightRows {
     }
 
     fn set(&mut self, lane: usize, light: LightSample) {
-        set3(&mut self.to, lane, light.to);
+        set3(&mut self.to_light, lane, light.to);
         set3(&mut self.radiance, lane, light.radiance);
         self.pdf[lane] = light.pdf;
         self.is_delta[lane] = if light.is_delta { 1.0 } else { 0.0 };
@@ -249,7 +249,7 @@ impl LightRows {
     }
 }
 
-/// Returns the light if it is the only emitter and can be sampled in lanes.
+/// Returns the only light of the scene, if it can be sampled in lanes.
 fn only_light(scene: &Packed) -> Option<&Light> {
     let s = &scene.specialization;
     let [emitter] = scene.lighting.emitters[..] else {
@@ -336,7 +336,7 @@ impl Batch<'_> {
         rows.depth[lane] = state.path.depth;
     }
 
-    /// Samples the next rays and light samples, like the part of [`shade`] after the emission.
+    /// Samples lights and the next rays, like the part of [`shade`] after emission is added.
     #[inline(always)]
     fn shade<S: Simd>(
         &mut self,
@@ -374,14 +374,14 @@ impl Batch<'_> {
         let normals = store3(surface.shading_normal);
 
         let mut contributions = Rows3::default();
-        let mut is_queued = 0;
+        let mut queued_mask = 0;
         if s.emitters != 0 {
             let u = decision(scene, Lanes2 { x: key[0], y: key[1] }, sample);
-            let (to, radiance, pdf, is_delta);
+            let (to_light, radiance, pdf, is_delta);
             if let Some(light) = only_light(scene) {
-                (to, radiance, pdf) = rectangle_samples(simd, light, surface.ray_origin, u);
-                is_delta = zero.lt(zero);
-                lights.to = store3(to);
+                (to_light, radiance, pdf) = rectangle_samples(simd, light, surface.ray_origin, u);
+                is_delta = zero.lt(zero); // false in all lanes
+                lights.to_light = store3(to_light);
             } else {
                 let mut bits = Lanes2 { x, y };
                 if s.emitters > 1 {
@@ -407,16 +407,16 @@ impl Batch<'_> {
                     let u = Vec2::new(u_x[lane], u_y[lane]);
                     lights.set(lane, sample_emitter(scene, selection, p, normal, u));
                 }
-                to = load3(simd, &lights.to);
+                to_light = load3(simd, &lights.to_light);
                 radiance = load3(simd, &lights.radiance);
                 pdf = f32x8::simd_from(simd, lights.pdf);
                 is_delta = f32x8::simd_from(simd, lights.is_delta).gt(zero);
             }
-            let reflected = reflections(&surface, diffuse, normalize(to));
+            let reflected = reflections(&surface, diffuse, normalize(to_light));
             let mut contribution = throughput * reflected.value * radiance * (constant(1.0) / pdf);
             contribution = contribution * select(power_heuristic(pdf, reflected.pdf), one, is_delta);
             let max_component = largest(contribution);
-            is_queued = (max_component.gt(zero) & max_component.lt(zero.splat(INFINITE_T))).to_bitmask();
+            queued_mask = (max_component.gt(zero) & max_component.lt(zero.splat(INFINITE_T))).to_bitmask();
             contributions = store3(contribution);
         }
 
@@ -425,7 +425,7 @@ impl Batch<'_> {
         let reflected = reflections(&surface, diffuse, wi);
         let inverse_pdf = select(zero, constant(1.0) / reflected.pdf, reflected.pdf.gt(zero));
         let mut continued = throughput * (reflected.value * inverse_pdf);
-        let mut survives = zero.le(zero);
+        let mut survives = zero.le(zero); // true in all lanes
         if has_roulette {
             let choices = decision_set(
                 scene,
@@ -435,12 +435,12 @@ impl Batch<'_> {
                 },
                 sample,
             );
-            let first = x.splat(s.rr_depth);
-            let is_played = (depth + 1).simd_ge(first);
+            let first_depth = x.splat(s.rr_depth);
+            let in_roulette = (depth + 1).simd_ge(first_depth);
             let chance = min(largest(continued) / f32x8::simd_from(simd, rows.eta2), one);
             let random = unit_float(choices.y);
-            survives = !(is_played & random.ge(chance));
-            continued = Vector3::select(continued, continued * (constant(1.0) / chance), is_played);
+            survives = !(in_roulette & random.ge(chance));
+            continued = Vector3::select(continued, continued * (constant(1.0) / chance), in_roulette);
         }
         let survives = (survives & largest(continued).gt(zero)).to_bitmask();
 
@@ -455,12 +455,12 @@ impl Batch<'_> {
             let bounces = rows.depth[lane] + 1;
             if s.emitters != 0 {
                 let contribution = get3(&contributions, lane);
-                if is_queued >> lane & 1 != 0 {
+                if queued_mask >> lane & 1 != 0 {
                     self.shadow_rays.push(QueuedShadowRay {
                         path: queued.path,
                         ray: ShadowRay {
                             origin,
-                            to_light: get3(&lights.to, lane),
+                            to_light: get3(&lights.to_light, lane),
                             t_max: lights.t_max[lane],
                             exclude_front,
                             exclude_back,
@@ -504,10 +504,10 @@ struct Reflections<S: Simd> {
     pdf: F<S>,
 }
 
-/// Returns the reflection to a direction, like `reflection` for diffuse materials.
+/// Returns the reflection of light from `wi`, like `reflection` for diffuse materials.
 #[inline(always)]
 fn reflections<S: Simd>(surface: &LaneSurfaces<S>, diffuse: V<S>, wi: V<S>) -> Reflections<S> {
-    // The direction to the previous vertex does not matter.
+    // The pdf does not depend on the direction to the previous vertex, for which `wi` is passed.
     let pdf = diffuse_pdf(angles_at(surface.shading_normal, wi, wi));
     Reflections {
         value: Vector3::select(
@@ -519,18 +519,18 @@ fn reflections<S: Simd>(surface: &LaneSurfaces<S>, diffuse: V<S>, wi: V<S>) -> R
     }
 }
 
-/// Returns colors with components up to 1, like `bounded`.
+/// Clamps the colors of textured materials to at most 1, like `bounded`.
 #[inline(always)]
 fn clamped<S: Simd>(color: V<S>, is_textured: bool) -> V<S> {
     if !is_textured {
         return color;
     }
     let one = color.x.splat(1.0);
-    let clamped = |x: F<S>| select(x, one, x.gt(one));
+    let clamp = |x: F<S>| select(x, one, x.gt(one));
     Lanes3 {
-        x: clamped(color.x),
-        y: clamped(color.y),
-        z: clamped(color.z),
+        x: clamp(color.x),
+        y: clamp(color.y),
+        z: clamp(color.z),
     }
 }
 

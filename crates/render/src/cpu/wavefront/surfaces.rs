@@ -26,7 +26,7 @@ pub struct LaneSurfaces<S: Simd> {
     pub face: Option<LaneFaces<S>>,
 }
 
-/// The plane coordinates of triangles, as in [`Primitive`](crate::records::Primitive).
+/// The maps from points to coordinates x and y in triangles, as in [`Primitive`](crate::records::Primitive).
 #[derive(Clone, Copy)]
 pub struct LaneFaces<S: Simd> {
     anchor: V<S>,
@@ -35,15 +35,15 @@ pub struct LaneFaces<S: Simd> {
 }
 
 impl<S: Simd> LaneSurfaces<S> {
-    /// Returns true where a surface may reflect light to a direction, like `direction_allowed`.
+    /// Returns true where a surface may reflect light from `wi`, like the scalar `direction_allowed`.
     #[inline(always)]
     pub fn direction_allowed(&self, wi: V<S>) -> mask32x8<S> {
         let zero = wi.x.splat(0.0);
         let lit = dot(self.shading_normal, wi).gt(zero) & dot(self.smooth_normal, wi).gt(zero);
+        // Without a mesh, the smooth normal is the geometric normal, so light from below is not in `lit`.
         let Some(face) = &self.face else {
             return lit;
         };
-        // On other surfaces, the smooth normal is the normal: light does not fall from below.
         let fall = -dot(self.normal, wi);
         let height = dot(self.normal, self.terminator_offset);
         let crossing = self.position + self.terminator_offset + wi * (height / max(fall, fall.splat(1e-30)));
@@ -108,14 +108,14 @@ impl FlatHits {
     }
 }
 
-/// Returns -1 if a ray meets a surface from behind, else 1.
+/// Returns -1 if a ray hits a surface from behind, else 1.
 #[inline(always)]
 fn side_towards<S: Simd>(outward: V<S>, direction: V<S>) -> F<S> {
     let cosine = dot(outward, direction);
     select(cosine.splat(1.0), cosine.splat(-1.0), cosine.gt(cosine.splat(0.0)))
 }
 
-/// The fields of an instance, in each lane.
+/// The fields of one instance per lane.
 struct InstanceRows {
     x: Rows3,
     y: Rows3,
@@ -151,7 +151,7 @@ impl InstanceRows {
     }
 }
 
-/// Hits on meshes.
+/// Hits on triangles of meshes.
 pub struct FaceHits {
     direction: Rows3,
     barycentric: [Row; 2],
@@ -272,7 +272,7 @@ impl FaceHits {
     }
 }
 
-/// Hits whose surfaces are evaluated one by one: on solids, and on materials with textures or vertex colors.
+/// Hits whose surfaces are evaluated one by one: hits on solids, and on materials with textures or vertex colors.
 #[derive(Default)]
 pub struct EvaluatedHits {
     position: Rows3,
@@ -322,12 +322,13 @@ impl EvaluatedHits {
     }
 }
 
+/// Maps a vector from object space to world space.
 #[inline(always)]
 fn from_mesh<S: Simd>(u: V<S>, v: V<S>, w: V<S>, vector: V<S>) -> V<S> {
     u * vector.x + v * vector.y + w * vector.z
 }
 
-/// Returns zero where a mesh has no normals.
+/// Maps a vertex normal to a unit normal in world space. Returns zero where the mesh has no normals.
 #[inline(always)]
 fn normal_from_mesh<S: Simd>((x, y, z): (V<S>, V<S>, V<S>), n: V<S>, has_normals: mask32x8<S>) -> V<S> {
     let v = x * n.x + y * n.y + z * n.z;
