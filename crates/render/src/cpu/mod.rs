@@ -69,6 +69,10 @@ pub mod traversal;
 pub mod triangle;
 pub mod vertices;
 pub mod warp;
+#[cfg(not(target_arch = "wasm32"))]
+pub mod wavefront;
+#[cfg(target_arch = "wasm32")]
+#[path = "wavefront/scalar.rs"]
 pub mod wavefront;
 
 pub use renderer::Cpu;

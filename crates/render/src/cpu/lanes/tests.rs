@@ -36,11 +36,7 @@ where
     let u: <W::Real as Real>::Vec2 = Vector2::new(a.square[0], a.square[1]);
     let n = &a.numbers;
     let vector = |first: usize| Vector3::new(n[first], n[first + 1], n[first + 2]);
-    let (p, q, r): (
-        <W::Real as Real>::Vec3,
-        <W::Real as Real>::Vec3,
-        <W::Real as Real>::Vec3,
-    ) = (vector(0), vector(3), vector(6));
+    let [p, q, r]: [<W::Real as Real>::Vec3; 3] = [0, 3, 6].map(vector);
     let unit = normalize(p);
     let angles = angles_at(p, q, r);
     let scalars = [

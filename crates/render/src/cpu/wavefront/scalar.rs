@@ -1,0 +1,46 @@
+//! The interface of `wavefront` on WebAssembly: paths are traced one by one. Without SIMD instructions, the lanes are
+//! not faster, and compiling them for this target takes many minutes and gigabytes.
+
+use std::sync::Arc;
+
+use glam::UVec2;
+
+use crate::cpu::integrators::path::{PathState, advance, begin_path};
+use crate::records::Packed;
+
+/// Maximum number of paths in a batch.
+pub const MAX_PATHS: usize = 1024;
+
+/// Nothing: single rays are traced in the packed meshes.
+#[derive(Clone, Debug, Default)]
+pub struct BatchMeshes;
+
+impl BatchMeshes {
+    pub fn new(_: &Packed) -> BatchMeshes {
+        BatchMeshes
+    }
+}
+
+/// A batch of paths.
+pub struct Wavefront {
+    paths: Vec<PathState>,
+}
+
+impl Wavefront {
+    pub fn new(_: Arc<BatchMeshes>) -> Wavefront {
+        Wavefront { paths: Vec::new() }
+    }
+
+    /// Traces a path for each camera sample, and returns the ended paths in the order of the samples.
+    pub fn trace(&mut self, scene: &Packed, samples: impl Iterator<Item = (UVec2, u32)>) -> &[PathState] {
+        self.paths.clear();
+        self.paths.extend(samples.map(|(pixel, sample)| {
+            let mut path = begin_path(scene, pixel, sample);
+            while !path.ended {
+                advance(scene, &mut path, pixel);
+            }
+            path
+        }));
+        &self.paths
+    }
+}
