@@ -82,7 +82,7 @@ fn count_differing(paths: &[PathBits], expected: &[PathBits]) -> usize {
 fn with_diffuse_materials(mut packed: Packed, scene_index: usize) -> Packed {
     packed.specialization.absorption = 0;
     packed.specialization.bounces = packed.specialization.bounces.max(3);
-    if scene_index % 3 == 0 {
+    if scene_index.is_multiple_of(3) {
         let s = &mut packed.specialization;
         (s.pixel_pattern, s.pixel_side, s.filter_bins) = (SOBOL, s.pixel_samples, 0);
         (s.lens, s.panoramic, s.camera_invisible) = (0, 0, 0);
