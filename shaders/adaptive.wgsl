@@ -1,4 +1,4 @@
-// Adaptive sampling: variance, and sample counts from neighbors' pilot samples.
+// Noise estimates: variance; adaptive sampling: sample counts from neighbors' pilot samples.
 
 // Returns a pixel's moments after a sample; `sum` is the weighted sum before the sample. xyz are sums of squared
 // deviations from the mean, w the sample count. Weighted update by Welford ("Note on a Method for Calculating Corrected
@@ -13,6 +13,19 @@ fn squared_deviation(sum: vec4f, sample: vec4f) -> vec3f {
     let after = sample.rgb - mean_of(sum + sample) * sample.w;
     let product = before * after;
     return select(product, vec3f(0.0), product < vec3f(0.0));
+}
+
+// Returns the moments of a layer after a sample. `layer` and `weight_sum` are the weighted sums before the sample,
+// `sample` is weighted.
+fn layer_moments_with(moments: vec4f, layer: vec4f, weight_sum: f32, sample: vec4f, weight: f32) -> vec4f {
+    let before = sample - layer_mean(layer, weight_sum) * weight;
+    let after = sample - layer_mean(layer + sample, weight_sum + weight) * weight;
+    let product = before * after;
+    return moments + select(product, vec4f(0.0), product < vec4f(0.0));
+}
+
+fn layer_mean(layer: vec4f, weight_sum: f32) -> vec4f {
+    return select(vec4f(0.0), layer / weight_sum, abs(weight_sum) > 0.0);
 }
 
 fn mean_of(sum: vec4f) -> vec3f {

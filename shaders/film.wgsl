@@ -1,4 +1,5 @@
-// The film: consecutive lists with one vector per pixel. The last lists are the layers.
+// The film: consecutive lists with one vector per pixel. The layers follow the lists of the kernel; the half sums and the
+// moments of albedo and normal, if enabled, are last.
 
 @group(0) @binding(1) var<storage, read_write> film: array<vec4f>;
 
@@ -18,6 +19,47 @@ fn store_layers(layers: Layers, index: u32, first_layer: u32) {
     film[start + 2u * pixels] = layers.indirect;
     film[start + 3u * pixels] = layers.albedo;
     film[start + 4u * pixels] = layers.normal;
+}
+
+// The noise estimates of a pixel, except the moments of the radiance.
+struct Noise {
+    half_sum: vec4f,       // like the pixel's sum, over samples of even index
+    albedo_moments: vec4f, // rgb: squared deviations of the albedo
+    normal_moments: vec4f, // xyz: squared deviations of the normal; w: of the depth
+}
+
+fn stored_noise(index: u32, first_layer: u32) -> Noise {
+    let pixels = params.film_size.x * params.film_size.y;
+    if LAYERS == 0u {
+        return Noise(film[first_layer * pixels + index], vec4f(0.0), vec4f(0.0));
+    }
+    let start = (first_layer + 5u) * pixels + index;
+    return Noise(film[start], film[start + pixels], film[start + 2u * pixels]);
+}
+
+fn store_noise(noise: Noise, index: u32, first_layer: u32) {
+    let pixels = params.film_size.x * params.film_size.y;
+    if LAYERS == 0u {
+        film[first_layer * pixels + index] = noise.half_sum;
+        return;
+    }
+    let start = (first_layer + 5u) * pixels + index;
+    film[start] = noise.half_sum;
+    film[start + pixels] = noise.albedo_moments;
+    film[start + 2u * pixels] = noise.normal_moments;
+}
+
+// Adds a sample. `layers` and `sum` do not include the sample.
+fn noise_with(noise: Noise, layers: Layers, sum: vec4f, path: PathState) -> Noise {
+    let value = path_value(path);
+    let half_sum = noise.half_sum + select(value, vec4f(0.0), (path.sample & 1u) != 0u);
+    if LAYERS == 0u {
+        return Noise(half_sum, vec4f(0.0), vec4f(0.0));
+    }
+    let sample = path_layers(path);
+    return Noise(half_sum,
+                 layer_moments_with(noise.albedo_moments, layers.albedo, sum.w, sample.albedo, value.w),
+                 layer_moments_with(noise.normal_moments, layers.normal, sum.w, sample.normal, value.w));
 }
 
 fn layers_sum(a: Layers, b: Layers) -> Layers {

@@ -37,7 +37,7 @@ struct Layers {
     direct: vec4f,         // radiance scattered once
     indirect: vec4f,       // radiance scattered more than once
     albedo: vec4f,         // albedo of the first surface that is neither mirror nor glass
-    normal: vec4f,         // outward shading normal of the first hit
+    normal: vec4f,         // outward shading normal of the first hit; w: its distance, if noise is estimated
 }
 
 // Returns the differential of the ray through the lens center with respect to the image position.

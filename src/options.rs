@@ -1,6 +1,7 @@
 //! The options of a render.
 
 use wgray_image::Region;
+use wgray_render::film::FilmLayout;
 use wgray_render::output::{Aov, AovSource};
 use wgray_render::pack::pack;
 use wgray_render::records::Packed;
@@ -34,7 +35,7 @@ impl Options {
         let Region { x0, y0, x1, y1 } = region;
         let integrator = scene.render.integrator;
         let unsupported = self.aovs.iter().find_map(|aov| {
-            let rule = aov.missing(integrator, scene.render.adaptive.is_some());
+            let rule = aov.missing(integrator, true); // the film gets noise estimates if necessary
             rule.map(|rule| (aov, rule))
         });
         let rule = if x0 >= x1 || y0 >= y1 {
@@ -49,16 +50,28 @@ impl Options {
         Err(Problem::of("crop", format!("{x0},{y0},{x1},{y1} {rule}")))
     }
 
-    /// Returns true if the film must have layers: for alpha, or for requested layers that are means over samples.
-    pub(crate) fn needs_layers(&self, scene: &Scene) -> bool {
+    /// Returns the layout of the film. It has layers for alpha, and for requested layers that are means over samples. It
+    /// has noise estimates for requested statistics, unless sampling is adaptive.
+    pub(crate) fn film_layout(&self, scene: &Scene) -> FilmLayout {
         let integrator = scene.render.integrator;
-        let is_mean = |aov: &Aov| aov.source(integrator) == AovSource::Samples;
-        integrator.has_layers() && (scene.render.alpha || self.aovs.iter().any(is_mean))
+        let requests = |source: AovSource| self.aovs.iter().any(|aov| aov.source(integrator) == source);
+        let adaptive = scene.render.adaptive.is_some();
+        FilmLayout {
+            adaptive,
+            layers: integrator.has_layers() && (scene.render.alpha || requests(AovSource::Samples)),
+            noise: requests(AovSource::Statistics) && !adaptive,
+        }
     }
 
     pub(crate) fn pack(&self, scene: &Scene) -> Packed {
         let mut packed = pack(scene);
-        packed.specialization.layers = self.needs_layers(scene).into();
+        set_film_layout(&mut packed, self.film_layout(scene));
         packed
     }
+}
+
+/// Sets the layers and noise estimates of a scene's films.
+pub(crate) fn set_film_layout(packed: &mut Packed, film_layout: FilmLayout) {
+    packed.specialization.layers = film_layout.layers.into();
+    packed.specialization.noise = film_layout.noise.into();
 }

@@ -8,6 +8,7 @@ use tracing::warn;
 use web_time::Instant;
 use wgray_image::panic_guard::catch_panic;
 use wgray_render::backend::Backend;
+use wgray_render::film::FilmLayout;
 use wgray_render::records::Packed;
 
 use crate::context::Context;
@@ -141,13 +142,12 @@ impl OpenScene {
         Ok(open)
     }
 
-    /// Returns true if a render with these options can use this device and kernel. `layers` is true if its film needs
-    /// layers.
-    pub fn suits(&self, options: &Options, layers: bool) -> bool {
+    /// Returns true if a render with these options and this layout of the film can use this device and kernel.
+    pub fn suits(&self, options: &Options, film_layout: FilmLayout) -> bool {
         let requested = (&options.device, options.exact_rounding);
         (&self.device, self.exact_rounding) == requested
             && self.lost.is_none()
-            && self.engine.scene().film_layout().layers == layers
+            && self.engine.scene().film_layout() == film_layout
     }
 
     /// Closes the scene and returns it. The device stays open in the context.

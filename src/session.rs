@@ -12,7 +12,7 @@ use wgray_scene::{Camera, Scene};
 use crate::cancel::CancelToken;
 use crate::context::Context;
 use crate::error::{Error, RenderError};
-use crate::options::Options;
+use crate::options::{Options, set_film_layout};
 use crate::picture::Picture;
 use crate::progressive::{ProgressiveRender, Status};
 use crate::render::{ImageSetup, Progressive, render_progressive_with, render_with};
@@ -310,9 +310,9 @@ impl SceneState {
         options: &Options,
         mut on_fault: FaultHandler<'a>,
     ) -> Result<Renderer<'a>, Error> {
-        let layers = options.needs_layers(scene);
+        let film_layout = options.film_layout(scene);
         let open = match self.open.take() {
-            Some(open) if open.suits(options, layers) => open,
+            Some(open) if open.suits(options, film_layout) => open,
             other => {
                 self.open = other;
                 let packed = self.packed(scene, options);
@@ -324,9 +324,9 @@ impl SceneState {
     }
 
     fn packed(&mut self, scene: &Scene, options: &Options) -> Arc<Packed> {
-        let layers = options.needs_layers(scene);
+        let film_layout = options.film_layout(scene);
         if let Some(open) = &self.open
-            && open.suits(options, layers)
+            && open.suits(options, film_layout)
         {
             return Arc::clone(open.scene());
         }
@@ -335,8 +335,8 @@ impl SceneState {
             let shading = self.shading.insert(PackedShading::of(scene));
             Arc::new(pack::pack_with(scene, shading))
         });
-        if packed.film_layout().layers != layers {
-            Arc::make_mut(packed).specialization.layers = layers.into();
+        if packed.film_layout() != film_layout {
+            set_film_layout(Arc::make_mut(packed), film_layout);
         }
         Arc::clone(packed)
     }

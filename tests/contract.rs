@@ -17,9 +17,9 @@ use crate::{patterns, scenes};
 const SIZE: (u32, u32) = (20, 12);
 const SAMPLES: u32 = 40;
 
-/// Returns four variants of a small scene: direct lighting, and path tracing with layers, each with uniform and with
-/// adaptive sampling.
-pub fn subjects() -> [Packed; 4] {
+/// Returns variants of a small scene: direct lighting, and path tracing with layers, each with uniform and with adaptive
+/// sampling; then some of them with noise estimates.
+pub fn subjects() -> [Packed; 7] {
     let mut base = scenes::scene("cornell.toml");
     (base.image.width, base.image.height) = SIZE;
     base.render.pixel_samples = patterns::samples(wgray::scene::Pattern::Sobol, SAMPLES);
@@ -32,11 +32,15 @@ pub fn subjects() -> [Packed; 4] {
     });
     let paths = [&base, &adaptive].map(|scene| scenes::packed(&with_path_integrator(scene)).with_layers());
     let [layered, layered_adaptive] = paths;
+    let (base, adaptive) = (scenes::packed(&base), scenes::packed(&adaptive));
     [
-        scenes::packed(&base),
-        scenes::packed(&adaptive),
-        layered,
-        layered_adaptive,
+        base.clone(),
+        adaptive,
+        layered.clone(),
+        layered_adaptive.clone(),
+        base.with_noise(),
+        layered.with_noise(),
+        layered_adaptive.with_noise(),
     ]
 }
 
@@ -120,8 +124,8 @@ const SENTENCES: &[Sentence] = &[
                 "lists have the wrong length",
             )?;
             check(
-                film.has_layers() == packed.film_layout().layers,
-                "layers are missing, or were not requested",
+                film.film_layout() == packed.film_layout(),
+                "layers or noise estimates are missing, or were not requested",
             )?;
         }
         Ok(())
@@ -139,6 +143,18 @@ const SENTENCES: &[Sentence] = &[
             same(&film.pilot_sums, &film_without_layers.pilot_sums),
             "the pilot sums differ",
         )
+    }),
+    ("noise estimates do not change the other lists", |packed, make| {
+        let mut film = complete_film(&mut *make());
+        let mut other = complete_film(&mut Cpu::new(&packed.clone().without_noise()));
+        if !packed.sampling.adaptive {
+            film.moments.clear();
+        }
+        for film in [&mut film, &mut other] {
+            (film.half_sums, film.albedo_moments, film.normal_moments) = Default::default();
+            film.layers[4].iter_mut().for_each(|normal| normal.w = 0.0); // the depth
+        }
+        check(bits(&film) == bits(&other), "a list differs")
     }),
     ("reading a film changes nothing", |_, make| {
         let mut backend = make();
@@ -200,6 +216,18 @@ const SENTENCES: &[Sentence] = &[
             },
             Film {
                 pilot_sums: vec![glam::Vec4::ZERO; 3],
+                ..film.clone()
+            },
+            Film {
+                half_sums: vec![glam::Vec4::ZERO; 3],
+                ..film.clone()
+            },
+            Film {
+                albedo_moments: vec![glam::Vec4::ZERO; 3],
+                ..film.clone()
+            },
+            Film {
+                normal_moments: vec![glam::Vec4::ZERO; 3],
                 ..film.clone()
             },
             Film {
@@ -419,9 +447,11 @@ enum Defect {
     DropsResumedLayers,
     OmitsLayers,
     WritesLayersIntoTheSums,
+    DropsResumedHalves,
+    WritesHalvesIntoTheSums,
 }
 
-const DEFECTS: [Defect; 12] = [
+const DEFECTS: [Defect; 14] = [
     Defect::KeepsTheFilm,
     Defect::EmptiesTheFilmByReading,
     Defect::IgnoresAMissingFilm,
@@ -434,6 +464,8 @@ const DEFECTS: [Defect; 12] = [
     Defect::DropsResumedLayers,
     Defect::OmitsLayers,
     Defect::WritesLayersIntoTheSums,
+    Defect::DropsResumedHalves,
+    Defect::WritesHalvesIntoTheSums,
 ];
 
 impl Backend for DefectiveBackend<'_> {
@@ -449,6 +481,10 @@ impl Backend for DefectiveBackend<'_> {
             Defect::DropsTheResumedFilm => self.inner.begin(film.region),
             Defect::DropsResumedLayers => self.inner.resume(Film {
                 layers: film.layers.map(|layer| vec![glam::Vec4::ZERO; layer.len()]),
+                ..film
+            }),
+            Defect::DropsResumedHalves => self.inner.resume(Film {
+                half_sums: vec![glam::Vec4::ZERO; film.half_sums.len()],
                 ..film
             }),
             _ => self.inner.resume(film),
@@ -482,6 +518,7 @@ impl Backend for DefectiveBackend<'_> {
         let mut film = self.inner.film()?;
         match self.defect {
             Defect::OmitsLayers => film.layers = Film::new(film.region).layers,
+            Defect::WritesHalvesIntoTheSums if film.has_noise() => film.sums = film.half_sums.clone(),
             Defect::WritesLayersIntoTheSums if film.has_layers() => film.sums = film.layers[0].clone(),
             _ => {}
         }

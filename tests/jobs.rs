@@ -475,12 +475,15 @@ fn different_jobs_have_different_identities() {
         let difference = identity.difference(&identity_with(change)).unwrap_or_default();
         assert!(difference.starts_with(expected_start), "{expected_start}: {difference}");
     }
-    let changes: [Change<Identity>; 6] = [
+    let changes: [Change<Identity>; 7] = [
         ("its version", &|job| job.version.push('1')),
         ("its crop is", &|job| job.region[0] = 1),
         ("its sampling is adaptive, not uniform", &|job| job.adaptive = true),
         ("its layers are means over the samples, not", &|job| job.layers = true),
-        ("it was rendered with, not without", &|job| job.exact_rounding = true),
+        ("it was rendered with, not without, noise", &|job| job.noise = true),
+        ("it was rendered with, not without, --exact", &|job| {
+            job.exact_rounding = true
+        }),
         ("its shaders differ", &|job| job.shaders.push('1')),
     ];
     for (expected_start, change) in changes {
@@ -489,11 +492,14 @@ fn different_jobs_have_different_identities() {
         let difference = identity.difference(&changed).unwrap_or_default();
         assert!(difference.starts_with(expected_start), "{expected_start}: {difference}");
     }
-    // Layers do not change the scene hash.
-    let [_, _, layered, _] = subjects();
+    // Layers and noise estimates do not change the scene hash.
+    let [_, _, layered, ..] = subjects();
     let plain = layered.clone().without_layers();
-    let hashes = [layered, plain].map(|packed| Identity::of(&packed, whole(&packed), false).scene);
-    assert_eq!(hashes[0], hashes[1]);
+    let noisy = plain.clone().with_noise();
+    let [layered, plain, noisy] = [layered, plain, noisy].map(|packed| Identity::of(&packed, whole(&packed), false));
+    assert_eq!((&layered.scene, &noisy.scene), (&plain.scene, &plain.scene));
+    let names = [layered, plain, noisy].map(|identity| identity.file_name());
+    assert!(names[0] != names[1] && names[1] != names[2] && names[0] != names[2]);
 }
 
 #[test]

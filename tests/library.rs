@@ -139,7 +139,7 @@ fn invalid_options_are_rejected() {
         ..cpu_options()
     };
     let aov = Options {
-        aovs: vec![Aov::Depth, Aov::SampleCount],
+        aovs: vec![Aov::Depth, Aov::Albedo],
         ..cpu_options()
     };
     for (options, expected) in [
@@ -149,7 +149,7 @@ fn invalid_options_are_rejected() {
         ),
         (crop(3, 0, 3, 16), "crop: 3,0,3,16 must have x0 < x1 and y0 < y1"),
         (crop(5, 9, 7, 2), "crop: 5,9,7,2 must have x0 < x1 and y0 < y1"),
-        (aov, "aov.sample_count: needs adaptive sampling"),
+        (aov, "aov.albedo: needs integrator = \"path\""),
     ] {
         let error = wgray::render(&scene(), &options).unwrap_err();
         assert_eq!(error.to_string(), expected);

@@ -34,6 +34,7 @@ mod meshes;
 mod model;
 mod mutations;
 mod nearly;
+mod noise;
 mod oracle;
 mod panorama;
 mod path;

@@ -125,9 +125,12 @@ pub fn first_hits(packed: &Packed, mode: RenderMode) -> Vec<FirstHit> {
     hits.unwrap_or_else(|error| panic!("{mode:?}: {error}"))
 }
 
-/// Counts the records that are not bit-identical: pixels, moments and layers.
+/// Counts the records that are not bit-identical: pixels, moments, layers and noise estimates.
 pub fn differing(a: &Film, b: &Film) -> usize {
-    let layout = |film: &Film| (film.region, film.sums.len(), film.moments.len(), film.has_layers());
+    let layout = |film: &Film| {
+        let lengths = (film.sums.len(), film.moments.len());
+        (film.region, lengths, film.has_layers(), film.has_noise())
+    };
     assert_eq!(layout(a), layout(b), "films of different regions or layouts");
     let bits = |sum: &Vec4| sum.to_array().map(f32::to_bits);
     let records = image_records(a).zip(image_records(b));
@@ -136,7 +139,9 @@ pub fn differing(a: &Film, b: &Film) -> usize {
 
 /// Iterates over all records except those that only scheduling uses.
 fn image_records(film: &Film) -> impl Iterator<Item = &Vec4> {
-    [&film.sums, &film.moments].into_iter().chain(&film.layers).flatten()
+    let noise = [&film.half_sums, &film.albedo_moments, &film.normal_moments];
+    let lists = [&film.sums, &film.moments].into_iter().chain(&film.layers).chain(noise);
+    lists.flatten()
 }
 
 pub fn crop(film: &Film, region: Region) -> Film {

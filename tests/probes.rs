@@ -2,8 +2,8 @@
 
 use glam::{UVec2, UVec3, UVec4, Vec2, Vec3, Vec4};
 use wgray_render::cpu::adaptive::{
-    display_slope_squared, display_variance, mean_of, moments_with, pilot_add, pilot_finish, samples_wanted,
-    squared_deviation, variance_of_mean,
+    display_slope_squared, display_variance, layer_mean, layer_moments_with, mean_of, moments_with, pilot_add,
+    pilot_finish, samples_wanted, squared_deviation, variance_of_mean,
 };
 use wgray_render::cpu::bvh_node::{
     children_hit, children_in_interval, far_side, four_hit, four_in_interval, hit_bits, in_order, larger, leaf_items,
@@ -197,6 +197,8 @@ probes! {
     filter_bin(u: f32, bins: u32) -> u32;
     filter_offset(u: f32, bin: u32, bins: u32, low: f32, high: f32) -> f32;
     moments_with(moments: Vec4, sum: Vec4, sample: Vec4) -> Vec4;
+    layer_moments_with(moments: Vec4, layer: Vec4, weight_sum: f32, sample: Vec4, weight: f32) -> Vec4;
+    layer_mean(layer: Vec4, weight_sum: f32) -> Vec4;
     squared_deviation(sum: Vec4, sample: Vec4) -> Vec3;
     pilot_add(pilot: Vec4, sum: Vec4, sample: Vec4) -> Vec4;
     pilot_finish(pilot: Vec4, sum: Vec4, moments: Vec4) -> Vec4;

@@ -267,6 +267,7 @@ fn random_scenes_have_the_paths_of_the_scalar_integrator() {
     let mut coverage = LaneCoverage::default();
     for (i, packed) in random_path_scenes().enumerate() {
         let packed = if i % 2 == 0 { packed.with_layers() } else { packed };
+        let packed = if i % 3 == 0 { packed.with_noise() } else { packed }; // layers then contain the depth
         let batch_size = [1, 7, 64, 1024][i % 4];
         let diffuse = with_diffuse_materials(packed.clone(), i);
         for (packed, step) in [(&packed, 2), (&diffuse, 3)] {

@@ -80,6 +80,7 @@ fn advance(before: PathState, pixel: vec2u) -> PathState {
         state = add_emission(state, prim, hit, surface, material, is_hit);
     }
     surface.shading_normal = shaded_normal(surface, material, shading.normal);
+    let distance = hit.t + state.skipped_distance;
     state.skipped_distance = 0.0;
     var mixture = PrincipledLobes();
     if (MATERIALS & (1u << PRINCIPLED)) != 0u {
@@ -92,7 +93,7 @@ fn advance(before: PathState, pixel: vec2u) -> PathState {
     }
     if LAYERS != 0u {
         if is_hit {
-            state = record_first_hit_layers(state, surface, material);
+            state = record_first_hit_layers(state, surface, material, distance);
         }
     }
     let continues = is_hit & (path.depth < BOUNCES) & (material.kind != EMITTER);
@@ -225,12 +226,12 @@ fn continue_through(before: PathState, surface: Surface, hit_diff: HitDifferenti
     return state;
 }
 
-// Records coverage and normal of the first hit, and the albedo of the first hit that is not specular.
-fn record_first_hit_layers(before: PathState, surface: Surface, material: Material) -> PathState {
+// Records coverage, normal and distance of the first hit, and the albedo of the first hit that is not specular.
+fn record_first_hit_layers(before: PathState, surface: Surface, material: Material, distance: f32) -> PathState {
     var state = before;
     if state.path.depth == 0u {
         state.layers.emission.w = 1.0;
-        state.layers.normal = vec4f(surface.shading_normal * surface.side, 0.0);
+        state.layers.normal = vec4f(surface.shading_normal * surface.side, select(0.0, distance, NOISE != 0u));
     }
     if !state.albedo_recorded & !is_delta(material) {
         state.layers.albedo = vec4f(state.path.throughput * albedo(material), 0.0);

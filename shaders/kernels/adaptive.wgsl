@@ -24,12 +24,19 @@ fn adaptive(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_
     if LAYERS != 0u {
         layers = stored_layers(index, 3u);
     }
+    var noise = Noise();
+    if NOISE != 0u {
+        noise = stored_noise(index, 3u);
+    }
     var sample = params.samples.x;
     var path = begin_path(pixel, sample);
     while sample < end {
         path = advance(path, pixel);
         if path.ended {
             let value = path_value(path);
+            if NOISE != 0u {
+                noise = noise_with(noise, layers, sum, path);
+            }
             pilot = pilot_add(pilot, sum, value);
             moments = moments_with(moments, sum, value);
             sum += value;
@@ -43,6 +50,9 @@ fn adaptive(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_
     film[index] = sum;
     if LAYERS != 0u {
         store_layers(layers, index, 3u);
+    }
+    if NOISE != 0u {
+        store_noise(noise, index, 3u);
     }
     film[pixels + index] = moments;
     if is_pilot {

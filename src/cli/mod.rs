@@ -259,7 +259,6 @@ fn option_error(problem: &Problem) -> Usage {
         name => name.replace('_', "-"),
     };
     let hint = match (name.as_str(), rest) {
-        ("aov", "sample_count" | "variance") => " (--adaptive ERROR)",
         ("aov", _) => " (--integrator path)",
         ("adaptive", "") => " (--pixel-pattern sobol)", // the value itself has been validated
         _ => "",

@@ -44,7 +44,10 @@ fn invalid_command_lines_exit_with_2() {
         (&["--device", ""], "--device"),
         (&["--threads", "0"], "--threads"),
         (&["--aov", "normal,colour"], "colour"),
-        (&["--aov", "variance"], "--aov variance: needs adaptive sampling"),
+        (
+            &["--aov", "albedo"],
+            "--aov albedo: needs integrator = \"path\" (--integrator path)",
+        ),
         (&["--pixel-pattern", "hexagonal"], "hexagonal"),
         (
             &["--pixel-pattern", "sobol", "--adaptive", "2"],

@@ -17,7 +17,7 @@ const LONG: [&str; 8] = [
     "--spp",
     "300",
     "--aov",
-    "normal",
+    "normal,variance",
 ];
 
 fn render_expected(folder: &TestFolder) -> Vec<u8> {
@@ -571,7 +571,16 @@ fn parts_merge_to_the_same_image() {
         "cpu",
         "--reproducible",
         "--aov",
-        "normal,depth,instance",
+        "normal,depth,instance,variance,sample_count",
+    ];
+    let suffixes = [
+        "png",
+        "exr",
+        "normal.png",
+        "depth.png",
+        "instance.png",
+        "variance.png",
+        "sample_count.png",
     ];
     let render = |extra: &[&str]| folder.run_quietly(&[&["render"], &options[..], extra].concat());
     render(&["-o", "whole.png", "-o", "whole.exr"]);
@@ -585,7 +594,7 @@ fn parts_merge_to_the_same_image() {
     };
     let result = merge(&shuffled);
     assert_eq!((result.code, result.stderr.as_str()), (0, ""));
-    for suffix in ["png", "exr", "normal.png", "depth.png", "instance.png"] {
+    for suffix in suffixes {
         assert!(
             folder.read(&format!("out.{suffix}")) == folder.read(&format!("whole.{suffix}")),
             "{suffix}"
@@ -612,7 +621,7 @@ fn parts_merge_to_the_same_image() {
     // A single part that covers the full image is accepted.
     render(&["--tile", "1/1", "-o", "all.part"]);
     assert_eq!(merge(&["all.part"]).code, 0);
-    for suffix in ["png", "exr", "normal.png", "depth.png", "instance.png"] {
+    for suffix in suffixes {
         fs::remove_file(folder.path(&format!("out.{suffix}"))).expect("a file");
     }
     render(&["--tile", "1/7", "--seed", "3", "-o", "seed.part"]);

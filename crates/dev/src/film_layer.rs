@@ -125,6 +125,7 @@ mod tests {
         let film_layout = FilmLayout {
             adaptive: true,
             layers: true,
+            noise: false,
         };
         let mut film = Film::of(Region::whole(1, 2), film_layout);
         film.sums.fill(Vec4::new(4.0, 8.0, 12.0, 4.0));

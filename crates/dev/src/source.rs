@@ -127,7 +127,7 @@ impl KernelChoice {
     pub fn supported_view(&self, view: View) -> View {
         match view.aov().map(|aov| aov.source(self.integrator)) {
             Some(AovSource::Samples) if self.specialization.layers == 0 => View::Color,
-            Some(AovSource::Adaptive) if !self.adaptive => View::Color,
+            Some(AovSource::Statistics) if !self.adaptive => View::Color,
             None if self.on_cpu && view.is_rendered_twice() => View::Color,
             _ => view,
         }

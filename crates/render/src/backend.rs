@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use crate::error::RenderError;
-use crate::film::{Film, FilmLayout};
+use crate::film::{Film, FilmLayout, Layer};
 use crate::records::{FirstHit, Packed};
 use wgray_image::Region;
 
@@ -17,7 +17,8 @@ use wgray_image::Region;
 ///   backend. Both replace the current film.
 /// - A film covers a region of the image, which may be empty.
 /// - A film has the scene's [layout](FilmLayout): sums; with adaptive sampling, also moments and pilot statistics; if
-///   requested, layers ([`Packed::with_layers`]). Layers do not change the bits of other lists.
+///   requested, layers ([`Packed::with_layers`]) and noise estimates ([`Packed::with_noise`]). Layers do not change the
+///   bits of other lists, noise estimates do not change the bits of sums, moments, pilot statistics and colors of layers.
 /// - [`film`](Backend::film) returns a copy of the film. It fails while a dispatch is pending.
 ///
 /// # Dispatches
@@ -161,17 +162,38 @@ impl Rules {
         self.in_picture(film.region)?;
         let pixels = film.region.pixels();
         let length_if = |exists: bool| if exists { pixels } else { 0 };
-        let FilmLayout { adaptive, layers } = self.film_layout;
+        let film_layout = self.film_layout;
+        let FilmLayout {
+            adaptive,
+            layers,
+            noise,
+        } = film_layout;
         let with_or_without = |exists: bool| if exists { "with" } else { "without" };
         let sampling = format!("a scene {} adaptive sampling", with_or_without(adaptive));
         let layering = format!("a scene {} layers", with_or_without(layers));
+        let estimating = format!("a scene {} noise estimates", with_or_without(noise));
+        let moments = if adaptive { &sampling } else { &estimating };
         let first_lists = [
             ("sums", pixels, &sampling),
-            ("moments", length_if(adaptive), &sampling),
+            ("moments", length_if(film_layout.has_moments()), moments),
             ("pilot statistics", length_if(adaptive), &sampling),
         ];
-        let layer_lists = std::iter::repeat(("pixels of a layer", length_if(layers), &layering));
-        for (list, (name, expected, scene)) in film.lists().zip(first_lists.into_iter().chain(layer_lists)) {
+        let layer_lists = [("pixels of a layer", length_if(layers), &layering); Layer::ALL.len()];
+        let noise_lists = [
+            ("half sums", length_if(noise), &estimating),
+            (
+                "moments of the albedo",
+                length_if(film_layout.has_layer_moments()),
+                &estimating,
+            ),
+            (
+                "moments of the normal",
+                length_if(film_layout.has_layer_moments()),
+                &estimating,
+            ),
+        ];
+        let expected_lists = first_lists.into_iter().chain(layer_lists).chain(noise_lists);
+        for (list, (name, expected, scene)) in film.lists().zip(expected_lists) {
             let found = list.len() as u64;
             if found != expected {
                 return Err(RenderError::FilmMismatch(format!(

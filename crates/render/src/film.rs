@@ -11,13 +11,29 @@ pub struct FilmLayout {
     pub adaptive: bool,
     /// The sums of each [`Layer`].
     pub layers: bool,
+    /// Half sums and moments, for estimates of the noise.
+    pub noise: bool,
 }
 
 impl FilmLayout {
     /// Returns the number of lists.
     pub fn lists(self) -> usize {
-        let (adaptive, layers) = (usize::from(self.adaptive), usize::from(self.layers));
-        1 + 2 * adaptive + Layer::ALL.len() * layers
+        let count = |lists: usize, exist: bool| if exist { lists } else { 0 };
+        1 + count(1, self.has_moments())
+            + count(1, self.adaptive)
+            + count(Layer::ALL.len(), self.layers)
+            + count(1, self.noise)
+            + count(2, self.has_layer_moments())
+    }
+
+    /// Returns true if the film has moments of the radiance.
+    pub fn has_moments(self) -> bool {
+        self.adaptive || self.noise
+    }
+
+    /// Returns true if the film has moments of albedo, normal and depth.
+    pub fn has_layer_moments(self) -> bool {
+        self.layers && self.noise
     }
 
     /// Returns the number of bytes per pixel.
@@ -37,7 +53,7 @@ pub enum Layer {
     Indirect,
     /// Albedo of the first surface that is neither mirror nor glass, times the tints of the surfaces in front of it.
     Albedo,
-    /// Outward shading normal.
+    /// Outward shading normal; a: sum of the weighted distances to the first hits if the film has noise estimates, else 0.
     Normal,
 }
 
@@ -59,12 +75,29 @@ pub struct Film {
     pub region: Region,
     /// rgb: sum of weighted radiances; a: sum of weights.
     pub sums: Vec<Vec4>,
-    /// rgb: summed squared deviations from the mean; a: number of samples. Empty without adaptive sampling.
+    /// rgb: summed squared deviations from the mean; a: number of samples. Empty without adaptive sampling and noise
+    /// estimates.
     pub moments: Vec<Vec4>,
     /// Pilot statistics, which determine the sample counts of neighboring pixels. Empty without adaptive sampling.
     pub pilot_sums: Vec<Vec4>,
     /// Weighted sums of each [`Layer`]. Empty unless requested.
     pub layers: [Vec<Vec4>; Layer::ALL.len()],
+    /// Like `sums`, over the samples with even index. Empty without noise estimates.
+    pub half_sums: Vec<Vec4>,
+    /// rgb: summed squared deviations of the albedo from its mean. Empty without noise estimates or layers.
+    pub albedo_moments: Vec<Vec4>,
+    /// xyz: summed squared deviations of the normal from its mean; w: of the depth. Empty without noise estimates or
+    /// layers.
+    pub normal_moments: Vec<Vec4>,
+}
+
+/// A half of a pixel's samples.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Half {
+    /// The samples with even index.
+    Even,
+    /// The samples with odd index.
+    Odd,
 }
 
 impl Film {
@@ -91,21 +124,26 @@ impl Film {
         Film {
             region,
             sums: list(true),
-            moments: list(film_layout.adaptive),
+            moments: list(film_layout.has_moments()),
             pilot_sums: list(film_layout.adaptive),
             layers: std::array::from_fn(|_| list(film_layout.layers)),
+            half_sums: list(film_layout.noise),
+            albedo_moments: list(film_layout.has_layer_moments()),
+            normal_moments: list(film_layout.has_layer_moments()),
         }
     }
 
     /// Returns the layout; the default layout if the film has no pixels.
     pub fn film_layout(&self) -> FilmLayout {
         FilmLayout {
-            adaptive: !self.moments.is_empty(),
+            adaptive: !self.pilot_sums.is_empty(),
             layers: self.has_layers(),
+            noise: self.has_noise(),
         }
     }
 
-    /// Returns all lists, even empty ones: sums, moments, pilot statistics, layers.
+    /// Returns all lists, even empty ones: sums, moments, pilot statistics, layers, half sums, and the moments of albedo
+    /// and normal.
     pub fn lists(&self) -> impl Iterator<Item = &Vec<Vec4>> {
         let Film {
             region: _,
@@ -113,8 +151,12 @@ impl Film {
             moments,
             pilot_sums,
             layers,
+            half_sums,
+            albedo_moments,
+            normal_moments,
         } = self;
-        [sums, moments, pilot_sums].into_iter().chain(layers)
+        let first = [sums, moments, pilot_sums].into_iter();
+        first.chain(layers).chain([half_sums, albedo_moments, normal_moments])
     }
 
     /// Returns [`Film::lists`] mutably.
@@ -125,8 +167,12 @@ impl Film {
             moments,
             pilot_sums,
             layers,
+            half_sums,
+            albedo_moments,
+            normal_moments,
         } = self;
-        [sums, moments, pilot_sums].into_iter().chain(layers)
+        let first = [sums, moments, pilot_sums].into_iter();
+        first.chain(layers).chain([half_sums, albedo_moments, normal_moments])
     }
 
     /// Returns the part of the film in a region, which must lie inside the film.
@@ -147,10 +193,13 @@ impl Film {
             moments: crop(&self.moments),
             pilot_sums: crop(&self.pilot_sums),
             layers: self.layers.each_ref().map(|list| crop(list)),
+            half_sums: crop(&self.half_sums),
+            albedo_moments: crop(&self.albedo_moments),
+            normal_moments: crop(&self.normal_moments),
         }
     }
 
-    /// Returns a pixel's number of samples. Requires adaptive sampling.
+    /// Returns a pixel's number of samples. Requires adaptive sampling or noise estimates.
     pub fn sample_count(&self, pixel: usize) -> u32 {
         self.moments[pixel].w as u32
     }
@@ -160,11 +209,63 @@ impl Film {
         (0..self.moments.len()).map(|pixel| self.sample_count(pixel))
     }
 
-    /// Returns the estimated variance of a pixel's mean per channel. Requires adaptive sampling. The estimate assumes
-    /// independent samples; for stratified patterns it is, on average, an upper bound. The estimate
-    /// is not biased by the choice of sample counts, which depends on the variance of a pixel's neighbors only.
+    /// Returns the estimated variance of a pixel's mean per channel. Requires adaptive sampling or noise estimates.
+    /// Infinite if the pixel has fewer than two samples, whose variance is unknown, or a value that is not a number.
+    ///
+    /// The estimate is unbiased for independent samples of equal weights. Stratified patterns have less noise than
+    /// independent samples, so that the estimate is, on average, an upper bound. The choice of sample counts does not bias
+    /// the estimate, because it depends on the variance of a pixel's neighbors only.
     pub fn variance(&self, pixel: usize) -> [f32; 3] {
-        variance_of_mean(self.sums[pixel], self.moments[pixel]).to_array()
+        self.variance_of(self.moments[pixel], pixel).truncate().to_array()
+    }
+
+    /// Returns true if the film has pixels with noise estimates.
+    pub fn has_noise(&self) -> bool {
+        !self.half_sums.is_empty()
+    }
+
+    /// Returns the mean over a half of a pixel's samples; black if the half has no samples. Requires noise estimates.
+    pub fn half_mean(&self, half: Half, pixel: usize) -> [f32; 3] {
+        let even = self.half_sums[pixel];
+        mean(match half {
+            Half::Even => even,
+            Half::Odd => self.sums[pixel] - even,
+        })
+    }
+
+    /// Returns the mean distance along the camera ray to the first hit; samples that hit nothing count as 0. Requires
+    /// noise estimates and layers.
+    pub fn depth(&self, pixel: usize) -> f32 {
+        let sum = self.layers[Layer::Normal as usize][pixel];
+        mean(Vec4::new(sum.w, 0.0, 0.0, self.sums[pixel].w))[0]
+    }
+
+    /// Returns the variance of [`Layer::Albedo`] like [`Film::variance`]. Requires noise estimates and layers.
+    pub fn albedo_variance(&self, pixel: usize) -> [f32; 3] {
+        self.variance_of(self.albedo_moments[pixel], pixel)
+            .truncate()
+            .to_array()
+    }
+
+    /// Returns the variance of [`Layer::Normal`] like [`Film::variance`]. Requires noise estimates and layers.
+    pub fn normal_variance(&self, pixel: usize) -> [f32; 3] {
+        self.variance_of(self.normal_moments[pixel], pixel)
+            .truncate()
+            .to_array()
+    }
+
+    /// Returns the variance of [`Film::depth`] like [`Film::variance`]. Requires noise estimates and layers.
+    pub fn depth_variance(&self, pixel: usize) -> f32 {
+        self.variance_of(self.normal_moments[pixel], pixel).w
+    }
+
+    fn variance_of(&self, deviations: Vec4, pixel: usize) -> Vec4 {
+        let count = self.moments[pixel].w;
+        let variance = deviations * variance_scale(self.sums[pixel], count);
+        match count >= 2.0 {
+            true => Vec4::select(variance.cmpge(Vec4::ZERO), variance, Vec4::INFINITY),
+            false => Vec4::INFINITY,
+        }
     }
 
     /// Returns true if the film has pixels with layers.
@@ -197,9 +298,12 @@ impl Film {
 
 /// Returns the variance of a pixel's mean per channel, for independent samples.
 pub fn variance_of_mean(sum: Vec4, moments: Vec4) -> Vec3 {
-    let n = moments.w;
-    let scale = n / ((n - 1.0) * sum.w * sum.w);
-    moments.xyz() * scale
+    moments.xyz() * variance_scale(sum, moments.w)
+}
+
+/// Returns the variance of the mean of `n` samples per unit of summed squared deviations.
+fn variance_scale(sum: Vec4, n: f32) -> f32 {
+    n / ((n - 1.0) * sum.w * sum.w)
 }
 
 /// Returns a pixel's mean in linear RGB; black if the pixel has no samples.

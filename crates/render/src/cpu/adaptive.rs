@@ -17,6 +17,21 @@ pub fn squared_deviation(sum: Vec4, sample: Vec4) -> Vec3 {
     Vec3::select(product.cmplt(Vec3::ZERO), Vec3::ZERO, product)
 }
 
+pub fn layer_moments_with(moments: Vec4, layer: Vec4, weight_sum: f32, sample: Vec4, weight: f32) -> Vec4 {
+    let before = sample - layer_mean(layer, weight_sum) * weight;
+    let after = sample - layer_mean(layer + sample, weight_sum + weight) * weight;
+    let product = before * after;
+    moments + Vec4::select(product.cmplt(Vec4::ZERO), Vec4::ZERO, product)
+}
+
+pub fn layer_mean(layer: Vec4, weight_sum: f32) -> Vec4 {
+    if weight_sum.abs() > 0.0 {
+        layer / weight_sum
+    } else {
+        Vec4::ZERO
+    }
+}
+
 pub fn mean_of(sum: Vec4) -> Vec3 {
     if sum.w.abs() > 0.0 {
         sum.xyz() / sum.w

@@ -6,7 +6,7 @@ use std::sync::{Arc, OnceLock};
 use glam::{UVec2, Vec4};
 use rayon::prelude::*;
 
-use super::adaptive::{moments_with, pilot_add, pilot_finish, samples_wanted};
+use super::adaptive::{layer_moments_with, moments_with, pilot_add, pilot_finish, samples_wanted};
 use super::geometry::pixel_first_hit;
 use super::integrators::path::{path_layers, path_value};
 use super::pixel::{Layers, pixel_radiance};
@@ -158,6 +158,9 @@ fn add_samples(scene: &Packed, meshes: &Arc<BatchMeshes>, film: &mut Film, tile:
         moments,
         pilot_sums,
         layers,
+        half_sums,
+        albedo_moments,
+        normal_moments,
     } = film;
     let region = *region;
     let is_pilot = scene.sampling.adaptive && samples.start < scene.specialization.pilot_samples;
@@ -171,9 +174,7 @@ fn add_samples(scene: &Packed, meshes: &Arc<BatchMeshes>, film: &mut Film, tile:
         .map(|(first, sums)| Run {
             first,
             sums,
-            moments: &mut [],
-            pilot_sums: &mut [],
-            layers: Default::default(),
+            ..Run::default()
         })
         .collect();
     for (run, (_, moments)) in segments.iter_mut().zip(runs(moments)) {
@@ -187,20 +188,24 @@ fn add_samples(scene: &Packed, meshes: &Arc<BatchMeshes>, film: &mut Film, tile:
             run.layers[i] = layer;
         }
     }
-    let statistics = match is_pilot {
-        _ if !scene.sampling.adaptive => Statistics::None,
-        true => Statistics::Pilot,
-        false => Statistics::Further,
-    };
+    for (run, (_, half_sums)) in segments.iter_mut().zip(runs(half_sums)) {
+        run.half_sums = half_sums;
+    }
+    for (i, moments) in [albedo_moments, normal_moments].into_iter().enumerate() {
+        for (run, (_, moments)) in segments.iter_mut().zip(runs(moments)) {
+            run.layer_moments[i] = moments;
+        }
+    }
+    let has_further_samples = scene.sampling.adaptive && !is_pilot;
     segments.into_par_iter().for_each_init(
         || Wavefront::new(Arc::clone(meshes)),
         |wavefront, mut run| {
             let (first, width) = (run.first, run.sums.len());
             let pixel = |x: usize| UVec2::new(first.x + x as u32, first.y);
             let samples_of = |x: usize| {
-                let end = match statistics {
-                    Statistics::None | Statistics::Pilot => samples.end,
-                    Statistics::Further => further_samples_end(scene, pilot_to_read, region, pixel(x), samples.end),
+                let end = match has_further_samples {
+                    true => further_samples_end(scene, pilot_to_read, region, pixel(x), samples.end),
+                    false => samples.end,
                 };
                 (samples.start..end).map(move |sample| (x, sample))
             };
@@ -210,55 +215,61 @@ fn add_samples(scene: &Packed, meshes: &Arc<BatchMeshes>, film: &mut Film, tile:
                     Integrator::Phong => {
                         for &(x, sample) in batch {
                             let (value, layers) = pixel_radiance(scene, pixel(x), sample);
-                            run.add(statistics, x, value, layers);
+                            run.add(x, sample, value, layers);
                         }
                     }
                     Integrator::Path => {
                         let samples = batch.iter().map(|&(x, sample)| (pixel(x), sample));
                         let paths = wavefront.trace(scene, samples);
-                        for (&(x, _), path) in batch.iter().zip(paths) {
-                            run.add(statistics, x, path_value(path), path_layers(path));
+                        for (&(x, sample), path) in batch.iter().zip(paths) {
+                            run.add(x, sample, path_value(path), path_layers(path));
                         }
                     }
                 }
             }
-            if statistics == Statistics::Pilot {
+            if is_pilot {
                 run.finish_pilot();
             }
         },
     );
 }
 
-/// The statistics of samples that adaptive sampling needs. See `shaders/kernels/adaptive.wgsl`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Statistics {
-    /// No statistics, because sampling is not adaptive.
-    None,
-    /// Statistics of the pilot samples.
-    Pilot,
-    /// Statistics of the samples after the pilot samples.
-    Further,
-}
-
 /// A segment of a film row. Slices that the film lacks or that are not written are empty.
+#[derive(Default)]
 struct Run<'a> {
     first: UVec2,
     sums: &'a mut [Vec4],
     moments: &'a mut [Vec4],
     pilot_sums: &'a mut [Vec4],
     layers: [&'a mut [Vec4]; Layer::ALL.len()],
+    half_sums: &'a mut [Vec4],
+    /// Moments of albedo and normal.
+    layer_moments: [&'a mut [Vec4]; 2],
 }
 
 impl Run<'_> {
     /// Adds a sample to pixel `x`. Samples of a pixel are added in order.
-    fn add(&mut self, statistics: Statistics, x: usize, value: Vec4, layers: Layers) {
-        if statistics == Statistics::Pilot {
-            self.pilot_sums[x] = pilot_add(self.pilot_sums[x], self.sums[x], value);
+    fn add(&mut self, x: usize, sample: u32, value: Vec4, layers: Layers) {
+        let sum = self.sums[x];
+        if let Some(pilot_sum) = self.pilot_sums.get_mut(x) {
+            *pilot_sum = pilot_add(*pilot_sum, sum, value);
         }
-        if statistics != Statistics::None {
-            self.moments[x] = moments_with(self.moments[x], self.sums[x], value);
+        if let Some(moments) = self.moments.get_mut(x) {
+            *moments = moments_with(*moments, sum, value);
         }
-        self.sums[x] += value;
+        if sample.is_multiple_of(2)
+            && let Some(half_sum) = self.half_sums.get_mut(x)
+        {
+            *half_sum += value;
+        }
+        let values = [(Layer::Albedo, layers.albedo), (Layer::Normal, layers.normal)];
+        for (moments, (layer, value_of_layer)) in self.layer_moments.iter_mut().zip(values) {
+            if let Some(moments) = moments.get_mut(x) {
+                let layer_sum = self.layers[layer as usize][x];
+                *moments = layer_moments_with(*moments, layer_sum, sum.w, value_of_layer, value.w);
+            }
+        }
+        self.sums[x] = sum + value;
         self.add_layers(x, layers);
     }
 

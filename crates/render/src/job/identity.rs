@@ -3,6 +3,7 @@
 use bytemuck::bytes_of;
 use serde::{Deserialize, Serialize};
 
+use crate::film::FilmLayout;
 use crate::records::{Packed, PackedMesh, Specialization};
 use wgray_image::Region;
 
@@ -29,6 +30,8 @@ pub struct Identity {
     pub adaptive: bool,
     /// True if the film has layers.
     pub layers: bool,
+    /// True if the film has noise estimates.
+    pub noise: bool,
     /// True for rounding in software.
     pub exact_rounding: bool,
 }
@@ -46,6 +49,7 @@ impl Identity {
             pixel_samples: scene.sampling.pixel_samples,
             adaptive: film_layout.adaptive,
             layers: film_layout.layers,
+            noise: film_layout.noise,
             exact_rounding,
         }
     }
@@ -61,6 +65,7 @@ impl Identity {
             pixel_samples,
             adaptive,
             layers,
+            noise,
             exact_rounding,
         } = self;
         let mut hasher = blake3::Hasher::new();
@@ -70,8 +75,20 @@ impl Identity {
         hash_list(&mut hasher, bytes_of(picture));
         hash_list(&mut hasher, bytes_of(region));
         hash_list(&mut hasher, bytes_of(pixel_samples));
-        hash_list(&mut hasher, &[*adaptive, *layers, *exact_rounding].map(u8::from));
+        hash_list(
+            &mut hasher,
+            &[*adaptive, *layers, *noise, *exact_rounding].map(u8::from),
+        );
         format!("{}.checkpoint", &hasher.finalize().to_hex()[..16])
+    }
+
+    /// Returns the layout of the film.
+    pub fn film_layout(&self) -> FilmLayout {
+        FilmLayout {
+            adaptive: self.adaptive,
+            layers: self.layers,
+            noise: self.noise,
+        }
     }
 
     /// Returns the rendered pixels.
@@ -130,6 +147,9 @@ impl Identity {
                 "its layers are {}",
                 either(other.layers, "means over the samples", "first hits only")
             )
+        } else if self.noise != other.noise {
+            let text = either(other.noise, "with", "without");
+            format!("it was rendered {text}, noise estimates")
         } else if self.exact_rounding != other.exact_rounding {
             let text = either(other.exact_rounding, "with", "without");
             format!("it was rendered {text}, --exact-rounding")
@@ -181,9 +201,10 @@ pub fn hash_of_scene(scene: &Packed) -> String {
     }
     hasher.update(&sampling.pixel_samples.to_le_bytes());
     hasher.update(&[u8::from(sampling.adaptive)]);
-    // Layers do not change the scene.
+    // Layers and noise estimates do not change the scene.
     let specialization = Specialization {
         layers: 0,
+        noise: 0,
         ..*specialization
     };
     for (name, value) in specialization.constants() {
@@ -227,6 +248,7 @@ mod tests {
             pixel_samples: 65_536,
             adaptive: false,
             layers: false,
+            noise: false,
             exact_rounding: false,
         };
         valid.check().unwrap();

@@ -13,7 +13,6 @@ use super::piece::FilmPiece;
 use super::pieces_file::{self, Entry, FORMAT, Header, Key};
 use super::steps::SampleProgress;
 use crate::error::RenderError;
-use crate::film::FilmLayout;
 use crate::output::{Aov, AovSource, Band, Layout, Metadata, Sink};
 use wgray_image::Pending;
 use wgray_image::Region;
@@ -73,7 +72,7 @@ impl PartHeader {
         let aov_named = |name: &String| Aov::ALL.into_iter().find(|aov| aov.name() == name);
         for aov in self.aovs.iter().filter_map(aov_named) {
             let has_values = match aov.source(Integrator::Phong) {
-                AovSource::Adaptive => identity.adaptive,
+                AovSource::Statistics => identity.film_layout().has_moments(),
                 AovSource::Samples => identity.layers,
                 AovSource::FirstHit => {
                     entries.iter().all(|entry| entry.has_hits) || aov == Aov::ShadingNormal && identity.layers
@@ -314,12 +313,11 @@ impl Parts {
     ///
     /// Errors of the sink, and unreadable files.
     pub fn read(&self, sink: &mut Sink) -> Result<(), RenderError> {
-        let Identity { adaptive, layers, .. } = self.identity;
+        let film_layout = self.identity.film_layout();
         for (number, entry) in self.pieces.values() {
             let Some((path, key)) = self.files.get(*number) else {
                 continue;
             };
-            let film_layout = FilmLayout { adaptive, layers };
             let read = File::open(path).and_then(|file| pieces_file::read_piece(&file, key, entry, film_layout));
             let (piece, hits) = read.map_err(|error| {
                 let message = format!("{}: cannot be read: {error}", path.display());
@@ -405,7 +403,7 @@ mod tests {
     use std::fs;
 
     use super::*;
-    use crate::film::Film;
+    use crate::film::{Film, FilmLayout};
 
     /// Returns the error of a part of 4 x 3 pixels with a modified header and piece, or an empty text.
     fn error_of(change: impl Fn(&mut Header, &mut FilmPiece)) -> String {
@@ -421,6 +419,7 @@ mod tests {
                 pixel_samples: 16,
                 adaptive: false,
                 layers: false,
+                noise: false,
                 exact_rounding: false,
             },
             part: Some(PartHeader {

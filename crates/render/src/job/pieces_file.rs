@@ -28,7 +28,7 @@ use wgray_image::Region;
 /// such damage is detected.
 pub const MAGIC: &[u8; 16] = b"\x89wgray pieces\r\n\x1a";
 
-pub const FORMAT: u32 = 2;
+pub const FORMAT: u32 = 3;
 
 const MAX_HEADER_BYTES: u32 = 1 << 20;
 
@@ -233,7 +233,12 @@ impl Head {
         let Region { x0, y0, x1, y1 } = self.region;
         let film = self.film_region;
         let SampleProgress { pass, next } = &self.reached;
-        let flags = [self.film_layout.adaptive, self.film_layout.layers, self.has_hits];
+        let FilmLayout {
+            adaptive,
+            layers,
+            noise,
+        } = self.film_layout;
+        let flags = [adaptive, layers, self.has_hits, noise];
         let flags = (0..).zip(flags).map(|(i, flag)| u32::from(flag) << i).sum();
         let regions = [x0, y0, x1, y1, film.x0, film.y0, film.x1, film.y1];
         let progress = [pass.start, pass.end, next[0], next[1], flags, 0];
@@ -260,6 +265,7 @@ impl Head {
             film_layout: FilmLayout {
                 adaptive: flags & 1 != 0,
                 layers: flags & 2 != 0,
+                noise: flags & 8 != 0,
             },
             has_hits: flags & 4 != 0,
         };
@@ -276,11 +282,7 @@ impl Head {
             && end <= identity.pixel_samples
             && (head.film_region.x0..head.film_region.x1).contains(&x)
             && (head.film_region.y0..=head.film_region.y1).contains(&y)
-            && head.film_layout
-                == FilmLayout {
-                    adaptive: identity.adaptive,
-                    layers: identity.layers,
-                };
+            && head.film_layout == identity.film_layout();
         is_valid.then_some(head)
     }
 

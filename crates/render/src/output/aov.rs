@@ -1,5 +1,4 @@
-//! Arbitrary output variables (AOVs): first hits through pixel centers, adaptive sampling statistics, and means over
-//! samples.
+//! Arbitrary output variables (AOVs): first hits through pixel centers, means over samples, and statistics of samples.
 
 use std::fmt;
 use std::str::FromStr;
@@ -71,8 +70,8 @@ pub enum AovSource {
     FirstHit,
     /// Mean over samples, weighted like the radiance. Only with the path integrator.
     Samples,
-    /// Adaptive sampling statistics.
-    Adaptive,
+    /// Statistics of the samples, which adaptive sampling and films with noise estimates have.
+    Statistics,
 }
 
 /// A channel of an AOV.
@@ -154,9 +153,10 @@ impl Aov {
     }
 
     /// Returns the reason why renders with these settings lack the variable; `None` if the renders have the variable.
-    pub fn missing(self, integrator: Integrator, adaptive: bool) -> Option<&'static str> {
+    /// `has_statistics` is true if sampling is adaptive or the film has noise estimates.
+    pub fn missing(self, integrator: Integrator, has_statistics: bool) -> Option<&'static str> {
         match self.source(integrator) {
-            AovSource::Adaptive if !adaptive => Some("needs adaptive sampling"),
+            AovSource::Statistics if !has_statistics => Some("needs adaptive sampling"),
             AovSource::Samples if !integrator.has_layers() => Some("needs integrator = \"path\""),
             _ => None,
         }
@@ -181,7 +181,7 @@ impl Aov {
     }
 
     const fn row(self) -> Row {
-        use AovSource::{Adaptive, FirstHit, Samples};
+        use AovSource::{FirstHit, Samples, Statistics};
         use Channel::{Count, Float, Integer, Mean, ShadingNormal, Variance};
         const fn row(name: &'static str, source: AovSource, channels: &'static [Channel]) -> Row {
             Row { name, source, channels }
@@ -238,10 +238,10 @@ impl Aov {
             Aov::Direct => colors!("direct", Direct),
             Aov::Indirect => colors!("indirect", Indirect),
             Aov::Emission => colors!("emission", Emission),
-            Aov::SampleCount => row("sample_count", Adaptive, &[Count("sample_count.N")]),
+            Aov::SampleCount => row("sample_count", Statistics, &[Count("sample_count.N")]),
             Aov::Variance => row(
                 "variance",
-                Adaptive,
+                Statistics,
                 &[
                     Variance("variance.R", 0),
                     Variance("variance.G", 1),

@@ -206,6 +206,7 @@ fn path_constants(
         max_indirect: scene.render.clamp.map_or(0, |clamp| (clamp as f32).to_bits()),
         alpha: scene.render.alpha.into(),
         layers: scene.render.alpha.into(),
+        noise: 0,
         ..Specialization::default()
     }
 }

@@ -128,6 +128,21 @@ impl Packed {
         self
     }
 
+    /// Adds noise estimates to the film: half sums and moments of the radiance; if the film has layers, also moments of
+    /// albedo, normal and depth.
+    #[must_use]
+    pub fn with_noise(mut self) -> Packed {
+        self.specialization.noise = 1;
+        self
+    }
+
+    /// Removes noise estimates from the film. The radiance does not change.
+    #[must_use]
+    pub fn without_noise(mut self) -> Packed {
+        self.specialization.noise = 0;
+        self
+    }
+
     /// Returns the size of all BVHs in bytes.
     pub fn tree_bytes(&self) -> u64 {
         let mesh_bvhs = self.bvh.meshes.iter().map(|mesh| size_of_val(mesh.nodes.as_slice()));
@@ -212,6 +227,7 @@ impl Packed {
         FilmLayout {
             adaptive: self.sampling.adaptive,
             layers: self.specialization.layers != 0,
+            noise: self.specialization.noise != 0,
         }
     }
 

@@ -114,4 +114,6 @@ specialization! {
     alpha = "ALPHA",
     /// 1 for a film with layers, else 0.
     layers = "LAYERS",
+    /// 1 for a film with noise estimates, else 0.
+    noise = "NOISE",
 }

@@ -176,6 +176,7 @@ pub fn shade(scene: &Packed, state: &mut PathState, hit: Hit, pixel: UVec2) -> O
         add_emission(scene, state, &prim, hit, surface, material, true);
     }
     surface.shading_normal = shaded_normal(surface, material, normal);
+    let distance = hit.t + state.skipped_distance;
     state.skipped_distance = 0.0;
     let principled_lobes;
     let mixture = if material.kind == PRINCIPLED {
@@ -188,7 +189,7 @@ pub fn shade(scene: &Packed, state: &mut PathState, hit: Hit, pixel: UVec2) -> O
         &NO_LOBES
     };
     if s.layers != 0 {
-        record_first_hit_layers(state, surface, material);
+        record_first_hit_layers(scene, state, surface, material, distance);
     }
     if (path.depth >= s.bounces) | (material.kind == EMITTER) {
         state.ended = true;
@@ -379,10 +380,17 @@ pub fn continue_through(scene: &Packed, state: &mut PathState, surface: Surface,
 }
 
 #[inline(always)]
-pub fn record_first_hit_layers(state: &mut PathState, surface: Surface, material: &Material) {
+pub fn record_first_hit_layers(
+    scene: &Packed,
+    state: &mut PathState,
+    surface: Surface,
+    material: &Material,
+    distance: f32,
+) {
     if state.path.depth == 0 {
         state.layers.emission.w = 1.0;
-        state.layers.normal = (surface.shading_normal * surface.side).extend(0.0);
+        let distance = if scene.specialization.noise != 0 { distance } else { 0.0 };
+        state.layers.normal = (surface.shading_normal * surface.side).extend(distance);
     }
     if !state.albedo_recorded & !is_delta(material) {
         state.layers.albedo = (state.path.throughput * albedo(material)).extend(0.0);
