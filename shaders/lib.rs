@@ -54,6 +54,7 @@ pub static SHARED: &[File] = files![
     "normal_map.wgsl",
     "filter.wgsl",
     "adaptive.wgsl",
+    "denoise.wgsl",
     "slab.wgsl",
     "bvh_node.wgsl",
     "mesh.wgsl",
@@ -97,6 +98,9 @@ pub static ADAPTIVE_FILES: &[File] = files!["film.wgsl", "kernels/adaptive.wgsl"
 /// Files of the kernel that writes first hits.
 pub static FIRST_HITS_FILES: &[File] = files!["kernels/first_hits.wgsl"];
 
+/// Files of the kernel that denoises an image.
+pub static DENOISE_FILES: &[File] = files!["kernels/denoise.wgsl"];
+
 /// Returns every file once, in the order in which [`hash`] reads them.
 pub fn built_in() -> impl Iterator<Item = File> {
     let scene = [
@@ -110,7 +114,7 @@ pub fn built_in() -> impl Iterator<Item = File> {
         TEXELS,
     ];
     // `[1..]` omits film.wgsl, which `RENDER_FILES` contains too.
-    let kernels = [RENDER_FILES, &ADAPTIVE_FILES[1..], FIRST_HITS_FILES];
+    let kernels = [RENDER_FILES, &ADAPTIVE_FILES[1..], FIRST_HITS_FILES, DENOISE_FILES];
     scene.into_iter().chain(kernels).flatten().copied()
 }
 

@@ -4,6 +4,7 @@
 pub mod backend;
 pub mod bvh;
 pub mod cpu;
+pub mod denoise;
 pub mod error;
 pub mod excerpt;
 pub mod film;

@@ -12,7 +12,8 @@ use crate::records::Specialization;
 use wgray_image::blocking_path;
 use wgray_scene::Integrator;
 use wgray_shaders::{
-    ADAPTIVE_FILES, FIRST_HITS_FILES, FROM_BUFFERS, KERNEL, PATH, PHONG, RENDER_FILES, ROUNDING_FILES, SAMPLES, TEXELS,
+    ADAPTIVE_FILES, DENOISE_FILES, FIRST_HITS_FILES, FROM_BUFFERS, KERNEL, PATH, PHONG, RENDER_FILES, ROUNDING_FILES,
+    SAMPLES, TEXELS,
 };
 pub use wgray_shaders::{File, SHARED, built_in};
 
@@ -49,7 +50,13 @@ pub static FIRST_HITS: Kernel = Kernel {
     files: &[KERNEL, FIRST_HITS_FILES],
     integrates: false,
 };
-/// All kernels.
+/// Denoises an image. Reads no scene.
+pub static DENOISE: Kernel = Kernel {
+    entry_point: "denoise",
+    files: &[DENOISE_FILES],
+    integrates: false,
+};
+/// All kernels that read the scene.
 pub static KERNELS: [&Kernel; 3] = [&RENDER, &ADAPTIVE, &FIRST_HITS];
 
 fn integrator_files(integrator: Integrator) -> &'static [File] {
@@ -133,6 +140,21 @@ impl Shaders {
         source
     }
 
+    /// Composes a kernel that reads no scene.
+    pub fn compose_alone(&self, kernel: &Kernel) -> Source {
+        let mut source = Source::default();
+        self.append(&mut source, ROUNDING_FILES);
+        source.extend(&self.shared());
+        source.append(
+            "crates/render/src/records/specialization.rs",
+            &Specialization::declarations(),
+        );
+        for files in kernel.files {
+            self.append(&mut source, files);
+        }
+        source
+    }
+
     /// Composes a kernel. `baked` is the text of functions with the scene as constants; if it is `None`, the scene is
     /// read from buffers.
     pub fn compose(&self, kernel: &Kernel, integrator: Integrator, baked: Option<&str>) -> Source {
@@ -148,16 +170,7 @@ impl Shaders {
         baked: Option<&str>,
         texels: Option<&str>,
     ) -> Source {
-        let mut source = Source::default();
-        self.append(&mut source, ROUNDING_FILES);
-        source.extend(&self.shared());
-        source.append(
-            "crates/render/src/records/specialization.rs",
-            &Specialization::declarations(),
-        );
-        for files in kernel.files {
-            self.append(&mut source, files);
-        }
+        let mut source = self.compose_alone(kernel);
         if kernel.integrates {
             self.append(&mut source, integrator_files(integrator));
         }

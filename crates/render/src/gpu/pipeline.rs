@@ -59,26 +59,31 @@ pub fn bind_group_layouts(device: &Device, more_texels: usize, sliders: bool) ->
             SCENE_GROUP => std::iter::repeat_n(READ, more_texels),
             _ => std::iter::repeat_n(READ, 0),
         };
-        let entries: Vec<wgpu::BindGroupLayoutEntry> = (0..)
-            .zip(types.iter().copied().chain(added))
-            .map(|(binding, ty)| wgpu::BindGroupLayoutEntry {
-                binding,
-                visibility: wgpu::ShaderStages::COMPUTE,
-                ty: BindingType::Buffer {
-                    ty,
-                    has_dynamic_offset: false,
-                    min_binding_size: None,
-                },
-                count: None,
-            })
-            .collect();
-        let descriptor = wgpu::BindGroupLayoutDescriptor {
-            label: None,
-            entries: &entries,
-        };
-        device.device.create_bind_group_layout(&descriptor)
+        layout_of(device, types.iter().copied().chain(added))
     };
     GROUPS.iter().enumerate().map(layout).collect()
+}
+
+/// Returns the layout of a bind group with buffers of these types, in binding order.
+pub fn layout_of(device: &Device, types: impl IntoIterator<Item = BufferBindingType>) -> wgpu::BindGroupLayout {
+    let entries: Vec<wgpu::BindGroupLayoutEntry> = (0..)
+        .zip(types)
+        .map(|(binding, ty)| wgpu::BindGroupLayoutEntry {
+            binding,
+            visibility: wgpu::ShaderStages::COMPUTE,
+            ty: BindingType::Buffer {
+                ty,
+                has_dynamic_offset: false,
+                min_binding_size: None,
+            },
+            count: None,
+        })
+        .collect();
+    let descriptor = wgpu::BindGroupLayoutDescriptor {
+        label: None,
+        entries: &entries,
+    };
+    device.device.create_bind_group_layout(&descriptor)
 }
 
 /// Creates a bind group of buffers, which are in binding order.

@@ -223,4 +223,27 @@ constants! {
 
     /// Minimum effective sample size of the variance estimate for each multiple of the pilot samples after the first.
     pub const EFFECTIVE_SAMPLES_PER_DOUBLING: f32 = 2.0;
+
+    /// Radius of the denoiser's window in pixels: a pixel is averaged with the pixels of a square of 2 * radius + 1.
+    pub const DENOISE_RADIUS: u32 = 7;
+    /// Radius of the patches that the denoiser compares.
+    pub const DENOISE_PATCH_RADIUS: u32 = 2;
+    /// Squared difference of colors at which the denoiser's weight falls to about 1/e, in units of their variance.
+    pub const DENOISE_COLOR_SCALE: f32 = 1.1;
+    /// Smallest variance, against division by zero.
+    pub const DENOISE_MIN_VARIANCE: f32 = 1e-20;
+
+    /// First plane of the denoiser's color, in three planes.
+    pub const GUIDE_COLOR: u32 = 0;
+    /// Plane of the summed variances of the color's components.
+    pub const GUIDE_COLOR_VARIANCE: u32 = 3;
+    /// First plane of the denoiser's normal: three planes, the summed variances, and the scale, which is 1 / (tolerated
+    /// squared difference).
+    pub const GUIDE_NORMAL: u32 = 4;
+    /// First plane of the denoiser's albedo, like [`GUIDE_NORMAL`].
+    pub const GUIDE_ALBEDO: u32 = 9;
+    /// First plane of the denoiser's depth: depth, variance and scale.
+    pub const GUIDE_DEPTH: u32 = 14;
+    /// Number of planes.
+    pub const GUIDE_PLANES: u32 = 17;
 }

@@ -456,4 +456,14 @@ records! {
         /// Start and end of the loop that detects truncated loops (`shaders/completion.wgsl`).
         pub loop_probe: UVec2,
     }
+
+    /// Parameters of the denoiser.
+    pub struct DenoiseParams {
+        /// Size of the rows in pixels, without margins.
+        pub size: UVec2,
+        /// Number of floats per row of a plane, with margins.
+        pub stride: u32,
+        /// Number of floats per plane.
+        pub plane: u32,
+    }
 }

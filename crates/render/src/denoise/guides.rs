@@ -1,0 +1,221 @@
+//! The guides of the denoiser: colors without albedo, features, and their variances, as padded planes.
+
+use std::ops::Range;
+
+use glam::Vec3;
+use rayon::prelude::*;
+
+use crate::film::{Film, Half, Layer, mean};
+use crate::records::{
+    DENOISE_PATCH_RADIUS, DENOISE_RADIUS, GUIDE_ALBEDO, GUIDE_COLOR, GUIDE_COLOR_VARIANCE, GUIDE_DEPTH, GUIDE_NORMAL,
+    GUIDE_PLANES,
+};
+
+/// Pixels around the image that the window and its patches reach.
+pub const MARGIN: usize = (DENOISE_RADIUS + DENOISE_PATCH_RADIUS) as usize;
+
+/// Added to the albedo before colors are divided by it, so that light which the albedo does not describe, such as
+/// reflections on dark surfaces, is not amplified.
+const ALBEDO_OFFSET: f32 = 0.15;
+/// Squared differences of features at which the weight falls to about 1/e: of normals, of albedos, and of depths
+/// relative to the depth.
+const NORMAL_TOLERANCE: f32 = 0.015;
+const ALBEDO_TOLERANCE: f32 = 0.03;
+const DEPTH_TOLERANCE: f32 = 0.003;
+/// Variances of features are multiplied by this factor, because estimates from a few samples are too low as often as too
+/// high.
+const FEATURE_VARIANCE_SCALE: f32 = 2.0;
+/// Variance of features from which on a pixel contains an edge.
+const EDGE_VARIANCE: f32 = 1e-4;
+/// Minimum of a pixel's variance, relative to the mean variance of the 3 x 3 pixels around it.
+const MIN_RELATIVE_VARIANCE: f32 = 0.25;
+/// Radius of the mean of squared half differences.
+const HALF_RADIUS: usize = 4;
+/// Larger components of colors are treated like infinity, because their squares would overflow.
+const MAX_COLOR: f32 = 1e15;
+/// Depth of pixels that are not averaged with any other pixel.
+const EXCLUDED_DEPTH: f32 = 1e15;
+
+const COLOR: usize = GUIDE_COLOR as usize;
+const COLOR_VARIANCE: usize = GUIDE_COLOR_VARIANCE as usize;
+const NORMAL: usize = GUIDE_NORMAL as usize;
+const ALBEDO: usize = GUIDE_ALBEDO as usize;
+const DEPTH: usize = GUIDE_DEPTH as usize;
+const PLANES: usize = GUIDE_PLANES as usize;
+
+/// Planes of floats, each with a margin that mirrors the image.
+pub struct Guides {
+    /// Width of the image without margins.
+    pub width: usize,
+    /// Height of the image without margins.
+    pub height: usize,
+    /// Floats per row of a plane.
+    pub stride: usize,
+    planes: Vec<Vec<f32>>,
+}
+
+impl Guides {
+    /// Number of planes.
+    pub const PLANES: usize = PLANES;
+
+    /// Returns the guides of a film with noise estimates.
+    pub fn of(film: &Film) -> Guides {
+        let (width, height) = (film.region.width() as usize, film.region.height() as usize);
+        let mut values: Vec<[f32; PLANES]> = (0..width * height)
+            .into_par_iter()
+            .map(|i| guides_of(film, i))
+            .collect();
+        limit_variances(film, &mut values);
+        let stride = width + 2 * MARGIN;
+        let plane = |k: usize| {
+            let mut plane = Vec::with_capacity(stride * (height + 2 * MARGIN));
+            for y in padded(height) {
+                let row = &values[y * width..(y + 1) * width];
+                plane.extend(padded(width).map(|x| row[x][k]));
+            }
+            plane
+        };
+        Guides {
+            width,
+            height,
+            stride,
+            planes: (0..PLANES).into_par_iter().map(plane).collect(),
+        }
+    }
+
+    /// Returns a plane.
+    pub fn plane(&self, k: usize) -> &[f32] {
+        &self.planes[k]
+    }
+
+    /// Returns the planes of some rows of the image with their margins, one plane after the other.
+    pub fn rows(&self, rows: Range<usize>) -> Vec<f32> {
+        let range = rows.start * self.stride..(rows.end + 2 * MARGIN) * self.stride;
+        self.planes
+            .iter()
+            .flat_map(|plane| &plane[range.clone()])
+            .copied()
+            .collect()
+    }
+
+    /// Multiplies filtered colors by the albedo.
+    pub fn colors(&self, film: &Film, filtered: &[Vec3]) -> Vec<Vec3> {
+        let color = |(i, filtered): (usize, &Vec3)| match usable_color(film, i) {
+            Some(_) => *filtered * divisor(film, i),
+            None => Vec3::from(mean(film.sums[i])),
+        };
+        filtered.iter().enumerate().map(color).collect()
+    }
+}
+
+/// Returns the coordinates of a row with margins, mirrored at the centers of the first and last pixel.
+fn padded(size: usize) -> impl Iterator<Item = usize> {
+    let (size, margin) = (size as isize, MARGIN as isize);
+    let period = (2 * (size - 1)).max(1);
+    (-margin..size + margin).map(move |x| {
+        let x = x.rem_euclid(period);
+        x.min(period - x).min(size - 1) as usize
+    })
+}
+
+/// Returns a pixel's color, if the denoiser can average it.
+fn usable_color(film: &Film, i: usize) -> Option<Vec3> {
+    let color = Vec3::from(mean(film.sums[i]));
+    (film.sums[i].w != 0.0 && color.abs().cmple(Vec3::splat(MAX_COLOR)).all()).then_some(color)
+}
+
+/// Returns the albedo by which a pixel's color is divided.
+fn divisor(film: &Film, i: usize) -> Vec3 {
+    Vec3::from(film.layer(Layer::Albedo, i)).max(Vec3::ZERO) + ALBEDO_OFFSET
+}
+
+fn guides_of(film: &Film, i: usize) -> [f32; PLANES] {
+    let mut guides = [0.0; PLANES];
+    let Some(color) = usable_color(film, i) else {
+        guides[DEPTH] = EXCLUDED_DEPTH;
+        guides[DEPTH + 2] = 1.0 / EXCLUDED_DEPTH;
+        return guides;
+    };
+    let mut set = |first: usize, values: &[f32]| guides[first..first + values.len()].copy_from_slice(values);
+    let divisor = divisor(film, i);
+    let variance = Vec3::from(film.variance(i));
+    // The variance of a single sample is unknown; a standard error of 100 % is assumed.
+    let variance = if variance.is_finite() { variance } else { color * color };
+    set(COLOR, &(color / divisor).to_array());
+    set(COLOR_VARIANCE, &[(variance / (divisor * divisor)).element_sum()]);
+    if film.has_layers() {
+        let normal = (NORMAL, Layer::Normal, film.normal_variance(i), NORMAL_TOLERANCE);
+        let albedo = (ALBEDO, Layer::Albedo, film.albedo_variance(i), ALBEDO_TOLERANCE);
+        for (first, layer, variance, tolerance) in [normal, albedo] {
+            let variance = feature_variance(Vec3::from(variance).element_sum());
+            set(first, &film.layer(layer, i));
+            set(first + 3, &[variance, 1.0 / variance.max(tolerance)]);
+        }
+        let (depth, variance) = (film.depth(i), feature_variance(film.depth_variance(i)));
+        let tolerance = variance.max(DEPTH_TOLERANCE * depth * depth);
+        set(DEPTH, &[depth, variance, 1.0 / tolerance.max(f32::MIN_POSITIVE)]);
+    }
+    guides
+}
+
+/// Returns the variance of a feature for the denoiser; 0 if it is unknown.
+fn feature_variance(variance: f32) -> f32 {
+    if variance.is_finite() {
+        FEATURE_VARIANCE_SCALE * variance
+    } else {
+        0.0
+    }
+}
+
+/// Corrects the estimated variances of colors. Pixels whose few samples are equal by chance get a part of the variance
+/// of the pixels around them. At edges, stratified samples have much less noise than independent samples, for which the
+/// variance is estimated; the mean squared difference of the halves is a limit there.
+fn limit_variances(film: &Film, guides: &mut [[f32; PLANES]]) {
+    let width = film.region.width() as usize;
+    let variances: Vec<f32> = guides.iter().map(|guides| guides[COLOR_VARIANCE]).collect();
+    let half_variances: Vec<f32> = (0..guides.len())
+        .into_par_iter()
+        .map(|i| half_variance(film, i))
+        .collect();
+    let (local, limits) = (
+        box_means(&variances, width, 1),
+        box_means(&half_variances, width, HALF_RADIUS),
+    );
+    for (guides, (local, limit)) in guides.iter_mut().zip(local.into_iter().zip(limits)) {
+        let mut variance = guides[COLOR_VARIANCE].max(MIN_RELATIVE_VARIANCE * local);
+        let relative_depth_variance = guides[DEPTH + 1] / (guides[DEPTH] * guides[DEPTH]).max(f32::MIN_POSITIVE);
+        let feature_variance = guides[NORMAL + 3] + guides[ALBEDO + 3] + relative_depth_variance;
+        if feature_variance > FEATURE_VARIANCE_SCALE * EDGE_VARIANCE {
+            variance = variance.min(limit);
+        }
+        guides[COLOR_VARIANCE] = variance;
+    }
+}
+
+/// Returns the variance of a pixel's color, divided by the albedo, that the difference of the halves suggests.
+fn half_variance(film: &Film, i: usize) -> f32 {
+    if usable_color(film, i).is_none() {
+        return 0.0;
+    }
+    let [even, odd] = [Half::Even, Half::Odd].map(|half| Vec3::from(film.half_mean(half, i)));
+    let difference = (even - odd) * 0.5 / divisor(film, i);
+    let variance = difference.length_squared();
+    if variance.is_finite() { variance } else { 0.0 }
+}
+
+/// Returns the means of squares of 2 * `radius` + 1 pixels, clipped to the image.
+fn box_means(values: &[f32], width: usize, radius: usize) -> Vec<f32> {
+    let height = values.len() / width.max(1);
+    let window = |i: usize, size: usize| i.saturating_sub(radius)..(i + radius + 1).min(size);
+    let row_sum = |i: usize| {
+        let row = i - i % width;
+        window(i % width, width).map(|x| values[row + x]).sum()
+    };
+    let row_sums: Vec<f32> = (0..values.len()).into_par_iter().map(row_sum).collect();
+    let mean = |i: usize| {
+        let (rows, columns) = (window(i / width, height), window(i % width, width).len());
+        let count = (rows.len() * columns) as f32;
+        rows.map(|y| row_sums[y * width + i % width]).sum::<f32>() / count
+    };
+    (0..values.len()).into_par_iter().map(mean).collect()
+}
