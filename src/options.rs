@@ -54,13 +54,27 @@ impl Options {
     /// has noise estimates for requested statistics, unless sampling is adaptive.
     pub(crate) fn film_layout(&self, scene: &Scene) -> FilmLayout {
         let integrator = scene.render.integrator;
-        let requests = |source: AovSource| self.aovs.iter().any(|aov| aov.source(integrator) == source);
+        let aovs = self.layers(scene);
+        let requests = |source: AovSource| aovs.iter().any(|aov| aov.source(integrator) == source);
+        let denoise = aovs.contains(&Aov::Denoised);
         let adaptive = scene.render.adaptive.is_some();
         FilmLayout {
             adaptive,
-            layers: integrator.has_layers() && (scene.render.alpha || requests(AovSource::Samples)),
-            noise: requests(AovSource::Statistics) && !adaptive,
+            layers: integrator.has_layers() && (scene.render.alpha || denoise || requests(AovSource::Samples)),
+            noise: denoise || (requests(AovSource::Statistics) && !adaptive),
         }
+    }
+
+    /// Returns the layers to render, each once: the requested layers, and the denoised image if the scene requests it.
+    pub(crate) fn layers(&self, scene: &Scene) -> Vec<Aov> {
+        let denoised = scene.render.denoise.then_some(Aov::Denoised);
+        let mut aovs: Vec<Aov> = Vec::new();
+        for aov in self.aovs.iter().copied().chain(denoised) {
+            if !aovs.contains(&aov) {
+                aovs.push(aov);
+            }
+        }
+        aovs
     }
 
     pub(crate) fn pack(&self, scene: &Scene) -> Packed {

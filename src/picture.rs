@@ -50,13 +50,27 @@ impl Picture {
     }
 
     /// Returns the pixels as linear RGB in row-major order, top row first. If the image has alpha, the colors are
-    /// premultiplied.
+    /// premultiplied. The colors are not denoised; see [`Picture::denoised`].
     pub fn pixels(&self) -> Pixels {
         Pixels {
             width: self.width(),
             height: self.height(),
             colors: self.film.means().collect(),
         }
+    }
+
+    /// Returns the denoised pixels like [`Picture::pixels`], if [`Aov::Denoised`] or the scene requests them.
+    pub fn denoised(&self) -> Option<Pixels> {
+        (self.layout.aovs.contains(&Aov::Denoised)).then(|| Pixels {
+            width: self.width(),
+            height: self.height(),
+            colors: self.colors().collect(),
+        })
+    }
+
+    /// Returns the displayed colors.
+    fn colors(&self) -> impl Iterator<Item = [f32; 3]> {
+        (0..self.film.sums.len()).map(|pixel| self.film.color(pixel))
     }
 
     /// Returns the alpha values in row-major order, top row first, if the background is transparent. With filters that
@@ -67,9 +81,9 @@ impl Picture {
     }
 
     /// Returns the pixels as 8-bit RGB in row-major order, top row first, with the scene's view transform and exposure,
-    /// as in a PNG. Alpha is composited over black.
+    /// as in a PNG: denoised if the image has [`Picture::denoised`] pixels. Alpha is composited over black.
     pub fn rgb8(&self) -> Vec<u8> {
-        self.film.means().flat_map(|mean| self.layout.view.rgb8(mean)).collect()
+        self.colors().flat_map(|color| self.layout.view.rgb8(color)).collect()
     }
 
     /// Returns the pixels as 8-bit RGBA in row-major order, top row first, as in a PNG with alpha. The colors are
@@ -79,7 +93,7 @@ impl Picture {
             true => self.layout.view.rgba8(mean, self.film.alpha(i)),
             false => self.layout.view.rgba8(mean, 1.0),
         };
-        self.film.means().enumerate().flat_map(pixel).collect()
+        self.colors().enumerate().flat_map(pixel).collect()
     }
 
     /// Returns a channel by its OpenEXR name, if it exists: `R`, `G`, `B`, `A`, and the channels of requested layers,

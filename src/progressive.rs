@@ -4,14 +4,16 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use wgray_render::backend::Backend;
+use wgray_render::denoise::denoise;
 use wgray_render::film::{Film, FilmLayout};
 use wgray_render::job::{Bands, Flow, NoCheckpoint, Order, WorkSplit};
 use wgray_scene::Problem;
 
 use crate::cancel::CancelToken;
 use crate::error::{Error, RenderError};
+use crate::image::Aov;
 use crate::picture::Picture;
-use crate::render::{ImageSetup, copy_band, empty, render_span};
+use crate::render::{ImageSetup, empty, render_span};
 use crate::renderer::{FaultHandler, OpenScene, Renderer, warnings};
 use wgray_image::Region;
 
@@ -193,7 +195,10 @@ impl<'s> ProgressiveRender<'s> {
     }
 
     fn copy_to(&self, film: &mut Film) {
-        self.bands.films(&mut |band| copy_band(film, &band));
+        self.bands.films(&mut |band| film.copy_rows(&band));
+        if self.setup.layout.aovs.contains(&Aov::Denoised) {
+            film.denoised = denoise(film);
+        }
     }
 
     /// Ends the render, and returns the image with the samples rendered so far.

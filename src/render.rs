@@ -68,9 +68,9 @@ pub(crate) fn render_with(renderer: Renderer, scene: &Scene, options: &Options) 
         })
     };
     while let Some(band) = next()? {
-        copy_band(&mut film, &band.film);
+        film.copy_rows(&band.film);
     }
-    Ok(setup.picture(film))
+    setup.picture(film)
 }
 
 pub(crate) fn render_span(renderer: &Renderer) -> tracing::span::EnteredSpan {
@@ -143,7 +143,7 @@ pub(crate) fn render_progressive_with(
                 }
             };
             let band = bands.render_next(backend, &mut report_progress, &mut || counter.increment())?;
-            Ok(band.map(|band| copy_band(&mut full_film, &band.film)))
+            Ok(band.map(|band| full_film.copy_rows(&band.film)))
         })
     };
     let rendered = loop {
@@ -157,7 +157,7 @@ pub(crate) fn render_progressive_with(
         Some(error) => Err(error),
         None => {
             rendered?;
-            Ok(setup.picture(full_film))
+            setup.picture(full_film)
         }
     }
 }
@@ -185,9 +185,13 @@ impl Progressive<'_> {
     ///
     /// The device is lost, or its driver reports an error.
     pub fn picture(&mut self) -> Result<Picture, Error> {
-        copy_band(self.full_film, &self.backend.film()?.part(self.band));
+        self.full_film.copy_rows(&self.backend.film()?.part(self.band));
+        let mut film = self.full_film.clone();
+        if self.layout.aovs.contains(&Aov::Denoised) {
+            self.backend.denoise(&mut film)?;
+        }
         Ok(Picture {
-            film: self.full_film.clone(),
+            film,
             hits: self.hits.to_vec(),
             layout: self.layout.clone(),
             device: self.device.clone(),
@@ -216,16 +220,10 @@ impl ImageSetup {
             true => renderer.work(|backend, _| job::first_hits(backend, region))?,
             false => Vec::new(),
         };
-        let mut aovs: Vec<Aov> = Vec::new();
-        for aov in &options.aovs {
-            if !aovs.contains(aov) {
-                aovs.push(*aov);
-            }
-        }
         let layout = Layout {
             picture: (scene.width, scene.height),
             region,
-            aovs,
+            aovs: options.layers(scene),
             alpha: packed.has_alpha(),
             middle_depth: renderer.work(|backend, _| middle_depth(packed, &options.aovs, backend))?,
             max_samples: packed.sampling.pixel_samples,
@@ -241,13 +239,16 @@ impl<'a> RenderSetup<'a> {
         Ok(RenderSetup { renderer, hits, layout })
     }
 
-    fn picture(self, film: Film) -> Picture {
-        Picture {
+    fn picture(mut self, mut film: Film) -> Result<Picture, Error> {
+        if self.layout.aovs.contains(&Aov::Denoised) {
+            self.renderer.work(|backend, _| backend.denoise(&mut film))?;
+        }
+        Ok(Picture {
             film,
             hits: self.hits,
             layout: self.layout,
             device: self.renderer.info().clone(),
-        }
+        })
     }
 }
 
@@ -255,17 +256,6 @@ impl<'a> RenderSetup<'a> {
 pub(crate) fn empty(region: Region, film_layout: FilmLayout) -> Result<Film, RenderError> {
     job::check_memory(region.pixels().saturating_mul(film_layout.bytes() as u64))?;
     Ok(Film::of(region, film_layout))
-}
-
-/// Copies the rows of a band to the film of the full image.
-pub(crate) fn copy_band(full_film: &mut Film, band: &Film) {
-    let start = (band.region.y0 - full_film.region.y0) as usize * full_film.region.width() as usize;
-    for (to, from) in full_film.lists_mut().zip(band.lists()) {
-        // Lists that this film layout does not include are empty.
-        if let Some(to) = to.get_mut(start..start + from.len()) {
-            to.copy_from_slice(from);
-        }
-    }
 }
 
 /// Returns true if any of these layers is derived from the first hits.

@@ -5,8 +5,9 @@ use std::process::ExitCode;
 use std::{fs, io};
 
 use crate::error::RenderError;
-use crate::image;
+use crate::image::{self, Aov, Band, Sink};
 use anyhow::{Context as _, bail};
+use wgray_render::denoise;
 use wgray_render::job::Parts;
 
 use super::frames::{self, Frame};
@@ -69,10 +70,21 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         return Ok(ExitCode::SUCCESS); // unreachable: merge does not write parts
     };
     let options = args.picture_options.save_options(parts.metadata());
-    let written = image::save(targets, &layout, &options, &mut |sink| {
+    let read = |sink: &mut Sink| {
         parts.read(&mut |band| match stop.signal() {
             None => sink(band),
             Some(_) => Err(RenderError::Cancelled),
+        })
+    };
+    let written = image::save(targets, &layout, &options, &mut |sink| {
+        if !layout.aovs.contains(&Aov::Denoised) {
+            return read(sink);
+        }
+        let (mut film, hits) = denoise::collect(layout.region, parts.film_layout(), &mut |sink| read(sink))?;
+        film.denoised = denoise::denoise(&film);
+        sink(Band {
+            film: &film,
+            hits: &hits,
         })
     });
     match (written, stop.signal()) {

@@ -102,7 +102,7 @@ impl Outputs {
             };
             let mut files = vec![("--output".to_owned(), destination)];
             let aov_files = image::files(path, format, separate_aovs).into_iter().skip(1);
-            for (aov, path) in separate_aovs.iter().zip(aov_files) {
+            for (aov, path) in separate_aovs.iter().filter(|aov| aov.has_file()).zip(aov_files) {
                 files.push((format!("--aov {}", aov.name()), output(&path)?));
             }
             images.push(ImageOutput { format, files });
@@ -370,7 +370,10 @@ fn check_layers(aovs: &[Aov], destinations: &[(&Path, Output)], formats: &[Forma
             Layers::Beside if !output.is_file() => Layers::Unsupported,
             layers => layers,
         });
-    let (Some(aov), true) = (aovs.first(), layers.all(|layers| layers == Layers::Unsupported)) else {
+    let (Some(aov), true) = (
+        aovs.iter().find(|aov| aov.has_file()),
+        layers.all(|layers| layers == Layers::Unsupported),
+    ) else {
         return Ok(());
     };
     let aov = aov.name();

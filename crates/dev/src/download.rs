@@ -50,7 +50,10 @@ pub fn exr_file(frame: &Frame) -> io::Result<Vec<u8>> {
                     Channel::ShadingNormal(_, component) => {
                         FlatSamples::F32(hits.iter().map(|hit| hit.shading_normal[*component]).collect())
                     }
-                    Channel::Mean(..) | Channel::Count(_) | Channel::Variance(..) => return None, // channels of films
+                    // Channels of films.
+                    Channel::Mean(..) | Channel::Count(_) | Channel::Variance(..) | Channel::Denoised(..) => {
+                        return None;
+                    }
                 };
                 Some(AnyChannel::new(channel.name(), values))
             })

@@ -1,5 +1,7 @@
 //! The film: sums over the samples of each pixel, in linear f32.
 
+use std::ops::Range;
+
 use bytemuck::Zeroable;
 use glam::{Vec3, Vec4, Vec4Swizzles};
 use wgray_image::Region;
@@ -89,6 +91,9 @@ pub struct Film {
     /// xyz: summed squared deviations of the normal from its mean; w: of the depth. Empty without noise estimates or
     /// layers.
     pub normal_moments: Vec<Vec4>,
+    /// Denoised colors of a finished film in linear RGB, which are not accumulated and not one of the [`Film::lists`].
+    /// Empty unless the film has been denoised.
+    pub denoised: Vec<Vec3>,
 }
 
 /// A half of a pixel's samples.
@@ -130,6 +135,7 @@ impl Film {
             half_sums: list(film_layout.noise),
             albedo_moments: list(film_layout.has_layer_moments()),
             normal_moments: list(film_layout.has_layer_moments()),
+            denoised: Vec::new(),
         }
     }
 
@@ -154,6 +160,7 @@ impl Film {
             half_sums,
             albedo_moments,
             normal_moments,
+            denoised: _,
         } = self;
         let first = [sums, moments, pilot_sums].into_iter();
         first.chain(layers).chain([half_sums, albedo_moments, normal_moments])
@@ -170,6 +177,7 @@ impl Film {
             half_sums,
             albedo_moments,
             normal_moments,
+            denoised: _,
         } = self;
         let first = [sums, moments, pilot_sums].into_iter();
         first.chain(layers).chain([half_sums, albedo_moments, normal_moments])
@@ -183,10 +191,12 @@ impl Film {
         let width = self.region.width() as usize;
         let columns = (region.x0 - self.region.x0) as usize..(region.x1 - self.region.x0) as usize;
         let rows = (region.y0 - self.region.y0) as usize..(region.y1 - self.region.y0) as usize;
-        let crop = |records: &[Vec4]| {
+        fn crop<T: Copy>(records: &[T], width: usize, rows: &Range<usize>, columns: &Range<usize>) -> Vec<T> {
             let rows = records.chunks(width.max(1)).take(rows.end).skip(rows.start);
             rows.flat_map(|row| row[columns.clone()].to_vec()).collect()
-        };
+        }
+        let denoised = crop(&self.denoised, width, &rows, &columns);
+        let crop = |records: &[Vec4]| crop(records, width, &rows, &columns);
         Film {
             region,
             sums: crop(&self.sums),
@@ -196,6 +206,18 @@ impl Film {
             half_sums: crop(&self.half_sums),
             albedo_moments: crop(&self.albedo_moments),
             normal_moments: crop(&self.normal_moments),
+            denoised,
+        }
+    }
+
+    /// Copies the rows of a band, which must have the columns of this film and lie inside the film. Lists that this film
+    /// lacks are ignored.
+    pub fn copy_rows(&mut self, band: &Film) {
+        let start = (band.region.y0 - self.region.y0) as usize * self.region.width() as usize;
+        for (to, from) in self.lists_mut().zip(band.lists()) {
+            if let Some(to) = to.get_mut(start..start + from.len()) {
+                to.copy_from_slice(from);
+            }
         }
     }
 
@@ -287,6 +309,14 @@ impl Film {
             None => 1.0,
             Some(_) if weight == 0.0 => 0.0,
             Some(sum) => sum.w / weight,
+        }
+    }
+
+    /// Returns the color that is displayed, in linear RGB: the denoised color, or the mean of a film that is not denoised.
+    pub fn color(&self, pixel: usize) -> [f32; 3] {
+        match self.denoised.get(pixel) {
+            Some(color) => color.to_array(),
+            None => mean(self.sums[pixel]),
         }
     }
 

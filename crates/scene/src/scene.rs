@@ -145,6 +145,8 @@ pub struct Render {
     pub filter: PixelFilter,
     /// Adaptive sampling; `pixel_samples` is then the number of samples per round.
     pub adaptive: Option<Adaptive>,
+    /// Denoise the image.
+    pub denoise: bool,
 }
 
 /// A set of sample positions in the unit square.

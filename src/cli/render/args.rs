@@ -8,7 +8,7 @@ use crate::image::Aov;
 use crate::options::Options;
 use crate::scene::{Define, Integrator, Overrides, Pattern, Scene, is_gltf};
 use clap::ValueHint;
-use clap::builder::NonEmptyStringValueParser;
+use clap::builder::{NonEmptyStringValueParser, PossibleValuesParser, TypedValueParser};
 use wgray_image::Region;
 use wgray_render::job::Tile;
 
@@ -74,6 +74,10 @@ pub struct Args {
     /// Add samples where a pixel's standard error exceeds ERROR
     #[arg(long, help_heading = "Sampling", value_name = "ERROR", value_parser = parse_error)]
     pub adaptive: Option<f64>,
+
+    /// Denoise the image: on or off [default: the scene's setting]
+    #[arg(long, display_order = 6, value_name = "on|off", value_parser = on_or_off(), hide_possible_values = true, num_args = 0..=1, require_equals = true, default_missing_value = "on")]
+    pub denoise: Option<bool>,
 
     /// Limit paths to N bounces
     #[arg(long, help_heading = "Sampling", value_name = "N", value_parser = bounces)]
@@ -153,6 +157,11 @@ pub struct Args {
     /// Round in software for identical bits on more GPUs (slower, Vulkan only)
     #[arg(long, help_heading = LONG_RENDERS, hide_short_help = true)]
     pub exact_rounding: bool,
+}
+
+/// Returns the parser of `on` and `off`.
+fn on_or_off() -> impl TypedValueParser<Value = bool> {
+    PossibleValuesParser::new(["on", "off"]).map(|text| text == "on")
 }
 
 /// Heading of the options for long, tiled or measured renders.
@@ -257,6 +266,7 @@ impl Args {
             pixel_samples: self.pixel_samples,
             light_samples: self.light_samples,
             seed: self.seed,
+            denoise: self.denoise,
             pixel_pattern: self.pixel_pattern,
             adaptive: self.adaptive,
             integrator: self.integrator,

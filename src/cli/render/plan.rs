@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use crate::error::RenderError;
-use crate::image::Layout;
+use crate::image::{Aov, Layout};
 use crate::options::Options;
 use crate::renderer::{FaultHandler, Recovery, Renderer};
 use crate::scene::{Scene, ViewSettings};
@@ -63,7 +63,8 @@ impl<'a> Plan<'a> {
         for (option, _) in early_stops.into_iter().filter(|(_, is_set)| *is_set) {
             check_early_stop(option, scene)?;
         }
-        let options = args.rendering();
+        let mut options = args.rendering();
+        options.aovs = options.layers(scene);
         let image_region = options.region(scene).map_err(|problem| option_error(&problem))?;
         let tile = match args.tile {
             None => None,
@@ -108,6 +109,11 @@ impl<'a> Plan<'a> {
             max_samples: self.scene.sampling.pixel_samples,
             view: self.view,
         }
+    }
+
+    /// Returns true if the image is denoised.
+    pub fn denoises(&self) -> bool {
+        self.options.aovs.contains(&Aov::Denoised)
     }
 
     /// Returns true if the file is the complete part of the image that this render would write.

@@ -8,7 +8,10 @@ use crate::render::{middle_depth, needs_first_hits};
 use crate::renderer::Renderer;
 use wgray_image::Region;
 use wgray_render::backend::Backend;
+use wgray_render::denoise;
+use wgray_render::film::Film;
 use wgray_render::job::{self, Bands, CheckpointStore, FinishedBand, Flow, Order, PartHeader, WorkSplit};
+use wgray_render::records::FirstHit;
 
 use super::plan::Plan;
 use super::preview::Previews;
@@ -62,8 +65,20 @@ pub fn write(
         .metadata
         .with_device(renderer.info(), plan.picture_options.reproducible);
     let mut render_to = |sink: &mut Sink| {
-        let previews = previews.as_mut().map(|previews| (previews, &layout));
-        render(plan, renderer, store, stop, &mut totals, previews, sink)
+        let mut previews = previews.as_mut().map(|previews| (previews, &layout));
+        match plan.denoises() && plan.tile.is_none() {
+            true => {
+                let (film, hits) = denoise::collect(layout.region, plan.scene.film_layout(), &mut |sink| {
+                    let previews = previews.as_mut().map(|(previews, layout)| (&mut **previews, *layout));
+                    render(plan, renderer, store, stop, &mut totals, previews, sink)
+                })?;
+                let start = Instant::now();
+                write_denoised(renderer, (film, hits), sink)?;
+                totals.time += start.elapsed();
+                Ok(())
+            }
+            false => render(plan, renderer, store, stop, &mut totals, previews, sink),
+        }
     };
     match files {
         Files::Images(targets) => {
@@ -175,6 +190,19 @@ fn render(
     }
 }
 
+/// Denoises a film, and passes it to a sink.
+fn write_denoised(
+    renderer: &mut Renderer,
+    (mut film, hits): (Film, Vec<FirstHit>),
+    sink: &mut Sink,
+) -> Result<(), RenderError> {
+    renderer.work(|backend, _| backend.denoise(&mut film))?;
+    sink(Band {
+        film: &film,
+        hits: &hits,
+    })
+}
+
 /// Passes a band to a sink and adds its counts to the totals.
 fn write_band(
     plan: &Plan,
@@ -223,7 +251,13 @@ fn save_pass(
         totals.partial = files.map(|file| file.name().to_owned()).collect();
         if !targets.is_empty() {
             image::save(targets, layout, &options, &mut |sink| {
-                bands.last_pass(&mut |band| write_band(plan, renderer, band, &mut totals, sink))
+                if !plan.denoises() {
+                    return bands.last_pass(&mut |band| write_band(plan, renderer, band, &mut totals, sink));
+                }
+                let parts = denoise::collect(layout.region, plan.scene.film_layout(), &mut |sink| {
+                    bands.last_pass(&mut |band| write_band(plan, renderer, band, &mut totals, sink))
+                })?;
+                write_denoised(renderer, parts, sink)
             })?;
         }
         Ok(())

@@ -161,6 +161,7 @@ fn add_samples(scene: &Packed, meshes: &Arc<BatchMeshes>, film: &mut Film, tile:
         half_sums,
         albedo_moments,
         normal_moments,
+        denoised: _,
     } = film;
     let region = *region;
     let is_pilot = scene.sampling.adaptive && samples.start < scene.specialization.pilot_samples;

@@ -10,12 +10,39 @@ mod guides;
 
 use glam::Vec3;
 
-use crate::film::Film;
+use crate::error::RenderError;
+use crate::film::{Film, FilmLayout};
+use crate::job::check_memory;
+use crate::output::Sink;
+use crate::records::FirstHit;
+use guides::GUIDE_BYTES;
 pub use guides::Guides;
+use wgray_image::Region;
 
 /// Returns the denoised colors of a film with noise estimates, in row-major order, top row first. Without layers, only
 /// colors guide the denoiser. Pixels that are not finite, or without samples, keep their color.
 pub fn denoise(film: &Film) -> Vec<Vec3> {
     let guides = Guides::of(film);
     guides.colors(film, &filter::filter(&guides))
+}
+
+/// Joins the bands that `render` produces, since the denoiser needs the whole film. Also returns the first hits.
+///
+/// # Errors
+///
+/// Errors of `render`; [`RenderError::Memory`] if the film does not fit into memory.
+pub fn collect(
+    region: Region,
+    film_layout: FilmLayout,
+    render: &mut dyn FnMut(&mut Sink) -> Result<(), RenderError>,
+) -> Result<(Film, Vec<FirstHit>), RenderError> {
+    check_memory(region.pixels().saturating_mul(film_layout.bytes() as u64 + GUIDE_BYTES))?;
+    let mut film = Film::of(region, film_layout);
+    let mut hits = Vec::new();
+    render(&mut |band| {
+        film.copy_rows(band.film);
+        hits.extend_from_slice(band.hits);
+        Ok(())
+    })?;
+    Ok((film, hits))
 }

@@ -20,6 +20,7 @@ use super::sliders::{Slider, with_buffer};
 use super::texels::TexelParts;
 use super::timer::{TIMESTAMP_BYTES, Timer};
 use crate::backend::{Backend, FilmState, Rules};
+use crate::denoise::denoise;
 use crate::error::RenderError;
 use crate::film::{Film, FilmLayout};
 use crate::records::{Camera, DispatchParams, FirstHit, Packed, Specialization};
@@ -625,6 +626,15 @@ impl Backend for Gpu {
         }
         let result = self.find_first_hits(region);
         self.discard_film_on_error(result)
+    }
+
+    fn denoise(&mut self, film: &mut Film) -> Result<(), RenderError> {
+        // On software Vulkan, the CPU path is faster.
+        film.denoised = match self.device.info.is_software() {
+            true => denoise(film),
+            false => super::denoise::denoise(&self.device, film, self.kernels.exact)?,
+        };
+        Ok(())
     }
 
     fn samples_of_all(&self) -> u32 {

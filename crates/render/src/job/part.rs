@@ -13,6 +13,7 @@ use super::piece::FilmPiece;
 use super::pieces_file::{self, Entry, FORMAT, Header, Key};
 use super::steps::SampleProgress;
 use crate::error::RenderError;
+use crate::film::FilmLayout;
 use crate::output::{Aov, AovSource, Band, Layout, Metadata, Sink};
 use wgray_image::Pending;
 use wgray_image::Region;
@@ -72,6 +73,7 @@ impl PartHeader {
         let aov_named = |name: &String| Aov::ALL.into_iter().find(|aov| aov.name() == name);
         for aov in self.aovs.iter().filter_map(aov_named) {
             let has_values = match aov.source(Integrator::Phong) {
+                AovSource::Statistics if aov == Aov::Denoised => identity.film_layout().noise,
                 AovSource::Statistics => identity.film_layout().has_moments(),
                 AovSource::Samples => identity.layers,
                 AovSource::FirstHit => {
@@ -298,6 +300,11 @@ impl Parts {
                 exposure: f64::from_bits(self.header.exposure),
             },
         }
+    }
+
+    /// Returns the layout of the parts' films.
+    pub fn film_layout(&self) -> FilmLayout {
+        self.identity.film_layout()
     }
 
     /// Returns the metadata of the merged image.

@@ -41,6 +41,8 @@ pub enum Aov {
     SampleCount,
     /// Variance estimated by [`Film::variance`](crate::film::Film::variance).
     Variance,
+    /// Denoised color ([`denoise`](crate::denoise)). Display formats show it in place of the image.
+    Denoised,
 }
 
 impl fmt::Display for Aov {
@@ -88,6 +90,8 @@ pub enum Channel {
     Count(&'static str),
     /// Variance of a color channel.
     Variance(&'static str, usize),
+    /// A denoised color channel.
+    Denoised(&'static str, usize),
 }
 
 impl Channel {
@@ -96,6 +100,7 @@ impl Channel {
         match self {
             Channel::Float(name, _) | Channel::Integer(name, _) | Channel::Count(name) => name,
             Channel::Mean(name, ..) | Channel::ShadingNormal(name, _) | Channel::Variance(name, _) => name,
+            Channel::Denoised(name, _) => name,
         }
     }
 
@@ -116,6 +121,7 @@ impl Channel {
             Channel::ShadingNormal(_, component) => band.hits[i].shading_normal[*component].to_ne_bytes(),
             Channel::Count(_) => band.film.sample_count(i).to_ne_bytes(),
             Channel::Variance(_, channel) => band.film.variance(i)[*channel].to_ne_bytes(),
+            Channel::Denoised(_, channel) => band.film.color(i)[*channel].to_ne_bytes(),
         }
     }
 }
@@ -128,7 +134,7 @@ struct Row {
 
 impl Aov {
     /// All output variables.
-    pub const ALL: [Aov; 13] = [
+    pub const ALL: [Aov; 14] = [
         Aov::Normal,
         Aov::ShadingNormal,
         Aov::Depth,
@@ -142,6 +148,7 @@ impl Aov {
         Aov::Emission,
         Aov::SampleCount,
         Aov::Variance,
+        Aov::Denoised,
     ];
 
     /// Returns the source with an integrator, which may not support the variable: see [`Aov::missing`].
@@ -170,6 +177,11 @@ impl Aov {
         })
     }
 
+    /// Returns true if a PNG has the variable in a separate file. The denoised color is in the PNG itself.
+    pub fn has_file(self) -> bool {
+        self != Aov::Denoised
+    }
+
     /// Returns the name in options, files and layers.
     pub fn name(self) -> &'static str {
         self.row().name
@@ -182,7 +194,7 @@ impl Aov {
 
     const fn row(self) -> Row {
         use AovSource::{FirstHit, Samples, Statistics};
-        use Channel::{Count, Float, Integer, Mean, ShadingNormal, Variance};
+        use Channel::{Count, Denoised, Float, Integer, Mean, ShadingNormal, Variance};
         const fn row(name: &'static str, source: AovSource, channels: &'static [Channel]) -> Row {
             Row { name, source, channels }
         }
@@ -248,6 +260,15 @@ impl Aov {
                     Variance("variance.B", 2),
                 ],
             ),
+            Aov::Denoised => row(
+                "denoised",
+                Statistics,
+                &[
+                    Denoised("denoised.R", 0),
+                    Denoised("denoised.G", 1),
+                    Denoised("denoised.B", 2),
+                ],
+            ),
         }
     }
 
@@ -274,6 +295,7 @@ impl Aov {
                 let [count, max] = [band.film.sample_count(i), layout.max_samples].map(|n| n.max(1) as f32);
                 Vec3::splat(count.ln() / max.max(2.0).ln())
             }
+            Aov::Denoised => band.film.color(i).into(),
             Aov::Variance => Vec3::from(band.film.variance(i)).map(|v| v.sqrt().powf(1.0 / 2.2)),
             _ => self.color_of_hit(&band.hits[i], layout.middle_depth),
         }

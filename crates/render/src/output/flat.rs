@@ -12,7 +12,6 @@ use rayon::prelude::*;
 
 use super::{Band, Format, Layout, Metadata, SaveOptions, Sink};
 use crate::error::RenderError;
-use crate::film::mean;
 use wgray_image::memory::fallible;
 
 /// Bytes per pixel that the WebP encoder allocates: a copy of four channels, and the file in a growing buffer.
@@ -76,12 +75,12 @@ fn allocate(bytes: u64) -> Option<Vec<u8>> {
 }
 
 fn without_alpha(band: Band, layout: &Layout) -> Vec<u8> {
-    let sums = band.film.sums.par_iter();
-    sums.flat_map_iter(|sum| layout.view.rgb8(mean(*sum))).collect()
+    let pixel = |i| layout.view.rgb8(band.film.color(i));
+    (0..band.film.sums.len()).into_par_iter().flat_map_iter(pixel).collect()
 }
 
 fn with_alpha(band: Band, layout: &Layout) -> Vec<u8> {
-    let pixel = |i| layout.view.rgba8(mean(band.film.sums[i]), band.film.alpha(i));
+    let pixel = |i| layout.view.rgba8(band.film.color(i), band.film.alpha(i));
     (0..band.film.sums.len()).into_par_iter().flat_map_iter(pixel).collect()
 }
 

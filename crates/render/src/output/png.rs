@@ -10,7 +10,6 @@ use rayon::prelude::*;
 
 use super::{Aov, Band, BitDepth, Layout, Metadata, SaveOptions, Sink, to_8_bits, to_16_bits};
 use crate::error::RenderError;
-use crate::film::mean;
 use wgray_image::GAMMA;
 
 /// Encodes 8-bit RGB as a PNG in memory, with fast compression.
@@ -103,11 +102,9 @@ fn write_metadata<W: Write>(png: &mut Encoder<'static, W>, metadata: &Metadata) 
 fn encode(band: Band, content: Option<Aov>, layout: &Layout, depth: BitDepth) -> Vec<u8> {
     match (content, layout.alpha) {
         (None, true) => quantize(band, depth, |i| {
-            layout
-                .view
-                .display_straight(mean(band.film.sums[i]), band.film.alpha(i))
+            layout.view.display_straight(band.film.color(i), band.film.alpha(i))
         }),
-        (None, false) => quantize(band, depth, |i| layout.view.display(mean(band.film.sums[i]))),
+        (None, false) => quantize(band, depth, |i| layout.view.display(band.film.color(i))),
         (Some(aov), _) => quantize(band, depth, |i| {
             let color = aov.color(band, i, layout).to_array();
             match (aov, aov.light()) {

@@ -117,6 +117,7 @@ pub fn files(path: &Path, format: Format, aovs: &[Aov]) -> Vec<PathBuf> {
     if format.layers() == Layers::Beside {
         files.extend(
             aovs.iter()
+                .filter(|aov| aov.has_file())
                 .map(|aov| path.with_extension(format!("{}.png", aov.name()))),
         );
     }
@@ -165,7 +166,8 @@ fn write(
     };
     match (*format, files.as_mut_slice()) {
         (Format::Png, files) => {
-            let contents = [None].into_iter().chain(layout.aovs.iter().copied().map(Some));
+            let aovs = layout.aovs.iter().copied().filter(|aov| aov.has_file());
+            let contents = [None].into_iter().chain(aovs.map(Some));
             png::write(
                 files.iter_mut().zip(contents),
                 layout,

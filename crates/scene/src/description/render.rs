@@ -71,6 +71,9 @@ pub struct RenderDescription {
     /// Adaptive sampling: further samples for pixels with a large error.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub adaptive: Option<AdaptiveDescription>,
+    /// Denoise the image. If absent, false.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub denoise: Option<bool>,
 }
 
 impl Default for RenderDescription {
@@ -98,6 +101,7 @@ impl Default for RenderDescription {
                 radius: None,
             },
             adaptive: None,
+            denoise: None,
         }
     }
 }

@@ -31,6 +31,8 @@ pub struct Overrides {
     pub pixel_pattern: Option<Pattern>,
     /// Target error of adaptive sampling, 0 to 1; the maximum number of samples is not changed.
     pub adaptive: Option<f64>,
+    /// Denoise the image.
+    pub denoise: Option<bool>,
     /// The integrator.
     pub integrator: Option<Integrator>,
     /// Maximum path depth, 1 to 64; 0 to 1024 for [`Integrator::Path`].
@@ -93,6 +95,7 @@ impl Overrides {
         set_count(&mut render.pixel_samples, self.pixel_samples, integrator).at("pixel_samples")?;
         set_count(&mut render.light_samples, self.light_samples, integrator).at("light_samples")?;
         render.seed = self.seed.unwrap_or(render.seed);
+        render.denoise = self.denoise.or(render.denoise);
         if let Some(error) = self.adaptive {
             adaptive_error(error).at("adaptive")?;
             let max_samples = (render.adaptive.as_ref()).and_then(|adaptive| adaptive.max_samples);
@@ -115,11 +118,12 @@ impl Overrides {
         if let Some(define) = self.define.iter().find(|define| define.overrides_key(key)) {
             return Some(format!("--define {define}"));
         }
-        let options: [(bool, &str, &[&str]); 9] = [
+        let options: [(bool, &str, &[&str]); 10] = [
             (self.size.is_some(), "--size", &["image.width", "image.height"]),
             (self.integrator.is_some(), "integrator", &["render.integrator"]),
             (self.max_depth.is_some(), "max_depth", &["render.max_depth"]),
             (self.seed.is_some(), "seed", &["render.seed"]),
+            (self.denoise.is_some(), "denoise", &["render.denoise"]),
             (
                 self.pixel_samples.is_some() || self.pixel_pattern.is_some(),
                 "pixel_samples",
@@ -228,6 +232,7 @@ light_samples = { pattern = 'random', count = 5 }
             seed: Some(3),
             pixel_pattern: None,
             adaptive: None,
+            denoise: Some(true),
             integrator: None,
             max_depth: None,
             asset_root: None,
@@ -245,11 +250,17 @@ light_samples = { pattern = 'random', count = 5 }
         let scene = Scene::parse_with(SCENE, "s.toml", &overrides).unwrap();
         let render = scene.render;
         assert_eq!((scene.width, scene.height, render.seed), (50, 40, 3));
-        assert_eq!((render.pixel_samples.count, render.light_samples.count), (9, 8));
+        assert_eq!(
+            (render.pixel_samples.count, render.light_samples.count, render.denoise),
+            (9, 8, true)
+        );
         let scene = Scene::parse(SCENE, "s.toml").unwrap();
         let render = scene.render;
         assert_eq!((scene.width, scene.height, render.seed), (4, 3, 0));
-        assert_eq!((render.pixel_samples.count, render.light_samples.count), (16, 5));
+        assert_eq!(
+            (render.pixel_samples.count, render.light_samples.count, render.denoise),
+            (16, 5, false)
+        );
     }
 
     #[test]

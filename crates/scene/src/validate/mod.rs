@@ -292,6 +292,7 @@ fn render(description: &RenderDescription, integrator: Integrator) -> Result<Ren
         light_samples,
         filter,
         adaptive,
+        denoise: description.denoise.unwrap_or(false),
     })
 }
 

@@ -270,7 +270,7 @@ radius = 1
             "s.toml:5: render.max_depth: \"deep\" must be a whole number from 1 to 64",
             "s.toml:6: render.colour: unknown key; expected one of \"integrator\", \"ambient\", \"background\", \"shadow_epsilon\", \
              \"shadows\", \"max_depth\", \"rr_depth\", \"clamp\", \"alpha\", \"ray_differentials\", \"seed\", \"pixel_samples\", \
-             \"light_samples\", \"filter\", \"adaptive\"",
+             \"light_samples\", \"filter\", \"adaptive\", \"denoise\"",
             "s.toml:7: render.pixel_samples: -3 must be a whole number from 1 to 65536, or a table such as { pattern = \"grid\", count = 16 }",
             "s.toml:10: shapes[0].size: unknown key; expected one of \"type\", \"material\", \"center\", \"radius\"",
             "s.toml:11: shapes[0].center: [0, 0] must be a list of 3 numbers",
