@@ -12,6 +12,7 @@ mod compare;
 mod contract;
 mod cost;
 mod culling;
+mod denoise;
 #[cfg(feature = "dev")]
 mod dev;
 mod documents;

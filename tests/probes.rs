@@ -15,6 +15,7 @@ use wgray_render::cpu::cylinder::{
     cylinder_levels, cylinder_occludes, cylinder_tangent, cylinder_uv, cylinder_uv_derivative, intersect_cylinder,
     is_on_cap,
 };
+use wgray_render::cpu::denoise::{color_distance, denoise_weight, feature_distance, noise_of};
 use wgray_render::cpu::dielectric::{DielectricSample, dielectric_sample, eta_of, refracts_inwards, transmittance};
 use wgray_render::cpu::differential::{
     Derivative, Differential, HitDifferential, normal_derivative, primitive_hit_differential, reflected_derivative,
@@ -432,6 +433,10 @@ probes! {
     standalone_prim(prim_id: UVec2) -> u32;
     nearer_hit(a: Hit, b: Hit) -> Hit;
     with_positive_zeros(v: Vec3) -> Vec3;
+    color_distance(squared: f32, p: f32, q: f32) -> f32;
+    feature_distance(squared: f32, p: f32, q: f32, scale: f32) -> f32;
+    noise_of(p: f32, q: f32) -> f32;
+    denoise_weight(distance: f32) -> f32;
     slabs(origin: Vec3, direction: Vec3, pad: f32) -> Slabs;
     inverse_of(x: f32) -> f32;
     box_interval(low: Vec3, high: Vec3, s: Slabs) -> Vec2;

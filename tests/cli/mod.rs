@@ -2,6 +2,7 @@
 
 mod bad_input;
 mod commands;
+mod denoise;
 mod diff;
 mod farm;
 mod files;

@@ -7,6 +7,8 @@
 
 mod filter;
 mod guides;
+#[cfg(test)]
+mod tests;
 
 use glam::Vec3;
 

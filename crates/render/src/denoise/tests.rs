@@ -1,0 +1,234 @@
+use glam::{DVec3, Vec4};
+
+use super::*;
+use crate::film::Layer;
+
+/// A film of 4 samples per pixel whose samples are `color` of the pixel plus noise: a triangular distribution of this
+/// amplitude. Albedo, normal and depth have no noise.
+struct Subject {
+    width: u32,
+    height: u32,
+    amplitude: f64,
+}
+
+const SAMPLES: u32 = 4;
+
+/// Returns a number from -1 to 1.
+fn random(state: &mut u64) -> f64 {
+    *state = state
+        .wrapping_mul(6_364_136_223_846_793_005)
+        .wrapping_add(1_442_695_040_888_963_407);
+    (*state >> 33) as f64 / f64::from(1 << 30) - 1.0
+}
+
+impl Subject {
+    fn film(&self, color: impl Fn(u32, u32) -> DVec3, albedo: impl Fn(u32, u32) -> DVec3) -> Film {
+        let film_layout = FilmLayout {
+            layers: true,
+            noise: true,
+            ..FilmLayout::default()
+        };
+        let mut film = Film::of(Region::whole(self.width, self.height), film_layout);
+        let mut state = 1;
+        for i in 0..film.sums.len() {
+            let (x, y) = (i as u32 % self.width, i as u32 / self.width);
+            let values = [(); SAMPLES as usize].map(|()| {
+                let noise = DVec3::splat(random(&mut state) + random(&mut state)) * self.amplitude;
+                color(x, y) + noise
+            });
+            let sum: DVec3 = values.iter().sum();
+            let mean = sum / f64::from(SAMPLES);
+            let squares: DVec3 = values.iter().map(|value| (value - mean) * (value - mean)).sum();
+            let weight = SAMPLES as f32;
+            film.sums[i] = sum.as_vec3().extend(weight);
+            film.half_sums[i] = (values[0] + values[2]).as_vec3().extend(weight / 2.0);
+            film.moments[i] = squares.as_vec3().extend(weight);
+            film.layers[Layer::Albedo as usize][i] = (albedo(x, y).as_vec3() * weight).extend(0.0);
+            film.layers[Layer::Normal as usize][i] = Vec4::new(0.0, 0.0, weight, 2.0 * weight);
+        }
+        film
+    }
+
+    /// Returns the mean squared error of colors in columns.
+    fn error(&self, colors: &[Vec3], expected: impl Fn(u32, u32) -> DVec3, columns: std::ops::Range<u32>) -> f64 {
+        let errors = (0..colors.len() as u32).map(|i| (i % self.width, i / self.width, i));
+        let errors = errors.filter(|(x, ..)| columns.contains(x));
+        let errors: Vec<f64> = errors
+            .map(|(x, y, i)| (colors[i as usize].as_dvec3() - expected(x, y)).length_squared())
+            .collect();
+        errors.iter().sum::<f64>() / errors.len() as f64
+    }
+}
+
+const WHITE: fn(u32, u32) -> DVec3 = |_, _| DVec3::ONE;
+
+fn means(film: &Film) -> Vec<Vec3> {
+    film.means().map(Vec3::from).collect()
+}
+
+#[test]
+fn noise_on_an_even_surface_falls_by_a_factor_of_40_and_the_mean_stays() {
+    let subject = Subject {
+        width: 64,
+        height: 48,
+        amplitude: 0.2,
+    };
+    let color = |_, _| DVec3::new(0.5, 0.4, 0.3);
+    let film = subject.film(color, WHITE);
+    let denoised = denoise(&film);
+    let [before, after] = [means(&film), denoised.clone()].map(|colors| subject.error(&colors, color, 0..64));
+    assert!(after < before / 40.0, "{before} before, {after} after");
+    let mean = |colors: &[Vec3]| colors.iter().map(|color| color.as_dvec3()).sum::<DVec3>() / colors.len() as f64;
+    assert!((mean(&denoised) - mean(&means(&film))).abs().max_element() < 2e-3);
+}
+
+#[test]
+fn edges_of_light_and_of_albedo_stay() {
+    let subject = Subject {
+        width: 64,
+        height: 48,
+        amplitude: 0.05,
+    };
+    let step = |x, _| if x < 32 { DVec3::splat(0.2) } else { DVec3::splat(0.8) };
+    for film in [subject.film(step, WHITE), subject.film(step, step)] {
+        let denoised = denoise(&film);
+        let [before, after] = [means(&film), denoised].map(|colors| subject.error(&colors, step, 30..34));
+        assert!(after < before / 4.0, "{before} before, {after} after");
+    }
+}
+
+#[test]
+fn textures_without_noise_stay() {
+    let subject = Subject {
+        width: 40,
+        height: 40,
+        amplitude: 0.1,
+    };
+    // The light has noise, the texture has none: the color of a pixel is its albedo times the light.
+    let texture = |x: u32, y: u32| DVec3::splat([0.2, 0.5, 0.9][((x + 2 * y) % 3) as usize]);
+    let mut film = subject.film(WHITE, texture);
+    for i in 0..film.sums.len() {
+        let albedo = Vec3::from(film.layer(Layer::Albedo, i)).extend(1.0);
+        (film.sums[i], film.half_sums[i]) = (film.sums[i] * albedo, film.half_sums[i] * albedo);
+        film.moments[i] *= albedo * albedo;
+    }
+    let [before, after] = [means(&film), denoise(&film)].map(|colors| subject.error(&colors, texture, 0..40));
+    assert!(after < before / 10.0, "{before} before, {after} after");
+}
+
+#[test]
+fn pixels_that_are_not_finite_stay_and_do_not_spread() {
+    let subject = Subject {
+        width: 30,
+        height: 20,
+        amplitude: 0.1,
+    };
+    let color = |_, _| DVec3::splat(0.5);
+    let mut film = subject.film(color, WHITE);
+    for (i, value) in [(65, f32::NAN), (190, f32::INFINITY), (340, 1e30), (599, -f32::INFINITY)] {
+        film.sums[i].y = value;
+        film.half_sums[i].y = value;
+        film.moments[i].y = f32::NAN;
+    }
+    film.sums[444] = Vec4::ZERO;
+    let denoised = denoise(&film);
+    for (i, color) in denoised.iter().enumerate() {
+        match i {
+            65 | 190 | 340 | 444 | 599 => assert_eq!(color.to_array().map(f32::to_bits), {
+                crate::film::mean(film.sums[i]).map(f32::to_bits)
+            }),
+            _ => assert!((*color - 0.5).abs().max_element() < 0.15, "{i}: {color}"),
+        }
+    }
+}
+
+/// The method in f64, from the definitions: every pixel, window and patch by itself, without planes, tiles and lanes.
+/// `guides` returns plane `k` of a pixel, mirrored at the borders.
+fn definition(guides: &Guides, x: i32, y: i32) -> DVec3 {
+    let mirrored = |x: i32, size: usize| {
+        let last = size as i32 - 1;
+        let mut x = x;
+        while x < 0 || x > last {
+            x = if x < 0 { -x } else { 2 * last - x };
+        }
+        x as usize
+    };
+    let margin = guides::MARGIN;
+    let at = |k: usize, x: i32, y: i32| {
+        let (x, y) = (mirrored(x, guides.width) + margin, mirrored(y, guides.height) + margin);
+        f64::from(guides.plane(k)[y * guides.stride + x])
+    };
+    let squared = |k: usize, count: usize, p: (i32, i32), q: (i32, i32)| {
+        (k..k + count)
+            .map(|k| (at(k, p.0, p.1) - at(k, q.0, q.1)).powi(2))
+            .sum::<f64>()
+    };
+    let (mut sum, mut weights) = (DVec3::ZERO, 0.0);
+    for dy in -7..=7 {
+        for dx in -7..=7 {
+            let (p, q) = ((x, y), (x + dx, y + dy));
+            let mut patch = 0.0;
+            for j in -2..=2 {
+                for i in -2..=2 {
+                    let (p, q) = ((p.0 + i, p.1 + j), (q.0 + i, q.1 + j));
+                    let (vp, vq) = (at(3, p.0, p.1), at(3, q.0, q.1));
+                    patch += (squared(0, 3, p, q) - vp - vp.min(vq)) / (1.1 * (vp + vq) + 1e-20) / 25.0;
+                }
+            }
+            let feature = |k: usize, count: usize| {
+                let (vp, vq) = (at(k + count, p.0, p.1), at(k + count, q.0, q.1));
+                (squared(k, count, p, q) - vp - vp.min(vq)) * at(k + count + 1, p.0, p.1)
+            };
+            let distance = patch.max(feature(4, 3)).max(feature(9, 3)).max(feature(14, 1)).max(0.0);
+            let weight = (1.0 - distance / 4.0).max(0.0).powi(4);
+            sum += DVec3::new(at(0, q.0, q.1), at(1, q.0, q.1), at(2, q.0, q.1)) * weight;
+            weights += weight;
+        }
+    }
+    sum / weights
+}
+
+#[test]
+fn the_filter_matches_its_definition_in_f64() {
+    for (width, height) in [(1, 1), (2, 1), (1, 9), (17, 3), (40, 12), (131, 34)] {
+        let subject = Subject {
+            width,
+            height,
+            amplitude: 0.2,
+        };
+        let color = |x, y| DVec3::new(0.2, 0.4, 0.6) + f64::from(x / 5 % 2) * 0.3 + f64::from(y) * 0.01;
+        let film = subject.film(color, |x, _| DVec3::splat(0.3 + 0.1 * f64::from(x % 3)));
+        let guides = Guides::of(&film);
+        let filtered = filter::filter(&guides);
+        assert_eq!(filtered.len() as u32, width * height);
+        for (i, found) in filtered.iter().enumerate().step_by(7) {
+            let expected = definition(&guides, (i as u32 % width) as i32, (i as u32 / width) as i32);
+            let error = (found.as_dvec3() - expected).abs().max_element();
+            assert!(
+                error < 2e-4,
+                "{width} x {height}, pixel {i}: {found}, expected {expected}"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_single_sample_is_denoised_by_features() {
+    let subject = Subject {
+        width: 32,
+        height: 32,
+        amplitude: 0.2,
+    };
+    let color = |_, _| DVec3::splat(0.5);
+    let mut film = subject.film(color, WHITE);
+    for i in 0..film.sums.len() {
+        film.sums[i] = (film.half_sums[i] * 0.5).with_w(1.0);
+        film.half_sums[i] = film.sums[i];
+        film.moments[i] = Vec4::new(0.0, 0.0, 0.0, 1.0);
+        for layer in &mut film.layers {
+            layer[i] *= 0.25;
+        }
+    }
+    let [before, after] = [means(&film), denoise(&film)].map(|colors| subject.error(&colors, color, 0..32));
+    assert!(after < before / 20.0, "{before} before, {after} after");
+}
