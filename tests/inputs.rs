@@ -128,8 +128,9 @@ struct Face {
     barycentric: DVec2,
     origin: DVec3,
     direction: DVec3,
-    /// Half-extent of the directions of a ray interval.
-    spread: DVec3,
+    /// The rays of a [`RayInterval`](wgray_render::cpu::slab::RayInterval) have directions within `direction_spread` of
+    /// `direction`, per component.
+    direction_spread: DVec3,
 }
 
 impl Face {
@@ -184,7 +185,7 @@ impl Face {
             barycentric,
             origin,
             direction: away * random.pick(&[1.0, size, 1e-3]),
-            spread: vector(random).abs() * size * random.pick(&[0.0, 0.01, 1.0]),
+            direction_spread: vector(random).abs() * size * random.pick(&[0.0, 0.01, 1.0]),
         }
     }
 
@@ -261,8 +262,8 @@ impl Face {
                 "edge_2" => self.edges()[1],
                 "origin" => self.origin,
                 "direction" => self.direction,
-                "min_direction" => self.direction - self.spread,
-                "max_direction" => self.direction + self.spread,
+                "min_direction" => self.direction - self.direction_spread,
+                "max_direction" => self.direction + self.direction_spread,
                 _ => return None,
             }
             .as_vec3(),

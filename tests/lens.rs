@@ -163,7 +163,7 @@ fn blades_give_a_polygon_with_a_corner_at_the_top() {
             assert!(!is_lit(&far, point_at(degrees + 60.0), mode), "{mode:?} {degrees}");
             assert!(is_lit(&far, point_at(degrees + 120.0), mode), "{mode:?} {degrees}");
         }
-        // Near points show the aperture upside down, with nearly the same circle of confusion.
+        // Near points show the aperture upside down. Their circle of confusion has nearly the same radius.
         let near = disk_scene(2.4, &format!("{lens}0"), 64);
         assert!(is_lit(&near, point_at(180.0), mode), "{mode:?}");
         assert!(!is_lit(&near, point_at(0.0), mode), "{mode:?}");

@@ -268,7 +268,7 @@ fn no_file_is_read_and_no_error_reveals_which_files_exist() {
     assert!(Path::new("Cargo.toml").is_file() && Path::new("scenes/textures/grid.png").is_file());
     let root = std::env::current_dir().unwrap();
     let folder = models();
-    let elsewhere = folder.path("color.png");
+    let existing_image = folder.path("color.png");
     let templates = [
         "shapes = [{ type = 'mesh', file = 'FILE' }]",
         "shapes = [{ type = 'gltf', file = 'FILE' }]",
@@ -293,7 +293,7 @@ fn no_file_is_read_and_no_error_reveals_which_files_exist() {
             ["Cargo.toml", "None.toml"],
             ["scenes/textures/grid.png", "scenes/textures/none.png"],
             ["scenes/meshes/../textures/grid.png", "scenes/none/../textures/grid.png"],
-            [elsewhere.to_str().unwrap(), "/none/color.png"],
+            [existing_image.to_str().unwrap(), "/none/color.png"],
             [root.join("scenes/meshes/knot.obj").to_str().unwrap(), "/none.obj"],
             ["../../../../../../etc/passwd", "../../../../../../none/none"],
         ] {
@@ -319,12 +319,12 @@ fn no_file_is_read_and_no_error_reveals_which_files_exist() {
     let options = LoadOptions::new().with_source(denied.clone());
     let error = Scene::from_slice(&folder.read("g.gltf"), SceneFormat::Gltf, &options).unwrap_err();
     assert!(error.to_string().starts_with("scene.gltf: buffers[0].uri: "), "{error}");
-    // Symbolic links out of a folder are refused.
+    // A symbolic link in the served folder to a file outside of it is refused.
     #[cfg(unix)]
     {
-        let outside = TestFolder::with_file("s.toml", "");
-        std::os::unix::fs::symlink(&elsewhere, outside.path("link.png")).unwrap();
-        let source = FolderFiles::new(outside.folder());
+        let served = TestFolder::with_file("s.toml", "");
+        std::os::unix::fs::symlink(&existing_image, served.path("link.png")).unwrap();
+        let source = FolderFiles::new(served.folder());
         assert!(source.read("link.png").is_err() && !source.contains("link.png"));
         assert!(source.read("s.toml").is_ok() && source.contains("s.toml"));
         assert!(source.read("../s.toml").is_err() && source.read("").is_err());

@@ -379,9 +379,8 @@ const BEYOND_SCHEMA: &[&str] = &[
     "no texture here",
     "no normal map here",
     "must be a texture of type",
-    "must have encoding",
-    "must have no factor",
-    "must have a red and green factor",
+    "its encoding must be",
+    "its factor must be",
     "texture's factor",
     "texture with uv_set",
     // Keys that exclude or require other keys.

@@ -533,8 +533,7 @@ fn full_and_read_only_file_systems_are_reported() {
     let full = run("size=256k", &checkpointed);
     assert_eq!(full.stdout, "0\nc\n", "{}", full.stderr);
     assert!(
-        full.stderr
-            .contains("warning: disk/c: a piece could not be written; rendering continues"),
+        full.stderr.contains("warning: disk/c: progress could not be saved: "),
         "{}",
         full.stderr
     );

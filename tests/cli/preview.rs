@@ -242,9 +242,9 @@ fn files_with_more_samples_are_not_replaced() {
     let (samples, _) = partial(&folder.path("new.exr")).expect("a partial file");
     assert!(has_pixels_of(&folder, "new.exr", samples, &[]));
     let fewer_samples = "has 60000 samples per pixel; a preview with fewer samples does not replace it";
-    let foreign = "was not written by wgray; a preview does not replace it, but the complete image will";
+    let not_by_wgray = "was not written by wgray; a preview does not replace it, but the complete image will";
     let notes = files.map(|file| match file {
-        "other.png" => format!("note: {file}: {foreign}\n"),
+        "other.png" => format!("note: {file}: {not_by_wgray}\n"),
         _ => format!("note: {file}: {fewer_samples}\n"),
     });
     let interrupted = format!("note: interrupted: the image has {samples} of 65536 samples per pixel\n");

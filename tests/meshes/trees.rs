@@ -111,7 +111,8 @@ fn brute_force_occlusion(scene: &Packed, surface: &Surface, light: &Light, block
                 let mesh = &scene.bvh.meshes[instance.mesh as usize];
                 mesh.triangles.iter().enumerate().any(|(slot, triangle)| {
                     let group = mesh.groups.get(slot).copied().unwrap_or(0);
-                    let casts_shadows = scene.bvh.group_words[(instance.materials + group) as usize] & NO_SHADOW == 0;
+                    let casts_shadows =
+                        scene.bvh.group_words[(instance.first_group_word + group) as usize] & NO_SHADOW == 0;
                     let [v0, v1, v2] = corners(scene, instance, slot);
                     let crossing = triangle_crossing(v0, v1, v2, mesh_origin, shear_of(direction), s);
                     let is_origin = surface.exclude_front == UVec2::new(item.index + 1, triangle.w);

@@ -438,7 +438,7 @@ fn invalid_factors_and_sets_are_reported() {
         (
             "normal_map = { texture = 't' }",
             SHAPE,
-            "materials.m.normal_map.texture: \"t\" must have no factor as a normal map; use strength instead",
+            "materials.m.normal_map.texture: \"t\" is used as a normal map; its factor must be 1; use strength instead",
         ),
         (
             "base_color = { texture = 'second' }",
@@ -681,16 +681,19 @@ fn invalid_direction_maps_are_rejected() {
             .err()
             .map(|error| error.to_string())
     };
-    let prefix = "materials.m.anisotropy_direction.texture: \"t\" must";
+    let prefix = "materials.m.anisotropy_direction.texture: \"t\"";
     for (texture, rule) in [
-        ("type = 'constant', color = [1, 1, 1]", "be a texture of type \"image\""),
+        (
+            "type = 'constant', color = [1, 1, 1]",
+            "must be a texture of type \"image\"",
+        ),
         (
             "type = 'image', file = 't.png'",
-            "have encoding = \"linear\" as a direction map",
+            "is used as an anisotropy direction; its encoding must be \"linear\"",
         ),
         (
             "type = 'image', file = 't.png', encoding = 'linear', factor = [1, 0.5, 1, 1]",
-            "have a red and green factor of 1 as a direction map",
+            "is used as an anisotropy direction; the red and green components of its factor must be 1",
         ),
     ] {
         let message = message(texture);

@@ -418,7 +418,7 @@ fn invalid_values_are_rejected() {
         ),
         (
             format!("{image}{mapped}"),
-            "9: materials.m.normal_map.texture: \"t\" must have encoding = \"linear\" as a normal map",
+            "9: materials.m.normal_map.texture: \"t\" is used as a normal map; its encoding must be \"linear\"",
         ),
         (
             format!("{checker}{mapped}"),
