@@ -129,7 +129,7 @@ impl Canvas {
         self.engine.backend().resume(film)
     }
 
-    /// Returns true if the canvas renders this scene with the current camera.
+    /// Returns true if the canvas renders `scene`, from its camera.
     pub fn renders(&self, scene: &Packed) -> bool {
         scene.camera == self.camera && scene.same_but_camera(&self.scene)
     }
