@@ -13,7 +13,7 @@ use wgray::scene::{
 use crate::pictures::{RenderMode, both, first_hits, means, render};
 use crate::scenes::packed;
 
-/// Image side in pixels.
+/// Width and height of the image in pixels.
 const SIDE: u32 = 64;
 
 fn grid(count: u32) -> SamplesDescription {

@@ -131,12 +131,15 @@ const SENTENCES: &[Sentence] = &[
         let mut without_layers = packed.clone();
         without_layers.specialization.layers = 0;
         let film_without_layers = complete_film(&mut Cpu::new(&without_layers));
-        let same =
+        let has_equal_bits =
             |a: &[glam::Vec4], b: &[glam::Vec4]| bytemuck::cast_slice::<_, u32>(a) == bytemuck::cast_slice::<_, u32>(b);
-        check(same(&film.sums, &film_without_layers.sums), "the sums differ")?;
-        check(same(&film.moments, &film_without_layers.moments), "the moments differ")?;
+        check(has_equal_bits(&film.sums, &film_without_layers.sums), "the sums differ")?;
         check(
-            same(&film.pilot_sums, &film_without_layers.pilot_sums),
+            has_equal_bits(&film.moments, &film_without_layers.moments),
+            "the moments differ",
+        )?;
+        check(
+            has_equal_bits(&film.pilot_sums, &film_without_layers.pilot_sums),
             "the pilot sums differ",
         )
     }),
@@ -144,8 +147,8 @@ const SENTENCES: &[Sentence] = &[
         let mut backend = make();
         backend.begin(full_region()).map_err(|e| e.to_string())?;
         backend.render(full_region(), 0..4).map_err(|e| e.to_string())?;
-        let first = film_bits(&mut *backend);
-        check(first == film_bits(&mut *backend), "the second copy differs")?;
+        let first_copy = film_bits(&mut *backend);
+        check(first_copy == film_bits(&mut *backend), "the second copy differs")?;
         backend.render(full_region(), 4..8).map_err(|e| e.to_string())?;
         let mut uninterrupted = make();
         uninterrupted.begin(full_region()).map_err(|e| e.to_string())?;

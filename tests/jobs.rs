@@ -491,8 +491,8 @@ fn different_jobs_have_different_identities() {
     }
     // Layers do not change the scene hash.
     let [_, _, layered, _] = subjects();
-    let plain = layered.clone().without_layers();
-    let hashes = [layered, plain].map(|packed| Identity::of(&packed, whole(&packed), false).scene);
+    let without_layers = layered.clone().without_layers();
+    let hashes = [layered, without_layers].map(|packed| Identity::of(&packed, whole(&packed), false).scene);
     assert_eq!(hashes[0], hashes[1]);
 }
 

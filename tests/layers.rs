@@ -141,9 +141,9 @@ fn layers_do_not_depend_on_backend_or_work_split() {
 #[test]
 fn layers_do_not_change_the_image() {
     for (name, packed) in subjects() {
-        let plain = packed.clone().without_layers();
-        let expected = reference(&plain);
-        assert_eq!(plain.film_layout().layers, expected.has_layers(), "{name}");
+        let without_layers = packed.clone().without_layers();
+        let expected = reference(&without_layers);
+        assert_eq!(without_layers.film_layout().layers, expected.has_layers(), "{name}");
         for mode in exact_modes() {
             let found = render(&packed, mode);
             let found = Film {
@@ -153,8 +153,12 @@ fn layers_do_not_change_the_image() {
             assert_eq!(differing(&found, &expected), 0, "{name}, {mode:?}");
         }
     }
-    let [plain, alpha] = [SCENE, &scene_with("alpha = true")].map(|text| reference(&parse(text).without_layers()));
-    assert!(differing(&plain, &alpha) > 0, "alpha does not hide the background");
+    let [opaque, with_alpha] =
+        [SCENE, &scene_with("alpha = true")].map(|text| reference(&parse(text).without_layers()));
+    assert!(
+        differing(&opaque, &with_alpha) > 0,
+        "alpha does not hide the background"
+    );
 }
 
 #[test]
@@ -195,7 +199,7 @@ fn light_layers_are_split_by_path_length() {
     assert!(depth_0[0] > 0.0 && depth_0[1..] == [0.0, 0.0], "{depth_0:?}");
     assert!(depth_1[1] > 0.0 && depth_1[2] == 0.0, "{depth_1:?}");
     assert!(depth_4[2] > 0.0, "{depth_4:?}");
-    // The light of short paths does not depend on the maximum depth.
+    // The radiance of short paths does not depend on the maximum depth.
     assert_eq!([depth_0[0], depth_1[0]], [depth_4[0]; 2]);
     assert_eq!(depth_1[1], depth_4[1]);
 }
@@ -441,10 +445,10 @@ fn the_library_returns_layers_and_alpha() {
     with_alpha.save(path("a.exr")).unwrap();
     assert_eq!(wgray::image::read_exr(&path("a.exr")).unwrap(), with_alpha.pixels());
 
-    let plain = picture(&text.replace("alpha = true", ""), Vec::new());
-    assert_eq!((plain.alpha(), plain.channel("A")), (None, None));
-    assert_eq!(plain.rgba8().chunks(4).map(|p| p[3]).collect::<Vec<_>>(), [255; 3]);
-    plain.save(path("b.png")).unwrap();
+    let opaque = picture(&text.replace("alpha = true", ""), Vec::new());
+    assert_eq!((opaque.alpha(), opaque.channel("A")), (None, None));
+    assert_eq!(opaque.rgba8().chunks(4).map(|p| p[3]).collect::<Vec<_>>(), [255; 3]);
+    opaque.save(path("b.png")).unwrap();
     assert_eq!(image::open(path("b.png")).unwrap().color(), image::ColorType::Rgb8);
 }
 
@@ -488,9 +492,9 @@ fn path_layers_are_rejected_with_other_integrators() {
 
 #[test]
 fn film_layouts_have_their_own_kernels() {
-    let plain = parse(SCENE);
-    let layered = plain.clone().with_layers();
-    assert!(!plain.same_but_camera(&layered));
+    let without_layers = parse(SCENE);
+    let layered = without_layers.clone().with_layers();
+    assert!(!without_layers.same_but_camera(&layered));
     let Some(device) = adapter::device() else {
         return;
     };
@@ -498,7 +502,7 @@ fn film_layouts_have_their_own_kernels() {
         exact: device.info.exact.then_some(wgray_render::gpu::Rounding::Device),
         baked: false,
     };
-    let mut gpu = Gpu::new(device, &plain, sources::shaders(), options).unwrap();
+    let mut gpu = Gpu::new(device, &without_layers, sources::shaders(), options).unwrap();
     assert!(
         gpu.update(&parse(&SCENE.replace("0.9, 0.8, 0.7", "0.7, 0.8, 0.9")))
             .unwrap()

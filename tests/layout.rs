@@ -1,4 +1,4 @@
-//! Records, constants and overrides of `crates/render/src/pack/`, compared with the WGSL that naga parses.
+//! Records, constants and overrides of `crates/render/src/records/`, compared with the WGSL that naga parses.
 
 use wgray_render::gpu::compose::{KERNELS, Source, built_in};
 use wgray_render::gpu::naga::proc::Layouter;

@@ -102,13 +102,16 @@ fn a_scene_built_in_code_equals_a_scene_from_a_file() {
     let picture = wgray::render(&loaded, &cpu_options()).unwrap();
     assert_eq!((picture.width(), picture.height()), (24, 16));
     assert_eq!(picture.device().name, "cpu");
-    let different = picture
+    let differing_pairs = picture
         .pixels()
         .colors
         .windows(2)
         .filter(|pair| pair[0] != pair[1])
         .count();
-    assert!(different > 100, "only {different} pairs of neighboring pixels differ");
+    assert!(
+        differing_pairs > 100,
+        "only {differing_pairs} pairs of neighboring pixels differ"
+    );
 }
 
 #[test]
@@ -247,9 +250,9 @@ fn a_progressive_image_equals_the_rendered_image_and_can_be_cancelled() {
     });
     adaptive.image.width = 130; // more than the first dispatch covers
     adaptive.image.height = 130;
-    let mut plain = adaptive.clone();
-    plain.render.adaptive = None;
-    for description in [plain, adaptive] {
+    let mut uniform = adaptive.clone();
+    uniform.render.adaptive = None;
+    for description in [uniform, adaptive] {
         let scene = description.validate().unwrap();
         let options = Options {
             aovs: vec![Aov::Depth],

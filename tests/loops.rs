@@ -94,10 +94,10 @@ fn looping(rounds: u32) -> Shaders {
     edited_shaders(file, store, &looping)
 }
 
-/// Returns true if the red sums of `film` exceed those of `plain` by `rounds`, so that no iteration is missing.
-fn has_rounds(film: &Film, plain: &Film, rounds: u32) -> bool {
+/// Returns true if the red sums of `film` exceed those of `unedited` by `rounds`, so that no iteration is missing.
+fn has_rounds(film: &Film, unedited: &Film, rounds: u32) -> bool {
     let matches = |(a, b): (&glam::Vec4, &glam::Vec4)| a.x == b.x + rounds as f32 && a.y == b.y;
-    film.sums.iter().zip(&plain.sums).all(matches)
+    film.sums.iter().zip(&unedited.sums).all(matches)
 }
 
 /// Returns true if the driver truncates loops, tested with shaders without the check.
@@ -213,13 +213,13 @@ fn long_loops_of_edited_shaders_are_errors_or_correct() {
         return;
     }
     let packed = scenes::packed(&small("cornell.toml", (3, 2), 1, 1));
-    let plain = reference(&packed);
+    let unedited = reference(&packed);
     let truncates = driver_truncates_loops();
     for (rounds, too_long) in [(4, false), (60_000, false), (66_000, true), (1_000_000, true)] {
         match try_render(&packed, RenderMode::Buffers, &looping(rounds)) {
             Ok(film) => {
                 assert!(!(truncates && too_long), "{rounds} rounds: truncation not detected");
-                assert!(has_rounds(&film, &plain, rounds), "{rounds} rounds: wrong image");
+                assert!(has_rounds(&film, &unedited, rounds), "{rounds} rounds: wrong image");
             }
             Err(RenderError::LoopTruncated { .. }) => {
                 assert!(

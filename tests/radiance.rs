@@ -56,7 +56,7 @@ fn largest_error(film: &Film, expected: impl Fn(f64, f64) -> [f64; 3]) -> f64 {
     largest
 }
 
-/// Returns the light that the plane reflects from the point light at the height h. For a view along the normal, the
+/// Returns the radiance of the plane at (x, y) under the point light, at height h. For a view along the normal, the
 /// cosines of the diffuse and the specular term are equal: h / sqrt(h^2 + dx^2 + dy^2).
 fn point_light(x: f64, y: f64, power: i32) -> [f64; 3] {
     let (h, dx, dy) = (1.5, x - 0.4, y + 0.3);

@@ -64,7 +64,7 @@ fn differing_pixels(a: &Film, b: &Film, tolerance: f32) -> Vec<usize> {
 }
 
 /// Returns the pixels that differ visibly, of 40,000 pixels. A shadow edge that moves across a light sample changes a
-/// pixel by 1/16 of the light.
+/// pixel by 1/16 of the light's contribution.
 fn visibly_differing_pixels(offset: f64, shadow_epsilon: f64) -> Vec<usize> {
     let expected = reference(&packed(&cornell()));
     let mut description = transformed(&cornell(), 1.0, DVec3::splat(offset));
@@ -86,8 +86,8 @@ fn is_near_edge(description: &Description, pixel: usize) -> bool {
     let expected = value(description);
     let differs = |moved: Description| (value(&moved) - expected).abs().max_element() > 1e-3;
     let offsets = [DVec3::X, DVec3::Y, DVec3::Z].map(|offset| offset * ROUNDING);
-    let moves = offsets.into_iter().chain(offsets.map(|offset| -offset));
-    moves
+    let displacements = offsets.into_iter().chain(offsets.map(|offset| -offset));
+    displacements
         .into_iter()
         .any(|offset| differs(with_moved_light(description, offset)) || differs(with_moved_camera(description, offset)))
 }
@@ -126,9 +126,9 @@ fn scaling_changes_pixels_only_near_edges() {
             assert!(is_near_edge(&scene, pixel), "scaled by {scale}: pixel {pixel}");
         }
     }
-    let some_pixels = (0..40_000).step_by(41);
-    let near = some_pixels.filter(|pixel| is_near_edge(&scene, *pixel)).count();
-    assert_eq!(near, 0, "some of the sampled pixels are near edges");
+    let sampled_pixels = (0..40_000).step_by(41);
+    let near_edge_count = sampled_pixels.filter(|pixel| is_near_edge(&scene, *pixel)).count();
+    assert_eq!(near_edge_count, 0, "some of the sampled pixels are near edges");
 }
 
 /// Offsets are up to a million times the size of the scene. The image does not change, because packed coordinates are

@@ -84,7 +84,7 @@ fn check_session(device: &Device, scene_count: usize) {
     let context = Context::new();
     let mut session = Session::new(&context, Arc::clone(&scenes[0]));
     let mut previous: Option<Vec<u32>> = None;
-    let mut changed = 0;
+    let mut changed_count = 0;
     for scene in &scenes {
         session.set_scene(Arc::clone(scene));
         for (i, camera) in cameras.iter().enumerate() {
@@ -105,11 +105,11 @@ fn check_session(device: &Device, scene_count: usize) {
                 assert_eq!(image, expected, "camera {i}");
             }
             let now = bits(&expected);
-            changed += usize::from(previous.is_some_and(|previous| previous != now));
+            changed_count += usize::from(previous.is_some_and(|previous| previous != now));
             previous = Some(now);
         }
     }
-    assert!(changed > scene_count, "the images do not depend on the camera");
+    assert!(changed_count > scene_count, "the images do not depend on the camera");
 }
 
 #[test]

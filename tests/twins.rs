@@ -198,7 +198,7 @@ fn functions_and_records_match() {
 #[test]
 fn a_changed_twin_is_detected() {
     let shared = shared_source();
-    let changed = |file: &str, from: &str, to: &str| {
+    let edited_twin = |file: &str, from: &str, to: &str| {
         let text = std::fs::read_to_string(sources::path(&format!("crates/render/src/cpu/{file}"))).expect("a twin");
         assert!(text.contains(from), "{file}: '{from}' not found");
         syn::parse_file(&text.replacen(from, to, 1)).expect("still Rust")
@@ -230,7 +230,7 @@ fn a_changed_twin_is_detected() {
             "pub specular: f32,\n    pub diffuse: f32",
         ),
     ] {
-        let twin = changed(file, from, to);
+        let twin = edited_twin(file, from, to);
         assert!(
             !twin_differences(&shared, &file.replace(".rs", ".wgsl"), &twin).is_empty(),
             "{change}"

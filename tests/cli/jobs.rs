@@ -49,14 +49,14 @@ fn wait_for(folder: &TestFolder, file: &str, bytes: u64) {
 
 /// Waits until the child has used 0.15 s of CPU time. By then, its signal handlers are installed.
 fn wait_for_cpu_time(child: &Child) {
-    let ticks = || {
+    let cpu_ticks = || {
         let stat = fs::read_to_string(format!("/proc/{}/stat", child.id())).ok()?;
         let fields: Vec<&str> = stat.rsplit(") ").next()?.split(' ').collect();
         let number = |i: usize| fields.get(i)?.parse::<u64>().ok();
         Some(number(11)? + number(12)?) // user and system time in 1/100 s
     };
     let start = Instant::now();
-    while ticks().is_some_and(|ticks| ticks < 15) && start.elapsed() < Duration::from_secs(60) {
+    while cpu_ticks().is_some_and(|cpu_ticks| cpu_ticks < 15) && start.elapsed() < Duration::from_secs(60) {
         std::thread::sleep(Duration::from_millis(2));
     }
     std::thread::sleep(Duration::from_millis(100));

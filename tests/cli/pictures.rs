@@ -428,10 +428,14 @@ fn radiance_layers_use_the_view_of_the_image() {
         let (_, _, layer) = read_png(&folder.path(&format!("a.{name}.png")));
         for (i, found) in layer.chunks(3).enumerate() {
             let color = ["R", "G", "B"].map(|part| f32::from_bits(channels[&format!("{name}.{part}")][i]));
-            let light = settings.rgb8(color);
-            let reflectance = settings.display_reflectance(color).map(to_8_bits);
-            differing += usize::from(light != reflectance);
-            assert_eq!(found, if name == "albedo" { reflectance } else { light }, "{name} {i}");
+            let as_light = settings.rgb8(color);
+            let as_reflectance = settings.display_reflectance(color).map(to_8_bits);
+            differing += usize::from(as_light != as_reflectance);
+            assert_eq!(
+                found,
+                if name == "albedo" { as_reflectance } else { as_light },
+                "{name} {i}"
+            );
         }
     }
     assert!(differing > 30, "{differing}");

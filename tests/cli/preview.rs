@@ -122,9 +122,9 @@ fn the_complete_files_are_the_same_with_and_without_previews() {
                 assert_eq!((result.code, result.stderr.as_str()), (0, ""), "{options:?}");
                 read_and_remove_files(&folder)
             };
-            let (plain, previewed) = (render(&[]), render(&["--preview"]));
-            assert!(plain.len() >= 2);
-            assert!(plain == previewed, "{device}: {options:?}");
+            let (without_preview, with_preview) = (render(&[]), render(&["--preview"]));
+            assert!(without_preview.len() >= 2);
+            assert!(without_preview == with_preview, "{device}: {options:?}");
         }
     }
 }

@@ -72,10 +72,10 @@ fn insert_long_loop(files: &Files, file: &str, next_code: &str) {
 
 #[test]
 fn a_truncated_loop_is_reported_or_the_image_is_complete() {
-    let small = SCENE
+    let small_scene = SCENE
         .replace("width = 40", "width = 8")
         .replace("height = 30", "height = 8");
-    let files = Files::new(&small);
+    let files = Files::new(&small_scene);
     let session = files.start();
     session.wait_for_rendered_image(&files);
     let initial = session.colors();

@@ -173,13 +173,13 @@ fn images_are_not_sent_to_foreign_origins_and_are_only_accepted_from_the_page() 
         let (status, text) = send_request(address, &get(path, &own_host, ""));
         assert_eq!(status, "HTTP/1.1 200 OK", "{path}");
         assert!(text.contains(mime_type) && text.contains("same-origin"), "{path}");
-        let foreign = get(path, &own_host, "Origin: http://evil.example\r\n");
-        assert_eq!(send_request(address, &foreign).0, "HTTP/1.1 403 Forbidden");
+        let cross_origin_request = get(path, &own_host, "Origin: http://evil.example\r\n");
+        assert_eq!(send_request(address, &cross_origin_request).0, "HTTP/1.1 403 Forbidden");
     }
     let upload = |origin: &str| {
-        let head =
+        let request_head =
             format!("POST /reference/a%20b.png HTTP/1.1\r\nHost: {own_host}\r\n{origin}Content-Length: 10\r\n\r\n");
-        send_request(address, &(head + "not image."))
+        send_request(address, &(request_head + "not image."))
     };
     let own_origin = format!("Origin: http://{own_host}\r\n");
     for origin in ["", "Origin: null\r\n", "Origin: http://evil.example\r\n"] {

@@ -484,7 +484,7 @@ fn constant_textures_equal_plain_values() {
     for case in cases() {
         let name = format!("texture-{}", case.name);
         let textured = pixels(&tilted_quad(&name, case.texel, &case.textured));
-        let plain = pixels(&tilted_quad(&format!("{name}-plain"), case.texel, &case.plain));
+        let untextured = pixels(&tilted_quad(&format!("{name}-plain"), case.texel, &case.plain));
         let white = pixels(&tilted_quad(&format!("{name}-white"), WHITE, &case.textured));
         let max_difference = |a: &[[f32; 3]], b: &[[f32; 3]]| {
             let pairs = a.as_flattened().iter().zip(b.as_flattened());
@@ -499,14 +499,14 @@ fn constant_textures_equal_plain_values() {
             1e-5
         };
         assert!(
-            max_difference(&textured, &plain) < tolerance,
-            "{}: {textured:?} {plain:?}",
+            max_difference(&textured, &untextured) < tolerance,
+            "{}: {textured:?} {untextured:?}",
             case.name
         );
         // Negative control: with a white texel, the image differs visibly.
         assert!(
-            max_difference(&white, &plain) > 0.1,
-            "{}: {white:?} {plain:?}",
+            max_difference(&white, &untextured) > 0.1,
+            "{}: {white:?} {untextured:?}",
             case.name
         );
     }

@@ -139,8 +139,8 @@ fn vertex_colors_that_are_not_finite_are_white() {
 
 #[test]
 fn ply_lines_may_have_more_values_than_declared() {
-    let wide = "0 0 0 255 1 2\n1 0 0 3\n1 1 0\n0 1 0 7 8\n";
-    let mesh = load("a.ply", ply(wide, "3 0 1 2 200 100 50\n"), None).unwrap();
+    let long_lines = "0 0 0 255 1 2\n1 0 0 3\n1 1 0\n0 1 0 7 8\n";
+    let mesh = load("a.ply", ply(long_lines, "3 0 1 2 200 100 50\n"), None).unwrap();
     assert_eq!(corners(&mesh), [FIRST]);
     assert_eq!(
         mesh.notes,

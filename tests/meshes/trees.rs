@@ -523,16 +523,20 @@ fn any_other_bvh_gives_the_same_bits() {
         ("knots", scenes::packed(&scenes::scene("twisted-tube.toml"))),
     ] {
         for max_leaf_size in 1..=4 {
-            let changed = with_bvhs(&scene, &|boxes| build_bvh(boxes, max_leaf_size));
+            let other_scene = with_bvhs(&scene, &|boxes| build_bvh(boxes, max_leaf_size));
             assert_eq!(
-                differing_between(&scene, &changed, 4000),
+                differing_between(&scene, &other_scene, 4000),
                 [0, 0],
                 "{name}, at most {max_leaf_size} per leaf"
             );
         }
-        let changed = with_bvhs(&scene, &|boxes| random_bvh(boxes, &random));
-        assert_ne!(changed.bvh.nodes, scene.bvh.nodes);
-        assert_eq!(differing_between(&scene, &changed, 250), [0, 0], "{name}, a random BVH");
+        let other_scene = with_bvhs(&scene, &|boxes| random_bvh(boxes, &random));
+        assert_ne!(other_scene.bvh.nodes, scene.bvh.nodes);
+        assert_eq!(
+            differing_between(&scene, &other_scene, 250),
+            [0, 0],
+            "{name}, a random BVH"
+        );
     }
 }
 

@@ -104,11 +104,11 @@ fn count_leaks(scene: &Packed, rays: u32, from_inside: bool) -> u32 {
 /// Traces a random ray and a shadow ray. Returns true if one of them leaks through the convex mesh.
 fn leaks(scene: &Packed, solid: &Solid, from_inside: bool, random: &Random) -> bool {
     let target = solid.target(random);
-    let sideways = DVec3::from_array([(); 3].map(|()| random.between(-0.3, 0.3))) * solid.radius;
+    let offset = DVec3::from_array([(); 3].map(|()| random.between(-0.3, 0.3))) * solid.radius;
     let out = target - solid.center;
     let origin = match from_inside {
-        true => solid.center + sideways,
-        false => target + (out - sideways) * random.magnitude(-1.0, 3.0),
+        true => solid.center + offset,
+        false => target + (out - offset) * random.magnitude(-1.0, 3.0),
     };
     let origin = origin.as_vec3();
     let direction = (target - origin.as_dvec3()).as_vec3();

@@ -164,8 +164,11 @@ fn irradiance_matches_a_sum_over_all_directions() {
         }
     }
     // Negative control: the unrotated normal gives another irradiance.
-    let wrong = irradiance(&sunny(), 8, DVec3::Z) / irradiance(&sunny(), 8, tilted);
-    assert!((wrong - DVec3::ONE).abs().min_element() > 0.05, "{wrong}");
+    let unrotated_ratio = irradiance(&sunny(), 8, DVec3::Z) / irradiance(&sunny(), 8, tilted);
+    assert!(
+        (unrotated_ratio - DVec3::ONE).abs().min_element() > 0.05,
+        "{unrotated_ratio}"
+    );
 }
 
 #[test]
@@ -290,21 +293,21 @@ fn light_and_bsdf_sampling_of_the_map_agree() {
     ] {
         let packed = with_map(&image, "\nvisible = false", (4096, 2), &text);
         let found = |shaders| mean(&render_with(&packed, RenderMode::Baked, shaders));
-        let both = found(sources::shaders());
+        let with_mis = found(sources::shaders());
         let [light, bsdf, wrong] = [&light_sampling, &bsdf_sampling, &wrong].map(found);
         for i in 0..3 {
-            let near = |x: f64| (x - both[i]).abs() < 1e-2 * both[i];
+            let is_near = |x: f64| (x - with_mis[i]).abs() < 1e-2 * with_mis[i];
             assert!(
-                near(light[i]),
-                "light sampling alone differs: {light:?}, expected {both:?}"
+                is_near(light[i]),
+                "light sampling alone differs: {light:?}, expected {with_mis:?}"
             );
             assert!(
-                near(bsdf[i]),
-                "BSDF sampling alone differs: {bsdf:?}, expected {both:?}"
+                is_near(bsdf[i]),
+                "BSDF sampling alone differs: {bsdf:?}, expected {with_mis:?}"
             );
             assert!(
-                !near(wrong[i]),
-                "a wrong weight is accepted: {wrong:?}, expected {both:?}"
+                !is_near(wrong[i]),
+                "a wrong weight is accepted: {wrong:?}, expected {with_mis:?}"
             );
         }
     }
@@ -343,7 +346,7 @@ fn light_of_the_map_and_of_other_emitters_adds_up() {
 fn the_floor_occludes_light_from_below() {
     // For area lights, the renderer would skip the floor as an occluder, because no shape is below the floor. The lower
     // half of the ball is lit only from below.
-    let below = image(8, 4, |_, y| [if y > 2 { 5.0 } else { 0.0 }; 3]);
+    let map_bright_below = image(8, 4, |_, y| [if y > 2 { 5.0 } else { 0.0 }; 3]);
     let floors = [
         "type = 'plane'\nmaterial = 'm'\npoint = [0, 0, 0]\nnormal = [0, 0, 1]\ntangent = [1, 0, 0]",
         "type = 'rectangle'\nmaterial = 'm'\ncenter = [0, 0, 0]\nsize = [1e4, 1e4]\nnormal = [0, 0, 1]\ntangent = [1, 0, 0]",
@@ -355,7 +358,12 @@ fn the_floor_occludes_light_from_below() {
     for mode in both() {
         let brightness = |floor: &str| {
             mean(&render(
-                &with_map(&below, "\nvisible = false", (64, 1), &format!("{ball}{floor}")),
+                &with_map(
+                    &map_bright_below,
+                    "\nvisible = false",
+                    (64, 1),
+                    &format!("{ball}{floor}"),
+                ),
                 mode,
             ))
         };

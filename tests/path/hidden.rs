@@ -62,7 +62,7 @@ fn only_mirrors_show_camera_invisible_emitters() {
                 bright > 3,
                 "{mode:?}, {integrator}: only {bright} pixels of the mirror show the emitter"
             );
-            // Behind the hidden emitter, the camera sees the wall.
+            // Behind the camera-invisible emitter, the camera sees the wall.
             let center = 12 * 24 + 12;
             assert!(
                 hidden[center][0] < 3.9 && hidden[center][0] > 0.0,

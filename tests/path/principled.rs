@@ -433,13 +433,13 @@ fn values_come_from_the_channels_of_a_texture() {
         "constant" => "[textures.t]\ntype = 'constant'\ncolor = [0.75, 0.5, 0.25]",
         _ => "[textures.t]\ntype = 'checker'\neven = [0.75, 0.5, 0.25]\nodd = [0.75, 0.5, 0.25]",
     };
-    let plain = sphere_scene(
+    let untextured = sphere_scene(
         "metallic = 0.25\nroughness = 0.5\nclearcoat = 0.75\nclearcoat_roughness = 0.5",
         "",
     );
     let textured = "metallic = { texture = 't', channel = 'b' }\nroughness = { texture = 't', channel = 'g' }\n\
                     clearcoat = { texture = 't' }\nclearcoat_roughness = { texture = 't', channel = 'g' }";
-    let expected = crate::pictures::reference(&plain);
+    let expected = crate::pictures::reference(&untextured);
     for kind in ["constant", "checker"] {
         let packed = sphere_scene(textured, texture(kind));
         // All four values share one texture lookup; a constant texture needs no lookup.

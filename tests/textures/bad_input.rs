@@ -173,9 +173,9 @@ fn the_total_size_of_images_is_limited() {
         format!("[textures.{name}]\ntype = 'image'\nfilter = '{filter}'\nfile = '{file}'\n")
     };
     let error = |text: &str| load(folder.path(), text).unwrap_err();
-    let small = texture("a", "a.png", "nearest");
+    let small_texture = texture("a", "a.png", "nearest");
     assert_eq!(
-        error(&(small.clone() + &texture("b", "huge.png", "nearest"))),
+        error(&(small_texture.clone() + &texture("b", "huge.png", "nearest"))),
         "10: textures.b.file: \"huge.png\" (16384 x 16384 texels) needs 1024.0 MiB and the previous textures 1.0 MiB; \
          the limit is 1024.0 MiB"
     );

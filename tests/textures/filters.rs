@@ -63,7 +63,7 @@ fn a_constant_image_is_constant_under_every_filter_and_footprint() {
     write_png(&path("spot.png"), 7, 13, |x, y| {
         if (x, y) == (3, 6) { [0; 3] } else { [200, 31, 5] }
     });
-    let mut changed = 0;
+    let mut changed_count = 0;
     for file in ["even.png", "odd.png", "line.exr", "spot.png"] {
         for filter in FILTERS {
             for wrap in WRAPS {
@@ -73,7 +73,7 @@ fn a_constant_image_is_constant_under_every_filter_and_footprint() {
                 for (uv, dx, dy) in footprints() {
                     let found = color(&scene, uv, dx, dy);
                     if file == "spot.png" {
-                        changed += u32::from(found != expected); // negative control: a single texel is visible
+                        changed_count += u32::from(found != expected); // negative control: a single texel is visible
                     } else {
                         assert_eq!(found, expected, "{keys}\n{uv} {dx} {dy}");
                     }
@@ -82,7 +82,7 @@ fn a_constant_image_is_constant_under_every_filter_and_footprint() {
         }
     }
     // Clamped footprints beyond the edge do not cover the texel.
-    assert!(changed > 800, "{changed}");
+    assert!(changed_count > 800, "{changed_count}");
 }
 
 #[test]
@@ -105,7 +105,7 @@ fn cached_weights_give_the_colors_of_the_reference() {
         "file = 'd.exr'",
     ]
     .map(|keys| textured(folder.path(), &format!("type = 'image'\nfilter = 'ewa'\n{keys}")));
-    let mut different = 0;
+    let mut differing_count = 0;
     for (uv, dx, dy) in footprints() {
         let colors = scenes.each_ref().map(|scene| color(scene, uv, dx, dy));
         for (scene, found) in scenes.iter().zip(colors) {
@@ -117,9 +117,9 @@ fn cached_weights_give_the_colors_of_the_reference() {
                 "{uv} {dx} {dy}"
             );
         }
-        different += u32::from((1..colors.len()).all(|i| colors[i] != colors[0]));
+        differing_count += u32::from((1..colors.len()).all(|i| colors[i] != colors[0]));
     }
-    assert!(different > 100, "{different}"); // negative control: the lookups differ
+    assert!(differing_count > 100, "{differing_count}"); // negative control: the lookups differ
 }
 
 #[test]
