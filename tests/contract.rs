@@ -274,17 +274,20 @@ const SENTENCES: &[Sentence] = &[
     }),
     ("regions outside are rejected", |_, make| {
         let mut backend = make();
-        let outside = |result: Result<(), RenderError>| matches!(result, Err(RenderError::Outside { .. }));
+        let is_outside_error = |result: Result<(), RenderError>| matches!(result, Err(RenderError::Outside { .. }));
         check(
-            outside(backend.begin(region(0, 0, 21, 12))),
+            is_outside_error(backend.begin(region(0, 0, 21, 12))),
             "a film may exceed the image",
         )?;
         backend.begin(region(4, 4, 10, 10)).map_err(|e| e.to_string())?;
         for tile in [region(3, 4, 10, 10), region(4, 4, 11, 10), full_region()] {
-            check(outside(backend.render(tile, 0..1)), "a tile may exceed the film")?;
+            check(
+                is_outside_error(backend.render(tile, 0..1)),
+                "a tile may exceed the film",
+            )?;
         }
         let hits = backend.first_hits(region(0, 0, 20, 13)).map(|_| ());
-        check(outside(hits), "first hits may exceed the image")?;
+        check(is_outside_error(hits), "first hits may exceed the image")?;
         let film = backend.film().map_err(|e| e.to_string())?;
         check(
             film.sums.iter().all(|sum| *sum == glam::Vec4::ZERO),
@@ -300,25 +303,25 @@ const SENTENCES: &[Sentence] = &[
         backend.wait().map_err(|e| e.to_string())?;
         backend.begin(full_region()).map_err(|e| e.to_string())?;
         backend.submit(full_region(), 0..8).map_err(|e| e.to_string())?;
-        let pending = |result: Result<(), RenderError>| matches!(result, Err(RenderError::Pending));
+        let is_pending_error = |result: Result<(), RenderError>| matches!(result, Err(RenderError::Pending));
         check(
-            pending(backend.submit(full_region(), 8..9)),
+            is_pending_error(backend.submit(full_region(), 8..9)),
             "a second submit is accepted",
         )?;
         check(
-            pending(backend.film().map(|_| ())),
+            is_pending_error(backend.film().map(|_| ())),
             "a film is read while work is pending",
         )?;
         check(
-            pending(backend.begin(full_region())),
+            is_pending_error(backend.begin(full_region())),
             "a film is begun while work is pending",
         )?;
         check(
-            pending(backend.resume(Film::new(full_region()))),
+            is_pending_error(backend.resume(Film::new(full_region()))),
             "a film is resumed while work is pending",
         )?;
         check(
-            pending(backend.first_hits(full_region()).map(|_| ())),
+            is_pending_error(backend.first_hits(full_region()).map(|_| ())),
             "first hits are computed while work is pending",
         )?;
         while !backend.poll().map_err(|e| e.to_string())? {

@@ -136,8 +136,8 @@ fn min_of_three(task: impl Fn() + Sync) -> f64 {
         .num_threads(1)
         .build()
         .expect("a thread");
-    let times = || (0..3).map(|_| cpu_time(&task)).fold(f64::INFINITY, f64::min);
-    thread.install(times)
+    let min_time = || (0..3).map(|_| cpu_time(&task)).fold(f64::INFINITY, f64::min);
+    thread.install(min_time)
 }
 
 /// Returns the CPU time of `large` divided by that of `small`. Repeats the measurements while the quotient is not below

@@ -389,13 +389,17 @@ fn negative_filter_lobes_give_negative_alpha() {
 
 #[test]
 fn png_alpha_is_straight_and_exr_alpha_premultiplied() {
-    let straight = |color, alpha| ViewSettings::default().rgba8(color, alpha);
-    assert_eq!(straight([0.25, 0.125, 0.5], 0.5), [186, 136, 255, 128]);
-    assert_eq!(straight([0.5, 0.25, 1.0], 1.0), [186, 136, 255, 255]);
-    assert_eq!(straight([0.0; 3], 0.0), [0; 4]);
-    assert_eq!(straight([-0.01; 3], -0.01), [0; 4], "negative values from filter lobes");
-    assert_eq!(straight([1.1, 0.55, 0.0], 1.1), [255, 186, 0, 255]);
-    assert_eq!(straight([f32::NAN; 3], f32::NAN), [0; 4]);
+    let straight_rgba8 = |color, alpha| ViewSettings::default().rgba8(color, alpha);
+    assert_eq!(straight_rgba8([0.25, 0.125, 0.5], 0.5), [186, 136, 255, 128]);
+    assert_eq!(straight_rgba8([0.5, 0.25, 1.0], 1.0), [186, 136, 255, 255]);
+    assert_eq!(straight_rgba8([0.0; 3], 0.0), [0; 4]);
+    assert_eq!(
+        straight_rgba8([-0.01; 3], -0.01),
+        [0; 4],
+        "negative values from filter lobes"
+    );
+    assert_eq!(straight_rgba8([1.1, 0.55, 0.0], 1.1), [255, 186, 0, 255]);
+    assert_eq!(straight_rgba8([f32::NAN; 3], f32::NAN), [0; 4]);
 }
 
 fn picture(text: &str, aovs: Vec<Aov>) -> Picture {

@@ -137,7 +137,7 @@ fn invalid_scenes_are_reported_with_key_value_and_rule() {
 
 #[test]
 fn invalid_options_are_rejected() {
-    let crop = |x0, y0, x1, y1| Options {
+    let crop_options = |x0, y0, x1, y1| Options {
         crop: Some(Region { x0, y0, x1, y1 }),
         ..cpu_options()
     };
@@ -147,11 +147,14 @@ fn invalid_options_are_rejected() {
     };
     for (options, expected) in [
         (
-            crop(0, 0, 25, 16),
+            crop_options(0, 0, 25, 16),
             "crop: 0,0,25,16 must lie within the image of 24 x 16 pixels",
         ),
-        (crop(3, 0, 3, 16), "crop: 3,0,3,16 must have x0 < x1 and y0 < y1"),
-        (crop(5, 9, 7, 2), "crop: 5,9,7,2 must have x0 < x1 and y0 < y1"),
+        (
+            crop_options(3, 0, 3, 16),
+            "crop: 3,0,3,16 must have x0 < x1 and y0 < y1",
+        ),
+        (crop_options(5, 9, 7, 2), "crop: 5,9,7,2 must have x0 < x1 and y0 < y1"),
         (aov, "aov.sample_count: needs adaptive sampling"),
     ] {
         let error = wgray::render(&scene(), &options).unwrap_err();

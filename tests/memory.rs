@@ -392,7 +392,7 @@ fn image_of(scene: &Scene) -> Arc<Image> {
 fn errors_of_files_have_a_kind_and_a_source() {
     use std::error::Error as _;
     use wgray::scene::SceneError;
-    let missing = |text: &str, overrides: Overrides| {
+    let error_without_files = |text: &str, overrides: Overrides| {
         let options = LoadOptions::new().with_overrides(overrides).with_source(NoFiles);
         Scene::from_slice(format!("{CAMERA}{text}").as_bytes(), SceneFormat::Toml, &options).unwrap_err()
     };
@@ -404,8 +404,8 @@ fn errors_of_files_have_a_kind_and_a_source() {
 materials.a = { type = 'diffuse', color = { texture = 'a' } }
 shapes = [{ type = 'sphere', material = 'a', center = [0, 0, 0], radius = 1 }]";
     for error in [
-        missing("shapes = [{ type = 'mesh', file = 'wood.png' }]", Overrides::default()),
-        missing(texture, strict),
+        error_without_files("shapes = [{ type = 'mesh', file = 'wood.png' }]", Overrides::default()),
+        error_without_files(texture, strict),
     ] {
         let SceneError::Invalid { problem, .. } = &error else {
             panic!("{error:?}");

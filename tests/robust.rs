@@ -10,36 +10,38 @@ use crate::scenes::{packed, scene};
 
 fn transformed(description: &Description, scale: f64, offset: DVec3) -> Description {
     let mut description = description.clone();
-    let point = |p: &mut DVec3| *p = *p * scale + offset;
-    let vector = |v: &mut DVec3| *v *= scale;
-    let lengths = |size: &mut [f64; 2]| *size = size.map(|length| length * scale);
+    let transform_point = |p: &mut DVec3| *p = *p * scale + offset;
+    let scale_vector = |v: &mut DVec3| *v *= scale;
+    let scale_lengths = |size: &mut [f64; 2]| *size = size.map(|length| length * scale);
     match &mut description.camera {
-        CameraDescription::Perspective(camera) => {
-            [&mut camera.position, &mut camera.look_at].into_iter().for_each(point)
-        }
+        CameraDescription::Perspective(camera) => [&mut camera.position, &mut camera.look_at]
+            .into_iter()
+            .for_each(transform_point),
         other => panic!("unexpected variant: {other:?}"),
     };
     for light in &mut description.lights {
         match light {
             LightDescription::Rectangle(light) => {
-                point(&mut light.center);
-                lengths(&mut light.size);
+                transform_point(&mut light.center);
+                scale_lengths(&mut light.size);
             }
-            LightDescription::Point(light) => point(&mut light.position),
+            LightDescription::Point(light) => transform_point(&mut light.position),
             other => panic!("unexpected variant: {other:?}"),
         }
     }
     for shape in &mut description.shapes {
         match shape {
             ShapeDescription::Rectangle(shape) => {
-                point(&mut shape.center);
-                lengths(&mut shape.size);
+                transform_point(&mut shape.center);
+                scale_lengths(&mut shape.size);
             }
             ShapeDescription::Ellipsoid(shape) => {
-                point(&mut shape.center);
-                [&mut shape.a, &mut shape.b, &mut shape.c].into_iter().for_each(vector);
+                transform_point(&mut shape.center);
+                [&mut shape.a, &mut shape.b, &mut shape.c]
+                    .into_iter()
+                    .for_each(scale_vector);
             }
-            ShapeDescription::Tetrahedron(shape) => shape.vertices.iter_mut().for_each(point),
+            ShapeDescription::Tetrahedron(shape) => shape.vertices.iter_mut().for_each(transform_point),
             other => panic!("unexpected variant: {other:?}"),
         }
     }

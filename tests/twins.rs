@@ -126,12 +126,12 @@ const ONE_SIDED: &[(&str, &str, &str)] = &[
 
 fn twin_differences(source: &Source, file: &str, twin: &syn::File) -> Vec<String> {
     let module = parse(source);
-    let two_sided = |s: &Signature| !ONE_SIDED.iter().any(|(f, name, _)| *f == file && *name == s.name);
+    let has_twin = |s: &Signature| !ONE_SIDED.iter().any(|(f, name, _)| *f == file && *name == s.name);
     let functions: Vec<_> = sources::wgsl_functions(&module, source, file)
         .into_iter()
-        .filter(two_sided)
+        .filter(has_twin)
         .collect();
-    let mut twins: Vec<_> = rust_functions(twin).into_iter().filter(two_sided).collect();
+    let mut twins: Vec<_> = rust_functions(twin).into_iter().filter(has_twin).collect();
     // If a WGSL function takes `before` and returns the new value, its Rust twin may take `state: &mut T` instead. The
     // argument is renamed for the comparison.
     let in_place = |wgsl: &Signature, twin: &Signature| {
@@ -156,8 +156,8 @@ fn twin_differences(source: &Source, file: &str, twin: &syn::File) -> Vec<String
         }
     }
     let mut records = sources::wgsl_records(&module, source, file);
-    records.retain(two_sided);
-    let twin_records: Vec<_> = rust_records(twin).into_iter().filter(two_sided).collect();
+    records.retain(has_twin);
+    let twin_records: Vec<_> = rust_records(twin).into_iter().filter(has_twin).collect();
     let mut problems = differences(file, &functions, &twins);
     problems.extend(differences(file, &records, &twin_records));
     problems

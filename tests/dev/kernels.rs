@@ -9,11 +9,11 @@ const ADAPTIVE: &str = "shaders/kernels/adaptive.wgsl";
 
 fn problems(session: &TestSession) -> Vec<String> {
     let state = session.state();
-    let location = |location: &Option<String>| location.clone().unwrap_or_default();
+    let location_text = |location: &Option<String>| location.clone().unwrap_or_default();
     state
         .problems
         .iter()
-        .map(|problem| format!("{}: {}", location(&problem.place), problem.message))
+        .map(|problem| format!("{}: {}", location_text(&problem.place), problem.message))
         .collect()
 }
 

@@ -159,8 +159,11 @@ fn base_color_is_srgb_and_multiplied_by_its_factor() {
     let mesh = builder.quad(Some(material));
     builder.root_node(json!({ "mesh": mesh }));
     // The sRGB transfer function (IEC 61966-2-1).
-    let linear = |byte: f64| ((byte / 255.0 + 0.055) / 1.055).powf(2.4);
-    assert_all(&scene(&builder, "srgb"), [0.5 * linear(128.0), 0.25, linear(64.0)]);
+    let to_linear = |byte: f64| ((byte / 255.0 + 0.055) / 1.055).powf(2.4);
+    assert_all(
+        &scene(&builder, "srgb"),
+        [0.5 * to_linear(128.0), 0.25, to_linear(64.0)],
+    );
 }
 
 #[test]

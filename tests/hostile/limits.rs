@@ -59,16 +59,16 @@ fn the_total_number_of_triangles_is_limited() {
     json["buffers"][0]["byteLength"] = json!(binary.len());
     json["bufferViews"][0]["byteLength"] = json!(binary.len());
     json["accessors"][0]["count"] = json!(3 * count);
-    let meshes = |json: &mut Value, count: usize| {
+    let set_mesh_count = |json: &mut Value, count: usize| {
         json["meshes"] = json!(vec![
             json!({ "primitives": [{ "attributes": { "POSITION": 0 } }] });
             count
         ]);
         json["nodes"] = (0..count).map(|i| json!({ "mesh": i })).collect();
     };
-    meshes(&mut json, 1000);
+    set_mesh_count(&mut json, 1000);
     assert_rejected(&json, &binary, " triangles");
-    meshes(&mut json, 20);
+    set_mesh_count(&mut json, 20);
     assert_eq!(render_glb(&json, &binary).code, 0);
 }
 
@@ -212,10 +212,10 @@ fn images_that_decode_to_a_thousand_times_their_size_are_rejected() {
         &mut json["bufferViews"],
         json!({ "buffer": 0, "byteOffset": start, "byteLength": image.len() }),
     );
-    let slots = |i: usize| json!({ "pbrMetallicRoughness": { "baseColorTexture": { "index": i } } });
+    let new_material = |i: usize| json!({ "pbrMetallicRoughness": { "baseColorTexture": { "index": i } } });
     json["images"] = json!(vec![json!({ "bufferView": 1 }); 50]);
     json["textures"] = (0..50).map(|i| json!({ "source": i })).collect();
-    json["materials"] = (0..50).map(slots).collect();
+    json["materials"] = (0..50).map(new_material).collect();
     let primitive = |i: usize| json!({ "attributes": { "POSITION": 0 }, "material": i });
     json["meshes"][0]["primitives"] = (0..50).map(primitive).collect();
     assert_rejected(&json, &binary, "texels in total; for files of ");
@@ -226,7 +226,7 @@ fn images_that_decode_to_a_thousand_times_their_size_are_rejected() {
     json["buffers"][0]["byteLength"] = json!(binary.len());
     json["bufferViews"][1]["byteLength"] = json!(rgba16.len());
     json["meshes"][0]["primitives"] = json!([primitive(0)]);
-    json["materials"] = json!([slots(0)]);
+    json["materials"] = json!([new_material(0)]);
     assert_rejected(&json, &binary, "; the limit for a file of ");
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("deep.png"), &rgba16).unwrap();

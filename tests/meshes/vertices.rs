@@ -119,7 +119,7 @@ fn vertex_colors_are_interpolated() {
 #[test]
 fn base_colors_above_one_are_clamped_and_emission_is_not() {
     let folder = tempfile::tempdir().unwrap();
-    let bright = |mesh: &mut Mesh| mesh.colors = vec![Vec4::new(4.0, 0.5, 1e6, 1.0); mesh.positions.len()];
+    let set_bright_colors = |mesh: &mut Mesh| mesh.colors = vec![Vec4::new(4.0, 0.5, 1e6, 1.0); mesh.positions.len()];
     let material = |keys: &str| {
         format!(
             "{CAMERA_ABOVE}environment = {{ color = [1, 1, 1] }}\nmaterials.m = {{ type = 'principled', specular = 0, metallic = 0, {keys} }}\n{SHAPE}"
@@ -129,13 +129,13 @@ fn base_colors_above_one_are_clamped_and_emission_is_not() {
         folder.path(),
         16,
         &material("vertex_colors = 'base_color', base_color = [0.5, 0.5, 0.5]"),
-        bright,
+        set_bright_colors,
     );
     let emission = scene(
         folder.path(),
         16,
         &material("vertex_colors = 'emission', base_color = [0, 0, 0], emission = [1, 1, 1]"),
-        bright,
+        set_bright_colors,
     );
     for mode in both() {
         for (packed, expected) in [(&base, [1.0, 0.25, 1.0]), (&emission, [4.0, 0.5, 1e6])] {
@@ -238,11 +238,11 @@ fn emission_from_vertex_colors_lights_like_plain_emission() {
 }
 
 fn set_uv_sets(mesh: &mut Mesh) {
-    let set = |map: fn(Vec2) -> Vec2| mesh.uvs.iter().copied().map(map).collect::<Vec<_>>();
+    let mapped_uvs = |map: fn(Vec2) -> Vec2| mesh.uvs.iter().copied().map(map).collect::<Vec<_>>();
     mesh.more_uvs = vec![
-        set(|uv| Vec2::new(3.0 * uv.y, 0.5 + uv.x)),
-        set(|uv| Vec2::new(0.7 - uv.x, 2.0 * uv.x + 5.0 * uv.y)),
-        set(|uv| uv * uv + Vec2::new(0.25, 0.125)),
+        mapped_uvs(|uv| Vec2::new(3.0 * uv.y, 0.5 + uv.x)),
+        mapped_uvs(|uv| Vec2::new(0.7 - uv.x, 2.0 * uv.x + 5.0 * uv.y)),
+        mapped_uvs(|uv| uv * uv + Vec2::new(0.25, 0.125)),
     ];
 }
 

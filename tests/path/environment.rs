@@ -138,8 +138,8 @@ fn irradiance_matches_a_sum_over_all_directions() {
         (sunny(), 8),
     ];
     // The ground normal in the space of the map.
-    let sines = |degrees: f64| degrees.to_radians().sin_cos();
-    let tilted = DVec3::new(sines(50.0).0, 0.0, sines(50.0).1);
+    let sin_cos = |degrees: f64| degrees.to_radians().sin_cos();
+    let tilted = DVec3::new(sin_cos(50.0).0, 0.0, sin_cos(50.0).1);
     for (image, points) in &images {
         for (rotation, normal) in [
             ("", DVec3::Z),
@@ -292,9 +292,9 @@ fn light_and_bsdf_sampling_of_the_map_agree() {
         image(2, 1, |x, _| [x as f32, 1.0, 2.0]),
     ] {
         let packed = with_map(&image, "\nvisible = false", (4096, 2), &text);
-        let found = |shaders| mean(&render_with(&packed, RenderMode::Baked, shaders));
-        let with_mis = found(sources::shaders());
-        let [light, bsdf, wrong] = [&light_sampling, &bsdf_sampling, &wrong].map(found);
+        let mean_with = |shaders| mean(&render_with(&packed, RenderMode::Baked, shaders));
+        let with_mis = mean_with(sources::shaders());
+        let [light, bsdf, wrong] = [&light_sampling, &bsdf_sampling, &wrong].map(mean_with);
         for i in 0..3 {
             let is_near = |x: f64| (x - with_mis[i]).abs() < 1e-2 * with_mis[i];
             assert!(
@@ -322,21 +322,21 @@ fn light_of_the_map_and_of_other_emitters_adds_up() {
     let text = format!("{EMITTERS}{lights}");
     let dark = EMITTERS.replace(", emission = [5, 3, 1]", "");
     for mode in both() {
-        let sum = |packed: Packed| mean(&render(&packed, mode));
+        let mean_radiance = |packed: Packed| mean(&render(&packed, mode));
         // The rectangle of the area light occludes other light, so the scene with only the map has a black rectangle.
         let rectangle = lights.split("[[lights]]").last().unwrap_or_default();
         let black_rectangle = format!(
             "[[lights]]{}",
             rectangle.replace("color = [3, 3, 3]", "color = [0, 0, 0]")
         );
-        let map_light = sum(with_map(&image, "", (1024, 3), &format!("{dark}{black_rectangle}")));
-        let other_light = sum(with_environment("color = [0, 0, 0]", None, (1024, 3), &text));
-        let all = sum(with_map(&image, "", (1024, 3), &text));
+        let map_light = mean_radiance(with_map(&image, "", (1024, 3), &format!("{dark}{black_rectangle}")));
+        let other_light = mean_radiance(with_environment("color = [0, 0, 0]", None, (1024, 3), &text));
+        let combined = mean_radiance(with_map(&image, "", (1024, 3), &text));
         for i in 0..3 {
             let expected = map_light[i] + other_light[i];
             assert!(
-                (all[i] / expected - 1.0).abs() < 0.01,
-                "{mode:?}: {all:?}, expected {map_light:?} + {other_light:?}"
+                (combined[i] / expected - 1.0).abs() < 0.01,
+                "{mode:?}: {combined:?}, expected {map_light:?} + {other_light:?}"
             );
         }
     }

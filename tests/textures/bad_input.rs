@@ -194,9 +194,9 @@ fn files_are_loaded_once() {
              color = {{ texture = '{name}' }}\n"
         )
     };
-    let packed = |text: &str| wgray_render::pack::pack(&load(folder.path(), text).unwrap());
-    let one_texture = packed(&image("a", "a.png", ""));
-    let three_textures = packed(&format!(
+    let pack = |text: &str| wgray_render::pack::pack(&load(folder.path(), text).unwrap());
+    let one_texture = pack(&image("a", "a.png", ""));
+    let three_textures = pack(&format!(
         "{}{}{}",
         image("a", "a.png", "filter = 'nearest'"),
         image("b", "inner/../a.png", "wrap = 'clamp'"),
@@ -211,7 +211,7 @@ fn files_are_loaded_once() {
         .collect();
     assert_eq!((three_textures.textures.records.len(), levels), (3, vec![1, 7, 7]));
     // Another encoding needs other mip levels.
-    let two_encodings = packed(&(image("a", "a.png", "") + &image("b", "a.png", "encoding = 'linear'")));
+    let two_encodings = pack(&(image("a", "a.png", "") + &image("b", "a.png", "encoding = 'linear'")));
     assert_eq!(
         two_encodings.textures.texels.len(),
         2 * one_texture.textures.texels.len()

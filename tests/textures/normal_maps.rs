@@ -129,9 +129,9 @@ fn a_flat_normal_map_does_not_change_normals() {
     let scene = shapes(Vec3::Z, "", 1.0);
     let numbers = Random::new(8);
     for _ in 0..200 {
-        let unit = || Vec3::from_array([0; 3].map(|_| numbers.between(-1.0, 1.0) as f32)).normalize();
-        let target = Vec3::new(9.0, 0.0, 0.0) + unit();
-        let origin = target + (target - Vec3::new(9.0, 0.0, 0.0)) * 3.0 + unit();
+        let random_unit_vector = || Vec3::from_array([0; 3].map(|_| numbers.between(-1.0, 1.0) as f32)).normalize();
+        let target = Vec3::new(9.0, 0.0, 0.0) + random_unit_vector();
+        let origin = target + (target - Vec3::new(9.0, 0.0, 0.0)) * 3.0 + random_unit_vector();
         let q = &scene.primitives[1];
         let ray = Ray {
             origin,

@@ -26,8 +26,8 @@ fn numeric_mean(kind: u32, width: f64, f: Footprint, n: i32) -> f64 {
     let mut sum = 0.0;
     for i in 0..n {
         for j in 0..n {
-            let step = |k: i32| (f64::from(k) + 0.5) / f64::from(n) - 0.5;
-            let p = f.uv.as_dvec2() + f.dx.as_dvec2() * step(i) + f.dy.as_dvec2() * step(j);
+            let offset = |k: i32| (f64::from(k) + 0.5) / f64::from(n) - 0.5;
+            let p = f.uv.as_dvec2() + f.dx.as_dvec2() * offset(i) + f.dy.as_dvec2() * offset(j);
             sum += pattern_value(kind, width, p.x, p.y);
         }
     }
