@@ -489,7 +489,7 @@ impl Situation {
                 let size = random.pick(&[1.0, 1.0, 400.0]);
                 words.extend([(); 2].map(|()| ((random.unit() * size) as f32).to_bits()));
             }
-            _ => arbitrary(&scalars(module, ty), random, words),
+            _ => write_arbitrary(&scalars(module, ty), random, words),
         }
     }
 
@@ -861,7 +861,7 @@ fn integer(function: &str, name: &str, random: &Random) -> u32 {
     }
 }
 
-fn arbitrary(kinds: &[ScalarKind], random: &Random, words: &mut Vec<u32>) {
+fn write_arbitrary(kinds: &[ScalarKind], random: &Random, words: &mut Vec<u32>) {
     for kind in kinds {
         words.push(match kind {
             ScalarKind::Float => (random.between(-1.0, 1.0) as f32).to_bits(),

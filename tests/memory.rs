@@ -127,7 +127,7 @@ fn load_all(folder: &Path, name: &str, overrides: &Overrides) -> Result<Scene, S
     memory
 }
 
-fn small() -> Overrides {
+fn small_overrides() -> Overrides {
     Overrides {
         size: Some((8, 6)),
         pixel_samples: Some(1),
@@ -144,18 +144,18 @@ fn scenes_and_models_in_memory_equal_files() {
         "twisted-tube.toml",
         "materials.toml",
     ] {
-        load_all(&scenes, name, &small()).unwrap();
+        load_all(&scenes, name, &small_overrides()).unwrap();
     }
     let folder = models();
     for name in ["s.toml", "a.obj", "b.ply", "c.stl", "g.gltf"] {
-        let scene = load_all(folder.folder(), name, &small()).unwrap();
+        let scene = load_all(folder.folder(), name, &small_overrides()).unwrap();
         assert!(!scene.shapes.is_empty(), "{name}");
         let has_texture = ["s.toml", "a.obj", "g.gltf"].contains(&name);
         assert_eq!(!scene.textures.is_empty(), has_texture, "{name}");
     }
     let unchanged = sources::path("tests/unchanged");
     for name in ["animated-skin.glb", "ktx2.glb", "coat-normal.glb", "small.toml"] {
-        load_all(&unchanged, name, &small()).unwrap();
+        load_all(&unchanged, name, &small_overrides()).unwrap();
     }
 }
 
@@ -202,7 +202,7 @@ fn errors_have_file_line_and_rule() {
         ("empty.ply", "empty.ply: the file is empty"),
         ("bad.gltf", "bad.gltf: "),
     ] {
-        let error = load_all(folder.folder(), name, &small()).unwrap_err();
+        let error = load_all(folder.folder(), name, &small_overrides()).unwrap_err();
         assert!(error.starts_with(expected), "{error}");
     }
     let load = |name: &str| {
@@ -358,7 +358,7 @@ radius = 1
         texels: Texels::Bytes(Encoding::Srgb, vec![[1, 2, 3]]),
     };
     let options = LoadOptions::new()
-        .with_overrides(small())
+        .with_overrides(small_overrides())
         .with_mesh("triangle", mesh)
         .with_image("a", image)
         .with_source(files_of(models().folder()));
@@ -505,7 +505,7 @@ impl Seek for FullDisk {
 
 #[test]
 fn images_written_to_memory_equal_files() {
-    let scene = Scene::load_with(sources::path("scenes/materials.toml"), &small()).unwrap();
+    let scene = Scene::load_with(sources::path("scenes/materials.toml"), &small_overrides()).unwrap();
     let options = Options {
         device: Device::Cpu,
         aovs: vec![Aov::Depth, Aov::Normal],

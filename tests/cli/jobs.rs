@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use super::{RunResult, TestFolder, program};
 
 /// A render that takes a few seconds.
-const LONG: [&str; 8] = [
+const LONG_RENDER: [&str; 8] = [
     "render",
     "small.toml",
     "--size",
@@ -21,7 +21,7 @@ const LONG: [&str; 8] = [
 ];
 
 fn render_expected(folder: &TestFolder) -> Vec<u8> {
-    let mut arguments = LONG.to_vec();
+    let mut arguments = LONG_RENDER.to_vec();
     arguments.extend(["-o", "whole.exr", "--reproducible", "--device", "cpu"]);
     folder.run_quietly(&arguments);
     folder.read("whole.exr")
@@ -30,7 +30,7 @@ fn render_expected(folder: &TestFolder) -> Vec<u8> {
 fn start(folder: &TestFolder, arguments: &[&str]) -> Child {
     Command::new(program())
         .current_dir(folder.path("."))
-        .args(LONG)
+        .args(LONG_RENDER)
         .args(["--reproducible", "--threads", "1"]) // so that the render takes seconds on any machine
         .args(arguments)
         .stderr(Stdio::piped())
@@ -74,7 +74,7 @@ fn wait_for_end(child: Child) -> RunResult {
 
 /// Resumes the render from the checkpoint `c`.
 fn resume_render(folder: &TestFolder, device: &str) -> RunResult {
-    let mut arguments = LONG.to_vec();
+    let mut arguments = LONG_RENDER.to_vec();
     arguments.extend(["--reproducible", "--checkpoint", "c", "--resume", "--device", device]);
     arguments.extend(["-o", "out.exr"]);
     folder.run(&arguments)

@@ -10,7 +10,7 @@ use wgray::image::read_metadata;
 use super::{RunResult, TestFolder, program, project_scene, restore_signal_defaults};
 
 /// A render that takes minutes, with passes of a few hundredths of a second.
-const LONG: [&str; 8] = [
+const LONG_RENDER: [&str; 8] = [
     "render",
     "small.toml",
     "--size",
@@ -31,7 +31,7 @@ fn start_in_shell(folder: &TestFolder, shell_prefix: &str, arguments: &[&str]) -
         .current_dir(folder.path("."))
         .args(["-c", &format!("{shell_prefix} exec \"$0\" \"$@\"")])
         .arg(program())
-        .args(LONG)
+        .args(LONG_RENDER)
         .arg("--preview")
         .args(arguments)
         .stderr(Stdio::piped())

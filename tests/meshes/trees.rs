@@ -21,7 +21,7 @@ use wgray_render::records::{
     SAMPLE_BLOCK,
 };
 
-use super::procedural::{HEAD, TriangleMesh, scene};
+use super::procedural::{SCENE_START, TriangleMesh, scene};
 use crate::random::Random;
 use crate::random_scenes::any_scene;
 use crate::scenes;
@@ -440,7 +440,7 @@ fn soups() -> Packed {
     )
     .expect("a mesh");
     let mut text = format!(
-        "{HEAD}[render]
+        "{SCENE_START}[render]
         shadows = 'transparent'
         [meshes.a]
         file = 'a.obj'

@@ -105,14 +105,14 @@ fn irradiance(image: &Image, points: u32, normal: DVec3) -> DVec3 {
     })
 }
 
-fn noise(width: u32, height: u32) -> Image {
+fn noise_image(width: u32, height: u32) -> Image {
     let random = Random::new(7);
     image(width, height, |_, _| {
         [(); 3].map(|()| random.unit().powi(6) as f32 * 8.0)
     })
 }
 
-fn sunny() -> Image {
+fn sunny_image() -> Image {
     image(64, 32, |x, y| match (x, y) {
         (20, 6) => [4000.0, 3000.0, 2000.0],
         (_, 0..16) => [0.3, 0.5, 0.9],
@@ -132,10 +132,10 @@ fn irradiance_matches_a_sum_over_all_directions() {
         (image(1, 1, |_, _| [0.5, 1.0, 2.0]), 64),
         (image(2, 1, |x, _| [f32::from(x as u8), 1.0, 0.5]), 128),
         (image(2, 2, |x, y| [x as f32, y as f32, 1.0]), 64),
-        (noise(33, 17), 8),
+        (noise_image(33, 17), 8),
         (one_bright_texel(16, 8, (5, 2)), 32),
         (one_bright_texel(16, 8, (15, 0)), 32),
-        (sunny(), 8),
+        (sunny_image(), 8),
     ];
     // The ground normal in the space of the map.
     let sin_cos = |degrees: f64| degrees.to_radians().sin_cos();
@@ -164,7 +164,7 @@ fn irradiance_matches_a_sum_over_all_directions() {
         }
     }
     // Negative control: the unrotated normal gives another irradiance.
-    let unrotated_ratio = irradiance(&sunny(), 8, DVec3::Z) / irradiance(&sunny(), 8, tilted);
+    let unrotated_ratio = irradiance(&sunny_image(), 8, DVec3::Z) / irradiance(&sunny_image(), 8, tilted);
     assert!(
         (unrotated_ratio - DVec3::ONE).abs().min_element() > 0.05,
         "{unrotated_ratio}"
@@ -287,7 +287,7 @@ fn light_and_bsdf_sampling_of_the_map_agree() {
     // The scene has no area light, because area lights have their own MIS weights.
     let text = EMITTERS.replace(", emission = [5, 3, 1]", "");
     for image in [
-        noise(16, 8),
+        noise_image(16, 8),
         one_bright_texel(16, 8, (4, 1)),
         image(2, 1, |x, _| [x as f32, 1.0, 2.0]),
     ] {
@@ -315,7 +315,7 @@ fn light_and_bsdf_sampling_of_the_map_agree() {
 
 #[test]
 fn light_of_the_map_and_of_other_emitters_adds_up() {
-    let image = sunny();
+    let image = sunny_image();
     let lights = "[[lights]]\ntype = 'point'\nposition = [1, -1, 2]\ncolor = [2, 2, 2]\n\
                  [[lights]]\ntype = 'directional'\ndirection = [1, 2, -3]\ncolor = [1, 1, 0.5]\n\
                  [[lights]]\ntype = 'rectangle'\ncenter = [0, 0.5, 1.5]\nsize = [0.5, 0.5]\nnormal = [0, 0, -1]\ntangent = [1, 0, 0]\ncolor = [3, 3, 3]\n";
@@ -435,7 +435,7 @@ fn a_scale_of_two_doubles_every_pixel_exactly() {
     for mode in both() {
         let film = |scale: f64| {
             render(
-                &with_map(&noise(16, 8), &format!("\nscale = {scale}"), (16, 3), GROUND),
+                &with_map(&noise_image(16, 8), &format!("\nscale = {scale}"), (16, 3), GROUND),
                 mode,
             )
         };
@@ -451,7 +451,7 @@ fn a_scale_of_two_doubles_every_pixel_exactly() {
 #[test]
 fn all_backends_give_the_same_bits() {
     let text = format!("{EMITTERS}[[lights]]\ntype = 'point'\nposition = [1, -1, 2]\ncolor = [2, 2, 2]\n");
-    for image in [noise(33, 17), sunny(), image(1, 1, |_, _| [1.0; 3])] {
+    for image in [noise_image(33, 17), sunny_image(), image(1, 1, |_, _| [1.0; 3])] {
         for rotation in ["", "\nrotate = [10, 20, 30]"] {
             let packed = with_map(&image, rotation, (64, 5), &text);
             let expected = render(&packed, RenderMode::Cpu);
@@ -493,10 +493,10 @@ fn sampled_directions_follow_their_pdf() {
         image(1, 1, |_, _| [1.0; 3]),
         image(2, 1, |x, _| [x as f32; 3]),
         image(3, 5, |x, y| [(x + 2 * y) as f32; 3]),
-        noise(33, 17),
-        noise(130, 70),
+        noise_image(33, 17),
+        noise_image(130, 70),
         one_bright_texel(16, 8, (3, 0)),
-        sunny(),
+        sunny_image(),
     ];
     // A zero normal selects all directions.
     let normals = [Vec3::ZERO, Vec3::Z, Vec3::new(0.6, -0.48, -0.64)];

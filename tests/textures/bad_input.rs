@@ -9,14 +9,14 @@ use super::{write_exr, write_png};
 
 const PAGE: &str = include_str!("../../docs/scene-format.md");
 
-const START: &str = "\
+const SCENE_START: &str = "\
 image = { width = 4, height = 4 }
 camera = { position = [0, -3, 1], look_at = [0, 0, 1], fov = 45 }
 ";
 
 fn load(folder: &Path, text: &str) -> Result<Scene, String> {
     let path = folder.join("s.toml");
-    std::fs::write(&path, format!("{START}{text}")).unwrap();
+    std::fs::write(&path, format!("{SCENE_START}{text}")).unwrap();
     let strict = Overrides {
         strict: true,
         ..Overrides::default()
