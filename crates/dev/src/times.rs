@@ -41,7 +41,7 @@ pub struct Time {
     pub kernel: bool,
     /// Number of measurements.
     pub count: u64,
-    /// Seconds of the last measurement.
+    /// Duration of the last measurement in seconds.
     pub last: f64,
     /// The median of the last measurements, in seconds.
     pub median: f64,
