@@ -106,7 +106,7 @@ fn with_diffuse_materials(mut packed: Packed, scene_index: usize) -> Packed {
     packed
 }
 
-/// For each feature, the number of scenes that have hits shaded in lanes and the feature.
+/// For each feature, the number of scenes with this feature in which hits are shaded in lanes.
 #[derive(Debug, Default)]
 struct LaneCoverage {
     camera: usize,

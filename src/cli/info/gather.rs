@@ -46,7 +46,7 @@ pub struct ImageInfo {
     pub integrator: &'static str,
     pub pixel_pattern: &'static str,
     pub pixel_samples: u32,
-    /// Maximum samples per pixel; differs from `pixel_samples` if sampling is adaptive.
+    /// Maximum number of samples per pixel; differs from `pixel_samples` if sampling is adaptive.
     pub max_samples: u32,
     /// The former name of `max_samples`, kept until version 0.3.
     #[serde(rename = "most_samples")]

@@ -14,7 +14,7 @@ use crate::memory::fallible;
 /// Memory limit of a decoder in addition to the image, in bytes.
 const MAX_DECODER_BYTES: usize = 64 << 20;
 
-/// Maximum pixels per byte of a JPEG: each block of 8 x 8 values takes at least one bit and covers up to 32 x 32
+/// Maximum pixel count per byte of a JPEG: each block of 8 x 8 values takes at least one bit and covers up to 32 x 32
 /// pixels.
 const MAX_JPEG_PIXELS_PER_BYTE: u64 = 8 * 32 * 32;
 
