@@ -205,7 +205,7 @@ fn emission_from_vertex_colors_lights_like_plain_emission() {
              normal = [0, 0, 1]\ntangent = [1, 0, 0]\n"
         )
     };
-    let set_colors = |mesh: &mut Mesh| mesh.colors = vec![Vec4::new(0.5, 0.25, 1.0, 0.5); mesh.positions.len()];
+    let set_uniform_colors = |mesh: &mut Mesh| mesh.colors = vec![Vec4::new(0.5, 0.25, 1.0, 0.5); mesh.positions.len()];
     for (alpha, plain_alpha) in [
         ("", ""),
         (
@@ -217,7 +217,7 @@ fn emission_from_vertex_colors_lights_like_plain_emission() {
             folder.path(),
             16,
             &text(&format!("{alpha}emission = [4, 4, 4], vertex_colors = 'emission'")),
-            set_colors,
+            set_uniform_colors,
         );
         let constant_emission = scene(
             folder.path(),

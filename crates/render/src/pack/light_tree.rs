@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use super::{LightNode, NO_INDEX};
 
-/// Buckets per axis for split candidates, section 4.4.
+/// Number of buckets per axis for split candidates (section 4.4).
 const BUCKETS: usize = 12;
 /// Binary splits after which nodes are split at the median, to bound the depth.
 const LIGHT_TREE_MAX_DEPTH: u32 = 48;

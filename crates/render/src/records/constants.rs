@@ -94,7 +94,7 @@ constants! {
     pub const BACKGROUND: u32 = 4;
     /// Maximum number of blocks of the environment map per row or column, a power of two.
     pub const ENVIRONMENT_BLOCKS: u32 = 32;
-    /// Bins of normals per side of the octahedral map; odd, to center the axes.
+    /// Number of bins of normals along each side of the octahedral map; odd, to center the axes.
     pub const NORMAL_BINS: u32 = 17;
     /// [`Light::kind`](super::Light::kind): a spot light.
     pub const SPOT: u32 = KINDS + 4;
