@@ -207,8 +207,8 @@ fn mixture_at(surface: Surface, material: Material, coat_normal: vec3f) -> Princ
     return principled_mixture(material, wo, surface.side > 0.0, coat, LOBES, energy);
 }
 
-// Returns true if wi is in front of the surface for the shading normal and the smooth normal, and the triangle itself does
-// not occlude wi; for transmissive materials, also if wi is behind the surface for all normals.
+// Returns true if wi is in front of the surface for the shading normal and the smooth normal, and the triangle itself
+// does not occlude wi; for transmissive materials, also if wi is behind the surface for all normals.
 fn direction_allowed(prim: HitPrimitive, surface: Surface, material: Material, wi: vec3f) -> bool {
     var lit = is_lit(surface, wi);
     if (TLAS_KINDS & (1u << INSTANCE)) != 0u {

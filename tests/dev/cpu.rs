@@ -27,8 +27,8 @@ fn files() -> Files {
     Files::new(&spheres("phong"))
 }
 
-/// Returns true if `auto` finds only a software Vulkan adapter. The CPU then renders in its place, as long as no shader is
-/// edited.
+/// Returns true if `auto` finds only a software Vulkan adapter. The CPU then renders in its place, as long as no shader
+/// is edited.
 fn only_software_adapter() -> bool {
     choose(&AdapterChoice::Auto).unwrap().info.is_software()
 }

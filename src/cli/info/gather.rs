@@ -106,7 +106,7 @@ pub struct Shapes {
     former_instanced_triangles: u64,
     /// Number of triangles of all mesh instances, triangle shapes and tetrahedra.
     pub triangles: u64,
-    /// Number of primitives that are not part of meshes: shapes (a tetrahedron counts as four triangles) and area lights.
+    /// Number of primitives that are not part of meshes: shapes (a tetrahedron is four triangles) and area lights.
     pub primitives: u64,
 }
 
