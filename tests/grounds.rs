@@ -71,8 +71,8 @@ fn assert_equal_on_all_backends(description: &Description) {
     }
 }
 
-/// A light that is wrongly occluded changes a value by 0.1. Rounding of the normal at the limb of a small sphere changes
-/// a value by less than this tolerance.
+/// A wrongly occluded light changes a value by 0.1. Rounding of the normal at the limb of a small sphere changes a value
+/// by less than this tolerance.
 const TOLERANCE: f64 = 1e-3;
 
 fn count_wrong_pixels(description: &Description) -> usize {

@@ -381,8 +381,8 @@ records! {
         pub groups: u32,
         /// First column of the object-to-world matrix.
         pub u: Vec3,
-        /// Index of the mesh's first group word in `PackedBvh::group_words`. A group word contains the material index of
-        /// a triangle group and the flag [`NO_SHADOW`].
+        /// Index of the mesh's first group word in `PackedBvh::group_words`. A group word contains the material index
+        /// of a triangle group and the flag [`NO_SHADOW`].
         pub first_group_word: u32,
         /// Second column.
         pub v: Vec3,
