@@ -71,7 +71,7 @@ fn assert_equal_on_all_backends(description: &Description) {
     }
 }
 
-/// A wrongly occluded light changes a value by 0.1. Rounding of the normal at the limb of a small sphere changes a value
+/// A wrongly occluded light changes a value by 0.1. Rounding of the normal at the limb of a small sphere changes it
 /// by less than this tolerance.
 const TOLERANCE: f64 = 1e-3;
 
