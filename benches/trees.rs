@@ -15,8 +15,8 @@ struct Surface {
 }
 
 impl Surface {
-    /// Returns a grid of `columns` x `rows` cells of two triangles each. `position` maps two coordinates from 0 to 1 to
-    /// a vertex.
+    /// Returns a grid of `columns` x `rows` cells of two triangles each. `position` maps (u, v), each
+    /// from 0 to 1, to the position of a vertex.
     fn grid(columns: u32, rows: u32, position: impl Fn(f32, f32) -> Vec3) -> Surface {
         let mut surface = Surface {
             corners: Vec::new(),

@@ -11,13 +11,13 @@ fn angles_at(normal: vec3f, wo: vec3f, wi: vec3f) -> Angles {
     return Angles(dot(normal, wi), dot(normal, wo), dot(wi, wo));
 }
 
-// Returns the BRDF times the cosine of wi.
+// Returns the BRDF times the cosine between wi and the normal.
 fn diffuse_eval(material: Material, angles: Angles) -> vec3f {
     return material.diffuse * (max(angles.wi, 0.0) * 0.31830988618379067);
 }
 
-// Returns the BRDF times the cosine of wi, Lambertian at roughness 0: Fujii's Oren-Nayar model with multiple
-// scattering. Portsmouth, Kutz and Hill, "EON: A Practical Energy-Preserving Rough Diffuse BRDF", 2024.
+// Returns the BRDF times the cosine between wi and the normal: Fujii's Oren-Nayar model with multiple scattering,
+// Lambertian at roughness 0. Portsmouth, Kutz and Hill, "EON: A Practical Energy-Preserving Rough Diffuse BRDF", 2024.
 fn rough_diffuse_eval(material: Material, angles: Angles) -> vec3f {
     let wi = max(angles.wi, 0.0);
     let wo = max(angles.wo, 0.0);

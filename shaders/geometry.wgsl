@@ -96,12 +96,12 @@ fn skip_camera_invisible(start: Path) -> Path {
             break;
         }
         let prim = fetch_hit_primitive(hit);
-        let visibility = material_of(prim).camera_visibility;
-        if visibility == 0u {
+        let culling = material_of(prim).camera_culling;
+        if culling == 0u {
             break;
         }
         let surface = surface_of(prim, hit, path.ray);
-        if (visibility == CULL_BACKFACE) & (surface.side > 0.0) {
+        if (culling == CULL_BACKFACE) & (surface.side > 0.0) {
             break;
         }
         path = pass_through_path(path, surface, hit_differential(prim, hit, surface, path.ray, path.differential));

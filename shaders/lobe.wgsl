@@ -62,7 +62,7 @@ fn half_vector(wo: vec3f, wi: vec3f) -> vec3f {
     return select(vec3f(0.0, 0.0, 1.0), sum * (1.0 / sqrt(length2)), length2 > 1e-20);
 }
 
-// Returns the BRDF with a Fresnel term of 1, times the cosine of wi: D G2 / (4 cos).
+// Returns the BRDF with a Fresnel term of 1, times the cosine between wi and the normal: D G2 / (4 cos).
 fn facet_eval(alpha: vec2f, wo: vec3f, wi: vec3f) -> f32 {
     let o = abs(wo.z);
     let i = abs(wi.z);

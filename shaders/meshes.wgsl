@@ -16,9 +16,9 @@ fn word_of(row: vec4u, i: u32) -> u32 {
     return select(select(row.x, row.y, i == 1u), select(row.z, row.w, i == 3u), i >= 2u);
 }
 
-// Returns the word of a triangle's group: the material, and the bit NO_SHADOW.
+// Returns the word of a triangle's group: the material index, combined with the flag NO_SHADOW.
 fn group_word(i: Instance, slot: u32) -> u32 {
-    var group = i.materials;
+    var group = i.first_group_word;
     if i.groups != NO_INDEX {
         group += word_of(meshes[i.groups + slot / 4u], slot % 4u);
     }

@@ -29,7 +29,7 @@ fn metal_factor(material: Material, cosine: f32) -> vec3f {
     return metal_fresnel(material, cosine) * (vec3f(1.0) + metal_fresnel(material, 1.0) * material.loss);
 }
 
-// Returns the BRDF times the cosine of wi.
+// Returns the BRDF times the cosine between wi and the normal.
 fn metal_eval(material: Material, wo: vec3f, wi: vec3f) -> vec3f {
     let lit = (wo.z > 0.0) & (wi.z > 0.0);
     let value = metal_factor(material, dot(wo, half_vector(wo, wi))) * facet_eval(facet_alpha(material), wo, wi);

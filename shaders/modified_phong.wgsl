@@ -23,7 +23,7 @@ fn phong_lobe(material: Material, angles: Angles) -> f32 {
     return power(min(max(cosine, 0.0), 1.0), material.shininess);
 }
 
-// Returns the BRDF times the cosine of wi.
+// Returns the BRDF times the cosine between wi and the normal.
 fn modified_phong_eval(material: Material, angles: Angles) -> vec3f {
     let factors = phong_factors(material);
     let specular = phong_lobe(material, angles) * (material.shininess + 2.0) * 0.15915494309189535;

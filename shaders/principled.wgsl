@@ -157,7 +157,7 @@ fn is_flat(alpha: vec2f) -> bool {
     return max(alpha.x, alpha.y) <= SMALLEST_ALPHA;
 }
 
-// Returns the specular BRDF with a Fresnel term of 1, times the cosine of wi.
+// Returns the specular BRDF with a Fresnel term of 1, times the cosine between wi and the normal.
 fn facets_eval(alpha: vec2f, wo: vec3f, wi: vec3f, half: vec3f) -> f32 {
     return ggx_d(alpha, half) * ggx_g2(alpha, wo, wi) / (4.0 * max(wo.z, 1e-6));
 }
@@ -185,7 +185,7 @@ fn refracting_density(wo: vec3f, wi: vec3f, half: vec3f, eta: f32) -> f32 {
     return select(0.0, density, (o > 0.0) & (i < 0.0));
 }
 
-// Returns the BSDF times the cosine of wi, without deltas.
+// Returns the BSDF without deltas, times |cos| of the angle between wi and the normal.
 fn principled_eval(m: PrincipledLobes, wo: vec3f, wi: vec3f, lobes: u32) -> vec3f {
     var value = m.diffuse * (max(wi.z, 0.0) * 0.31830988618379067);
     if (lobes & LOBE_SPECULAR) != 0u {

@@ -14,7 +14,7 @@ fn refracting_normal(material: Material, wo: vec3f, wi: vec3f) -> vec3f {
     return unit * select(-1.0, 1.0, unit.z > 0.0);
 }
 
-// Returns the BSDF times the cosine of wi, which may be below the surface: equations 20 and 21.
+// Returns the BSDF times |cos| of the angle between wi and the normal, wi above or below: equations 20 and 21.
 fn rough_dielectric_eval(material: Material, wo: vec3f, wi: vec3f) -> vec3f {
     let alpha = facet_alpha(material);
     let eta = 1.0 / material.ior;

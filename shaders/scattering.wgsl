@@ -1,7 +1,7 @@
 // Scattering at a surface for all material kinds.
 
 struct Reflection {
-    value: vec3f,          // BSDF times the cosine of wi; 0 if wi is not allowed
+    value: vec3f,          // BSDF times |cos| of the angle between wi and the shading normal
     pdf: f32,              // per solid angle
 }
 
@@ -25,6 +25,7 @@ fn plain_reflection(surface: Surface, material: Material, wi: vec3f) -> Reflecti
     return result;
 }
 
+// Evaluates the material. The value is 0 if `direction_allowed` returns false for wi.
 fn reflection(prim: HitPrimitive, surface: Surface, material: Material, mixture: PrincipledLobes, wi: vec3f) -> Reflection {
     var result = plain_reflection(surface, material, wi);
     if (MATERIALS & MICROFACET_KINDS) != 0u {
@@ -206,7 +207,8 @@ fn mixture_at(surface: Surface, material: Material, coat_normal: vec3f) -> Princ
     return principled_mixture(material, wo, surface.side > 0.0, coat, LOBES, energy);
 }
 
-// Returns false if shading and geometric normal disagree about the side of wi.
+// Returns true if wi is in front of the surface for the shading normal and the smooth normal, and the triangle itself
+// does not occlude wi; for transmissive materials, also if wi is behind the surface for all normals.
 fn direction_allowed(prim: HitPrimitive, surface: Surface, material: Material, wi: vec3f) -> bool {
     var lit = is_lit(surface, wi);
     if (TLAS_KINDS & (1u << INSTANCE)) != 0u {

@@ -26,8 +26,9 @@ fn sobol_reversed(i: u32) -> u32 {
     return x ^ (x >> 16u);
 }
 
-// Changes every bit depending on the lower bits, which Owen-scrambles reversed digits: the permutation of Laine and
-// Karras, "Stratified Sampling for Stochastic Transparency", EGSR 2011, with the constants of Burley 2020, listing 2.
+// Owen-scrambles bit-reversed digits: the change of each bit depends only on the lower bits. This is the permutation of
+// Laine and Karras, "Stratified Sampling for Stochastic Transparency", EGSR 2011, with the constants of Burley 2020,
+// listing 2.
 fn scramble(digits: u32, seed: u32) -> u32 {
     var x = digits + seed;
     x ^= x * 0x6c50b47cu;

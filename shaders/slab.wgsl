@@ -4,11 +4,12 @@
 // Every step is monotone in 32-bit floats: of two nested boxes, the outer one is entered no later and left no earlier.
 // A traversal thus misses no item whose box a ray hits (docs/decisions/trees.md).
 
-// Precomputed terms of a ray for box tests: origins for lower and upper sides, offset by the padding.
+// Precomputed terms of a ray for box tests: the origin for lower and upper sides, offset by the padding, and 1 over the
+// direction.
 struct Slabs {
     low_origin: vec3f,
     high_origin: vec3f,
-    inverse: vec3f,        // of the direction
+    inverse: vec3f,
 }
 
 fn slabs(origin: vec3f, direction: vec3f, pad: f32) -> Slabs {
@@ -22,7 +23,7 @@ fn inverse_of(x: f32) -> f32 {
     return 1.0 / select(smallest, x, abs(x) >= 7.888609e-31);
 }
 
-// Returns the t of entry, x, and of exit, y; a miss if x > y.
+// Returns the t at which the ray enters the box (x) and leaves it (y). The ray misses the box if x > y.
 fn box_interval(low: vec3f, high: vec3f, s: Slabs) -> vec2f {
     let a = (low - s.low_origin) * s.inverse;
     let b = (high - s.high_origin) * s.inverse;
@@ -36,8 +37,8 @@ fn interval_hits(interval: vec2f, limit: f32) -> bool {
     return (interval.x <= interval.y) & (interval.y >= 0.0) & (interval.x <= limit);
 }
 
-// Precomputed terms of all rays from a point with directions in a box. A box test reports a hit if any of these rays
-// hits.
+// A bundle of rays with a common origin, whose direction components are in given ranges, as precomputed terms for box
+// tests. A test reports a hit if any ray of the bundle may hit the box.
 struct RayInterval {
     low_origin: vec3f,
     high_origin: vec3f,

@@ -15,7 +15,7 @@ fn to_upper_side(wi: vec3f) -> vec3f {
     return vec3f(wi.x, wi.y, abs(wi.z));
 }
 
-// Returns the BSDF times the cosine of wi, which may be below the surface.
+// Returns the BSDF times |cos| of the angle between wi and the normal; wi may be below the surface.
 fn thin_eval(material: Material, wo: vec3f, wi: vec3f) -> vec3f {
     let up = to_upper_side(wi);
     let reflected = thin_reflectance(material.ior, dot(wo, half_vector(wo, up)));

@@ -125,12 +125,12 @@ fn supported_scenes() -> impl Iterator<Item = (String, Description)> {
 fn differing_fraction(a: &[[f64; 3]], b: &[[f64; 3]]) -> f64 {
     assert_eq!(a.len(), b.len());
     let agree = |a: &f64, b: &f64| (a - b).abs() <= TOLERANCE * (1.0 + b.abs());
-    let differ = a
+    let differing_count = a
         .iter()
         .zip(b)
         .filter(|(a, b)| !a.iter().zip(*b).all(|(a, b)| agree(a, b)))
         .count();
-    differ as f64 / a.len() as f64
+    differing_count as f64 / a.len() as f64
 }
 
 #[test]
@@ -238,12 +238,12 @@ fn first_hits_match_the_oracle() {
             let hits = first_hits(&scenes::packed(&description), mode);
             let differing_fraction = |expected: &[Option<Intersection>]| {
                 assert_eq!(hits.len(), expected.len());
-                let differ = hits
+                let differing_count = hits
                     .iter()
                     .zip(expected)
                     .filter(|(hit, intersection)| !same_first_hit(hit, intersection))
                     .count();
-                differ as f64 / hits.len() as f64
+                differing_count as f64 / hits.len() as f64
             };
             let fraction = differing_fraction(&expected);
             println!("{name} {mode:?}: the first hits of a fraction {fraction} of the pixels differ");

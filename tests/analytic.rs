@@ -13,7 +13,7 @@ use wgray::scene::{
 use crate::pictures::{RenderMode, both, first_hits, means, render};
 use crate::scenes::packed;
 
-/// Image side in pixels.
+/// Width and height of the image in pixels.
 const SIDE: u32 = 64;
 
 fn grid(count: u32) -> SamplesDescription {
@@ -194,15 +194,17 @@ fn the_shadow_of_a_sphere_is_an_ellipse() {
     let axis = center - light;
     let half_angle = (radius / axis.length()).asin();
     // Signed angle to the surface of the shadow cone, positive inside.
-    let inside = |position: DVec2| half_angle - (position.extend(0.0) - light).angle_between(axis);
+    let signed_angle = |position: DVec2| half_angle - (position.extend(0.0) - light).angle_between(axis);
     for mode in both() {
         let picture = means(&render(&packed(&scene), mode));
-        let lit = |pixel: u32| picture[pixel as usize][1] > 0.0;
+        let is_lit = |pixel: u32| picture[pixel as usize][1] > 0.0;
         let wrong_pixels = |shift: DVec2, margin: f64| {
-            let pixels =
-                (0..SIDE * SIDE).filter(|pixel| inside(floor_point(camera_position, height, *pixel)).abs() > margin);
+            let pixels = (0..SIDE * SIDE)
+                .filter(|pixel| signed_angle(floor_point(camera_position, height, *pixel)).abs() > margin);
             pixels
-                .filter(|pixel| lit(*pixel) == (inside(floor_point(camera_position, height, *pixel) + shift) > 0.0))
+                .filter(|pixel| {
+                    is_lit(*pixel) == (signed_angle(floor_point(camera_position, height, *pixel) + shift) > 0.0)
+                })
                 .count()
         };
         assert_eq!(wrong_pixels(DVec2::ZERO, 1e-5), 0, "{mode:?}");
@@ -213,7 +215,7 @@ fn the_shadow_of_a_sphere_is_an_ellipse() {
         let tilt = (axis.x / axis.z).abs().atan();
         let major_axis = light.z * ((tilt + half_angle).tan() - (tilt - half_angle).tan()) / 2.0;
         let minor_axis = major_axis * (1.0 - (tilt.sin() / half_angle.cos()).powi(2)).sqrt();
-        let shadow_area = (0..SIDE * SIDE).filter(|pixel| !lit(*pixel)).count() as f64 * pixel * pixel;
+        let shadow_area = (0..SIDE * SIDE).filter(|pixel| !is_lit(*pixel)).count() as f64 * pixel * pixel;
         println!(
             "{mode:?}: the area of the shadow is {shadow_area:.4}, expected {:.4}",
             PI * major_axis * minor_axis
@@ -227,7 +229,7 @@ fn the_shadow_of_a_sphere_is_an_ellipse() {
             "a circle is accepted"
         );
         // Outside the shadow, only the cosine remains, because a point light has no falloff.
-        let errors = (0..SIDE * SIDE).filter(|pixel| lit(*pixel)).map(|pixel| {
+        let errors = (0..SIDE * SIDE).filter(|pixel| is_lit(*pixel)).map(|pixel| {
             let to_light = light - floor_point(camera_position, height, pixel).extend(0.0);
             (picture[pixel as usize][1] - to_light.z / to_light.length()).abs()
         });

@@ -132,8 +132,8 @@ fn invalid_scenes_are_errors() {
         builder.build().expect_err("an error").to_string()
     };
     let mut other_builder = SceneBuilder::new(1, 1, camera());
-    let foreign = other_builder.material(DiffuseDescription::new([0.5; 3]));
-    let message = error(&|builder| builder.shape(SphereDescription::new(&foreign, [0.0; 3], 1.0)));
+    let other_builders_material = other_builder.material(DiffuseDescription::new([0.5; 3]));
+    let message = error(&|builder| builder.shape(SphereDescription::new(&other_builders_material, [0.0; 3], 1.0)));
     assert!(message.starts_with("shapes[0].material"), "{message}");
     let message = error(&|builder| {
         let empty = builder.image(Image {

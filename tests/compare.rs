@@ -111,10 +111,10 @@ fn an_image_equals_itself_and_the_second_image_is_the_reference() {
 
 #[test]
 fn metrics_of_extreme_images_match_closed_forms() {
-    let flat =
+    let uniform =
         |r: f32, g: f32, b: f32, (width, height)| picture(width, height, BYTES, move |_, _, c| [r, g, b][c as usize]);
     for size in [(1, 1), (3, 7), (40, 1), (1, 40), (31, 23)] {
-        let (black, white) = (flat(0.0, 0.0, 0.0, size), flat(255.0, 255.0, 255.0, size));
+        let (black, white) = (uniform(0.0, 0.0, 0.0, size), uniform(255.0, 255.0, 255.0, size));
         let found = color(&black, &white);
         assert_eq!((found.rmse, found.psnr), (1.0, 0.0));
         assert_near(found.rel_mse, 1.0 / 1.01, 1e-12);
@@ -122,7 +122,7 @@ fn metrics_of_extreme_images_match_closed_forms() {
         assert_near(compare::ssim(&black, &white).unwrap(), 1e-4 / (1.0 + 1e-4), 1e-12);
         // Green and blue have the maximum distance by definition.
         assert_near(
-            flip(&flat(0.0, 255.0, 0.0, size), &flat(0.0, 0.0, 255.0, size)),
+            flip(&uniform(0.0, 255.0, 0.0, size), &uniform(0.0, 0.0, 255.0, size)),
             1.0,
             1e-6,
         );
@@ -145,10 +145,10 @@ fn windows_wider_than_the_image_are_clipped_and_renormalized() {
         let cov = mean(&|x| (value_a(x) - ma) * (value_b(x) - mb));
         sum += (2.0 * ma * mb + 1e-4) * (2.0 * cov + 9e-4) / ((ma * ma + mb * mb + 1e-4) * (va + vb + 9e-4));
     }
-    let wide = |values: [f64; 4]| picture(4, 1, BYTES, move |x, _, _| values[x as usize] as f32);
-    let tall = |values: [f64; 4]| picture(1, 4, BYTES, move |_, y, _| values[y as usize] as f32);
-    assert_near(compare::ssim(&wide(a), &wide(b)).unwrap(), sum / 4.0, 1e-12);
-    assert_near(compare::ssim(&tall(a), &tall(b)).unwrap(), sum / 4.0, 1e-12);
+    let row = |values: [f64; 4]| picture(4, 1, BYTES, move |x, _, _| values[x as usize] as f32);
+    let column = |values: [f64; 4]| picture(1, 4, BYTES, move |_, y, _| values[y as usize] as f32);
+    assert_near(compare::ssim(&row(a), &row(b)).unwrap(), sum / 4.0, 1e-12);
+    assert_near(compare::ssim(&column(a), &column(b)).unwrap(), sum / 4.0, 1e-12);
 }
 
 #[test]
@@ -194,12 +194,12 @@ fn flip_decreases_with_the_viewing_distance() {
 
 #[test]
 fn flip_of_linear_values_adapts_its_exposures_to_the_reference() {
-    let flat = |value: f32| picture(12, 12, Kind::Linear, move |_, _, _| value);
+    let uniform = |value: f32| picture(12, 12, Kind::Linear, move |_, _, _| value);
     // The exposures follow the reference, so a common factor cancels.
-    let found = flip(&flat(1.1), &flat(1.0));
+    let found = flip(&uniform(1.1), &uniform(1.0));
     assert!(found > 0.01);
     for scale in [1e-30_f32, 1e-3, 1e3, 1e30] {
-        assert_near(flip(&flat(1.1 * scale), &flat(scale)), found, 1e-4);
+        assert_near(flip(&uniform(1.1 * scale), &uniform(scale)), found, 1e-4);
     }
     // Black, mostly black, negative and infinite images.
     let single_pixel = |value: f32| {
@@ -210,9 +210,9 @@ fn flip_of_linear_values_adapts_its_exposures_to_the_reference() {
             move |x, y, _| if (x, y) == (3, 4) { value } else { 0.0 },
         )
     };
-    assert_eq!(flip(&flat(0.0), &flat(-1.0)), 0.0);
+    assert_eq!(flip(&uniform(0.0), &uniform(-1.0)), 0.0);
     let (bright, similar) = (
-        flip(&single_pixel(5.0), &flat(0.0)),
+        flip(&single_pixel(5.0), &uniform(0.0)),
         flip(&single_pixel(5.0), &single_pixel(4.0)),
     );
     assert!(bright > similar && similar > 0.0, "{bright} {similar}");

@@ -135,12 +135,15 @@ const SENTENCES: &[Sentence] = &[
         let mut without_layers = packed.clone();
         without_layers.specialization.layers = 0;
         let film_without_layers = complete_film(&mut Cpu::new(&without_layers));
-        let same =
+        let has_equal_bits =
             |a: &[glam::Vec4], b: &[glam::Vec4]| bytemuck::cast_slice::<_, u32>(a) == bytemuck::cast_slice::<_, u32>(b);
-        check(same(&film.sums, &film_without_layers.sums), "the sums differ")?;
-        check(same(&film.moments, &film_without_layers.moments), "the moments differ")?;
+        check(has_equal_bits(&film.sums, &film_without_layers.sums), "the sums differ")?;
         check(
-            same(&film.pilot_sums, &film_without_layers.pilot_sums),
+            has_equal_bits(&film.moments, &film_without_layers.moments),
+            "the moments differ",
+        )?;
+        check(
+            has_equal_bits(&film.pilot_sums, &film_without_layers.pilot_sums),
             "the pilot sums differ",
         )
     }),
@@ -160,8 +163,8 @@ const SENTENCES: &[Sentence] = &[
         let mut backend = make();
         backend.begin(full_region()).map_err(|e| e.to_string())?;
         backend.render(full_region(), 0..4).map_err(|e| e.to_string())?;
-        let first = film_bits(&mut *backend);
-        check(first == film_bits(&mut *backend), "the second copy differs")?;
+        let first_copy = film_bits(&mut *backend);
+        check(first_copy == film_bits(&mut *backend), "the second copy differs")?;
         backend.render(full_region(), 4..8).map_err(|e| e.to_string())?;
         let mut uninterrupted = make();
         uninterrupted.begin(full_region()).map_err(|e| e.to_string())?;
@@ -299,17 +302,20 @@ const SENTENCES: &[Sentence] = &[
     }),
     ("regions outside are rejected", |_, make| {
         let mut backend = make();
-        let outside = |result: Result<(), RenderError>| matches!(result, Err(RenderError::Outside { .. }));
+        let is_outside_error = |result: Result<(), RenderError>| matches!(result, Err(RenderError::Outside { .. }));
         check(
-            outside(backend.begin(region(0, 0, 21, 12))),
+            is_outside_error(backend.begin(region(0, 0, 21, 12))),
             "a film may exceed the image",
         )?;
         backend.begin(region(4, 4, 10, 10)).map_err(|e| e.to_string())?;
         for tile in [region(3, 4, 10, 10), region(4, 4, 11, 10), full_region()] {
-            check(outside(backend.render(tile, 0..1)), "a tile may exceed the film")?;
+            check(
+                is_outside_error(backend.render(tile, 0..1)),
+                "a tile may exceed the film",
+            )?;
         }
         let hits = backend.first_hits(region(0, 0, 20, 13)).map(|_| ());
-        check(outside(hits), "first hits may exceed the image")?;
+        check(is_outside_error(hits), "first hits may exceed the image")?;
         let film = backend.film().map_err(|e| e.to_string())?;
         check(
             film.sums.iter().all(|sum| *sum == glam::Vec4::ZERO),
@@ -325,25 +331,25 @@ const SENTENCES: &[Sentence] = &[
         backend.wait().map_err(|e| e.to_string())?;
         backend.begin(full_region()).map_err(|e| e.to_string())?;
         backend.submit(full_region(), 0..8).map_err(|e| e.to_string())?;
-        let pending = |result: Result<(), RenderError>| matches!(result, Err(RenderError::Pending));
+        let is_pending_error = |result: Result<(), RenderError>| matches!(result, Err(RenderError::Pending));
         check(
-            pending(backend.submit(full_region(), 8..9)),
+            is_pending_error(backend.submit(full_region(), 8..9)),
             "a second submit is accepted",
         )?;
         check(
-            pending(backend.film().map(|_| ())),
+            is_pending_error(backend.film().map(|_| ())),
             "a film is read while work is pending",
         )?;
         check(
-            pending(backend.begin(full_region())),
+            is_pending_error(backend.begin(full_region())),
             "a film is begun while work is pending",
         )?;
         check(
-            pending(backend.resume(Film::new(full_region()))),
+            is_pending_error(backend.resume(Film::new(full_region()))),
             "a film is resumed while work is pending",
         )?;
         check(
-            pending(backend.first_hits(full_region()).map(|_| ())),
+            is_pending_error(backend.first_hits(full_region()).map(|_| ())),
             "first hits are computed while work is pending",
         )?;
         while !backend.poll().map_err(|e| e.to_string())? {

@@ -12,7 +12,7 @@ use wgray_render::records::Packed;
 
 use crate::sources;
 
-const START: &str = "\
+const SCENE_START: &str = "\
 image = { width = 8, height = 8 }
 camera = { position = [0, -5, 2], look_at = [0, 0, 0.5], fov = 40 }
 [materials.first]
@@ -33,7 +33,7 @@ tangent = [1, 0, 0]
 /// Returns a scene with n copies of `element`. In each copy, `{i}` is replaced by the number of the copy, and `{x}`,
 /// `{y}` and `{z}` by coordinates.
 fn scene(n: usize, element: &str) -> String {
-    let mut text = START.to_owned();
+    let mut text = SCENE_START.to_owned();
     for i in 0..n {
         let [x, y, z] = [7919, 104_729, 1_299_709].map(|step| format!("{:.3}", (i * step % 1000) as f64 / 250.0 - 2.0));
         let element = element.replace("{i}", &i.to_string());
@@ -136,8 +136,8 @@ fn min_of_three(task: impl Fn() + Sync) -> f64 {
         .num_threads(1)
         .build()
         .expect("a thread");
-    let times = || (0..3).map(|_| cpu_time(&task)).fold(f64::INFINITY, f64::min);
-    thread.install(times)
+    let min_time = || (0..3).map(|_| cpu_time(&task)).fold(f64::INFINITY, f64::min);
+    thread.install(min_time)
 }
 
 /// Returns the CPU time of `large` divided by that of `small`. Repeats the measurements while the quotient is not below
@@ -264,7 +264,11 @@ fn images_are_refused_by_their_headers() {
     std::fs::write(&path, scene(1, SPHERE)).unwrap();
     let program = address_space(&path);
     let check = |name: &str| {
-        std::fs::write(&path, format!("{START}[textures.t]\ntype = 'image'\nfile = '{name}'\n")).unwrap();
+        std::fs::write(
+            &path,
+            format!("{SCENE_START}[textures.t]\ntype = 'image'\nfile = '{name}'\n"),
+        )
+        .unwrap();
         check_within(program + 20_000, &path)
     };
     let (code, message) = check("bits.png");

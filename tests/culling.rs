@@ -66,12 +66,12 @@ fn culled_primitives_occlude_nothing() {
     println!("{culled} primitives were culled, {wrong} of them wrongly");
     assert!(culled > 10_000, "only {culled} primitives were culled");
     assert_eq!(wrong, 0);
-    let smaller = |sphere: Sphere| Sphere {
+    let shrink = |sphere: Sphere| Sphere {
         radius: 0.9 * sphere.radius,
         ..sphere
     };
     assert!(
-        count_culled(&scenes, smaller).1 > 0,
+        count_culled(&scenes, shrink).1 > 0,
         "spheres that are too small are not detected"
     );
 }

@@ -71,16 +71,16 @@ fn assert_equal_on_all_backends(description: &Description) {
     }
 }
 
-/// A missing light changes a value by 0.1. Rounding of the normal at the limb of a small sphere changes a value by less
-/// than this tolerance.
+/// A wrongly occluded light changes a value by 0.1. Rounding of the normal at the limb of a small sphere changes it
+/// by less than this tolerance.
 const TOLERANCE: f64 = 1e-3;
 
 fn count_wrong_pixels(description: &Description) -> usize {
     let expected = Oracle::new(description, Flaw::None).picture();
     let cpu = reference(&packed(description));
-    let close = |(a, b): (&f64, &f64)| (a - b).abs() <= TOLERANCE;
+    let is_close = |(a, b): (&f64, &f64)| (a - b).abs() <= TOLERANCE;
     let pixels = means(&cpu).into_iter().zip(&expected);
-    pixels.filter(|(a, b)| !a.iter().zip(*b).all(close)).count()
+    pixels.filter(|(a, b)| !a.iter().zip(*b).all(is_close)).count()
 }
 
 /// Checks that at most `max_wrong` pixels differ for each radius.

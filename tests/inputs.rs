@@ -128,8 +128,9 @@ struct Face {
     barycentric: DVec2,
     origin: DVec3,
     direction: DVec3,
-    /// Half-extent of the directions of a ray interval.
-    spread: DVec3,
+    /// The rays of a [`RayInterval`](wgray_render::cpu::slab::RayInterval) have directions within `direction_spread` of
+    /// `direction`, per component.
+    direction_spread: DVec3,
 }
 
 impl Face {
@@ -184,7 +185,7 @@ impl Face {
             barycentric,
             origin,
             direction: away * random.pick(&[1.0, size, 1e-3]),
-            spread: vector(random).abs() * size * random.pick(&[0.0, 0.01, 1.0]),
+            direction_spread: vector(random).abs() * size * random.pick(&[0.0, 0.01, 1.0]),
         }
     }
 
@@ -261,8 +262,8 @@ impl Face {
                 "edge_2" => self.edges()[1],
                 "origin" => self.origin,
                 "direction" => self.direction,
-                "min_direction" => self.direction - self.spread,
-                "max_direction" => self.direction + self.spread,
+                "min_direction" => self.direction - self.direction_spread,
+                "max_direction" => self.direction + self.direction_spread,
                 _ => return None,
             }
             .as_vec3(),
@@ -488,7 +489,7 @@ impl Situation {
                 let size = random.pick(&[1.0, 1.0, 400.0]);
                 words.extend([(); 2].map(|()| ((random.unit() * size) as f32).to_bits()));
             }
-            _ => arbitrary(&scalars(module, ty), random, words),
+            _ => write_arbitrary(&scalars(module, ty), random, words),
         }
     }
 
@@ -860,7 +861,7 @@ fn integer(function: &str, name: &str, random: &Random) -> u32 {
     }
 }
 
-fn arbitrary(kinds: &[ScalarKind], random: &Random, words: &mut Vec<u32>) {
+fn write_arbitrary(kinds: &[ScalarKind], random: &Random, words: &mut Vec<u32>) {
     for kind in kinds {
         words.push(match kind {
             ScalarKind::Float => (random.between(-1.0, 1.0) as f32).to_bits(),

@@ -1,6 +1,6 @@
 //! An integrator is a single file that only uses shared functions. This test replaces `phong` by another integrator and
-//! its twin: the diffuse color times the sum of the unoccluded light and, if a random ray near the normal leaves the
-//! scene, 0.5.
+//! its twin: the diffuse color times a sum over the unoccluded lights (color times cosine), plus 0.5 in the sum if a
+//! random ray near the normal leaves the scene.
 
 use glam::{UVec2, Vec3, Vec4};
 use wgray_render::cpu::camera::camera_ray;

@@ -30,13 +30,13 @@ struct MemoryStore {
 
 impl CheckpointStore for MemoryStore {
     fn pieces(&self) -> Vec<StoredPiece> {
-        let stored = |(y, piece): (&u32, &FilmPiece)| StoredPiece {
+        let stored_piece = |(y, piece): (&u32, &FilmPiece)| StoredPiece {
             number: *y as usize,
             region: piece.region,
             film: piece.film.region,
             reached: piece.reached.clone(),
         };
-        self.pieces.iter().map(stored).collect()
+        self.pieces.iter().map(stored_piece).collect()
     }
 
     fn load(&mut self, number: usize) -> Result<FilmPiece, RenderError> {

@@ -157,8 +157,15 @@ impl Function<'_> {
     pub fn run_rounded(&self, device: &Device, shared: &Source, words: &[u32], rounding: Rounding) -> Vec<u32> {
         let mut source = shared.clone();
         source.append("probe", &self.kernel());
-        let calls = words.len() / self.words_in();
-        run(device, &source, rounding, words, calls, calls * self.words_out().len())
+        let call_count = words.len() / self.words_in();
+        run(
+            device,
+            &source,
+            rounding,
+            words,
+            call_count,
+            call_count * self.words_out().len(),
+        )
     }
 }
 

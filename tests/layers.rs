@@ -141,9 +141,9 @@ fn layers_do_not_depend_on_backend_or_work_split() {
 #[test]
 fn layers_do_not_change_the_image() {
     for (name, packed) in subjects() {
-        let plain = packed.clone().without_layers();
-        let expected = reference(&plain);
-        assert_eq!(plain.film_layout().layers, expected.has_layers(), "{name}");
+        let without_layers = packed.clone().without_layers();
+        let expected = reference(&without_layers);
+        assert_eq!(without_layers.film_layout().layers, expected.has_layers(), "{name}");
         for mode in exact_modes() {
             let found = render(&packed, mode);
             let found = Film {
@@ -153,8 +153,12 @@ fn layers_do_not_change_the_image() {
             assert_eq!(differing(&found, &expected), 0, "{name}, {mode:?}");
         }
     }
-    let [plain, alpha] = [SCENE, &scene_with("alpha = true")].map(|text| reference(&parse(text).without_layers()));
-    assert!(differing(&plain, &alpha) > 0, "alpha does not hide the background");
+    let [opaque, with_alpha] =
+        [SCENE, &scene_with("alpha = true")].map(|text| reference(&parse(text).without_layers()));
+    assert!(
+        differing(&opaque, &with_alpha) > 0,
+        "alpha does not hide the background"
+    );
 }
 
 #[test]
@@ -195,7 +199,7 @@ fn light_layers_are_split_by_path_length() {
     assert!(depth_0[0] > 0.0 && depth_0[1..] == [0.0, 0.0], "{depth_0:?}");
     assert!(depth_1[1] > 0.0 && depth_1[2] == 0.0, "{depth_1:?}");
     assert!(depth_4[2] > 0.0, "{depth_4:?}");
-    // The light of short paths does not depend on the maximum depth.
+    // The radiance of short paths does not depend on the maximum depth.
     assert_eq!([depth_0[0], depth_1[0]], [depth_4[0]; 2]);
     assert_eq!(depth_1[1], depth_4[1]);
 }
@@ -385,13 +389,17 @@ fn negative_filter_lobes_give_negative_alpha() {
 
 #[test]
 fn png_alpha_is_straight_and_exr_alpha_premultiplied() {
-    let straight = |color, alpha| ViewSettings::default().rgba8(color, alpha);
-    assert_eq!(straight([0.25, 0.125, 0.5], 0.5), [186, 136, 255, 128]);
-    assert_eq!(straight([0.5, 0.25, 1.0], 1.0), [186, 136, 255, 255]);
-    assert_eq!(straight([0.0; 3], 0.0), [0; 4]);
-    assert_eq!(straight([-0.01; 3], -0.01), [0; 4], "negative values from filter lobes");
-    assert_eq!(straight([1.1, 0.55, 0.0], 1.1), [255, 186, 0, 255]);
-    assert_eq!(straight([f32::NAN; 3], f32::NAN), [0; 4]);
+    let straight_rgba8 = |color, alpha| ViewSettings::default().rgba8(color, alpha);
+    assert_eq!(straight_rgba8([0.25, 0.125, 0.5], 0.5), [186, 136, 255, 128]);
+    assert_eq!(straight_rgba8([0.5, 0.25, 1.0], 1.0), [186, 136, 255, 255]);
+    assert_eq!(straight_rgba8([0.0; 3], 0.0), [0; 4]);
+    assert_eq!(
+        straight_rgba8([-0.01; 3], -0.01),
+        [0; 4],
+        "negative values from filter lobes"
+    );
+    assert_eq!(straight_rgba8([1.1, 0.55, 0.0], 1.1), [255, 186, 0, 255]);
+    assert_eq!(straight_rgba8([f32::NAN; 3], f32::NAN), [0; 4]);
 }
 
 fn picture(text: &str, aovs: Vec<Aov>) -> Picture {
@@ -441,10 +449,10 @@ fn the_library_returns_layers_and_alpha() {
     with_alpha.save(path("a.exr")).unwrap();
     assert_eq!(wgray::image::read_exr(&path("a.exr")).unwrap(), with_alpha.pixels());
 
-    let plain = picture(&text.replace("alpha = true", ""), Vec::new());
-    assert_eq!((plain.alpha(), plain.channel("A")), (None, None));
-    assert_eq!(plain.rgba8().chunks(4).map(|p| p[3]).collect::<Vec<_>>(), [255; 3]);
-    plain.save(path("b.png")).unwrap();
+    let opaque = picture(&text.replace("alpha = true", ""), Vec::new());
+    assert_eq!((opaque.alpha(), opaque.channel("A")), (None, None));
+    assert_eq!(opaque.rgba8().chunks(4).map(|p| p[3]).collect::<Vec<_>>(), [255; 3]);
+    opaque.save(path("b.png")).unwrap();
     assert_eq!(image::open(path("b.png")).unwrap().color(), image::ColorType::Rgb8);
 }
 
@@ -487,9 +495,9 @@ fn path_layers_are_rejected_with_other_integrators() {
 
 #[test]
 fn film_layouts_have_their_own_kernels() {
-    let plain = parse(SCENE);
-    let layered = plain.clone().with_layers();
-    assert!(!plain.same_but_camera(&layered));
+    let without_layers = parse(SCENE);
+    let layered = without_layers.clone().with_layers();
+    assert!(!without_layers.same_but_camera(&layered));
     let Some(device) = adapter::device() else {
         return;
     };
@@ -497,7 +505,7 @@ fn film_layouts_have_their_own_kernels() {
         exact: device.info.exact.then_some(wgray_render::gpu::Rounding::Device),
         baked: false,
     };
-    let mut gpu = Gpu::new(device, &plain, sources::shaders(), options).unwrap();
+    let mut gpu = Gpu::new(device, &without_layers, sources::shaders(), options).unwrap();
     assert!(
         gpu.update(&parse(&SCENE.replace("0.9, 0.8, 0.7", "0.7, 0.8, 0.9")))
             .unwrap()

@@ -1,4 +1,4 @@
-//! Records, constants and overrides of `crates/render/src/pack/`, compared with the WGSL that naga parses.
+//! Records, constants and overrides of `crates/render/src/records/`, compared with the WGSL that naga parses.
 
 use wgray_render::gpu::compose::{KERNELS, Source, built_in};
 use wgray_render::gpu::naga::proc::Layouter;
@@ -12,7 +12,7 @@ use wgray::scene::Integrator;
 
 use crate::sources::{self, parse, shared_source};
 
-fn size<R: Record>() -> (&'static str, u32) {
+fn name_and_size<R: Record>() -> (&'static str, u32) {
     (R::NAME, size_of::<R>() as u32)
 }
 
@@ -49,27 +49,27 @@ fn layout_problems(module: &Module, (name, bytes): (&str, u32)) -> Vec<String> {
 #[test]
 fn records_have_the_same_layout_in_wgsl_and_rust() {
     let module = parse(&shared_source());
-    let sizes = [
-        size::<Camera>(),
-        size::<Environment>(),
-        size::<Primitive>(),
-        size::<Sphere>(),
-        size::<Material>(),
-        size::<Lookup>(),
-        size::<Texture>(),
-        size::<Light>(),
-        size::<Emitter>(),
-        size::<LightNode>(),
-        size::<Counts>(),
-        size::<Node>(),
-        size::<BvhItem>(),
-        size::<Instance>(),
-        size::<FirstHit>(),
-        size::<DispatchParams>(),
+    let records = [
+        name_and_size::<Camera>(),
+        name_and_size::<Environment>(),
+        name_and_size::<Primitive>(),
+        name_and_size::<Sphere>(),
+        name_and_size::<Material>(),
+        name_and_size::<Lookup>(),
+        name_and_size::<Texture>(),
+        name_and_size::<Light>(),
+        name_and_size::<Emitter>(),
+        name_and_size::<LightNode>(),
+        name_and_size::<Counts>(),
+        name_and_size::<Node>(),
+        name_and_size::<BvhItem>(),
+        name_and_size::<Instance>(),
+        name_and_size::<FirstHit>(),
+        name_and_size::<DispatchParams>(),
     ];
     let declared = wgray_render::records::declarations().matches("struct ").count();
-    assert_eq!(sizes.len(), declared, "some records are not compared");
-    for record in sizes {
+    assert_eq!(records.len(), declared, "some records are not compared");
+    for record in records {
         assert_eq!(layout_problems(&module, record), Vec::<String>::new());
     }
 }

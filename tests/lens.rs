@@ -51,8 +51,8 @@ fn pixels_per_unit() -> f64 {
 /// Returns the offset of a pixel center from the image center, in pixels to the right and up.
 fn pixel_offset(i: usize) -> (f64, f64) {
     let side = SIDE as usize;
-    let half = f64::from(SIDE) / 2.0;
-    ((i % side) as f64 + 0.5 - half, half - (i / side) as f64 - 0.5)
+    let half_side = f64::from(SIDE) / 2.0;
+    ((i % side) as f64 + 0.5 - half_side, half_side - (i / side) as f64 - 0.5)
 }
 
 /// Returns two relative errors in the image of a disk that is blurred to `radius` at distance 1: the maximum error of
@@ -61,7 +61,7 @@ fn relative_errors(picture: &[[f64; 3]], radius: f64) -> (f64, f64) {
     let (circle_radius, disk_radius) = (radius * pixels_per_unit(), 0.005 * pixels_per_unit());
     // The fraction of the aperture that sees the disk.
     let aperture_fraction = disk_radius * disk_radius / (circle_radius * circle_radius);
-    let mut worst = 0.0_f64;
+    let mut max_ring_error = 0.0_f64;
     let mut total = 0.0;
     let rings = [0.0, 0.4, 0.7, 1.0].map(|fraction| fraction * (circle_radius - disk_radius - 1.0));
     let mut sums = [(0.0, 0.0); 3];
@@ -75,14 +75,14 @@ fn relative_errors(picture: &[[f64; 3]], radius: f64) -> (f64, f64) {
             }
         }
         if distance > circle_radius + disk_radius + 1.0 {
-            worst = worst.max(mean[0] / aperture_fraction);
+            max_ring_error = max_ring_error.max(mean[0] / aperture_fraction);
         }
     }
     for (sum, count) in sums {
-        worst = worst.max((sum / count / aperture_fraction - 1.0).abs());
+        max_ring_error = max_ring_error.max((sum / count / aperture_fraction - 1.0).abs());
     }
     let expected_total = std::f64::consts::PI * disk_radius * disk_radius;
-    (worst, (total / expected_total - 1.0).abs())
+    (max_ring_error, (total / expected_total - 1.0).abs())
 }
 
 #[test]
@@ -94,8 +94,8 @@ fn an_out_of_focus_disk_blurs_to_its_circle_of_confusion() {
             let radius = 0.2 * (1.0_f64 / 4.0 - 1.0 / distance).abs();
             let packed = disk_scene(distance, lens, 1024);
             let picture = means(&render(&packed, mode));
-            let (worst, total_error) = relative_errors(&picture, radius);
-            assert!(worst < 0.03, "{mode:?} {distance}: {worst}");
+            let (max_ring_error, total_error) = relative_errors(&picture, radius);
+            assert!(max_ring_error < 0.03, "{mode:?} {distance}: {max_ring_error}");
             assert!(total_error < 0.02, "{mode:?} {distance}: {total_error}");
             assert!(
                 relative_errors(&picture, 1.1 * radius).0 > 0.1,
@@ -163,7 +163,7 @@ fn blades_give_a_polygon_with_a_corner_at_the_top() {
             assert!(!is_lit(&far, point_at(degrees + 60.0), mode), "{mode:?} {degrees}");
             assert!(is_lit(&far, point_at(degrees + 120.0), mode), "{mode:?} {degrees}");
         }
-        // Near points show the aperture upside down, with nearly the same circle of confusion.
+        // Near points show the aperture upside down. Their circle of confusion has nearly the same radius.
         let near = disk_scene(2.4, &format!("{lens}0"), 64);
         assert!(is_lit(&near, point_at(180.0), mode), "{mode:?}");
         assert!(!is_lit(&near, point_at(0.0), mode), "{mode:?}");
@@ -246,13 +246,13 @@ fn lens_rays_converge_in_the_focus_plane() {
         let center_direction = camera_ray(&packed.camera, pixel_point).direction;
         for p in [Vec2::X, Vec2::new(-0.3, 0.9), Vec2::ZERO] {
             let ray = lens_ray(&packed.camera, pixel_point, p);
-            let start = ray.origin - packed.camera.position;
-            let point = start + ray.direction * (4.0 / ray.direction.y);
+            let lens_point = ray.origin - packed.camera.position;
+            let point = lens_point + ray.direction * (4.0 / ray.direction.y);
             assert!(
                 point.distance(center_direction * (4.0 / center_direction.y)) < 2e-6,
                 "{pixel_point} {p}: {point}"
             );
-            assert!((start - Vec3::new(0.2 * p.x, 0.0, 0.2 * p.y)).length() < 1e-6);
+            assert!((lens_point - Vec3::new(0.2 * p.x, 0.0, 0.2 * p.y)).length() < 1e-6);
         }
     }
 }

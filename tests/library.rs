@@ -102,13 +102,16 @@ fn a_scene_built_in_code_equals_a_scene_from_a_file() {
     let picture = wgray::render(&loaded, &cpu_options()).unwrap();
     assert_eq!((picture.width(), picture.height()), (24, 16));
     assert_eq!(picture.device().name, "cpu");
-    let different = picture
+    let differing_pairs = picture
         .pixels()
         .colors
         .windows(2)
         .filter(|pair| pair[0] != pair[1])
         .count();
-    assert!(different > 100, "only {different} pairs of neighboring pixels differ");
+    assert!(
+        differing_pairs > 100,
+        "only {differing_pairs} pairs of neighboring pixels differ"
+    );
 }
 
 #[test]
@@ -134,7 +137,7 @@ fn invalid_scenes_are_reported_with_key_value_and_rule() {
 
 #[test]
 fn invalid_options_are_rejected() {
-    let crop = |x0, y0, x1, y1| Options {
+    let crop_options = |x0, y0, x1, y1| Options {
         crop: Some(Region { x0, y0, x1, y1 }),
         ..cpu_options()
     };
@@ -144,11 +147,14 @@ fn invalid_options_are_rejected() {
     };
     for (options, expected) in [
         (
-            crop(0, 0, 25, 16),
+            crop_options(0, 0, 25, 16),
             "crop: 0,0,25,16 must lie within the image of 24 x 16 pixels",
         ),
-        (crop(3, 0, 3, 16), "crop: 3,0,3,16 must have x0 < x1 and y0 < y1"),
-        (crop(5, 9, 7, 2), "crop: 5,9,7,2 must have x0 < x1 and y0 < y1"),
+        (
+            crop_options(3, 0, 3, 16),
+            "crop: 3,0,3,16 must have x0 < x1 and y0 < y1",
+        ),
+        (crop_options(5, 9, 7, 2), "crop: 5,9,7,2 must have x0 < x1 and y0 < y1"),
         (aov, "aov.albedo: needs integrator = \"path\""),
     ] {
         let error = wgray::render(&scene(), &options).unwrap_err();
@@ -247,9 +253,9 @@ fn a_progressive_image_equals_the_rendered_image_and_can_be_cancelled() {
     });
     adaptive.image.width = 130; // more than the first dispatch covers
     adaptive.image.height = 130;
-    let mut plain = adaptive.clone();
-    plain.render.adaptive = None;
-    for description in [plain, adaptive] {
+    let mut uniform = adaptive.clone();
+    uniform.render.adaptive = None;
+    for description in [uniform, adaptive] {
         let scene = description.validate().unwrap();
         let options = Options {
             aovs: vec![Aov::Depth],

@@ -12,7 +12,7 @@ use crate::pictures::{RenderMode, backend_with, differing, exact_modes, referenc
 use crate::sources::{self, edited, edited_shaders, with};
 use crate::{adapter, patterns, scenes};
 
-fn small(name: &str, size: (u32, u32), pixel_samples: u32, light_samples: u32) -> Description {
+fn small_scene(name: &str, size: (u32, u32), pixel_samples: u32, light_samples: u32) -> Description {
     let mut description = scenes::scene(name);
     (description.image.width, description.image.height) = size;
     description.render.pixel_samples = patterns::samples(Pattern::Grid, pixel_samples);
@@ -21,7 +21,7 @@ fn small(name: &str, size: (u32, u32), pixel_samples: u32, light_samples: u32) -
 }
 
 fn spheres(count: u32) -> Description {
-    let mut description = small("cornell.toml", (4, 3), 1, 1);
+    let mut description = small_scene("cornell.toml", (4, 3), 1, 1);
     let Some(material) = description.materials.keys().next().cloned() else {
         panic!("a scene without materials")
     };
@@ -43,7 +43,7 @@ fn spheres(count: u32) -> Description {
 
 /// Returns planes below the floor, which are not in the BVH.
 fn planes(count: u32) -> Description {
-    let mut description = small("cornell.toml", (4, 3), 1, 1);
+    let mut description = small_scene("cornell.toml", (4, 3), 1, 1);
     let Some(material) = description.materials.keys().next().cloned() else {
         panic!("a scene without materials")
     };
@@ -94,16 +94,16 @@ fn looping(rounds: u32) -> Shaders {
     edited_shaders(file, store, &looping)
 }
 
-/// Returns true if the red sums of `film` exceed those of `plain` by `rounds`, so that no iteration is missing.
-fn has_rounds(film: &Film, plain: &Film, rounds: u32) -> bool {
+/// Returns true if the red sums of `film` exceed those of `unedited` by `rounds`, so that no iteration is missing.
+fn has_rounds(film: &Film, unedited: &Film, rounds: u32) -> bool {
     let matches = |(a, b): (&glam::Vec4, &glam::Vec4)| a.x == b.x + rounds as f32 && a.y == b.y;
-    film.sums.iter().zip(&plain.sums).all(matches)
+    film.sums.iter().zip(&unedited.sums).all(matches)
 }
 
 /// Returns true if the driver truncates loops, tested with shaders without the check.
 fn driver_truncates_loops() -> bool {
     const ROUNDS: u32 = 1_000_000;
-    let packed = scenes::packed(&small("cornell.toml", (2, 2), 1, 1));
+    let packed = scenes::packed(&small_scene("cornell.toml", (2, 2), 1, 1));
     let unchecked = without_check(&looping(ROUNDS));
     let film = try_render(&packed, RenderMode::Buffers, &unchecked).expect("a film without the check");
     !has_rounds(&film, &reference(&packed), ROUNDS)
@@ -121,18 +121,18 @@ fn without_check(shaders: &Shaders) -> Shaders {
 
 #[test]
 fn long_renders_are_complete() {
-    let mut adaptive = small("cornell.toml", (5, 4), 64, 64);
+    let mut adaptive = small_scene("cornell.toml", (5, 4), 64, 64);
     adaptive.render.pixel_samples.pattern = Some(Pattern::Sobol);
     adaptive.render.adaptive = Some(AdaptiveDescription {
         error: 0.0,
         max_samples: Some(512),
     });
     for (name, description) in [
-        ("many samples", small("cornell.toml", (8, 4), 1024, 256)),
-        ("many light samples", small("cornell.toml", (6, 5), 2, 4096)),
-        ("three lights", small("lights.toml", (8, 5), 144, 64)),
-        ("mirrors and glass", small("mirror-glass.toml", (8, 6), 100, 64)),
-        ("textures", small("textures.toml", (8, 6), 100, 64)),
+        ("many samples", small_scene("cornell.toml", (8, 4), 1024, 256)),
+        ("many light samples", small_scene("cornell.toml", (6, 5), 2, 4096)),
+        ("three lights", small_scene("lights.toml", (8, 5), 144, 64)),
+        ("mirrors and glass", small_scene("mirror-glass.toml", (8, 6), 100, 64)),
+        ("textures", small_scene("textures.toml", (8, 6), 100, 64)),
         ("many spheres", {
             let mut description = spheres(100);
             description.render.pixel_samples = patterns::samples(Pattern::Grid, 256);
@@ -149,7 +149,7 @@ fn long_renders_are_complete() {
     }
     // Software division and square roots may contain loops.
     if adapter::device().is_some_and(adapter::bit_exact) {
-        let packed = scenes::packed(&small("cornell.toml", (2, 2), 256, 64));
+        let packed = scenes::packed(&small_scene("cornell.toml", (2, 2), 256, 64));
         assert_eq!(differing(&render(&packed, RenderMode::Rounded), &reference(&packed)), 0);
     }
 }
@@ -163,12 +163,12 @@ fn samples_with_too_many_iterations_are_errors_or_correct() {
     for (name, description, mode) in [
         (
             "light samples",
-            small("cornell.toml", (2, 2), 1, 65_536),
+            small_scene("cornell.toml", (2, 2), 1, 65_536),
             RenderMode::Baked,
         ),
         (
             "light samples",
-            small("cornell.toml", (2, 2), 1, 65_536),
+            small_scene("cornell.toml", (2, 2), 1, 65_536),
             RenderMode::Buffers,
         ),
         ("planes", planes(70_000), RenderMode::Buffers),
@@ -212,14 +212,14 @@ fn long_loops_of_edited_shaders_are_errors_or_correct() {
     if adapter::device().is_none() {
         return;
     }
-    let packed = scenes::packed(&small("cornell.toml", (3, 2), 1, 1));
-    let plain = reference(&packed);
+    let packed = scenes::packed(&small_scene("cornell.toml", (3, 2), 1, 1));
+    let unedited = reference(&packed);
     let truncates = driver_truncates_loops();
     for (rounds, too_long) in [(4, false), (60_000, false), (66_000, true), (1_000_000, true)] {
         match try_render(&packed, RenderMode::Buffers, &looping(rounds)) {
             Ok(film) => {
                 assert!(!(truncates && too_long), "{rounds} rounds: truncation not detected");
-                assert!(has_rounds(&film, &plain, rounds), "{rounds} rounds: wrong image");
+                assert!(has_rounds(&film, &unedited, rounds), "{rounds} rounds: wrong image");
             }
             Err(RenderError::LoopTruncated { .. }) => {
                 assert!(
@@ -246,7 +246,7 @@ fn without_the_check_truncated_images_are_wrong() {
     if adapter::device().is_none() || !driver_truncates_loops() {
         return;
     }
-    let packed = scenes::packed(&small("cornell.toml", (2, 2), 1, 65_536));
+    let packed = scenes::packed(&small_scene("cornell.toml", (2, 2), 1, 65_536));
     let film =
         try_render(&packed, RenderMode::Baked, &without_check(sources::shaders())).expect("a film without the check");
     assert!(differing(&film, &reference(&packed)) > 0);

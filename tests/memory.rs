@@ -127,7 +127,7 @@ fn load_all(folder: &Path, name: &str, overrides: &Overrides) -> Result<Scene, S
     memory
 }
 
-fn small() -> Overrides {
+fn small_overrides() -> Overrides {
     Overrides {
         size: Some((8, 6)),
         pixel_samples: Some(1),
@@ -144,18 +144,18 @@ fn scenes_and_models_in_memory_equal_files() {
         "twisted-tube.toml",
         "materials.toml",
     ] {
-        load_all(&scenes, name, &small()).unwrap();
+        load_all(&scenes, name, &small_overrides()).unwrap();
     }
     let folder = models();
     for name in ["s.toml", "a.obj", "b.ply", "c.stl", "g.gltf"] {
-        let scene = load_all(folder.folder(), name, &small()).unwrap();
+        let scene = load_all(folder.folder(), name, &small_overrides()).unwrap();
         assert!(!scene.shapes.is_empty(), "{name}");
         let has_texture = ["s.toml", "a.obj", "g.gltf"].contains(&name);
         assert_eq!(!scene.textures.is_empty(), has_texture, "{name}");
     }
     let unchanged = sources::path("tests/unchanged");
     for name in ["animated-skin.glb", "ktx2.glb", "coat-normal.glb", "small.toml"] {
-        load_all(&unchanged, name, &small()).unwrap();
+        load_all(&unchanged, name, &small_overrides()).unwrap();
     }
 }
 
@@ -202,7 +202,7 @@ fn errors_have_file_line_and_rule() {
         ("empty.ply", "empty.ply: the file is empty"),
         ("bad.gltf", "bad.gltf: "),
     ] {
-        let error = load_all(folder.folder(), name, &small()).unwrap_err();
+        let error = load_all(folder.folder(), name, &small_overrides()).unwrap_err();
         assert!(error.starts_with(expected), "{error}");
     }
     let load = |name: &str| {
@@ -268,7 +268,7 @@ fn no_file_is_read_and_no_error_reveals_which_files_exist() {
     assert!(Path::new("Cargo.toml").is_file() && Path::new("scenes/textures/grid.png").is_file());
     let root = std::env::current_dir().unwrap();
     let folder = models();
-    let elsewhere = folder.path("color.png");
+    let existing_image = folder.path("color.png");
     let templates = [
         "shapes = [{ type = 'mesh', file = 'FILE' }]",
         "shapes = [{ type = 'gltf', file = 'FILE' }]",
@@ -293,7 +293,7 @@ fn no_file_is_read_and_no_error_reveals_which_files_exist() {
             ["Cargo.toml", "None.toml"],
             ["scenes/textures/grid.png", "scenes/textures/none.png"],
             ["scenes/meshes/../textures/grid.png", "scenes/none/../textures/grid.png"],
-            [elsewhere.to_str().unwrap(), "/none/color.png"],
+            [existing_image.to_str().unwrap(), "/none/color.png"],
             [root.join("scenes/meshes/knot.obj").to_str().unwrap(), "/none.obj"],
             ["../../../../../../etc/passwd", "../../../../../../none/none"],
         ] {
@@ -319,12 +319,12 @@ fn no_file_is_read_and_no_error_reveals_which_files_exist() {
     let options = LoadOptions::new().with_source(denied.clone());
     let error = Scene::from_slice(&folder.read("g.gltf"), SceneFormat::Gltf, &options).unwrap_err();
     assert!(error.to_string().starts_with("scene.gltf: buffers[0].uri: "), "{error}");
-    // Symbolic links out of a folder are refused.
+    // A symbolic link in the served folder to a file outside of it is refused.
     #[cfg(unix)]
     {
-        let outside = TestFolder::with_file("s.toml", "");
-        std::os::unix::fs::symlink(&elsewhere, outside.path("link.png")).unwrap();
-        let source = FolderFiles::new(outside.folder());
+        let served = TestFolder::with_file("s.toml", "");
+        std::os::unix::fs::symlink(&existing_image, served.path("link.png")).unwrap();
+        let source = FolderFiles::new(served.folder());
         assert!(source.read("link.png").is_err() && !source.contains("link.png"));
         assert!(source.read("s.toml").is_ok() && source.contains("s.toml"));
         assert!(source.read("../s.toml").is_err() && source.read("").is_err());
@@ -358,7 +358,7 @@ radius = 1
         texels: Texels::Bytes(Encoding::Srgb, vec![[1, 2, 3]]),
     };
     let options = LoadOptions::new()
-        .with_overrides(small())
+        .with_overrides(small_overrides())
         .with_mesh("triangle", mesh)
         .with_image("a", image)
         .with_source(files_of(models().folder()));
@@ -392,7 +392,7 @@ fn image_of(scene: &Scene) -> Arc<Image> {
 fn errors_of_files_have_a_kind_and_a_source() {
     use std::error::Error as _;
     use wgray::scene::SceneError;
-    let missing = |text: &str, overrides: Overrides| {
+    let error_without_files = |text: &str, overrides: Overrides| {
         let options = LoadOptions::new().with_overrides(overrides).with_source(NoFiles);
         Scene::from_slice(format!("{CAMERA}{text}").as_bytes(), SceneFormat::Toml, &options).unwrap_err()
     };
@@ -404,8 +404,8 @@ fn errors_of_files_have_a_kind_and_a_source() {
 materials.a = { type = 'diffuse', color = { texture = 'a' } }
 shapes = [{ type = 'sphere', material = 'a', center = [0, 0, 0], radius = 1 }]";
     for error in [
-        missing("shapes = [{ type = 'mesh', file = 'wood.png' }]", Overrides::default()),
-        missing(texture, strict),
+        error_without_files("shapes = [{ type = 'mesh', file = 'wood.png' }]", Overrides::default()),
+        error_without_files(texture, strict),
     ] {
         let SceneError::Invalid { problem, .. } = &error else {
             panic!("{error:?}");
@@ -505,7 +505,7 @@ impl Seek for FullDisk {
 
 #[test]
 fn images_written_to_memory_equal_files() {
-    let scene = Scene::load_with(sources::path("scenes/materials.toml"), &small()).unwrap();
+    let scene = Scene::load_with(sources::path("scenes/materials.toml"), &small_overrides()).unwrap();
     let options = Options {
         device: Device::Cpu,
         aovs: vec![Aov::Depth, Aov::Normal],

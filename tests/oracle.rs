@@ -433,12 +433,12 @@ impl<'a> Oracle<'a> {
     fn is_occluded(&self, origin: DVec3, direction: DVec3, distance: f64, excluded: Option<[DVec3; 3]>) -> bool {
         let max_t = distance * (1.0 - self.scene.render.shadow_epsilon.max(1e-5));
         let transparent = self.scene.render.shadows == Shadows::Transparent;
-        let glass = |name: &String| matches!(self.scene.materials[name], MaterialDescription::Glass(_));
+        let is_glass = |name: &String| matches!(self.scene.materials[name], MaterialDescription::Glass(_));
         let occludes = |surface: &&Surface| {
             surface
                 .material
                 .as_ref()
-                .is_some_and(|name| !(transparent && glass(name)))
+                .is_some_and(|name| !(transparent && is_glass(name)))
         };
         let occluders = self.surfaces.iter().filter(occludes);
         occluders

@@ -121,7 +121,7 @@ fn spheres_appear_at_their_direction_with_their_solid_angle() {
 #[test]
 fn differentials_match_adjacent_rays() {
     let packed = spheres(&[], 1.0);
-    let exact = |x: f64, y: f64| {
+    let exact_direction = |x: f64, y: f64| {
         direction(
             x * 360.0 / f64::from(WIDTH) - 180.0,
             90.0 - y * 180.0 / f64::from(HEIGHT),
@@ -130,8 +130,8 @@ fn differentials_match_adjacent_rays() {
     for (x, y) in [(64.0, 32.0), (3.25, 7.5), (127.9, 60.0), (10.0, 0.01), (20.0, 63.99)] {
         let found = panorama_differential(&packed.camera, Vec2::new(x as f32, y as f32), 0.5);
         let h = 1e-4;
-        let dx = (exact(x + h, y) - exact(x - h, y)) * (0.5 / (2.0 * h));
-        let dy = (exact(x, y + h) - exact(x, y - h)) * (0.5 / (2.0 * h));
+        let dx = (exact_direction(x + h, y) - exact_direction(x - h, y)) * (0.5 / (2.0 * h));
+        let dy = (exact_direction(x, y + h) - exact_direction(x, y - h)) * (0.5 / (2.0 * h));
         assert!(
             found.x.direction.as_dvec3().distance(dx) < 1e-6,
             "{x} {y}: {found:?} {dx}"

@@ -566,8 +566,9 @@ fn same(kind: ScalarKind, a: u32, b: u32) -> bool {
 fn differing(kinds: &[ScalarKind], a: &[u32], b: &[u32]) -> Vec<usize> {
     assert_eq!(a.len(), b.len());
     let calls = a.chunks_exact(kinds.len()).zip(b.chunks_exact(kinds.len())).enumerate();
-    let differ = calls.filter(|(_, (a, b))| !kinds.iter().zip(*a).zip(*b).all(|((kind, a), b)| same(*kind, *a, *b)));
-    differ.map(|(call, _)| call).collect()
+    let differing_calls =
+        calls.filter(|(_, (a, b))| !kinds.iter().zip(*a).zip(*b).all(|((kind, a), b)| same(*kind, *a, *b)));
+    differing_calls.map(|(call, _)| call).collect()
 }
 
 fn show(kinds: &[ScalarKind], words: &[u32]) -> String {
@@ -589,7 +590,7 @@ fn compare(device: &Device, function: &Function) -> Result<usize, String> {
     let info = &device.info;
     let call_words = |call: usize| &words[call * function.words_in()..(call + 1) * function.words_in()];
     let denormals_differ = allowed(adapter::KNOWN_DIFFERENCES, &info.name, &info.driver, DENORMALS).is_some();
-    let (skipped, differ): (Vec<usize>, Vec<usize>) = differing(&kinds, &gpu, &cpu)
+    let (skipped, differing_calls): (Vec<usize>, Vec<usize>) = differing(&kinds, &gpu, &cpu)
         .into_iter()
         .partition(|call| denormals_differ && twin(name).involves_denormals(call_words(*call), kinds.len()));
     let known_difference = allowed(adapter::KNOWN_DIFFERENCES, &info.name, &info.driver, name);
@@ -600,13 +601,15 @@ fn compare(device: &Device, function: &Function) -> Result<usize, String> {
     // `sample_square` calls `jittered_sample`, which computes large integers from small ones.
     let converts_arguments = !matches!(name, "jittered_sample" | "sample_square");
     let is_rounded_twice = known_difference.is_some_and(|known_difference| known_difference.reason == ROUNDED_TWICE);
-    if is_rounded_twice && converts_arguments && !differ.iter().all(has_large) {
+    if is_rounded_twice && converts_arguments && !differing_calls.iter().all(has_large) {
         return Err(format!(
             "{name}: results differ for calls without integers of 2^31 or more"
         ));
     }
-    judge(known_difference, name, differ.len() as f64 / CALLS as f64).map_err(|message| {
-        let Some(&call) = differ.first() else { return message };
+    judge(known_difference, name, differing_calls.len() as f64 / CALLS as f64).map_err(|message| {
+        let Some(&call) = differing_calls.first() else {
+            return message;
+        };
         let result_start = call * kinds.len();
         let arguments = call_words(call);
         format!(
@@ -720,21 +723,21 @@ fn inputs_cover_both_outcomes_of_predicates() {
         if name.starts_with("intersect_") {
             let words_per_call = function.words_in();
             let limits = words.chunks_exact(words_per_call).map(|call| call[words_per_call - 1]);
-            let hits = results
+            let hit_count = results
                 .iter()
                 .zip(limits)
                 .filter(|(result, limit)| **result != *limit)
                 .count();
-            let hits = hits as f64 / CALLS as f64;
+            let hit_fraction = hit_count as f64 / CALLS as f64;
             assert!(
-                (0.1..0.9).contains(&hits),
-                "{file}: {name} hits for a fraction {hits} of the inputs, which must be from 0.1 to 0.9: see `local_point` in tests/inputs.rs"
+                (0.1..0.9).contains(&hit_fraction),
+                "{file}: {name} hits for a fraction {hit_fraction} of the inputs, which must be from 0.1 to 0.9: see `local_point` in tests/inputs.rs"
             );
         }
-        let nan = fraction(&|word| f32::from_bits(word).is_nan());
+        let nan_fraction = fraction(&|word| f32::from_bits(word).is_nan());
         assert!(
-            kinds[0] != ScalarKind::Float || nan < 0.5,
-            "{file}: {name} is NaN for a fraction {nan} of the inputs"
+            kinds[0] != ScalarKind::Float || nan_fraction < 0.5,
+            "{file}: {name} is NaN for a fraction {nan_fraction} of the inputs"
         );
     }
 }
@@ -766,9 +769,12 @@ fn a_difference_of_one_ulp_is_detected() {
             .expect("the function");
         let kinds = function.words_out();
         let words = inputs(&function, CALLS, 1);
-        let changed = function.run_in(device, &source, &words);
-        let differ = differing(&kinds, &changed, &twin(name).results(&words, kinds.len()));
-        assert!(!differ.is_empty(), "{name}: '{to}' instead of '{from}' is not detected");
+        let edited_results = function.run_in(device, &source, &words);
+        let differing_calls = differing(&kinds, &edited_results, &twin(name).results(&words, kinds.len()));
+        assert!(
+            !differing_calls.is_empty(),
+            "{name}: '{to}' instead of '{from}' is not detected"
+        );
     }
 }
 

@@ -11,7 +11,7 @@ fn films(scene: &Packed) -> Vec<Film> {
 }
 
 /// A camera that looks straight down on the ground; 40 x 30 pixels cover 4 x 3 units.
-const DOWN: &str = r#"
+const VIEW_DOWN: &str = r#"
 image = { width = 40, height = 30 }
 camera = { type = "orthographic", position = [0, 0, 5], look_at = [0, 0, 0], up = [0, 1, 0], height = 3 }
 [render]
@@ -56,7 +56,7 @@ fn largest_error(film: &Film, expected: impl Fn(f64, f64) -> [f64; 3]) -> f64 {
     largest
 }
 
-/// Returns the light that the plane reflects from the point light at the height h. For a view along the normal, the
+/// Returns the radiance of the plane at (x, y) under the point light, at height h. For a view along the normal, the
 /// cosines of the diffuse and the specular term are equal: h / sqrt(h^2 + dx^2 + dy^2).
 fn point_light(x: f64, y: f64, power: i32) -> [f64; 3] {
     let (h, dx, dy) = (1.5, x - 0.4, y + 0.3);
@@ -70,7 +70,7 @@ fn point_light(x: f64, y: f64, power: i32) -> [f64; 3] {
 #[test]
 fn a_point_light_over_a_plane_matches_the_closed_form() {
     // Shading is evaluated at the origin of the shadow rays, and the formula has no offset, so the offset is set to 0.
-    let down = DOWN.replace("[render]", "[render]\nshadow_epsilon = 0");
+    let down = VIEW_DOWN.replace("[render]", "[render]\nshadow_epsilon = 0");
     let scene = parse(&format!("{down}{GROUND}{LIGHT}"));
     for film in films(&scene) {
         let error = largest_error(&film, |x, y| point_light(x, y, 6));
@@ -82,7 +82,7 @@ fn a_point_light_over_a_plane_matches_the_closed_form() {
 
 #[test]
 fn ambient_light_is_multiplied_by_the_ambient_factor() {
-    let scene = parse(&format!("{DOWN}{GROUND}"));
+    let scene = parse(&format!("{VIEW_DOWN}{GROUND}"));
     for film in films(&scene) {
         let (expected, wrong) = ([0.1f32 * 0.5, 0.2 * 0.5, 0.3 * 1.0], [0.1f32, 0.2, 0.3]);
         assert!(film.means().all(|color| color == expected));
@@ -95,7 +95,7 @@ fn ambient_light_is_multiplied_by_the_ambient_factor() {
 
 #[test]
 fn an_empty_scene_shows_only_the_background() {
-    let scene = parse(&format!("{DOWN}{LIGHT}"));
+    let scene = parse(&format!("{VIEW_DOWN}{LIGHT}"));
     for film in films(&scene) {
         assert!(film.means().all(|color| color == [0.5, 0.25, 0.125]));
     }
@@ -104,7 +104,7 @@ fn an_empty_scene_shows_only_the_background() {
 #[test]
 fn the_ground_occludes_light_from_below() {
     let below = LIGHT.replace("1.5]", "-1.5]");
-    let [lit, unlit] = [LIGHT, &below].map(|light| films(&parse(&format!("{DOWN}{GROUND}{light}"))));
+    let [lit, unlit] = [LIGHT, &below].map(|light| films(&parse(&format!("{VIEW_DOWN}{GROUND}{light}"))));
     for (lit, unlit) in lit.iter().zip(&unlit) {
         assert!(
             unlit.means().all(|color| color == [0.1 * 0.5, 0.2 * 0.5, 0.3]),
@@ -118,7 +118,7 @@ fn the_ground_occludes_light_from_below() {
 /// shadow; rays start in the image plane, at height 0.25.
 #[test]
 fn a_sphere_under_directional_light_casts_a_disk_shaped_shadow() {
-    let scene = DOWN.replace("position = [0, 0, 5]", "position = [0, 0, 0.25]");
+    let scene = VIEW_DOWN.replace("position = [0, 0, 5]", "position = [0, 0, 0.25]");
     let sphere = "[[shapes]]\ntype = 'sphere'\nmaterial = 'ground'\ncenter = [0.2, 0.1, 1]\nradius = 0.5\n";
     let light = "[[lights]]\ntype = 'directional'\ndirection = [0, 0, -2]\ncolor = [1, 1, 1]\n";
     let disk = |radius: f64| {
@@ -150,7 +150,7 @@ fn covers(heights: [f64; 4]) -> [String; 4] {
 
 /// Returns whether all pixels below the covers are dark, and whether all are lit.
 fn all_dark_or_lit(light: &str, covers: &str) -> (bool, bool) {
-    let scene = DOWN.replace("position = [0, 0, 5]", "position = [0, 0, 0.25]");
+    let scene = VIEW_DOWN.replace("position = [0, 0, 5]", "position = [0, 0, 0.25]");
     let above = "[[shapes]]\ntype = 'sphere'\nmaterial = 'ground'\ncenter = [90, 90, 5]\nradius = 0.5\n";
     let films = films(&parse(&format!("{scene}{GROUND}{light}{above}{covers}")));
     let ambient = [0.1f32 * 0.5, 0.2 * 0.5, 0.3];

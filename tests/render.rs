@@ -37,12 +37,12 @@ pub fn compare(mode: RenderMode, packed: &Packed, gpu: &Film, cpu: &Film) -> Res
 pub fn compare_hits(gpu: &[FirstHit], cpu: &[FirstHit]) -> Result<(), String> {
     let device = adapter::device().expect("the device that rendered the image");
     assert_eq!(gpu.len(), cpu.len());
-    let same: fn(&FirstHit, &FirstHit) -> bool = if bit_exact(device) {
+    let are_equal: fn(&FirstHit, &FirstHit) -> bool = if bit_exact(device) {
         |a, b| bytemuck::bytes_of(a) == bytemuck::bytes_of(b)
     } else {
         |a, b| (a.shape, a.material) == (b.shape, b.material)
     };
-    let fraction = gpu.iter().zip(cpu).filter(|(a, b)| !same(a, b)).count() as f64 / gpu.len() as f64;
+    let fraction = gpu.iter().zip(cpu).filter(|(a, b)| !are_equal(a, b)).count() as f64 / gpu.len() as f64;
     if bit_exact(device) {
         let entry = allowed(KNOWN_DIFFERENCES, &device.info.name, &device.info.driver, "first hits");
         return judge(entry, "first hits", fraction);
@@ -71,7 +71,7 @@ fn configured(
 
 /// Returns all scenes at reduced size.
 pub fn small_scenes() -> Vec<(String, Packed)> {
-    let small = |(name, mut description): (String, Description)| {
+    let reduce = |(name, mut description): (String, Description)| {
         let scale = description.image.width.max(description.image.height).div_ceil(100);
         (description.image.width, description.image.height) =
             (description.image.width / scale, description.image.height / scale);
@@ -79,7 +79,7 @@ pub fn small_scenes() -> Vec<(String, Packed)> {
             patterns::samples(description.render.pixel_samples.pattern(description.integrator()), 4);
         (name, scenes::packed(&description))
     };
-    scenes::descriptions().into_iter().map(small).collect()
+    scenes::descriptions().into_iter().map(reduce).collect()
 }
 
 /// Returns each scene and pattern at least once, with varied sizes, seeds and sample counts.
@@ -109,7 +109,7 @@ fn images_of_all_scenes_agree() {
     if adapter::device().is_none() {
         return;
     }
-    let small = small_scenes().into_iter().map(|scene| {
+    let reduced = small_scenes().into_iter().map(|scene| {
         (
             scene,
             [RenderMode::Baked, RenderMode::Buffers, RenderMode::Plain].as_slice(),
@@ -119,7 +119,7 @@ fn images_of_all_scenes_agree() {
         .into_iter()
         .map(|scene| (scene, [RenderMode::Baked, RenderMode::Buffers].as_slice()));
     // Scenes are rendered in parallel, because a driver compiles a kernel on one thread.
-    let scenes: Vec<_> = small.chain(varied).collect();
+    let scenes: Vec<_> = reduced.chain(varied).collect();
     let compared = scenes.par_iter().map(|((name, packed), modes)| {
         let cpu = reference(packed);
         let (mut pixels, mut images, mut plain) = (0, 0, FilmDifference::default());

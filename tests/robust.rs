@@ -10,36 +10,38 @@ use crate::scenes::{packed, scene};
 
 fn transformed(description: &Description, scale: f64, offset: DVec3) -> Description {
     let mut description = description.clone();
-    let point = |p: &mut DVec3| *p = *p * scale + offset;
-    let vector = |v: &mut DVec3| *v *= scale;
-    let lengths = |size: &mut [f64; 2]| *size = size.map(|length| length * scale);
+    let transform_point = |p: &mut DVec3| *p = *p * scale + offset;
+    let scale_vector = |v: &mut DVec3| *v *= scale;
+    let scale_lengths = |size: &mut [f64; 2]| *size = size.map(|length| length * scale);
     match &mut description.camera {
-        CameraDescription::Perspective(camera) => {
-            [&mut camera.position, &mut camera.look_at].into_iter().for_each(point)
-        }
+        CameraDescription::Perspective(camera) => [&mut camera.position, &mut camera.look_at]
+            .into_iter()
+            .for_each(transform_point),
         other => panic!("unexpected variant: {other:?}"),
     };
     for light in &mut description.lights {
         match light {
             LightDescription::Rectangle(light) => {
-                point(&mut light.center);
-                lengths(&mut light.size);
+                transform_point(&mut light.center);
+                scale_lengths(&mut light.size);
             }
-            LightDescription::Point(light) => point(&mut light.position),
+            LightDescription::Point(light) => transform_point(&mut light.position),
             other => panic!("unexpected variant: {other:?}"),
         }
     }
     for shape in &mut description.shapes {
         match shape {
             ShapeDescription::Rectangle(shape) => {
-                point(&mut shape.center);
-                lengths(&mut shape.size);
+                transform_point(&mut shape.center);
+                scale_lengths(&mut shape.size);
             }
             ShapeDescription::Ellipsoid(shape) => {
-                point(&mut shape.center);
-                [&mut shape.a, &mut shape.b, &mut shape.c].into_iter().for_each(vector);
+                transform_point(&mut shape.center);
+                [&mut shape.a, &mut shape.b, &mut shape.c]
+                    .into_iter()
+                    .for_each(scale_vector);
             }
-            ShapeDescription::Tetrahedron(shape) => shape.vertices.iter_mut().for_each(point),
+            ShapeDescription::Tetrahedron(shape) => shape.vertices.iter_mut().for_each(transform_point),
             other => panic!("unexpected variant: {other:?}"),
         }
     }
@@ -64,7 +66,7 @@ fn differing_pixels(a: &Film, b: &Film, tolerance: f32) -> Vec<usize> {
 }
 
 /// Returns the pixels that differ visibly, of 40,000 pixels. A shadow edge that moves across a light sample changes a
-/// pixel by 1/16 of the light.
+/// pixel by 1/16 of the light's contribution.
 fn visibly_differing_pixels(offset: f64, shadow_epsilon: f64) -> Vec<usize> {
     let expected = reference(&packed(&cornell()));
     let mut description = transformed(&cornell(), 1.0, DVec3::splat(offset));
@@ -86,8 +88,8 @@ fn is_near_edge(description: &Description, pixel: usize) -> bool {
     let expected = value(description);
     let differs = |moved: Description| (value(&moved) - expected).abs().max_element() > 1e-3;
     let offsets = [DVec3::X, DVec3::Y, DVec3::Z].map(|offset| offset * ROUNDING);
-    let moves = offsets.into_iter().chain(offsets.map(|offset| -offset));
-    moves
+    let displacements = offsets.into_iter().chain(offsets.map(|offset| -offset));
+    displacements
         .into_iter()
         .any(|offset| differs(with_moved_light(description, offset)) || differs(with_moved_camera(description, offset)))
 }
@@ -126,9 +128,9 @@ fn scaling_changes_pixels_only_near_edges() {
             assert!(is_near_edge(&scene, pixel), "scaled by {scale}: pixel {pixel}");
         }
     }
-    let some_pixels = (0..40_000).step_by(41);
-    let near = some_pixels.filter(|pixel| is_near_edge(&scene, *pixel)).count();
-    assert_eq!(near, 0, "some of the sampled pixels are near edges");
+    let sampled_pixels = (0..40_000).step_by(41);
+    let near_edge_count = sampled_pixels.filter(|pixel| is_near_edge(&scene, *pixel)).count();
+    assert_eq!(near_edge_count, 0, "some of the sampled pixels are near edges");
 }
 
 /// Offsets are up to a million times the size of the scene. The image does not change, because packed coordinates are

@@ -138,8 +138,8 @@ fn count_wrong(case: &Case, text: &str) -> (usize, Option<String>) {
         exact.to_bits() != result.to_bits() && !(exact.is_nan() && result.is_nan())
     });
     let mut wrong = wrong.map(|(x, result)| format!("{}{x:?} is {result:?}, not {:?}", case.name, (case.exact)(x)));
-    let first = wrong.next();
-    (wrong.count() + usize::from(first.is_some()), first)
+    let first_wrong = wrong.next();
+    (wrong.count() + usize::from(first_wrong.is_some()), first_wrong)
 }
 
 #[test]

@@ -84,7 +84,7 @@ fn check_session(device: &Device, scene_count: usize) {
     let context = Context::new();
     let mut session = Session::new(&context, Arc::clone(&scenes[0]));
     let mut previous: Option<Vec<u32>> = None;
-    let mut changed = 0;
+    let mut changed_count = 0;
     for scene in &scenes {
         session.set_scene(Arc::clone(scene));
         for (i, camera) in cameras.iter().enumerate() {
@@ -105,11 +105,11 @@ fn check_session(device: &Device, scene_count: usize) {
                 assert_eq!(image, expected, "camera {i}");
             }
             let now = bits(&expected);
-            changed += usize::from(previous.is_some_and(|previous| previous != now));
+            changed_count += usize::from(previous.is_some_and(|previous| previous != now));
             previous = Some(now);
         }
     }
-    assert!(changed > scene_count, "the images do not depend on the camera");
+    assert!(changed_count > scene_count, "the images do not depend on the camera");
 }
 
 #[test]
@@ -301,7 +301,7 @@ environment = { file = 'map' }";
     let load_options = LoadOptions::new().with_image("map", image);
     let scene = Scene::from_slice(text.as_bytes(), SceneFormat::Toml, &load_options).expect("a scene");
     let scene = Arc::new(scene);
-    let cancelled = |result: Result<ProgressiveRender, Error>| {
+    let is_cancelled = |result: Result<ProgressiveRender, Error>| {
         matches!(result, Err(Error::Render(wgray::error::RenderError::Cancelled)))
     };
     for device in devices() {
@@ -309,7 +309,7 @@ environment = { file = 'map' }";
         let mut session = Session::new(&Context::new(), Arc::clone(&scene));
         let cancel = CancelToken::new();
         cancel.cancel();
-        assert!(cancelled(session.start(&options, &cancel)));
+        assert!(is_cancelled(session.start(&options, &cancel)));
         let cancel = CancelToken::new();
         let (start, mut time_of_cancel) = (Instant::now(), Duration::ZERO);
         std::thread::scope(|threads| {
@@ -318,7 +318,7 @@ environment = { file = 'map' }";
                 time_of_cancel = start.elapsed();
                 cancel.cancel();
             });
-            assert!(cancelled(session.start(&options, &cancel)));
+            assert!(is_cancelled(session.start(&options, &cancel)));
         });
         let delay = start.elapsed() - time_of_cancel;
         assert!(delay < Duration::from_millis(500), "cancelled after {delay:?}"); // usually 10 ms
@@ -335,7 +335,7 @@ environment = { file = 'map' }";
                 std::thread::sleep(Duration::from_millis(50));
                 cancel.cancel();
             });
-            assert!(cancelled(second_session.start(&options, &cancel)));
+            assert!(is_cancelled(second_session.start(&options, &cancel)));
         });
         let mut camera = scene.camera;
         camera.position.x += 1.0;

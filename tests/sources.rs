@@ -156,7 +156,7 @@ pub fn rust(relative: &str) -> syn::File {
 /// Returns the functions outside of tests and `impl`s. A function that updates an argument in place has the signature
 /// of the WGSL function that takes and returns this argument.
 pub fn rust_functions(file: &syn::File) -> Vec<Signature> {
-    let updated = |function: &syn::ItemFn| {
+    let updated_type = |function: &syn::ItemFn| {
         let arguments = function.sig.inputs.iter();
         let mut exclusive = arguments.filter_map(|input| match input {
             FnArg::Typed(typed) => match &*typed.ty {
@@ -186,7 +186,7 @@ pub fn rust_functions(file: &syn::File) -> Vec<Signature> {
                 .map(|input| argument(input, &function.sig.generics))
                 .collect(),
             result: match &function.sig.output {
-                ReturnType::Default => updated(function),
+                ReturnType::Default => updated_type(function),
                 ReturnType::Type(_, ty) => Some(rust_type(ty, &function.sig.generics)),
             },
         }),

@@ -142,8 +142,8 @@ fn positions_are_on_the_unit_square() {
     for (name, pattern) in patterns::all() {
         for count in [1, 4, 16, 100, 1024] {
             for p in positions(pattern, count, 20).into_iter().flatten() {
-                let inside = (0.0..1.0).contains(&p.x) & (0.0..1.0).contains(&p.y);
-                assert!(inside, "{name}, {count} samples: {p}");
+                let is_inside = (0.0..1.0).contains(&p.x) & (0.0..1.0).contains(&p.y);
+                assert!(is_inside, "{name}, {count} samples: {p}");
             }
         }
     }
@@ -154,15 +154,18 @@ fn positions_are_on_the_unit_square() {
 fn random_patterns_are_uniform_over_pixels() {
     let mut pattern_count = 0;
     for (name, pattern) in patterns::all().into_iter().filter(|(_, pattern)| !is_fixed(*pattern)) {
-        let sets = positions(pattern, 16, 40_000);
+        let pixel_positions = positions(pattern, 16, 40_000);
         // Some patterns confine a position to a grid cell.
         for (first, last) in [(0, 0), (7, 7), (15, 15), (0, 15)] {
             let confined = first == last
-                && sets
+                && pixel_positions
                     .iter()
                     .take(100)
-                    .all(|set| set[first].distance(sets[0][first]) < 0.36);
-            let list: Vec<Vec2> = sets.iter().flat_map(|set| set[first..=last].iter().copied()).collect();
+                    .all(|set| set[first].distance(pixel_positions[0][first]) < 0.36);
+            let list: Vec<Vec2> = pixel_positions
+                .iter()
+                .flat_map(|set| set[first..=last].iter().copied())
+                .collect();
             let problem = if confined { None } else { nonuniform_projection(&list) };
             assert!(problem.is_none(), "{name}, positions {first} to {last}: {problem:?}");
         }
@@ -175,19 +178,27 @@ fn random_patterns_are_uniform_over_pixels() {
 #[test]
 fn all_patterns_are_centered() {
     for (name, pattern) in patterns::all() {
-        let sets = positions(pattern, 16, 10_000);
-        let n = (sets.len() * sets[0].len()) as f64;
-        let mean = sets.iter().flatten().map(|p| p.as_dvec2()).sum::<glam::DVec2>() / n;
+        let pixel_positions = positions(pattern, 16, 10_000);
+        let n = (pixel_positions.len() * pixel_positions[0].len()) as f64;
+        let mean = pixel_positions
+            .iter()
+            .flatten()
+            .map(|p| p.as_dvec2())
+            .sum::<glam::DVec2>()
+            / n;
         // The standard error of independent positions; no pattern has a larger error.
-        let error = (1.0 / 12.0 / n).sqrt();
-        assert!(((mean - 0.5) / error).abs().max_element() < 5.0, "{name}: {mean}");
+        let standard_error = (1.0 / 12.0 / n).sqrt();
+        assert!(
+            ((mean - 0.5) / standard_error).abs().max_element() < 5.0,
+            "{name}: {mean}"
+        );
     }
 }
 
 #[test]
 fn a_biased_pattern_is_detected() {
-    let sets = positions(Pattern::Random, 16, 10_000);
-    let unbiased: Vec<Vec2> = sets.into_iter().flatten().collect();
+    let pixel_positions = positions(Pattern::Random, 16, 10_000);
+    let unbiased: Vec<Vec2> = pixel_positions.into_iter().flatten().collect();
     assert_eq!(nonuniform_projection(&unbiased), None);
     type Change = fn(usize, Vec2) -> Vec2;
     let changes: [(&str, Change); 6] = [

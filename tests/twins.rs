@@ -126,12 +126,12 @@ const ONE_SIDED: &[(&str, &str, &str)] = &[
 
 fn twin_differences(source: &Source, file: &str, twin: &syn::File) -> Vec<String> {
     let module = parse(source);
-    let two_sided = |s: &Signature| !ONE_SIDED.iter().any(|(f, name, _)| *f == file && *name == s.name);
+    let has_twin = |s: &Signature| !ONE_SIDED.iter().any(|(f, name, _)| *f == file && *name == s.name);
     let functions: Vec<_> = sources::wgsl_functions(&module, source, file)
         .into_iter()
-        .filter(two_sided)
+        .filter(has_twin)
         .collect();
-    let mut twins: Vec<_> = rust_functions(twin).into_iter().filter(two_sided).collect();
+    let mut twins: Vec<_> = rust_functions(twin).into_iter().filter(has_twin).collect();
     // If a WGSL function takes `before` and returns the new value, its Rust twin may take `state: &mut T` instead. The
     // argument is renamed for the comparison.
     let in_place = |wgsl: &Signature, twin: &Signature| {
@@ -156,8 +156,8 @@ fn twin_differences(source: &Source, file: &str, twin: &syn::File) -> Vec<String
         }
     }
     let mut records = sources::wgsl_records(&module, source, file);
-    records.retain(two_sided);
-    let twin_records: Vec<_> = rust_records(twin).into_iter().filter(two_sided).collect();
+    records.retain(has_twin);
+    let twin_records: Vec<_> = rust_records(twin).into_iter().filter(has_twin).collect();
     let mut problems = differences(file, &functions, &twins);
     problems.extend(differences(file, &records, &twin_records));
     problems
@@ -198,7 +198,7 @@ fn functions_and_records_match() {
 #[test]
 fn a_changed_twin_is_detected() {
     let shared = shared_source();
-    let changed = |file: &str, from: &str, to: &str| {
+    let edited_twin = |file: &str, from: &str, to: &str| {
         let text = std::fs::read_to_string(sources::path(&format!("crates/render/src/cpu/{file}"))).expect("a twin");
         assert!(text.contains(from), "{file}: '{from}' not found");
         syn::parse_file(&text.replacen(from, to, 1)).expect("still Rust")
@@ -230,7 +230,7 @@ fn a_changed_twin_is_detected() {
             "pub specular: f32,\n    pub diffuse: f32",
         ),
     ] {
-        let twin = changed(file, from, to);
+        let twin = edited_twin(file, from, to);
         assert!(
             !twin_differences(&shared, &file.replace(".rs", ".wgsl"), &twin).is_empty(),
             "{change}"

@@ -106,7 +106,7 @@ fn with_diffuse_materials(mut packed: Packed, scene_index: usize) -> Packed {
     packed
 }
 
-/// For each feature, the number of scenes that have hits shaded in lanes and the feature.
+/// For each feature, the number of scenes with this feature in which hits are shaded in lanes.
 #[derive(Debug, Default)]
 struct LaneCoverage {
     camera: usize,
@@ -332,23 +332,23 @@ fn changed_scenes_are_detected() {
     assert_eq!(count_differing(&paths, &expected), 0);
     let LaneHits { flat, faces, evaluated } = lane_hits;
     assert!(flat > 50 && faces > 50 && evaluated > 50, "{lane_hits:?}");
-    let changed = |change: fn(&mut Packed)| {
+    let count_after = |change: fn(&mut Packed)| {
         let mut packed = packed.clone();
         change(&mut packed);
         count_differing(&wavefront(&packed, &samples, 256), &expected)
     };
     let found = [
-        changed(|packed| packed.camera.seed += 1),
-        changed(|packed| packed.bvh.instances[3].anchor.x += 1e-4),
-        changed(|packed| packed.environment.shadow_epsilon *= 1.5),
-        changed(|packed| packed.primitives[0].anchor.z += 1e-5),
-        changed(|packed| {
+        count_after(|packed| packed.camera.seed += 1),
+        count_after(|packed| packed.bvh.instances[3].anchor.x += 1e-4),
+        count_after(|packed| packed.environment.shadow_epsilon *= 1.5),
+        count_after(|packed| packed.primitives[0].anchor.z += 1e-5),
+        count_after(|packed| {
             packed
                 .materials
                 .iter_mut()
                 .for_each(|material| material.diffuse.y *= 1.000_001)
         }),
-        changed(|packed| packed.lighting.lights[0].center.x += 1e-5),
+        count_after(|packed| packed.lighting.lights[0].center.x += 1e-5),
     ];
     assert!(found.iter().all(|count| *count > 0), "{found:?}");
 }

@@ -156,7 +156,7 @@ def main():
     parser.add_argument("--seed", type=int, default=0, help="seed of the first image; each further image uses the next one")
     parser.add_argument("--threads", type=int, help="default: all")
     parser.add_argument("-o", "--output", help="file of the last image")
-    parser.add_argument("--each", metavar="FOLDER", help="write each warm image to this folder, named by its seed")
+    parser.add_argument("--each", metavar="FOLDER", help="write the image of each render after the first to this folder, named by its seed")
     args = parser.parse_args()
 
     scene = scenes.load(args.scene, "path")

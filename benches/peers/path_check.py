@@ -153,8 +153,8 @@ def check(args, name, path, bound):
     our_total, their_total = (means(x.mean((1, 2, 3))) for x in (ours, theirs))
     ratio = our_total.mean / their_total.mean if their_total.mean else float("nan")
     error = np.sqrt(our_total.square + their_total.square) / their_total.mean if their_total.mean else float("nan")
-    whole = [means(x.mean((1, 2))) for x in (ours * args.control, theirs)]
-    if args.wrong == 1 and sidak(welch(*whole, rounding)[1]) >= bound:
+    image_means = [means(x.mean((1, 2))) for x in (ours * args.control, theirs)]
+    if args.wrong == 1 and sidak(welch(*image_means, rounding)[1]) >= bound:
         failures.append("control")
     a, b = (means(blocks(x).mean(-1)) for x in (ours, theirs))
     deviation = abs(a.mean - b.mean) / np.maximum(b.mean, 1e-12)

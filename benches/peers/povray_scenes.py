@@ -83,7 +83,7 @@ def light(l, samples, points):
         return "\n".join(f"light_source {{ {vec(add(l.center, scenes.scaled(l.u, s), scenes.scaled(l.v, t)))} rgb {colour} }}"
                          for s in cells for t in cells)
     # POV-Ray samples an area light's axes from end to end; these ends are the outermost cell centres of wgray's grid.
-    # With area_illumination the shading uses all samples, not only the shadows.
+    # With area_illumination, the shading uses all samples too; otherwise only the shadows do.
     axes = [vec(scenes.scaled(axis, 2 * (n - 1) / n)) for axis in (l.u, l.v)]
     return f"light_source {{ {vec(l.center)} rgb {vec(l.color)} area_light {axes[0]}, {axes[1]}, {n}, {n} area_illumination on }}"
 

@@ -225,7 +225,7 @@ def material(path, row, textures, traced):
     if row.get("roughness", 0) != 0 and not rough:
         raise ValueError(f"{path}: a rough {kind}: other renderers lack this model")
     if rough and row.get("roughness", 0) != 0 and kind != "principled" and row.get("energy_compensation", True):
-        raise ValueError(f"{path}: other renderers do not compensate for energy: energy_compensation must be false")
+        raise ValueError(f"{path}: other renderers do not compensate for lost energy: energy_compensation must be false")
     result = Material(kind, emission=color(path, row, "emission", textures))
     if kind == "principled":
         result.color, result.metallic = color(path, row, "base_color", textures, [1, 1, 1]), row.get("metallic", 1)

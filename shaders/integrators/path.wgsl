@@ -99,7 +99,7 @@ fn advance(before: PathState, pixel: vec2u) -> PathState {
     let continues = is_hit & (path.depth < BOUNCES) & (material.kind != EMITTER);
     let key = hash4(vec4u(pixel.x, pixel.y, camera.seed, 1u + 2u * path.depth));
     let decision_key = hash4(vec4u(pixel.x, pixel.y, camera.seed, 2u + 2u * path.depth));
-    var choices = vec2u(0u); // lobe, Russian roulette
+    var choices = vec2u(0u); // random bits: x selects the lobe, y is for Russian roulette
     if ((MATERIALS & ~((1u << DIFFUSE) | (1u << EMITTER))) != 0u) | (RR_DEPTH < BOUNCES) {
         choices = decision_set(decision_key.zw, state.sample);
     }

@@ -1,4 +1,4 @@
-//! `wgray convert`: writes a scene of any format as a TOML file that renders the same image.
+//! `wgray convert`: converts a scene, glTF or mesh file to a TOML scene that renders the same image.
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};

@@ -67,8 +67,8 @@ pub enum LayerPolicy {
 const PART: &str = "part";
 
 impl Outputs {
-    /// Checks all destinations. `-` is standard output. Without --output the image is `default`, which must not replace
-    /// a file of another program.
+    /// Checks all destinations. `-` is standard output. Without --output, the image is written to `default`, unless
+    /// that file exists and was not written by wgray.
     pub fn find(
         options: &PictureOptions,
         default: &Path,
@@ -113,19 +113,19 @@ impl Outputs {
             stats: stats.map(find_stats).transpose()?,
         };
         if options.output.is_empty() {
-            outputs.protect_foreign_files()?;
+            outputs.reject_files_of_unknown_origin()?;
         }
         Ok(outputs)
     }
 
     /// Rejects existing files that wgray did not write.
-    fn protect_foreign_files(&self) -> Result<(), Usage> {
+    fn reject_files_of_unknown_origin(&self) -> Result<(), Usage> {
         let mut files = self.images.iter().flat_map(|image| &image.files);
-        let is_foreign = |(_, output): &&(String, Output)| {
+        let is_not_by_wgray = |(_, output): &&(String, Output)| {
             let path = output.path().filter(|path| path.exists());
             path.is_some_and(|path| image::read_metadata(path).is_none())
         };
-        match files.find(is_foreign) {
+        match files.find(is_not_by_wgray) {
             Some((_, output)) => Err(Usage(format!(
                 "{} exists and was not written by wgray; name the output with -o",
                 output.name()

@@ -22,7 +22,7 @@ pub struct Stats {
     pub height: u32,
     /// Samples per pixel; the maximum if sampling is adaptive.
     pub pixel_samples: u32,
-    /// Minimum samples per pixel.
+    /// Minimum number of samples per pixel.
     pub min_samples: u32,
     /// The former name of `min_samples`, kept until version 0.3.
     #[serde(rename = "least_samples")]

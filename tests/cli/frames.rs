@@ -159,8 +159,13 @@ fn ambiguous_frame_names_are_rejected() {
     }
     let stats = ["moving.toml", "--frames", "1-2", "-o", "#.png", "--stats", "s.json"];
     assert_rejected(&folder, &stats, 2, &format!("--stats: s.json: {rule}"));
-    let twice = ["moving.toml", "--frames", "1-2", "-o", "#.#.png"];
-    assert_rejected(&folder, &twice, 2, "--output: #.#.png: must have a single group of #");
+    let two_groups = ["moving.toml", "--frames", "1-2", "-o", "#.#.png"];
+    assert_rejected(
+        &folder,
+        &two_groups,
+        2,
+        "--output: #.#.png: must have a single group of #",
+    );
     // These names collide once the frame numbers are inserted.
     let colliding = ["moving.toml", "--frames", "1-12", "-o", "b#.png", "-o", "b1#.png"];
     assert_rejected(
@@ -265,12 +270,12 @@ fn existing_frames_are_skipped_on_request() {
         "2.normal.png",
         "3.normal.png",
     ];
-    let set_old = |name: &str| {
+    let make_old = |name: &str| {
         let file = fs::File::options().write(true).open(folder.path(name)).unwrap();
         file.set_modified(old).unwrap();
     };
     let is_old = |name: &str| fs::metadata(folder.path(name)).unwrap().modified().unwrap() == old;
-    all.iter().copied().for_each(set_old);
+    all.iter().copied().for_each(make_old);
     let assert_skipped = |message: &str| {
         let result = folder.run(&[&["render"], &arguments[..], &CPU].concat());
         assert_eq!((result.code, result.stderr.as_str()), (0, message));
@@ -293,7 +298,7 @@ fn existing_frames_are_skipped_on_request() {
         "{}",
         result.stderr
     );
-    all.iter().copied().for_each(set_old);
+    all.iter().copied().for_each(make_old);
     render_quietly(&folder, &arguments[..7]);
     assert!(!all.into_iter().any(is_old));
     folder.write("p.png", "");

@@ -526,13 +526,13 @@ fn a_turntable_frames_the_model() {
     for frame in 1..=5 {
         let picture = image::open(folder.path(&format!("t{frame}.png"))).unwrap().into_rgba8();
         let is_at_edge = |x: u32, y: u32| x == 0 || y == 0 || x == 59 || y == 39;
-        let covered = |at_edge: bool| {
+        let shows_model = |at_edge: bool| {
             picture
                 .enumerate_pixels()
                 .any(|(x, y, p)| is_at_edge(x, y) == at_edge && p.0[3] > 0)
         };
         assert!(
-            covered(false) && !covered(true),
+            shows_model(false) && !shows_model(true),
             "frame {frame} does not show the full model"
         );
         let bytes = picture.into_raw();

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use super::{RunResult, TestFolder, program};
 
 /// A render that takes a few seconds.
-const LONG: [&str; 8] = [
+const LONG_RENDER: [&str; 8] = [
     "render",
     "small.toml",
     "--size",
@@ -21,7 +21,7 @@ const LONG: [&str; 8] = [
 ];
 
 fn render_expected(folder: &TestFolder) -> Vec<u8> {
-    let mut arguments = LONG.to_vec();
+    let mut arguments = LONG_RENDER.to_vec();
     arguments.extend(["-o", "whole.exr", "--reproducible", "--device", "cpu"]);
     folder.run_quietly(&arguments);
     folder.read("whole.exr")
@@ -30,7 +30,7 @@ fn render_expected(folder: &TestFolder) -> Vec<u8> {
 fn start(folder: &TestFolder, arguments: &[&str]) -> Child {
     Command::new(program())
         .current_dir(folder.path("."))
-        .args(LONG)
+        .args(LONG_RENDER)
         .args(["--reproducible", "--threads", "1"]) // so that the render takes seconds on any machine
         .args(arguments)
         .stderr(Stdio::piped())
@@ -49,14 +49,14 @@ fn wait_for(folder: &TestFolder, file: &str, bytes: u64) {
 
 /// Waits until the child has used 0.15 s of CPU time. By then, its signal handlers are installed.
 fn wait_for_cpu_time(child: &Child) {
-    let ticks = || {
+    let cpu_ticks = || {
         let stat = fs::read_to_string(format!("/proc/{}/stat", child.id())).ok()?;
         let fields: Vec<&str> = stat.rsplit(") ").next()?.split(' ').collect();
         let number = |i: usize| fields.get(i)?.parse::<u64>().ok();
         Some(number(11)? + number(12)?) // user and system time in 1/100 s
     };
     let start = Instant::now();
-    while ticks().is_some_and(|ticks| ticks < 15) && start.elapsed() < Duration::from_secs(60) {
+    while cpu_ticks().is_some_and(|cpu_ticks| cpu_ticks < 15) && start.elapsed() < Duration::from_secs(60) {
         std::thread::sleep(Duration::from_millis(2));
     }
     std::thread::sleep(Duration::from_millis(100));
@@ -74,7 +74,7 @@ fn wait_for_end(child: Child) -> RunResult {
 
 /// Resumes the render from the checkpoint `c`.
 fn resume_render(folder: &TestFolder, device: &str) -> RunResult {
-    let mut arguments = LONG.to_vec();
+    let mut arguments = LONG_RENDER.to_vec();
     arguments.extend(["--reproducible", "--checkpoint", "c", "--resume", "--device", device]);
     arguments.extend(["-o", "out.exr"]);
     folder.run(&arguments)
@@ -533,8 +533,7 @@ fn full_and_read_only_file_systems_are_reported() {
     let full = run("size=256k", &checkpointed);
     assert_eq!(full.stdout, "0\nc\n", "{}", full.stderr);
     assert!(
-        full.stderr
-            .contains("warning: disk/c: a piece could not be written; rendering continues"),
+        full.stderr.contains("warning: disk/c: progress could not be saved: "),
         "{}",
         full.stderr
     );

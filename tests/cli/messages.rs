@@ -182,11 +182,11 @@ fn wrong_types_are_reported_with_the_expected_type() {
 /// The parser and the validation print the same range.
 #[test]
 fn integer_ranges_are_consistent() {
-    let render = |line: &str| (String::from("[render]"), format!("[render]\n{line}"));
+    let in_render_table = |line: &str| (String::from("[render]"), format!("[render]\n{line}"));
     for (key, (from, to)) in [
         ("width", ("width = 10".to_owned(), "width = N".to_owned())),
         ("height", ("height = 6".to_owned(), "height = N".to_owned())),
-        ("max_depth", render("max_depth = N")),
+        ("max_depth", in_render_table("max_depth = N")),
         ("count", ("count = 3".to_owned(), "count = N".to_owned())),
     ] {
         let [negative, zero] = ["-1", "0"].map(|value| message_for(&from, &to.replace('N', value)));

@@ -166,9 +166,9 @@ fn any_number_of_threads_gives_the_same_image() {
 #[test]
 fn progress_is_printed_as_requested() {
     let folder = TestFolder::new();
-    let plain = folder.run(&["render", "small.toml", "--progress", "plain"]);
-    assert_eq!((plain.code, plain.stdout.as_str()), (0, ""));
-    assert!(plain.stderr.contains("100 % done after"), "{}", plain.stderr);
+    let result = folder.run(&["render", "small.toml", "--progress", "plain"]);
+    assert_eq!((result.code, result.stdout.as_str()), (0, ""));
+    assert!(result.stderr.contains("100 % done after"), "{}", result.stderr);
     folder.run_quietly(&["render", "small.toml", "--progress", "none"]);
     folder.run_quietly(&["render", "small.toml", "--progress", "auto"]); // standard error is not a terminal here
     folder.run_quietly(&["render", "small.toml", "--progress", "plain", "-q"]);

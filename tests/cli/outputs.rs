@@ -113,8 +113,8 @@ fn no_input_is_replaced() {
     let folder = TestFolder::new();
     write_textured_scene(&folder);
     let input_rule = "is an input of the scene; choose another name";
-    let foreign_rule = "exists and was not written by wgray; name the output with -o";
-    assert_rejected(&folder, &["tiles.toml"], 2, &format!("tiles.png {foreign_rule}"));
+    let not_by_wgray = "exists and was not written by wgray; name the output with -o";
+    assert_rejected(&folder, &["tiles.toml"], 2, &format!("tiles.png {not_by_wgray}"));
     assert_rejected(
         &folder,
         &["tiles.toml", "-o", "tiles.png"],
@@ -135,7 +135,7 @@ fn no_input_is_replaced() {
         &aov,
     );
     fs::copy(folder.path("small.toml"), folder.path("scene.png")).unwrap();
-    assert_rejected(&folder, &["scene.png"], 2, &format!("scene.png {foreign_rule}"));
+    assert_rejected(&folder, &["scene.png"], 2, &format!("scene.png {not_by_wgray}"));
     // An EXR contains its layers, so no separate layer file can collide.
     folder.run_quietly(&[
         "render",

@@ -309,11 +309,11 @@ fn half_float_overflows_are_counted() {
     ]);
     assert_eq!(result.code, 0, "{}", result.stderr);
     let found = channel_bits(&folder.path("h.exr"));
-    let infinite = |name: &str| found[name].iter().filter(|bits| **bits == 0x7c00).count();
-    let infinite_blue = infinite("B");
+    let count_infinite = |name: &str| found[name].iter().filter(|bits| **bits == 0x7c00).count();
+    let infinite_blue = count_infinite("B");
     assert!(infinite_blue > 5, "{infinite_blue}");
     // Values below 65520 round to 65504, the largest finite half float.
-    assert_eq!((infinite("R"), infinite("G")), (0, 0));
+    assert_eq!((count_infinite("R"), count_infinite("G")), (0, 0));
     let warning = format!(
         "warning: h.exr: values beyond 65504, the maximum of a 16-bit float, were written as infinity (number of these values: \
          {infinite_blue}); use --exr-type float\n"
@@ -428,10 +428,14 @@ fn radiance_layers_use_the_view_of_the_image() {
         let (_, _, layer) = read_png(&folder.path(&format!("a.{name}.png")));
         for (i, found) in layer.chunks(3).enumerate() {
             let color = ["R", "G", "B"].map(|part| f32::from_bits(channels[&format!("{name}.{part}")][i]));
-            let light = settings.rgb8(color);
-            let reflectance = settings.display_reflectance(color).map(to_8_bits);
-            differing += usize::from(light != reflectance);
-            assert_eq!(found, if name == "albedo" { reflectance } else { light }, "{name} {i}");
+            let as_light = settings.rgb8(color);
+            let as_reflectance = settings.display_reflectance(color).map(to_8_bits);
+            differing += usize::from(as_light != as_reflectance);
+            assert_eq!(
+                found,
+                if name == "albedo" { as_reflectance } else { as_light },
+                "{name} {i}"
+            );
         }
     }
     assert!(differing > 30, "{differing}");

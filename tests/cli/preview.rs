@@ -10,7 +10,7 @@ use wgray::image::read_metadata;
 use super::{RunResult, TestFolder, program, project_scene, restore_signal_defaults};
 
 /// A render that takes minutes, with passes of a few hundredths of a second.
-const LONG: [&str; 8] = [
+const LONG_RENDER: [&str; 8] = [
     "render",
     "small.toml",
     "--size",
@@ -31,7 +31,7 @@ fn start_in_shell(folder: &TestFolder, shell_prefix: &str, arguments: &[&str]) -
         .current_dir(folder.path("."))
         .args(["-c", &format!("{shell_prefix} exec \"$0\" \"$@\"")])
         .arg(program())
-        .args(LONG)
+        .args(LONG_RENDER)
         .arg("--preview")
         .args(arguments)
         .stderr(Stdio::piped())
@@ -122,9 +122,9 @@ fn the_complete_files_are_the_same_with_and_without_previews() {
                 assert_eq!((result.code, result.stderr.as_str()), (0, ""), "{options:?}");
                 read_and_remove_files(&folder)
             };
-            let (plain, previewed) = (render(&[]), render(&["--preview"]));
-            assert!(plain.len() >= 2);
-            assert!(plain == previewed, "{device}: {options:?}");
+            let (without_preview, with_preview) = (render(&[]), render(&["--preview"]));
+            assert!(without_preview.len() >= 2);
+            assert!(without_preview == with_preview, "{device}: {options:?}");
         }
     }
 }
@@ -242,9 +242,9 @@ fn files_with_more_samples_are_not_replaced() {
     let (samples, _) = partial(&folder.path("new.exr")).expect("a partial file");
     assert!(has_pixels_of(&folder, "new.exr", samples, &[]));
     let fewer_samples = "has 60000 samples per pixel; a preview with fewer samples does not replace it";
-    let foreign = "was not written by wgray; a preview does not replace it, but the complete image will";
+    let not_by_wgray = "was not written by wgray; a preview does not replace it, but the complete image will";
     let notes = files.map(|file| match file {
-        "other.png" => format!("note: {file}: {foreign}\n"),
+        "other.png" => format!("note: {file}: {not_by_wgray}\n"),
         _ => format!("note: {file}: {fewer_samples}\n"),
     });
     let interrupted = format!("note: interrupted: the image has {samples} of 65536 samples per pixel\n");

@@ -19,7 +19,7 @@ fn render_quietly(folder: &TestFolder, arguments: &[&str]) {
     folder.run_quietly(&[&["render"], arguments, &["--device", "cpu"]].concat());
 }
 
-fn write_room(folder: &TestFolder, name: &str) {
+fn write_environment_map(folder: &TestFolder, name: &str) {
     let room = image::Rgb32FImage::from_fn(4, 2, |x, y| image::Rgb([1.0 + x as f32, 0.5, 0.25 + y as f32]));
     room.save(folder.path(name)).unwrap();
 }
@@ -27,7 +27,7 @@ fn write_room(folder: &TestFolder, name: &str) {
 #[test]
 fn the_option_overrides_the_environment() {
     let folder = folder_with_ball();
-    write_room(&folder, "room.exr");
+    write_environment_map(&folder, "room.exr");
     fs::create_dir(folder.path("sub")).unwrap();
     fs::copy(folder.path("ball.toml"), folder.path("sub/ball.toml")).unwrap();
     render_quietly(&folder, &["ball.toml", "-o", "plain.exr"]);

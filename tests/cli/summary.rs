@@ -1,4 +1,5 @@
-//! The summary line after a render, and default output names, which do not replace files of other programs.
+//! The summary line after a render, and default output names. A default name never replaces a file that wgray did not
+//! write.
 
 use super::{SCENE, TestFolder, is_summary};
 
@@ -79,7 +80,7 @@ fn the_choice_of_the_device_is_explained_only_with_verbose() {
 }
 
 #[test]
-fn a_default_name_replaces_only_images_of_this_program() {
+fn a_default_name_replaces_only_images_that_wgray_wrote() {
     let folder = TestFolder::new();
     let options = ["render", "small.toml", "--device", "cpu", "--spp", "1"];
     let assert_rejected = |arguments: &[&str], name: &str| {
@@ -98,10 +99,10 @@ fn a_default_name_replaces_only_images_of_this_program() {
     // Rewriting the image removes the chunk that names wgray as its author.
     let picture = image::load_from_memory(&wgray_png).expect("a PNG");
     picture.save(folder.path("small.png")).expect("written");
-    let foreign_png = folder.read("small.png");
+    let rewritten_png = folder.read("small.png");
     assert_rejected(&[], "small.png");
     assert_rejected(&["--skip-existing"], "small.png");
-    assert_eq!(folder.read("small.png"), foreign_png);
+    assert_eq!(folder.read("small.png"), rewritten_png);
     for content in ["", "no PNG"] {
         folder.write("small.png", content);
         assert_rejected(&[], "small.png");

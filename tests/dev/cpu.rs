@@ -27,8 +27,9 @@ fn files() -> Files {
     Files::new(&spheres("phong"))
 }
 
-/// Returns whether the CPU replaces the adapter for unedited shaders.
-fn has_only_software() -> bool {
+/// Returns true if `auto` finds only a software Vulkan adapter. The CPU then renders in its place, as long as no shader
+/// is edited.
+fn only_software_adapter() -> bool {
     choose(&AdapterChoice::Auto).unwrap().info.is_software()
 }
 
@@ -81,11 +82,11 @@ fn the_cpu_renders_only_unedited_shaders() {
         assert!(!is_black(&unedited));
         assert_eq!(
             is_on_cpu(&session.state()),
-            has_only_software(),
+            only_software_adapter(),
             "{}",
             session.state().device
         );
-        assert_eq!(session.state().compile_seconds.is_none(), has_only_software());
+        assert_eq!(session.state().compile_seconds.is_none(), only_software_adapter());
 
         let before = session.revision();
         blacken(&files);
@@ -107,7 +108,7 @@ fn the_cpu_renders_only_unedited_shaders() {
         files.edit(KERNEL, "\n", "\n// a comment\n");
         session.wait_for_rendered_image(&files);
         assert_eq!(session.colors(), unedited);
-        assert_eq!(is_on_cpu(&session.state()), has_only_software());
+        assert_eq!(is_on_cpu(&session.state()), only_software_adapter());
     }
 }
 
@@ -215,5 +216,5 @@ fn the_comparison_with_the_cpu_runs_a_kernel() {
         let frame = session.frame()?;
         matches!(&frame.content, Content::Color(pixels) if frame.header.done && *pixels == image).then_some(())
     });
-    assert_eq!(is_on_cpu(&session.state()), has_only_software());
+    assert_eq!(is_on_cpu(&session.state()), only_software_adapter());
 }

@@ -18,30 +18,30 @@ fn invalid_messages_are_rejected_and_the_file_is_unchanged() {
     let (session, address) = serve(session);
     let mut viewer = Viewer::new(address);
 
-    let radius = |value: &str| format!("{{\"set\":{{\"path\":\"shapes[0].radius\",\"value\":{value}}}}}");
-    let nested = |count: usize| radius(&format!("{}1{}", "[".repeat(count), "]".repeat(count)));
+    let radius_message = |value: &str| format!("{{\"set\":{{\"path\":\"shapes[0].radius\",\"value\":{value}}}}}");
+    let nested = |count: usize| radius_message(&format!("{}1{}", "[".repeat(count), "]".repeat(count)));
     let number_rule = "must be a number";
     let not_editable = "cannot be changed";
     let path_rule = "must be a path, such as shapes[2].radius";
     let not_understood = "not understood: ";
     let mut messages = vec![
         // Values of other types, values out of range, and text that is not JSON.
-        (radius("{}"), number_rule),
-        (radius("{\"a\":1}"), number_rule),
-        (radius("[0.5]"), number_rule),
-        (radius("true"), number_rule),
-        (radius("\"0.5\""), number_rule),
-        (radius("\"NaN\""), number_rule),
-        (radius("\"0.5\\n[render]\\nseed = 7\""), number_rule),
-        (radius("NaN"), not_understood),
-        (radius("Infinity"), not_understood),
-        (radius("1e999"), not_understood),
-        (radius("-1e999"), not_understood),
-        (radius(&"9".repeat(400)), not_understood),
-        (radius("1e308"), "1e308 must be"),
-        (radius("18446744073709551615"), "1.8446744073709552e19 must be"),
-        (radius("-0.0"), "must be"),
-        (radius("5e-324"), "5e-324 must be"),
+        (radius_message("{}"), number_rule),
+        (radius_message("{\"a\":1}"), number_rule),
+        (radius_message("[0.5]"), number_rule),
+        (radius_message("true"), number_rule),
+        (radius_message("\"0.5\""), number_rule),
+        (radius_message("\"NaN\""), number_rule),
+        (radius_message("\"0.5\\n[render]\\nseed = 7\""), number_rule),
+        (radius_message("NaN"), not_understood),
+        (radius_message("Infinity"), not_understood),
+        (radius_message("1e999"), not_understood),
+        (radius_message("-1e999"), not_understood),
+        (radius_message(&"9".repeat(400)), not_understood),
+        (radius_message("1e308"), "1e308 must be"),
+        (radius_message("18446744073709551615"), "1.8446744073709552e19 must be"),
+        (radius_message("-0.0"), "must be"),
+        (radius_message("5e-324"), "5e-324 must be"),
         (nested(100), number_rule),
         (nested(1500), not_understood),
         (set("image.width", &json!(1e300)), "must be a whole number"),

@@ -9,11 +9,11 @@ const ADAPTIVE: &str = "shaders/kernels/adaptive.wgsl";
 
 fn problems(session: &TestSession) -> Vec<String> {
     let state = session.state();
-    let location = |location: &Option<String>| location.clone().unwrap_or_default();
+    let location_text = |location: &Option<String>| location.clone().unwrap_or_default();
     state
         .problems
         .iter()
-        .map(|problem| format!("{}: {}", location(&problem.place), problem.message))
+        .map(|problem| format!("{}: {}", location_text(&problem.place), problem.message))
         .collect()
 }
 
@@ -72,10 +72,10 @@ fn insert_long_loop(files: &Files, file: &str, next_code: &str) {
 
 #[test]
 fn a_truncated_loop_is_reported_or_the_image_is_complete() {
-    let small = SCENE
+    let small_scene = SCENE
         .replace("width = 40", "width = 8")
         .replace("height = 30", "height = 8");
-    let files = Files::new(&small);
+    let files = Files::new(&small_scene);
     let session = files.start();
     session.wait_for_rendered_image(&files);
     let initial = session.colors();

@@ -10,7 +10,7 @@ use super::running::{Files, TestSession};
 use crate::model::Model;
 
 /// The start of a scene. The camera is at -y, and the image covers about x = -2 to 2.
-const START: &str = "\
+const SCENE_START: &str = "\
 image = { width = 40, height = 30 }
 camera = { position = [0, -4, 0], look_at = [0, 0, 0], fov = 40 }
 render.pixel_samples = { count = 1 }
@@ -72,7 +72,7 @@ fn set(session: &TestSession, path: &str, value: serde_json::Value) -> Option<St
 #[test]
 fn picking_an_instance_returns_its_lines_mesh_and_material() {
     let text = format!(
-        "{START}materials.red = {{ type = 'phong', color = [0.8, 0.1, 0.1] }}
+        "{SCENE_START}materials.red = {{ type = 'phong', color = [0.8, 0.1, 0.1] }}
 materials.green = {{ type = 'phong', color = [0.1, 0.8, 0.1] }}
 
 [meshes.tile]
@@ -158,7 +158,7 @@ translate = [1, 0, 0]
 #[test]
 fn picking_a_mesh_returns_its_own_materials() {
     let text = format!(
-        "{START}[materials.leaf]
+        "{SCENE_START}[materials.leaf]
 type = 'phong'
 color = [0.1, 0.8, 0.1]
 
@@ -249,7 +249,7 @@ fn picking_a_gltf_file_reports_that_it_is_read_only() {
 #[test]
 fn objects_of_a_gltf_file_belong_to_the_shape_that_loads_it() {
     let files = Files::new(&format!(
-        "{START}materials.red = {{ type = 'phong', color = [0.8, 0.1, 0.1] }}
+        "{SCENE_START}materials.red = {{ type = 'phong', color = [0.8, 0.1, 0.1] }}
 render.integrator = 'path'
 
 [[shapes]]

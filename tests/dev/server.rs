@@ -32,11 +32,11 @@ fn is_complete(response: &str) -> bool {
     head.starts_with("HTTP/1.1 101") || body.len() >= length.unwrap_or(usize::MAX)
 }
 
-fn get(path: &str, host: &str, extra_headers: &str) -> String {
+fn get_request(path: &str, host: &str, extra_headers: &str) -> String {
     format!("GET {path} HTTP/1.1\r\nHost: {host}\r\n{extra_headers}Connection: close\r\n\r\n")
 }
 
-fn upgrade(host: &str, origin: &str) -> String {
+fn upgrade_request(host: &str, origin: &str) -> String {
     format!(
         "GET /socket HTTP/1.1\r\nHost: {host}\r\n{origin}Connection: Upgrade\r\nUpgrade: websocket\r\n\
          Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n"
@@ -63,7 +63,7 @@ fn the_server_answers_only_requests_from_its_own_page() {
         "/parts.js",
         "/touch.js",
     ] {
-        let (status, text) = send_request(address, &get(path, &own_host, ""));
+        let (status, text) = send_request(address, &get_request(path, &own_host, ""));
         assert_eq!(status, "HTTP/1.1 200 OK", "{path}");
         assert!(
             text.contains("default-src 'none'") && text.contains("nosniff"),
@@ -82,7 +82,7 @@ fn the_server_answers_only_requests_from_its_own_page() {
         "//etc/passwd",
     ] {
         assert_eq!(
-            send_request(address, &get(path, &own_host, "")).0,
+            send_request(address, &get_request(path, &own_host, "")).0,
             "HTTP/1.1 404 Not Found",
             "{path}"
         );
@@ -94,14 +94,18 @@ fn the_server_answers_only_requests_from_its_own_page() {
         "192.168.0.1",
         "127.0.0.1.evil.example",
     ] {
-        assert_eq!(send_request(address, &get("/", host, "")).0, forbidden, "{host}");
         assert_eq!(
-            send_request(address, &get(&format!("http://{host}/"), &own_host, "")).0,
+            send_request(address, &get_request("/", host, "")).0,
             forbidden,
             "{host}"
         );
         assert_eq!(
-            send_request(address, &upgrade(host, &format!("Origin: http://{host}\r\n"))).0,
+            send_request(address, &get_request(&format!("http://{host}/"), &own_host, "")).0,
+            forbidden,
+            "{host}"
+        );
+        assert_eq!(
+            send_request(address, &upgrade_request(host, &format!("Origin: http://{host}\r\n"))).0,
             forbidden,
             "{host}"
         );
@@ -113,20 +117,24 @@ fn the_server_answers_only_requests_from_its_own_page() {
         "",
     ] {
         assert_eq!(
-            send_request(address, &upgrade(&own_host, origin)).0,
+            send_request(address, &upgrade_request(&own_host, origin)).0,
             forbidden,
             "{origin}"
         );
     }
     assert_eq!(
-        send_request(address, &get("/", &own_host, "Origin: http://evil.example\r\n")).0,
+        send_request(address, &get_request("/", &own_host, "Origin: http://evil.example\r\n")).0,
         forbidden
     );
-    let accepted = send_request(address, &upgrade(&own_host, &format!("Origin: http://{own_host}\r\n"))).0;
+    let accepted = send_request(
+        address,
+        &upgrade_request(&own_host, &format!("Origin: http://{own_host}\r\n")),
+    )
+    .0;
     assert_eq!(accepted, "HTTP/1.1 101 Switching Protocols");
 
     // The number of viewers is limited; a viewer that disconnects makes room for another viewer.
-    let request = upgrade(&own_host, &format!("Origin: http://{own_host}\r\n"));
+    let request = upgrade_request(&own_host, &format!("Origin: http://{own_host}\r\n"));
     let mut connections = Vec::new();
     let status = loop {
         let mut stream = TcpStream::connect(address).unwrap();
@@ -170,16 +178,16 @@ fn images_are_not_sent_to_foreign_origins_and_are_only_accepted_from_the_page() 
     let (session, address) = serve(session);
     let own_host = address.to_string();
     for (path, mime_type) in [("/picture.png", "image/png"), ("/picture.exr", "image/x-exr")] {
-        let (status, text) = send_request(address, &get(path, &own_host, ""));
+        let (status, text) = send_request(address, &get_request(path, &own_host, ""));
         assert_eq!(status, "HTTP/1.1 200 OK", "{path}");
         assert!(text.contains(mime_type) && text.contains("same-origin"), "{path}");
-        let foreign = get(path, &own_host, "Origin: http://evil.example\r\n");
-        assert_eq!(send_request(address, &foreign).0, "HTTP/1.1 403 Forbidden");
+        let cross_origin_request = get_request(path, &own_host, "Origin: http://evil.example\r\n");
+        assert_eq!(send_request(address, &cross_origin_request).0, "HTTP/1.1 403 Forbidden");
     }
     let upload = |origin: &str| {
-        let head =
+        let request_head =
             format!("POST /reference/a%20b.png HTTP/1.1\r\nHost: {own_host}\r\n{origin}Content-Length: 10\r\n\r\n");
-        send_request(address, &(head + "not image."))
+        send_request(address, &(request_head + "not image."))
     };
     let own_origin = format!("Origin: http://{own_host}\r\n");
     for origin in ["", "Origin: null\r\n", "Origin: http://evil.example\r\n"] {
@@ -190,7 +198,7 @@ fn images_are_not_sent_to_foreign_origins_and_are_only_accepted_from_the_page() 
     assert!(text.contains("a b.png: "), "{text}");
     assert_eq!(session.state().comparable, (false, None));
     assert_eq!(
-        send_request(address, &get("/reference/a", &own_host, "")).0,
+        send_request(address, &get_request("/reference/a", &own_host, "")).0,
         "HTTP/1.1 405 Method Not Allowed"
     );
 }
@@ -214,7 +222,7 @@ fn incomplete_requests_time_out_and_do_not_block_other_requests() {
         .collect();
     let start = Instant::now();
     assert_eq!(
-        send_request(address, &get("/", &address.to_string(), "")).0,
+        send_request(address, &get_request("/", &address.to_string(), "")).0,
         "HTTP/1.1 200 OK"
     );
     assert!(start.elapsed() < Duration::from_secs(3), "{:?}", start.elapsed());

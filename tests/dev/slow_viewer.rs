@@ -71,7 +71,7 @@ fn a_slow_connection_does_not_delay_camera_moves() {
     let (session, address) = serve(session);
     let mut viewer = Viewer::slow(address, RATE);
     let mut sender = viewer.sender();
-    let moves = std::thread::spawn(move || {
+    let camera_mover = std::thread::spawn(move || {
         let start = Instant::now();
         while start.elapsed() < Duration::from_secs(5) {
             sender
@@ -81,7 +81,7 @@ fn a_slow_connection_does_not_delay_camera_moves() {
         }
     });
     let mut max_size = 0;
-    while !moves.is_finished() {
+    while !camera_mover.is_finished() {
         match viewer.receive().unwrap() {
             Received::Frame(header, size) => {
                 max_size = max_size.max(size);

@@ -32,13 +32,13 @@ impl Viewer {
              Upgrade: websocket\r\nSec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n"
         );
         stream.write_all(request.as_bytes()).unwrap();
-        let mut head = Vec::new();
-        while !head.ends_with(b"\r\n\r\n") {
+        let mut response_head = Vec::new();
+        while !response_head.ends_with(b"\r\n\r\n") {
             let mut byte = [0];
             stream.read_exact(&mut byte).unwrap();
-            head.push(byte[0]);
+            response_head.push(byte[0]);
         }
-        assert!(head.starts_with(b"HTTP/1.1 101"));
+        assert!(response_head.starts_with(b"HTTP/1.1 101"));
         Viewer { stream, rate: None }
     }
 

@@ -23,12 +23,12 @@ fn the_camera_moves_and_is_saved_without_another_render() {
     session.inner.send(Command::Move(Move::Orbit(-0.1, 0.0)));
     session.inner.send(Command::View(View::Normal));
     session.inner.send(Command::View(View::Color));
-    let finished = |session: &TestSession| {
+    let finished_revision = |session: &TestSession| {
         let frame = session.frame()?;
         (frame.header.done && frame.header.view == View::Color).then_some(frame.header.revision)
     };
     std::thread::sleep(IDLE_TIME);
-    session.wait("a finished image", finished);
+    session.wait("a finished image", finished_revision);
     let state = session.state();
     assert!(state.camera_moved);
     // A scene file with the text of the moved camera gives the displayed image.
@@ -161,16 +161,16 @@ fn the_cpu_agrees_until_a_shader_is_changed() {
     let session = files.start();
     session.wait_for_rendered_image(&files);
     session.inner.send(Command::View(View::Compare(Against::Cpu)));
-    let compared = |session: &TestSession| {
+    let differing = |session: &TestSession| {
         session
             .frame()
             .filter(|frame| frame.header.done)
             .and_then(|frame| frame.header.differing)
     };
-    assert_eq!(session.wait("a comparison", compared), (0, 0.0));
+    assert_eq!(session.wait("a comparison", differing), (0, 0.0));
     files.edit(KERNEL, RADIANCE, &format!("({RADIANCE} + vec4f(0.25, 0.0, 0.0, 0.0))"));
     let (pixels, max_difference) = session.wait("a difference", |session| {
-        compared(session).filter(|(pixels, _)| *pixels > 0)
+        differing(session).filter(|(pixels, _)| *pixels > 0)
     });
     assert!(pixels > 100, "{pixels}");
     assert!((max_difference - 0.25).abs() < 1e-5, "{max_difference}");

@@ -83,14 +83,19 @@ fn a_device_lost_several_times_is_reopened_each_time() {
     let Some(driver) = driver() else { return };
     let folder = TestFolder::with_scene(SCENE);
     let expected = folder.render_expected(driver, &[]);
-    let twice = folder.run_on(driver, &GPU, &[("FAULTS_LOSE", "2,4")]);
-    assert_eq!((twice.code, twice.count("lost")), (0, 2), "{}", twice.stderr);
-    assert_reopened(&twice, 2, &[]);
-    assert!(twice.picture == Some(expected.clone()));
+    let twice_lost = folder.run_on(driver, &GPU, &[("FAULTS_LOSE", "2,4")]);
+    assert_eq!(
+        (twice_lost.code, twice_lost.count("lost")),
+        (0, 2),
+        "{}",
+        twice_lost.stderr
+    );
+    assert_reopened(&twice_lost, 2, &[]);
+    assert!(twice_lost.picture == Some(expected.clone()));
     // Two losses during the samples and two during the first hits: at the second to last submit, and again after the
     // next warm-up. Four losses in a row, without progress between them, would exceed the limit.
-    let hits = twice.count("submit") - 1;
-    let lost_submits = format!("2,4,{hits},{}", hits + 2);
+    let first_hits_submit = twice_lost.count("submit") - 1;
+    let lost_submits = format!("2,4,{first_hits_submit},{}", first_hits_submit + 2);
     // The number of submits before the first hits depends on timing, so the losses of a run may miss the first hits.
     let mut runs = (0..5).map(|_| folder.run_on(driver, &GPU, &[("FAULTS_LOSE", &lost_submits)]));
     let result = runs.find(|result| (result.code, result.count("lost")) == (0, 4));

@@ -74,7 +74,7 @@ fn the_image_of_a_file_has_the_same_bits_on_cpu_and_gpu() {
     }
     // Negative control: another strength of the normal map changes the image.
     builder.get("materials")[material]["normalTexture"]["scale"] = json!(0.6);
-    let mut control = load_scene(&builder.write(folder.path(), "other", Packing::Binary), "");
-    (control.width, control.height) = (24, 24);
-    assert!(differing(&reference(&pack(&control)), &expected) > 50);
+    let mut other_scene = load_scene(&builder.write(folder.path(), "other", Packing::Binary), "");
+    (other_scene.width, other_scene.height) = (24, 24);
+    assert!(differing(&reference(&pack(&other_scene)), &expected) > 50);
 }

@@ -159,8 +159,11 @@ fn base_color_is_srgb_and_multiplied_by_its_factor() {
     let mesh = builder.quad(Some(material));
     builder.root_node(json!({ "mesh": mesh }));
     // The sRGB transfer function (IEC 61966-2-1).
-    let linear = |byte: f64| ((byte / 255.0 + 0.055) / 1.055).powf(2.4);
-    assert_all(&scene(&builder, "srgb"), [0.5 * linear(128.0), 0.25, linear(64.0)]);
+    let to_linear = |byte: f64| ((byte / 255.0 + 0.055) / 1.055).powf(2.4);
+    assert_all(
+        &scene(&builder, "srgb"),
+        [0.5 * to_linear(128.0), 0.25, to_linear(64.0)],
+    );
 }
 
 #[test]
@@ -484,7 +487,7 @@ fn constant_textures_equal_plain_values() {
     for case in cases() {
         let name = format!("texture-{}", case.name);
         let textured = pixels(&tilted_quad(&name, case.texel, &case.textured));
-        let plain = pixels(&tilted_quad(&format!("{name}-plain"), case.texel, &case.plain));
+        let untextured = pixels(&tilted_quad(&format!("{name}-plain"), case.texel, &case.plain));
         let white = pixels(&tilted_quad(&format!("{name}-white"), WHITE, &case.textured));
         let max_difference = |a: &[[f32; 3]], b: &[[f32; 3]]| {
             let pairs = a.as_flattened().iter().zip(b.as_flattened());
@@ -499,14 +502,14 @@ fn constant_textures_equal_plain_values() {
             1e-5
         };
         assert!(
-            max_difference(&textured, &plain) < tolerance,
-            "{}: {textured:?} {plain:?}",
+            max_difference(&textured, &untextured) < tolerance,
+            "{}: {textured:?} {untextured:?}",
             case.name
         );
         // Negative control: with a white texel, the image differs visibly.
         assert!(
-            max_difference(&white, &plain) > 0.1,
-            "{}: {white:?} {plain:?}",
+            max_difference(&white, &untextured) > 0.1,
+            "{}: {white:?} {untextured:?}",
             case.name
         );
     }

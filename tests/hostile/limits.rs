@@ -6,7 +6,7 @@ use std::path::Path;
 
 use serde_json::{Value, json};
 
-use super::seeds::{START, TEXTURE, container, ktx2, triangle};
+use super::seeds::{SCENE_START, TEXTURE, container, ktx2, triangle};
 use super::{RunResult, render, render_with, run};
 
 fn render_glb(json: &Value, binary: &[u8]) -> RunResult {
@@ -59,16 +59,16 @@ fn the_total_number_of_triangles_is_limited() {
     json["buffers"][0]["byteLength"] = json!(binary.len());
     json["bufferViews"][0]["byteLength"] = json!(binary.len());
     json["accessors"][0]["count"] = json!(3 * count);
-    let meshes = |json: &mut Value, count: usize| {
+    let set_mesh_count = |json: &mut Value, count: usize| {
         json["meshes"] = json!(vec![
             json!({ "primitives": [{ "attributes": { "POSITION": 0 } }] });
             count
         ]);
         json["nodes"] = (0..count).map(|i| json!({ "mesh": i })).collect();
     };
-    meshes(&mut json, 1000);
+    set_mesh_count(&mut json, 1000);
     assert_rejected(&json, &binary, " triangles");
-    meshes(&mut json, 20);
+    set_mesh_count(&mut json, 20);
     assert_eq!(render_glb(&json, &binary).code, 0);
 }
 
@@ -142,11 +142,11 @@ fn sparse_files_are_refused_by_their_length() {
     json["buffers"][0]["uri"] = json!("a.bin");
     fs::write(folder.join("b.gltf"), json.to_string()).unwrap();
     let material = "[materials.m]\ntype = 'diffuse'\ncolor = [1, 1, 1]\n";
-    let mesh = format!("{START}{material}[[shapes]]\ntype = 'mesh'\nmaterial = 'm'\nfile = 'a.obj'\n");
+    let mesh = format!("{SCENE_START}{material}[[shapes]]\ntype = 'mesh'\nmaterial = 'm'\nfile = 'a.obj'\n");
     fs::write(folder.join("mesh.toml"), mesh).unwrap();
     let texture = "[textures.t]\ntype = 'image'\nfile = 'a.png'\n[materials.m]\ntype = 'diffuse'\ncolor = { texture = 't' }\n\
         [[shapes]]\ntype = 'sphere'\nmaterial = 'm'\ncenter = [0, 0, 0]\nradius = 1\n";
-    fs::write(folder.join("texture.toml"), format!("{START}{texture}")).unwrap();
+    fs::write(folder.join("texture.toml"), format!("{SCENE_START}{texture}")).unwrap();
     for name in ["b.gltf", "a.toml", "a.glb", "mesh.toml", "texture.toml"] {
         let result = render(folder, name);
         assert!(
@@ -166,7 +166,7 @@ fn shapes_that_repeat_a_file_are_limited() {
     json["nodes"] = json!(vec![json!({ "mesh": 0 }); 2000]);
     fs::write(folder.join("a.glb"), container(&json, &binary)).unwrap();
     let shape = "[[shapes]]\ntype = 'gltf'\nfile = 'a.glb'\n";
-    fs::write(folder.join("a.toml"), START.to_owned() + &shape.repeat(20_000)).unwrap();
+    fs::write(folder.join("a.toml"), SCENE_START.to_owned() + &shape.repeat(20_000)).unwrap();
     let result = render(folder, "a.toml");
     assert!(
         result.code == 3 && result.output.contains("together must import at most 262144"),
@@ -177,7 +177,7 @@ fn shapes_that_repeat_a_file_are_limited() {
     // not take quadratic time.
     json["nodes"] = json!([{ "mesh": 0 }]);
     fs::write(folder.join("a.glb"), container(&json, &binary)).unwrap();
-    fs::write(folder.join("a.toml"), START.to_owned() + &shape.repeat(3000)).unwrap();
+    fs::write(folder.join("a.toml"), SCENE_START.to_owned() + &shape.repeat(3000)).unwrap();
     let result = render(folder, "a.toml");
     assert_eq!(result.code, 0, "{}", result.output);
 }
@@ -212,10 +212,10 @@ fn images_that_decode_to_a_thousand_times_their_size_are_rejected() {
         &mut json["bufferViews"],
         json!({ "buffer": 0, "byteOffset": start, "byteLength": image.len() }),
     );
-    let slots = |i: usize| json!({ "pbrMetallicRoughness": { "baseColorTexture": { "index": i } } });
+    let new_material = |i: usize| json!({ "pbrMetallicRoughness": { "baseColorTexture": { "index": i } } });
     json["images"] = json!(vec![json!({ "bufferView": 1 }); 50]);
     json["textures"] = (0..50).map(|i| json!({ "source": i })).collect();
-    json["materials"] = (0..50).map(slots).collect();
+    json["materials"] = (0..50).map(new_material).collect();
     let primitive = |i: usize| json!({ "attributes": { "POSITION": 0 }, "material": i });
     json["meshes"][0]["primitives"] = (0..50).map(primitive).collect();
     assert_rejected(&json, &binary, "texels in total; for files of ");
@@ -226,7 +226,7 @@ fn images_that_decode_to_a_thousand_times_their_size_are_rejected() {
     json["buffers"][0]["byteLength"] = json!(binary.len());
     json["bufferViews"][1]["byteLength"] = json!(rgba16.len());
     json["meshes"][0]["primitives"] = json!([primitive(0)]);
-    json["materials"] = json!([slots(0)]);
+    json["materials"] = json!([new_material(0)]);
     assert_rejected(&json, &binary, "; the limit for a file of ");
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("deep.png"), &rgba16).unwrap();
@@ -246,7 +246,7 @@ fn ktx2_files_are_refused_by_their_headers() {
         fs::write(folder.path().join("a.ktx2"), bytes).unwrap();
         fs::write(
             folder.path().join("a.toml"),
-            START.to_owned() + &TEXTURE.replace("FILE", "a.ktx2"),
+            SCENE_START.to_owned() + &TEXTURE.replace("FILE", "a.ktx2"),
         )
         .unwrap();
         let result = render_with(folder.path(), "a.toml", &["--strict"]);
@@ -368,7 +368,11 @@ fn pipes_and_devices_are_not_read() {
         ("pipe.png", "[textures.t]\ntype = 'image'\nfile = 'FILE'\n"),
         ("pipe.png", "[environment]\nfile = 'FILE'\n"),
     ] {
-        fs::write(folder.join("a.toml"), format!("{START}{}", text.replace("FILE", file))).unwrap();
+        fs::write(
+            folder.join("a.toml"),
+            format!("{SCENE_START}{}", text.replace("FILE", file)),
+        )
+        .unwrap();
         let result = run(folder, &["check", "a.toml"]);
         assert!(
             result.code == 3 && result.output.contains("must be a file"),
@@ -452,7 +456,7 @@ fn control_characters_are_escaped_in_messages() {
         "[materials.\"a\\u001b[31m\"]\ntype=\"nope\\u001b\"\n",
         "[[shapes]]\ntype=\"mesh\"\nfile=\"a\\u001b[31m\\n.obj\"\n",
     ] {
-        fs::write(folder.join("a.toml"), format!("{START}{text}")).unwrap();
+        fs::write(folder.join("a.toml"), format!("{SCENE_START}{text}")).unwrap();
         let result = run(folder, &["check", "a.toml"]);
         assert_eq!(
             (result.code, result.output.lines().count()),

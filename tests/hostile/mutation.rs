@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fs;
 
 use super::changed::changed;
-use super::seeds::{Format, ReadCommand, SCENES, START, all_formats, write_referenced_files};
+use super::seeds::{Format, ReadCommand, SCENE_START, SCENES, all_formats, write_referenced_files};
 use super::{RunResult, render, run};
 use crate::random::Random;
 
@@ -113,7 +113,7 @@ fn mutated_files_are_read_or_rejected_with_a_message() {
             let write_scene = |text: &str| {
                 fs::write(
                     folder.join("names.toml"),
-                    START.to_owned() + &text.replace("FILE", &file),
+                    SCENE_START.to_owned() + &text.replace("FILE", &file),
                 )
                 .unwrap()
             };

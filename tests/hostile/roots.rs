@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::json;
 
-use super::seeds::{START, triangle};
+use super::seeds::{SCENE_START, triangle};
 use super::{RunResult, render, render_with};
 
 /// Contents of the secret files, which no message may contain.
@@ -103,12 +103,16 @@ fn a_scene_reads_no_file_outside_the_asset_root() {
     ];
     for (extension, text) in texts {
         for name in escaping_names(outer.path(), extension) {
-            fs::write(folder.join("a.toml"), START.to_owned() + &text.replace("FILE", &name)).unwrap();
+            fs::write(
+                folder.join("a.toml"),
+                SCENE_START.to_owned() + &text.replace("FILE", &name),
+            )
+            .unwrap();
             assert_rejected(&render_with(&folder, "a.toml", &["--strict"]), &name);
         }
     }
     // `--asset-root` permits shared files.
-    let shared = format!("{START}{material}[[shapes]]\ntype = 'mesh'\nmaterial = 'm'\nfile = '../secret.obj'\n");
+    let shared = format!("{SCENE_START}{material}[[shapes]]\ntype = 'mesh'\nmaterial = 'm'\nfile = '../secret.obj'\n");
     fs::write(folder.join("a.toml"), shared).unwrap();
     assert_eq!(render(&folder, "a.toml").code, 3);
     let result = render_with(&folder, "a.toml", &["--asset-root", ".."]);
@@ -141,7 +145,7 @@ fn a_gltf_file_reads_no_file_outside_the_asset_root() {
             // A scene that imports this glTF file is rejected, too.
             fs::write(
                 folder.join("a.toml"),
-                format!("{START}[[shapes]]\ntype = 'gltf'\nfile = 'a.gltf'\n"),
+                format!("{SCENE_START}[[shapes]]\ntype = 'gltf'\nfile = 'a.gltf'\n"),
             )
             .unwrap();
             assert_rejected(&render_with(&folder, "a.toml", &["--strict"]), &name);
@@ -154,7 +158,7 @@ fn a_mesh_reads_no_file_outside_the_asset_root() {
     let (outer, folder) = create_folders();
     fs::write(
         folder.join("a.toml"),
-        format!("{START}[[shapes]]\ntype = 'mesh'\nfile = 'a.obj'\n"),
+        format!("{SCENE_START}[[shapes]]\ntype = 'mesh'\nfile = 'a.obj'\n"),
     )
     .unwrap();
     let mesh =

@@ -31,7 +31,7 @@ pub struct Format {
 pub enum ReadCommand {
     /// `wgray render` of the file.
     Scene,
-    /// `wgray render` of a scene that consists of [`START`] and this text, in which `FILE` stands for the file.
+    /// `wgray render` of a scene that consists of [`SCENE_START`] and this text, in which `FILE` stands for the file.
     Named(&'static str),
     /// `wgray render` of a scene as for `Named`, then `wgray diff` of the file.
     Picture(&'static str),
@@ -42,7 +42,7 @@ pub enum ReadCommand {
 }
 
 /// Keys that a scene needs in addition to shapes and materials.
-pub const START: &str = "
+pub const SCENE_START: &str = "
 image = { width = 8, height = 6 }
 camera = { position = [0, -4, 1], look_at = [0, 0, 0], fov = 50 }
 render = { integrator = 'path', pixel_samples = { pattern = 'random', count = 1 } }

@@ -23,7 +23,7 @@ fn assert_bounds(scene: &Scene, expected: (DVec3, DVec3), case: &str) {
     }
 }
 
-const HEAD: &str = "image = { width = 4, height = 4 }\n\
+const SCENE_START: &str = "image = { width = 4, height = 4 }\n\
                     camera = { position = [0, -5, 0], look_at = [0, 0, 0], fov = 40 }\n\
                     materials.m = { type = 'phong', color = [0.5, 0.5, 0.5] }\n";
 
@@ -64,13 +64,13 @@ fn meshes_away_from_the_origin_have_exact_bounds() {
         // The scaled coordinates are rotated by 90 degrees around z: x' = -y, y' = x.
         let transformed = |p: &DVec3| DVec3::new(-p.y + 5.0, 2.0 * p.x + 6.0, -3.0 * p.z + 7.0);
 
-        let shape = format!("{HEAD}[[shapes]]\ntype = 'mesh'\n{file}{transform}");
+        let shape = format!("{SCENE_START}[[shapes]]\ntype = 'mesh'\n{file}{transform}");
         std::fs::write(&path, shape).unwrap();
         let scene = Scene::load(&path).unwrap();
         assert_bounds(&scene, bounds_of(points.iter().map(transformed)), "a shape");
 
         let instances = format!(
-            "{HEAD}[meshes.a]\n{file}[[instances]]\nmesh = 'a'\n{transform}[[instances]]\nmesh = 'a'\nmaterial = 'm'\n"
+            "{SCENE_START}[meshes.a]\n{file}[[instances]]\nmesh = 'a'\n{transform}[[instances]]\nmesh = 'a'\nmaterial = 'm'\n"
         );
         std::fs::write(&path, instances).unwrap();
         let scene = Scene::load(&path).unwrap();

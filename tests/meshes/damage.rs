@@ -3,7 +3,7 @@
 use super::{corners, load};
 
 const SQUARE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
-const FIRST: [[f64; 3]; 3] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0]];
+const FIRST_TRIANGLE: [[f64; 3]; 3] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0]];
 
 #[test]
 fn damaged_lines_of_obj_files_are_replaced() {
@@ -59,7 +59,7 @@ fn damaged_lines_of_obj_files_are_replaced() {
         ),
     ] {
         let mesh = load("a.obj", format!("{SQUARE}{lines}"), None).unwrap();
-        assert_eq!(corners(&mesh), [FIRST], "{lines}");
+        assert_eq!(corners(&mesh), [FIRST_TRIANGLE], "{lines}");
         assert_eq!(mesh.notes[0], note, "{lines}");
     }
 }
@@ -68,7 +68,7 @@ fn damaged_lines_of_obj_files_are_replaced() {
 fn facets_of_a_truncated_stl_file_are_kept() {
     let facet = "facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 1 1 0\nendloop\nendfacet\n";
     let mesh = load("a.stl", format!("solid a\n{facet}"), None).unwrap();
-    assert_eq!(corners(&mesh), [FIRST]);
+    assert_eq!(corners(&mesh), [FIRST_TRIANGLE]);
     let note = "line 9: the file ends inside a solid; \"endsolid\" is missing; the facets before the end are used";
     assert_eq!(mesh.notes, [note]);
 }
@@ -118,7 +118,7 @@ fn damaged_rows_of_ply_files_are_removed() {
         ),
     ] {
         let mesh = load("a.ply", ply(vertices, faces), None).unwrap();
-        assert_eq!((corners(&mesh), mesh.notes.len()), (vec![FIRST], 1));
+        assert_eq!((corners(&mesh), mesh.notes.len()), (vec![FIRST_TRIANGLE], 1));
         assert_eq!(mesh.notes[0], note);
     }
 }
@@ -139,9 +139,9 @@ fn vertex_colors_that_are_not_finite_are_white() {
 
 #[test]
 fn ply_lines_may_have_more_values_than_declared() {
-    let wide = "0 0 0 255 1 2\n1 0 0 3\n1 1 0\n0 1 0 7 8\n";
-    let mesh = load("a.ply", ply(wide, "3 0 1 2 200 100 50\n"), None).unwrap();
-    assert_eq!(corners(&mesh), [FIRST]);
+    let long_lines = "0 0 0 255 1 2\n1 0 0 3\n1 1 0\n0 1 0 7 8\n";
+    let mesh = load("a.ply", ply(long_lines, "3 0 1 2 200 100 50\n"), None).unwrap();
+    assert_eq!(corners(&mesh), [FIRST_TRIANGLE]);
     assert_eq!(
         mesh.notes,
         [
@@ -152,7 +152,11 @@ fn ply_lines_may_have_more_values_than_declared() {
     for points in [POINTS.replace("1 1 0", "1 1\n\n0"), POINTS.replace("\n1", " 1")] {
         let text = ply(POINTS, "3 0 1 2\n").replace(POINTS, &points);
         let mesh = load("a.ply", text, None).unwrap();
-        assert_eq!((corners(&mesh), mesh.notes.len()), (vec![FIRST], 0), "{points}");
+        assert_eq!(
+            (corners(&mesh), mesh.notes.len()),
+            (vec![FIRST_TRIANGLE], 0),
+            "{points}"
+        );
     }
 }
 
@@ -160,7 +164,7 @@ fn ply_lines_may_have_more_values_than_declared() {
 fn unknown_lines_of_ply_headers_are_ignored() {
     let text = ply(POINTS, "3 0 1 2\n").replace("element face", "Created by a program\nelement face");
     let mesh = load("a.ply", text, None).unwrap();
-    assert_eq!(corners(&mesh), [FIRST]);
+    assert_eq!(corners(&mesh), [FIRST_TRIANGLE]);
     assert!(
         mesh.notes[0].message.ends_with("; the line was ignored"),
         "{:?}",
@@ -175,7 +179,7 @@ fn stl_facets_with_non_finite_vertices_are_skipped() {
     };
     let text = format!("solid a\n{}{}endsolid a\n", facet("0"), facet("nan"));
     let mesh = load("a.stl", text, None).unwrap();
-    assert_eq!(corners(&mesh), [FIRST]);
+    assert_eq!(corners(&mesh), [FIRST_TRIANGLE]);
     assert_eq!(
         mesh.notes,
         ["line 11: z: NaN must be from -1e9 to 1e9; the face was removed"]
@@ -197,7 +201,7 @@ fn obj_files_may_be_utf_16() {
             .chain(text.encode_utf16())
             .flat_map(bytes)
             .collect();
-        assert_eq!(corners(&load("a.obj", encoded, None).unwrap()), [FIRST]);
+        assert_eq!(corners(&load("a.obj", encoded, None).unwrap()), [FIRST_TRIANGLE]);
     }
 }
 

@@ -50,15 +50,15 @@ fn depth(mesh: &Arc<Mesh>) -> f32 {
 
 #[test]
 fn an_edited_clone_is_rendered_with_its_edits() {
-    let first = Arc::new(square());
-    assert!((depth(&first) - 5.0).abs() < 0.1);
+    let original = Arc::new(square());
+    assert!((depth(&original) - 5.0).abs() < 0.1);
     let move_back = |mesh: &mut Mesh| mesh.positions.iter_mut().for_each(|p| p.z -= 2.0);
 
-    let mut clone = Mesh::clone(&first);
+    let mut clone = Mesh::clone(&original);
     move_back(&mut clone);
     assert!((depth(&Arc::new(clone)) - 7.0).abs() < 0.1, "a clone has the old depth");
 
-    let mut unshared = Arc::clone(&first);
+    let mut unshared = Arc::clone(&original);
     move_back(Arc::make_mut(&mut unshared));
     assert!((depth(&unshared) - 7.0).abs() < 0.1, "Arc::make_mut of a shared mesh");
     move_back(Arc::make_mut(&mut unshared));
@@ -70,7 +70,7 @@ fn an_edited_clone_is_rendered_with_its_edits() {
     let mut owned = Arc::try_unwrap(unshared).unwrap();
     move_back(&mut owned);
     assert!((depth(&Arc::new(owned)) - 11.0).abs() < 0.1, "Arc::try_unwrap");
-    assert!((depth(&first) - 5.0).abs() < 0.1);
+    assert!((depth(&original) - 5.0).abs() < 0.1);
 }
 
 #[test]

@@ -15,8 +15,8 @@ fn write(folder: &Path, mtl: &str) {
     color.save(folder.join("color.png")).unwrap();
     let gray = image::RgbImage::from_pixel(2, 2, image::Rgb([90, 90, 90]));
     gray.save(folder.join("gray.png")).unwrap();
-    let clear = image::RgbaImage::from_pixel(2, 2, image::Rgba([90, 90, 90, 128]));
-    clear.save(folder.join("clear.png")).unwrap();
+    let transparent = image::RgbaImage::from_pixel(2, 2, image::Rgba([90, 90, 90, 128]));
+    transparent.save(folder.join("clear.png")).unwrap();
 }
 
 fn material(mtl: &str) -> (Material, Vec<String>) {

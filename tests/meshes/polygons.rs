@@ -114,8 +114,8 @@ fn random_polygons_are_covered() {
         let [u, v] = [DVec3::new(0.6, 0.0, 0.8), DVec3::new(-0.48, 0.8, 0.36)];
         let rotated: Vec<DVec3> = points.iter().map(|p| u * p.x + v * p.y).collect();
         let rotated_mesh = load("a.obj", polygon(&rotated), None).unwrap();
-        let sum = |mesh: &Mesh| areas(mesh).iter().map(|area| area.length()).sum::<f64>();
-        assert!((sum(&mesh) - sum(&rotated_mesh)).abs() < 1e-5, "{round}");
+        let total_area = |mesh: &Mesh| areas(mesh).iter().map(|area| area.length()).sum::<f64>();
+        assert!((total_area(&mesh) - total_area(&rotated_mesh)).abs() < 1e-5, "{round}");
     }
 }
 

@@ -171,7 +171,7 @@ pub fn scene(text: &str, folder: &Path) -> Packed {
 }
 
 /// Start of the scenes: an image, a camera towards the origin, materials.
-pub const HEAD: &str = "image = { width = 48, height = 36 }
+pub const SCENE_START: &str = "image = { width = 48, height = 36 }
 camera = { position = [0.3, -4, 1.6], look_at = [0, 0, 0], fov = 40 }
 [materials.m]
 type = 'phong'

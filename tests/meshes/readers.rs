@@ -146,11 +146,11 @@ fn equal_obj_corners_share_a_vertex() {
     assert_eq!(mesh.triangles, [[0, 1, 2], [0, 3, 4], [4, 3, 0]]);
     // Different normals split a vertex only if normals are read.
     let text = format!("{SQUARE}vn 0 0 1\nvn 1 0 0\nf 1//1 2//1 3//1\nf 1//2 3//2 4//2\n");
-    let count = |normals| load("a.obj", &text, normals).unwrap().positions.len();
-    assert_eq!(count(None), 6);
-    assert_eq!(count(Some(Normals::File)), 6);
-    assert_eq!(count(Some(Normals::Flat)), 4);
-    assert_eq!(count(Some(Normals::Smooth)), 4);
+    let position_count = |normals| load("a.obj", &text, normals).unwrap().positions.len();
+    assert_eq!(position_count(None), 6);
+    assert_eq!(position_count(Some(Normals::File)), 6);
+    assert_eq!(position_count(Some(Normals::Flat)), 4);
+    assert_eq!(position_count(Some(Normals::Smooth)), 4);
 }
 
 #[test]

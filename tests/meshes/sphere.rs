@@ -9,7 +9,7 @@ use crate::pictures::{RenderMode, first_hits, reference, render};
 
 const CENTER: DVec3 = DVec3::new(0.0, 0.0, 1.3);
 const LIGHT: DVec3 = DVec3::new(0.3, 0.2, -1.0);
-const OUTSIDE: &str = "[0.5, -6, 3.5]";
+const CAMERA_OUTSIDE: &str = "[0.5, -6, 3.5]";
 
 fn pack_above_floor(triangle_mesh: &TriangleMesh, normals: &str, camera: &str) -> Packed {
     let folder = tempfile::tempdir().expect("a folder");
@@ -72,7 +72,7 @@ struct Counts {
 
 /// Classifies all pixels; `inner_radius` is the radius of the inscribed sphere.
 fn classify(triangle_mesh: &TriangleMesh, inner_radius: f64, normals: &str) -> Counts {
-    let packed = pack_above_floor(triangle_mesh, normals, OUTSIDE);
+    let packed = pack_above_floor(triangle_mesh, normals, CAMERA_OUTSIDE);
     let hits = first_hits(&packed, RenderMode::Cpu);
     let radiances: Vec<[f32; 3]> = reference(&packed).means().collect();
     let to_light = -LIGHT.normalize();
@@ -172,7 +172,7 @@ fn no_light_enters_a_closed_mesh() {
                 assert_eq!(lit, 0, "{detail} {camera} {mode:?}");
             }
         }
-        let outside = pack_above_floor(&triangle_mesh, "smooth", OUTSIDE);
+        let outside = pack_above_floor(&triangle_mesh, "smooth", CAMERA_OUTSIDE);
         let lit = reference(&outside).means().filter(|radiance| radiance[0] > 0.0).count();
         assert!(lit > 1000, "{detail}: {lit}");
     }

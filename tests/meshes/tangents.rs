@@ -13,7 +13,7 @@ use wgray_render::cpu::ray::{Hit, Ray};
 use wgray_render::cpu::texture::evaluate_material;
 use wgray_render::records::{NO_INDEX, Packed};
 
-use super::procedural::{HEAD, Sheet, scene};
+use super::procedural::{SCENE_START, Sheet, scene};
 use crate::pictures::reference;
 use crate::textures::write_exr;
 
@@ -27,7 +27,7 @@ fn pack_tilted(obj: &str, texture: &str, shape: &str) -> Packed {
     write_exr(&folder.path().join("lean.exr"), 2, 2, |_, _| {
         (MAP_NORMAL * 0.5 + 0.5).to_array()
     });
-    let head = HEAD.replace("width = 48, height = 36", "width = 192, height = 144");
+    let head = SCENE_START.replace("width = 48, height = 36", "width = 192, height = 144");
     let head = head.replace("fov = 40", "fov = 8");
     let text = format!(
         "{head}
@@ -320,7 +320,7 @@ fn only_smooth_meshes_with_normal_maps_have_tangents() {
     let flat = pack_tilted(&sphere.obj(), "", "normals = 'flat'");
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("mesh.obj"), sphere.obj()).unwrap();
-    let text = format!("{HEAD}[[shapes]]\ntype = 'mesh'\nfile = 'mesh.obj'\nmaterial = 'm'");
+    let text = format!("{SCENE_START}[[shapes]]\ntype = 'mesh'\nfile = 'mesh.obj'\nmaterial = 'm'");
     for packed in [flat, scene(&text, folder.path())] {
         assert!(packed.bvh.meshes[0].tangents.is_empty());
         assert_eq!(packed.bvh.instances[0].tangents, NO_INDEX);

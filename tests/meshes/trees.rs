@@ -21,7 +21,7 @@ use wgray_render::records::{
     SAMPLE_BLOCK,
 };
 
-use super::procedural::{HEAD, TriangleMesh, scene};
+use super::procedural::{SCENE_START, TriangleMesh, scene};
 use crate::random::Random;
 use crate::random_scenes::any_scene;
 use crate::scenes;
@@ -111,7 +111,8 @@ fn brute_force_occlusion(scene: &Packed, surface: &Surface, light: &Light, block
                 let mesh = &scene.bvh.meshes[instance.mesh as usize];
                 mesh.triangles.iter().enumerate().any(|(slot, triangle)| {
                     let group = mesh.groups.get(slot).copied().unwrap_or(0);
-                    let casts_shadows = scene.bvh.group_words[(instance.materials + group) as usize] & NO_SHADOW == 0;
+                    let casts_shadows =
+                        scene.bvh.group_words[(instance.first_group_word + group) as usize] & NO_SHADOW == 0;
                     let [v0, v1, v2] = corners(scene, instance, slot);
                     let crossing = triangle_crossing(v0, v1, v2, mesh_origin, shear_of(direction), s);
                     let is_origin = surface.exclude_front == UVec2::new(item.index + 1, triangle.w);
@@ -439,7 +440,7 @@ fn soups() -> Packed {
     )
     .expect("a mesh");
     let mut text = format!(
-        "{HEAD}[render]
+        "{SCENE_START}[render]
         shadows = 'transparent'
         [meshes.a]
         file = 'a.obj'
@@ -522,16 +523,20 @@ fn any_other_bvh_gives_the_same_bits() {
         ("knots", scenes::packed(&scenes::scene("twisted-tube.toml"))),
     ] {
         for max_leaf_size in 1..=4 {
-            let changed = with_bvhs(&scene, &|boxes| build_bvh(boxes, max_leaf_size));
+            let other_scene = with_bvhs(&scene, &|boxes| build_bvh(boxes, max_leaf_size));
             assert_eq!(
-                differing_between(&scene, &changed, 4000),
+                differing_between(&scene, &other_scene, 4000),
                 [0, 0],
                 "{name}, at most {max_leaf_size} per leaf"
             );
         }
-        let changed = with_bvhs(&scene, &|boxes| random_bvh(boxes, &random));
-        assert_ne!(changed.bvh.nodes, scene.bvh.nodes);
-        assert_eq!(differing_between(&scene, &changed, 250), [0, 0], "{name}, a random BVH");
+        let other_scene = with_bvhs(&scene, &|boxes| random_bvh(boxes, &random));
+        assert_ne!(other_scene.bvh.nodes, scene.bvh.nodes);
+        assert_eq!(
+            differing_between(&scene, &other_scene, 250),
+            [0, 0],
+            "{name}, a random BVH"
+        );
     }
 }
 

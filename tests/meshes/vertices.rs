@@ -94,7 +94,7 @@ fn vertex_colors_are_interpolated() {
             &format!("{CAMERA_ABOVE}{material}{SHAPE}"),
             set_colors,
         );
-        let plain = scene(folder.path(), 64, &format!("{CAMERA_ABOVE}{material}{SHAPE}"), |_| ());
+        let uncolored = scene(folder.path(), 64, &format!("{CAMERA_ABOVE}{material}{SHAPE}"), |_| ());
         for mode in both() {
             for (i, found) in means(&render(&packed, mode)).iter().enumerate() {
                 let (x, y) = pixel_center(i);
@@ -109,7 +109,7 @@ fn vertex_colors_are_interpolated() {
                 assert!((found[2] - 0.25 * factor).abs() < 1e-5, "{mode:?}: {found:?}");
             }
             // Without vertex colors, the emission is white.
-            for found in means(&render(&plain, mode)) {
+            for found in means(&render(&uncolored, mode)) {
                 assert!(found.iter().all(|x| (x - factor).abs() < 1e-5), "{mode:?}: {found:?}");
             }
         }
@@ -119,7 +119,7 @@ fn vertex_colors_are_interpolated() {
 #[test]
 fn base_colors_above_one_are_clamped_and_emission_is_not() {
     let folder = tempfile::tempdir().unwrap();
-    let bright = |mesh: &mut Mesh| mesh.colors = vec![Vec4::new(4.0, 0.5, 1e6, 1.0); mesh.positions.len()];
+    let set_bright_colors = |mesh: &mut Mesh| mesh.colors = vec![Vec4::new(4.0, 0.5, 1e6, 1.0); mesh.positions.len()];
     let material = |keys: &str| {
         format!(
             "{CAMERA_ABOVE}environment = {{ color = [1, 1, 1] }}\nmaterials.m = {{ type = 'principled', specular = 0, metallic = 0, {keys} }}\n{SHAPE}"
@@ -129,13 +129,13 @@ fn base_colors_above_one_are_clamped_and_emission_is_not() {
         folder.path(),
         16,
         &material("vertex_colors = 'base_color', base_color = [0.5, 0.5, 0.5]"),
-        bright,
+        set_bright_colors,
     );
     let emission = scene(
         folder.path(),
         16,
         &material("vertex_colors = 'emission', base_color = [0, 0, 0], emission = [1, 1, 1]"),
-        bright,
+        set_bright_colors,
     );
     for mode in both() {
         for (packed, expected) in [(&base, [1.0, 0.25, 1.0]), (&emission, [4.0, 0.5, 1e6])] {
@@ -205,7 +205,7 @@ fn emission_from_vertex_colors_lights_like_plain_emission() {
              normal = [0, 0, 1]\ntangent = [1, 0, 0]\n"
         )
     };
-    let set_half = |mesh: &mut Mesh| mesh.colors = vec![Vec4::new(0.5, 0.25, 1.0, 0.5); mesh.positions.len()];
+    let set_uniform_colors = |mesh: &mut Mesh| mesh.colors = vec![Vec4::new(0.5, 0.25, 1.0, 0.5); mesh.positions.len()];
     for (alpha, plain_alpha) in [
         ("", ""),
         (
@@ -213,22 +213,22 @@ fn emission_from_vertex_colors_lights_like_plain_emission() {
             "alpha_mode = 'blend', alpha = 0.5, ",
         ),
     ] {
-        let from_vertices = scene(
+        let vertex_emission = scene(
             folder.path(),
             16,
             &text(&format!("{alpha}emission = [4, 4, 4], vertex_colors = 'emission'")),
-            set_half,
+            set_uniform_colors,
         );
-        let plain = scene(
+        let constant_emission = scene(
             folder.path(),
             16,
             &text(&format!("{plain_alpha}emission = [2, 1, 4]")),
             |_| (),
         );
-        let expected = reference(&plain);
+        let expected = reference(&constant_emission);
         assert!(means(&expected).iter().all(|pixel| pixel[0] > 0.1));
         for mode in exact_modes() {
-            let found = means(&render(&from_vertices, mode));
+            let found = means(&render(&vertex_emission, mode));
             for (found, expected) in found.iter().zip(means(&expected)) {
                 let is_near = (0..3).all(|k| (found[k] / expected[k] - 1.0).abs() < 1e-5);
                 assert!(is_near, "{mode:?}: {found:?} {expected:?}");
@@ -238,11 +238,11 @@ fn emission_from_vertex_colors_lights_like_plain_emission() {
 }
 
 fn set_uv_sets(mesh: &mut Mesh) {
-    let set = |map: fn(Vec2) -> Vec2| mesh.uvs.iter().copied().map(map).collect::<Vec<_>>();
+    let mapped_uvs = |map: fn(Vec2) -> Vec2| mesh.uvs.iter().copied().map(map).collect::<Vec<_>>();
     mesh.more_uvs = vec![
-        set(|uv| Vec2::new(3.0 * uv.y, 0.5 + uv.x)),
-        set(|uv| Vec2::new(0.7 - uv.x, 2.0 * uv.x + 5.0 * uv.y)),
-        set(|uv| uv * uv + Vec2::new(0.25, 0.125)),
+        mapped_uvs(|uv| Vec2::new(3.0 * uv.y, 0.5 + uv.x)),
+        mapped_uvs(|uv| Vec2::new(0.7 - uv.x, 2.0 * uv.x + 5.0 * uv.y)),
+        mapped_uvs(|uv| uv * uv + Vec2::new(0.25, 0.125)),
     ];
 }
 
@@ -284,9 +284,9 @@ fn textures_use_the_selected_set_of_coordinates() {
                 |text: String| text.replace("roughness = { texture = 'first', channel = 'g' }\n", "");
             let keep_one_uv_set = |mesh: &mut Mesh| {
                 set_uv_sets(mesh);
-                let sets = std::mem::take(&mut mesh.more_uvs);
+                let more_uvs = std::mem::take(&mut mesh.more_uvs);
                 if set > 0 {
-                    mesh.uvs = sets[set - 1].clone();
+                    mesh.uvs = more_uvs[set - 1].clone();
                 }
             };
             let expected = reference(&scene(
@@ -438,7 +438,7 @@ fn invalid_factors_and_sets_are_reported() {
         (
             "normal_map = { texture = 't' }",
             SHAPE,
-            "materials.m.normal_map.texture: \"t\" must have no factor as a normal map; use strength instead",
+            "materials.m.normal_map.texture: \"t\" is used as a normal map; its factor must be 1; use strength instead",
         ),
         (
             "base_color = { texture = 'second' }",
@@ -497,7 +497,7 @@ fn only_camera_rays_skip_back_faces() {
         } else {
             "visible = false"
         });
-        let control = pack_with(if is_visible {
+        let opposite = pack_with(if is_visible {
             "visible = false"
         } else {
             "double_sided = true"
@@ -518,7 +518,7 @@ fn only_camera_rays_skip_back_faces() {
             );
             // A camera below the wall sees the floor.
             assert!(
-                height < 1.0 || differing(&picture, &reference(&control)) > 300,
+                height < 1.0 || differing(&picture, &reference(&opposite)) > 300,
                 "{height} {transform} {mode:?}"
             );
             let hits: Vec<u32> = first_hits(&packed, mode).iter().map(|hit| hit.shape).collect();
@@ -624,7 +624,7 @@ fn anisotropy_directions_come_from_an_image() {
              [materials.m]\ntype = 'principled'\nroughness = 0.3\n{keys}\n{SHAPE}"
         )
     };
-    let plain = |degrees: f64| {
+    let constant_rotation = |degrees: f64| {
         let keys = format!("anisotropy = {{ texture = 'd', channel = 'b' }}\nanisotropy_rotation = {degrees}");
         means(&reference(&scene(folder.path(), 4, &text(&keys), |_| ())))
     };
@@ -647,13 +647,16 @@ fn anisotropy_directions_come_from_an_image() {
         let packed = scene(folder.path(), 4, &text(&keys), |_| ());
         assert_eq!(packed.textures.lookups.len(), 1);
         let found = means(&reference(&packed));
-        let expected = plain(if degrees + extra_degrees < -360.0 {
+        let expected = constant_rotation(if degrees + extra_degrees < -360.0 {
             degrees
         } else {
             degrees + extra_degrees
         });
         assert!(is_near(&found, &expected), "{degrees} {extra_degrees}");
-        assert!(!is_near(&found, &plain(degrees + 90.0)), "{degrees} {extra_degrees}");
+        assert!(
+            !is_near(&found, &constant_rotation(degrees + 90.0)),
+            "{degrees} {extra_degrees}"
+        );
         if extra_degrees != 0.0 {
             for mode in exact_modes().into_iter().filter(|mode| *mode == RenderMode::Baked) {
                 assert_eq!(
@@ -681,16 +684,19 @@ fn invalid_direction_maps_are_rejected() {
             .err()
             .map(|error| error.to_string())
     };
-    let prefix = "materials.m.anisotropy_direction.texture: \"t\" must";
+    let prefix = "materials.m.anisotropy_direction.texture: \"t\"";
     for (texture, rule) in [
-        ("type = 'constant', color = [1, 1, 1]", "be a texture of type \"image\""),
+        (
+            "type = 'constant', color = [1, 1, 1]",
+            "must be a texture of type \"image\"",
+        ),
         (
             "type = 'image', file = 't.png'",
-            "have encoding = \"linear\" as a direction map",
+            "is used as an anisotropy direction; its encoding must be \"linear\"",
         ),
         (
             "type = 'image', file = 't.png', encoding = 'linear', factor = [1, 0.5, 1, 1]",
-            "have a red and green factor of 1 as a direction map",
+            "is used as an anisotropy direction; the red and green components of its factor must be 1",
         ),
     ] {
         let message = message(texture);

@@ -8,7 +8,7 @@ use wgray_render::cpu::shadow::SampleBlock;
 use wgray_render::cpu::surface::Surface;
 use wgray_render::records::{CASTS_SHADOW, GRID, INFINITE_T, Instance, Light, NO_INDEX, NO_PRIMITIVE, Packed};
 
-use super::procedural::{HEAD, TriangleMesh, scene};
+use super::procedural::{SCENE_START, TriangleMesh, scene};
 use crate::random::Random;
 use crate::sources;
 
@@ -30,7 +30,7 @@ fn pack_mesh(obj: &str, transform: &str) -> Packed {
     let folder = tempfile::tempdir().expect("a folder");
     std::fs::write(folder.path().join("a.obj"), obj).expect("a mesh");
     scene(
-        &format!("{HEAD}[[shapes]]\ntype = 'mesh'\nfile = 'a.obj'\nmaterial = 'm'\n{transform}\n"),
+        &format!("{SCENE_START}[[shapes]]\ntype = 'mesh'\nfile = 'a.obj'\nmaterial = 'm'\n{transform}\n"),
         folder.path(),
     )
 }
@@ -104,11 +104,11 @@ fn count_leaks(scene: &Packed, rays: u32, from_inside: bool) -> u32 {
 /// Traces a random ray and a shadow ray. Returns true if one of them leaks through the convex mesh.
 fn leaks(scene: &Packed, solid: &Solid, from_inside: bool, random: &Random) -> bool {
     let target = solid.target(random);
-    let sideways = DVec3::from_array([(); 3].map(|()| random.between(-0.3, 0.3))) * solid.radius;
+    let offset = DVec3::from_array([(); 3].map(|()| random.between(-0.3, 0.3))) * solid.radius;
     let out = target - solid.center;
     let origin = match from_inside {
-        true => solid.center + sideways,
-        false => target + (out - sideways) * random.magnitude(-1.0, 3.0),
+        true => solid.center + offset,
+        false => target + (out - offset) * random.magnitude(-1.0, 3.0),
     };
     let origin = origin.as_vec3();
     let direction = (target - origin.as_dvec3()).as_vec3();
@@ -228,7 +228,7 @@ fn a_hole_in_a_mesh_is_detected() {
 fn standalone_triangles_are_not_watertight() {
     let triangle_mesh = TriangleMesh::icosphere(2);
     let mesh = pack_mesh(&triangle_mesh.obj(None, None), "rotate = [30, 40, 50]");
-    let mut text = HEAD.to_string();
+    let mut text = SCENE_START.to_string();
     for corners in Solid::new(&mesh).corners {
         let [a, b, c] = corners.map(|p| p.to_array());
         text += &format!("[[shapes]]\ntype = 'triangle'\nmaterial = 'm'\nvertices = [{a:?}, {b:?}, {c:?}]\n");

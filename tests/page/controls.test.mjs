@@ -1,4 +1,5 @@
-// Controls of the page do not write by accident, and disabled controls show why they are disabled.
+// The page's controls change no value by accident (for example by scrolling), and disabled controls show why they are
+// disabled.
 
 import assert from "node:assert/strict";
 import fs from "node:fs";

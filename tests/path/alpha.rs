@@ -8,10 +8,10 @@ use super::{mean, scene};
 use crate::pictures::{both, differing, exact_modes, first_hits, means, reference, render};
 
 /// Camera above the square of side 2 around the origin.
-const DOWN: &str =
+const CAMERA_DOWN: &str =
     "camera = { type = 'orthographic', position = [0, 0, 9], look_at = [0, 0, 0], up = [0, 1, 0], height = 2 }\n";
 
-fn black(keys: &str) -> String {
+fn black_material(keys: &str) -> String {
     format!("{{ type = 'principled', base_color = [0, 0, 0], metallic = 0, specular = 0, {keys} }}")
 }
 
@@ -26,8 +26,8 @@ fn square(z: f64, size: f64, material: &str) -> String {
 fn blended_layers_transmit_one_minus_alpha() {
     for (alpha, layers) in [(0.5, 1), (0.3, 1), (0.5, 3), (0.0, 2), (1.0, 2)] {
         let head = format!(
-            "{DOWN}environment = {{ color = [1, 1, 1] }}\nmaterials.surface = {}\n",
-            black(&format!("alpha = {alpha}, alpha_mode = 'blend'"))
+            "{CAMERA_DOWN}environment = {{ color = [1, 1, 1] }}\nmaterials.surface = {}\n",
+            black_material(&format!("alpha = {alpha}, alpha_mode = 'blend'"))
         );
         let text: String = (0..layers).map(|i| square(f64::from(i), 4.0, "surface")).collect();
         let packed = scene(256, 4, &format!("{head}{text}"));
@@ -48,9 +48,9 @@ fn blended_layers_transmit_one_minus_alpha() {
 fn a_blended_sphere_is_crossed_twice() {
     // Entry and exit are blended independently.
     let text = format!(
-        "{DOWN}environment = {{ color = [1, 1, 1] }}\nmaterials.surface = {}\n[[shapes]]\ntype = 'sphere'\nmaterial = 'surface'\n\
+        "{CAMERA_DOWN}environment = {{ color = [1, 1, 1] }}\nmaterials.surface = {}\n[[shapes]]\ntype = 'sphere'\nmaterial = 'surface'\n\
          center = [0, 0, 0]\nradius = 3\n",
-        black("alpha = 0.5, alpha_mode = 'blend'")
+        black_material("alpha = 0.5, alpha_mode = 'blend'")
     );
     let packed = scene(256, 4, &text);
     for mode in both() {
@@ -62,7 +62,7 @@ fn a_blended_sphere_is_crossed_twice() {
 #[test]
 fn shadows_scale_with_alpha() {
     let scene_with = |alpha: f64, light: &str| {
-        let material = black(&format!("alpha = {alpha}, alpha_mode = 'blend'"));
+        let material = black_material(&format!("alpha = {alpha}, alpha_mode = 'blend'"));
         // The camera is below the surface and sees the shadow on the floor.
         let text = format!(
             "camera = {{ type = 'orthographic', position = [0, 0, 0.4], look_at = [0, 0, 0], up = [0, 1, 0], height = 0.2 }}\n\
@@ -103,7 +103,7 @@ fn transparent_surfaces_do_not_change_mis_weights() {
             "camera = {{ type = 'orthographic', position = [0, 0, 0.4], look_at = [0, 0, 0], up = [0, 1, 0], height = 0.2 }}\n\
              materials.surface = {}\nmaterials.floor = {{ type = 'diffuse', color = [0.5, 0.5, 0.5] }}\n{}{shape}\
              [[lights]]\ntype = 'rectangle'\ncenter = [0, 0, 1]\nsize = [3, 3]\nnormal = [0, 0, -1]\ntangent = [1, 0, 0]\ncolor = [1, 1, 1]\n",
-            black("alpha = 0, alpha_mode = 'blend'"),
+            black_material("alpha = 0, alpha_mode = 'blend'"),
             square(0.0, 4.0, "floor")
         );
         scene(1024, 1, &text)
@@ -182,7 +182,7 @@ fn a_masked_surface_casts_the_shadow_of_its_mask() {
             );
         }
     }
-    let packed = leaf(folder.path(), "mask", DOWN);
+    let packed = leaf(folder.path(), "mask", CAMERA_DOWN);
     for render_mode in both() {
         let hits = first_hits(&packed, render_mode);
         for (i, hit) in hits.iter().enumerate() {

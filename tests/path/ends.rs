@@ -51,7 +51,7 @@ fn without_bounces_only_emission_is_visible() {
 #[test]
 fn scaling_a_scene_does_not_change_radiance() {
     // The radiance differs only by the rounding of coordinates.
-    let room = |s: f64| {
+    let scaled_text = |s: f64| {
         format!(
             "camera = {{ position = [0, {}, {s}], look_at = [0, 0, {s}], fov = 40 }}\n\
              materials.m = {{ type = 'diffuse', color = [0.7, 0.7, 0.7] }}\nmaterials.s = {{ type = 'diffuse', color = [0.2, 0.2, 0.2], emission = [5, 5, 5] }}\n\
@@ -68,9 +68,9 @@ fn scaling_a_scene_does_not_change_radiance() {
             4.0 * s
         )
     };
-    let expected = mean(&reference(&scene(1024, 6, &room(1.0))));
+    let expected = mean(&reference(&scene(1024, 6, &scaled_text(1.0))));
     for s in [1e-6, 1e-3, 1e3, 1e6] {
-        let packed = scene(1024, 6, &room(s));
+        let packed = scene(1024, 6, &scaled_text(s));
         for mode in both() {
             let found = mean(&render(&packed, mode));
             assert!(
@@ -149,11 +149,11 @@ fn reflectances_above_one_are_clamped() {
              [[shapes]]\ntype = 'sphere'\nmaterial = 'm'\ncenter = [0, 0, 0]\nradius = 1\n"
         );
         // Values above 1 are clamped.
-        let plain = match key {
+        let equivalent = match key {
             "color" => text.replace("{ texture = 'c' }", "[1, 1, 1]"),
             _ => text.replace("{ texture = 'c' }", "1"),
         };
-        let (body, expected) = (scene(256, 20, &text), mean(&reference(&scene(256, 20, &plain))));
+        let (body, expected) = (scene(256, 20, &text), mean(&reference(&scene(256, 20, &equivalent))));
         for mode in both() {
             assert_eq!(
                 mean(&render(&packed, mode)),

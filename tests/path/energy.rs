@@ -175,9 +175,17 @@ fn anisotropic_metal_and_glass_conserve_energy() {
     let packed = scene_of("type = 'conductor', roughness = 0.6, anisotropy = 0.7");
     let loss = 1.0 - albedo(&packed, &packed.materials[0], direction(0.4, 0.7), 1.0, false);
     assert!(loss > 0.1, "{loss}");
-    let plain = scene_of("type = 'conductor', roughness = 0.6, anisotropy = 0.7, energy_compensation = false");
-    assert_eq!(plain.materials[0].aniso_table, 0);
-    let uncompensated = 1.0 - albedo(&plain, &plain.materials[0], direction(0.4, 0.7), 1.0, true);
+    let uncompensated_scene =
+        scene_of("type = 'conductor', roughness = 0.6, anisotropy = 0.7, energy_compensation = false");
+    assert_eq!(uncompensated_scene.materials[0].aniso_table, 0);
+    let uncompensated = 1.0
+        - albedo(
+            &uncompensated_scene,
+            &uncompensated_scene.materials[0],
+            direction(0.4, 0.7),
+            1.0,
+            true,
+        );
     assert!((uncompensated - loss).abs() < 1e-9, "{uncompensated} {loss}");
 }
 
@@ -317,17 +325,17 @@ fn matched_indices_do_not_reflect() {
             )
         };
         for wo in [Vec3::Z, direction(0.3, 0.7), direction(0.02, 0.7)] {
-            let reflected = |ior: f64| {
+            let reflectance = |ior: f64| {
                 let packed = scene_of(&keys(ior));
                 let m = mixture(&packed, &packed.materials[0], wo, 1.0);
                 furnace(m.alpha, None, false, wo, |wi| {
                     (principled_eval(&m, wo, wi, ALL_LOBES) - m.diffuse * (wi.z.max(0.0) / std::f32::consts::PI)).x
                 })
             };
-            let matched = reflected(1.0);
+            let matched = reflectance(1.0);
             assert!(matched.abs() < 1e-3, "{}, {wo}: {matched}", keys(1.0));
             // Negative control: the default index reflects light.
-            assert!(reflected(1.5) > 0.03, "{wo}");
+            assert!(reflectance(1.5) > 0.03, "{wo}");
         }
     }
 }

@@ -105,14 +105,14 @@ fn irradiance(image: &Image, points: u32, normal: DVec3) -> DVec3 {
     })
 }
 
-fn noise(width: u32, height: u32) -> Image {
+fn noise_image(width: u32, height: u32) -> Image {
     let random = Random::new(7);
     image(width, height, |_, _| {
         [(); 3].map(|()| random.unit().powi(6) as f32 * 8.0)
     })
 }
 
-fn sunny() -> Image {
+fn sunny_image() -> Image {
     image(64, 32, |x, y| match (x, y) {
         (20, 6) => [4000.0, 3000.0, 2000.0],
         (_, 0..16) => [0.3, 0.5, 0.9],
@@ -132,14 +132,14 @@ fn irradiance_matches_a_sum_over_all_directions() {
         (image(1, 1, |_, _| [0.5, 1.0, 2.0]), 64),
         (image(2, 1, |x, _| [f32::from(x as u8), 1.0, 0.5]), 128),
         (image(2, 2, |x, y| [x as f32, y as f32, 1.0]), 64),
-        (noise(33, 17), 8),
+        (noise_image(33, 17), 8),
         (one_bright_texel(16, 8, (5, 2)), 32),
         (one_bright_texel(16, 8, (15, 0)), 32),
-        (sunny(), 8),
+        (sunny_image(), 8),
     ];
     // The ground normal in the space of the map.
-    let sines = |degrees: f64| degrees.to_radians().sin_cos();
-    let tilted = DVec3::new(sines(50.0).0, 0.0, sines(50.0).1);
+    let sin_cos = |degrees: f64| degrees.to_radians().sin_cos();
+    let tilted = DVec3::new(sin_cos(50.0).0, 0.0, sin_cos(50.0).1);
     for (image, points) in &images {
         for (rotation, normal) in [
             ("", DVec3::Z),
@@ -164,8 +164,11 @@ fn irradiance_matches_a_sum_over_all_directions() {
         }
     }
     // Negative control: the unrotated normal gives another irradiance.
-    let wrong = irradiance(&sunny(), 8, DVec3::Z) / irradiance(&sunny(), 8, tilted);
-    assert!((wrong - DVec3::ONE).abs().min_element() > 0.05, "{wrong}");
+    let unrotated_ratio = irradiance(&sunny_image(), 8, DVec3::Z) / irradiance(&sunny_image(), 8, tilted);
+    assert!(
+        (unrotated_ratio - DVec3::ONE).abs().min_element() > 0.05,
+        "{unrotated_ratio}"
+    );
 }
 
 #[test]
@@ -284,27 +287,27 @@ fn light_and_bsdf_sampling_of_the_map_agree() {
     // The scene has no area light, because area lights have their own MIS weights.
     let text = EMITTERS.replace(", emission = [5, 3, 1]", "");
     for image in [
-        noise(16, 8),
+        noise_image(16, 8),
         one_bright_texel(16, 8, (4, 1)),
         image(2, 1, |x, _| [x as f32, 1.0, 2.0]),
     ] {
         let packed = with_map(&image, "\nvisible = false", (4096, 2), &text);
-        let found = |shaders| mean(&render_with(&packed, RenderMode::Baked, shaders));
-        let both = found(sources::shaders());
-        let [light, bsdf, wrong] = [&light_sampling, &bsdf_sampling, &wrong].map(found);
+        let mean_with = |shaders| mean(&render_with(&packed, RenderMode::Baked, shaders));
+        let with_mis = mean_with(sources::shaders());
+        let [light, bsdf, wrong] = [&light_sampling, &bsdf_sampling, &wrong].map(mean_with);
         for i in 0..3 {
-            let near = |x: f64| (x - both[i]).abs() < 1e-2 * both[i];
+            let is_near = |x: f64| (x - with_mis[i]).abs() < 1e-2 * with_mis[i];
             assert!(
-                near(light[i]),
-                "light sampling alone differs: {light:?}, expected {both:?}"
+                is_near(light[i]),
+                "light sampling alone differs: {light:?}, expected {with_mis:?}"
             );
             assert!(
-                near(bsdf[i]),
-                "BSDF sampling alone differs: {bsdf:?}, expected {both:?}"
+                is_near(bsdf[i]),
+                "BSDF sampling alone differs: {bsdf:?}, expected {with_mis:?}"
             );
             assert!(
-                !near(wrong[i]),
-                "a wrong weight is accepted: {wrong:?}, expected {both:?}"
+                !is_near(wrong[i]),
+                "a wrong weight is accepted: {wrong:?}, expected {with_mis:?}"
             );
         }
     }
@@ -312,28 +315,28 @@ fn light_and_bsdf_sampling_of_the_map_agree() {
 
 #[test]
 fn light_of_the_map_and_of_other_emitters_adds_up() {
-    let image = sunny();
+    let image = sunny_image();
     let lights = "[[lights]]\ntype = 'point'\nposition = [1, -1, 2]\ncolor = [2, 2, 2]\n\
                  [[lights]]\ntype = 'directional'\ndirection = [1, 2, -3]\ncolor = [1, 1, 0.5]\n\
                  [[lights]]\ntype = 'rectangle'\ncenter = [0, 0.5, 1.5]\nsize = [0.5, 0.5]\nnormal = [0, 0, -1]\ntangent = [1, 0, 0]\ncolor = [3, 3, 3]\n";
     let text = format!("{EMITTERS}{lights}");
     let dark = EMITTERS.replace(", emission = [5, 3, 1]", "");
     for mode in both() {
-        let sum = |packed: Packed| mean(&render(&packed, mode));
+        let mean_radiance = |packed: Packed| mean(&render(&packed, mode));
         // The rectangle of the area light occludes other light, so the scene with only the map has a black rectangle.
         let rectangle = lights.split("[[lights]]").last().unwrap_or_default();
         let black_rectangle = format!(
             "[[lights]]{}",
             rectangle.replace("color = [3, 3, 3]", "color = [0, 0, 0]")
         );
-        let map_light = sum(with_map(&image, "", (1024, 3), &format!("{dark}{black_rectangle}")));
-        let other_light = sum(with_environment("color = [0, 0, 0]", None, (1024, 3), &text));
-        let all = sum(with_map(&image, "", (1024, 3), &text));
+        let map_light = mean_radiance(with_map(&image, "", (1024, 3), &format!("{dark}{black_rectangle}")));
+        let other_light = mean_radiance(with_environment("color = [0, 0, 0]", None, (1024, 3), &text));
+        let combined = mean_radiance(with_map(&image, "", (1024, 3), &text));
         for i in 0..3 {
             let expected = map_light[i] + other_light[i];
             assert!(
-                (all[i] / expected - 1.0).abs() < 0.01,
-                "{mode:?}: {all:?}, expected {map_light:?} + {other_light:?}"
+                (combined[i] / expected - 1.0).abs() < 0.01,
+                "{mode:?}: {combined:?}, expected {map_light:?} + {other_light:?}"
             );
         }
     }
@@ -343,7 +346,7 @@ fn light_of_the_map_and_of_other_emitters_adds_up() {
 fn the_floor_occludes_light_from_below() {
     // For area lights, the renderer would skip the floor as an occluder, because no shape is below the floor. The lower
     // half of the ball is lit only from below.
-    let below = image(8, 4, |_, y| [if y > 2 { 5.0 } else { 0.0 }; 3]);
+    let map_bright_below = image(8, 4, |_, y| [if y > 2 { 5.0 } else { 0.0 }; 3]);
     let floors = [
         "type = 'plane'\nmaterial = 'm'\npoint = [0, 0, 0]\nnormal = [0, 0, 1]\ntangent = [1, 0, 0]",
         "type = 'rectangle'\nmaterial = 'm'\ncenter = [0, 0, 0]\nsize = [1e4, 1e4]\nnormal = [0, 0, 1]\ntangent = [1, 0, 0]",
@@ -355,7 +358,12 @@ fn the_floor_occludes_light_from_below() {
     for mode in both() {
         let brightness = |floor: &str| {
             mean(&render(
-                &with_map(&below, "\nvisible = false", (64, 1), &format!("{ball}{floor}")),
+                &with_map(
+                    &map_bright_below,
+                    "\nvisible = false",
+                    (64, 1),
+                    &format!("{ball}{floor}"),
+                ),
                 mode,
             ))
         };
@@ -427,7 +435,7 @@ fn a_scale_of_two_doubles_every_pixel_exactly() {
     for mode in both() {
         let film = |scale: f64| {
             render(
-                &with_map(&noise(16, 8), &format!("\nscale = {scale}"), (16, 3), GROUND),
+                &with_map(&noise_image(16, 8), &format!("\nscale = {scale}"), (16, 3), GROUND),
                 mode,
             )
         };
@@ -443,7 +451,7 @@ fn a_scale_of_two_doubles_every_pixel_exactly() {
 #[test]
 fn all_backends_give_the_same_bits() {
     let text = format!("{EMITTERS}[[lights]]\ntype = 'point'\nposition = [1, -1, 2]\ncolor = [2, 2, 2]\n");
-    for image in [noise(33, 17), sunny(), image(1, 1, |_, _| [1.0; 3])] {
+    for image in [noise_image(33, 17), sunny_image(), image(1, 1, |_, _| [1.0; 3])] {
         for rotation in ["", "\nrotate = [10, 20, 30]"] {
             let packed = with_map(&image, rotation, (64, 5), &text);
             let expected = render(&packed, RenderMode::Cpu);
@@ -485,10 +493,10 @@ fn sampled_directions_follow_their_pdf() {
         image(1, 1, |_, _| [1.0; 3]),
         image(2, 1, |x, _| [x as f32; 3]),
         image(3, 5, |x, y| [(x + 2 * y) as f32; 3]),
-        noise(33, 17),
-        noise(130, 70),
+        noise_image(33, 17),
+        noise_image(130, 70),
         one_bright_texel(16, 8, (3, 0)),
-        sunny(),
+        sunny_image(),
     ];
     // A zero normal selects all directions.
     let normals = [Vec3::ZERO, Vec3::Z, Vec3::new(0.6, -0.48, -0.64)];

@@ -6,12 +6,12 @@ use wgray::scene::{Overrides, Scene};
 
 use crate::textures::{write_exr, write_png};
 
-const START: &str = "image = { width = 4, height = 4 }\ncamera = { position = [0, -3, 1], look_at = [0, 0, 1], fov = 45 }\n\
+const SCENE_START: &str = "image = { width = 4, height = 4 }\ncamera = { position = [0, -3, 1], look_at = [0, 0, 1], fov = 45 }\n\
                      render = { integrator = 'path' }\n";
 
 fn load(folder: &Path, environment: &str) -> Result<Scene, String> {
     let path = folder.join("s.toml");
-    std::fs::write(&path, format!("{START}[environment]\n{environment}\n")).unwrap();
+    std::fs::write(&path, format!("{SCENE_START}[environment]\n{environment}\n")).unwrap();
     Scene::load_with(
         &path,
         &Overrides {

@@ -6,7 +6,7 @@ use super::{mean, scene};
 use crate::pictures::{both, means, render};
 
 /// A camera near the origin that looks roughly along +x.
-const INSIDE: &str = "camera = { position = [0.1, 0, 0.05], look_at = [1, 0, 0.2], fov = 60 }\n";
+const CAMERA_INSIDE: &str = "camera = { position = [0.1, 0, 0.05], look_at = [1, 0, 0.2], fov = 60 }\n";
 
 fn camera_above(x: f64, y: f64, z: f64, height: f64) -> String {
     format!(
@@ -92,7 +92,7 @@ fn bounces_in_a_closed_emitter_are_a_geometric_series() {
     for body in bodies {
         for depth in [0, 1, 2, 5, 40] {
             let text = format!(
-                "{INSIDE}materials.m = {{ type = 'diffuse', color = [{albedo}, {albedo}, {albedo}], \
+                "{CAMERA_INSIDE}materials.m = {{ type = 'diffuse', color = [{albedo}, {albedo}, {albedo}], \
                  emission = [{emission}, {emission}, {emission}] }}\n{body}"
             );
             let packed = scene(256, depth, &text);
@@ -334,7 +334,7 @@ fn a_glass_slab_transmits_by_fresnel_and_beer() {
 fn radiance_in_glass_is_scaled_by_the_squared_index() {
     // With radiance 1 outside, the radiance in glass is n^2, internal reflections included.
     let text = format!(
-        "{INSIDE}environment = {{ color = [1, 1, 1] }}\nmaterials.m = {{ type = 'dielectric', ior = 1.5 }}\n\
+        "{CAMERA_INSIDE}environment = {{ color = [1, 1, 1] }}\nmaterials.m = {{ type = 'dielectric', ior = 1.5 }}\n\
          [[shapes]]\ntype = 'sphere'\nmaterial = 'm'\ncenter = [0, 0, 0]\nradius = 3\n"
     );
     let packed = scene(256, 1000, &text);

@@ -54,15 +54,18 @@ fn only_mirrors_show_camera_invisible_emitters() {
         for mode in both() {
             let (visible, hidden) = (means(&render(&visible, mode)), means(&render(&hidden, mode)));
             // Pixels outside of the emitter are unchanged; some of these pixels show the emitter in the mirror.
-            let covered = |i: usize| (i % 24).abs_diff(12) < 4 && (i / 24).abs_diff(12) < 4;
-            let uncovered = || (0..24 * 24).filter(|i| !covered(*i));
-            assert!(uncovered().all(|i| visible[i] == hidden[i]), "{mode:?}, {integrator}");
-            let bright = uncovered().filter(|i| hidden[*i][0] > 3.0).count();
+            let is_covered = |i: usize| (i % 24).abs_diff(12) < 4 && (i / 24).abs_diff(12) < 4;
+            let uncovered_pixels = || (0..24 * 24).filter(|i| !is_covered(*i));
+            assert!(
+                uncovered_pixels().all(|i| visible[i] == hidden[i]),
+                "{mode:?}, {integrator}"
+            );
+            let bright = uncovered_pixels().filter(|i| hidden[*i][0] > 3.0).count();
             assert!(
                 bright > 3,
                 "{mode:?}, {integrator}: only {bright} pixels of the mirror show the emitter"
             );
-            // Behind the hidden emitter, the camera sees the wall.
+            // Behind the camera-invisible emitter, the camera sees the wall.
             let center = 12 * 24 + 12;
             assert!(
                 hidden[center][0] < 3.9 && hidden[center][0] > 0.0,

@@ -27,7 +27,7 @@ fn selection_is_three_quarters_by_power_and_one_quarter_uniform() {
     let packed = scene(1, 1, &text);
     assert_eq!(packed.lighting.emitters.len(), 16, "the black light is an emitter");
     let mut counts = vec![0.0; packed.lighting.lights.len()];
-    let calls = 400_000;
+    let selection_count = 400_000;
     for i in 0..calls {
         let bits = hash4(glam::UVec4::new(i, 1, 2, 3));
         let emitter = select_emitter(&packed, UVec2::new(bits.x, bits.y));
@@ -41,7 +41,7 @@ fn selection_is_three_quarters_by_power_and_one_quarter_uniform() {
                 (f64::from(light.density) - probability).abs() < 1e-6,
                 "the PDF is not the documented probability"
             );
-            let expected = probability * f64::from(calls);
+            let expected = probability * f64::from(selection_count);
             (count - expected) * (count - expected) / expected
         })
         .sum();

@@ -16,7 +16,7 @@ use wgray_render::records::{DIFFUSE, Material, PRINCIPLED};
 /// The mask of all lobes.
 const ALL_LOBES: u32 = 31;
 
-fn plain() -> Material {
+fn base_material() -> Material {
     Material {
         kind: PRINCIPLED,
         diffuse: Vec3::ONE,
@@ -54,7 +54,10 @@ fn mixture(material: &Material, wo: Vec3) -> PrincipledLobes {
 fn grid() -> Vec<(String, Material)> {
     let mut all = Vec::new();
     let mut add = |name: &str, roughness: f32, change: &dyn Fn(&mut Material)| {
-        let mut material = Material { roughness, ..plain() };
+        let mut material = Material {
+            roughness,
+            ..base_material()
+        };
         change(&mut material);
         all.push((format!("{name}, roughness {roughness}"), material));
     };
@@ -154,7 +157,7 @@ fn principled_lobes_gain_no_energy_in_a_white_furnace() {
     let metal = Material {
         metallic: 1.0,
         roughness: 1.0,
-        ..plain()
+        ..base_material()
     };
     let wo = direction(0.5, 0.0);
     let mut m = mixture(&metal, wo);
@@ -289,7 +292,7 @@ fn diffuse_and_metal_lobes_equal_reference_bsdfs() {
             let matte = Material {
                 diffuse: color,
                 specular_weight: 0.0,
-                ..plain()
+                ..base_material()
             };
             let diffuse = Material {
                 kind: DIFFUSE,
@@ -305,7 +308,7 @@ fn diffuse_and_metal_lobes_equal_reference_bsdfs() {
                     metallic: 1.0,
                     diffuse: color,
                     roughness,
-                    ..plain()
+                    ..base_material()
                 };
                 let mut m = mixture(&metal, wo);
                 (m.f0, m.f90) = (color, Vec3::ONE);
@@ -342,7 +345,7 @@ fn smooth_lobes_are_deltas_and_all_values_are_finite() {
         roughness: 0.0,
         transmission: 1.0,
         thin: 0,
-        ..plain()
+        ..base_material()
     };
     let wo = direction(0.6, 0.3);
     let m = mixture(&smooth, wo);
@@ -382,7 +385,7 @@ fn smooth_lobes_are_deltas_and_all_values_are_finite() {
             sheen: Vec3::splat(pick(12)),
             sheen_roughness: pick(13),
             specular_weight: pick(14),
-            ..plain()
+            ..base_material()
         };
         let wo = direction([1.0, 0.5, 1e-3, 1e-6][(bits.z % 4) as usize], f64::from(i));
         let energy = Vec3::new(pick(15), pick(16), pick(17));
@@ -433,13 +436,13 @@ fn values_come_from_the_channels_of_a_texture() {
         "constant" => "[textures.t]\ntype = 'constant'\ncolor = [0.75, 0.5, 0.25]",
         _ => "[textures.t]\ntype = 'checker'\neven = [0.75, 0.5, 0.25]\nodd = [0.75, 0.5, 0.25]",
     };
-    let plain = sphere_scene(
+    let untextured = sphere_scene(
         "metallic = 0.25\nroughness = 0.5\nclearcoat = 0.75\nclearcoat_roughness = 0.5",
         "",
     );
     let textured = "metallic = { texture = 't', channel = 'b' }\nroughness = { texture = 't', channel = 'g' }\n\
                     clearcoat = { texture = 't' }\nclearcoat_roughness = { texture = 't', channel = 'g' }";
-    let expected = crate::pictures::reference(&plain);
+    let expected = crate::pictures::reference(&untextured);
     for kind in ["constant", "checker"] {
         let packed = sphere_scene(textured, texture(kind));
         // All four values share one texture lookup; a constant texture needs no lookup.

@@ -96,10 +96,10 @@ fn light_and_bsdf_sampling_agree() {
          [[shapes]]\ntype = 'triangle'\nmaterial = 'dim'\nvertices = [[-1, 1, 0.1], [1, 1, 0.1], [0, 1, 1.5]]\n\
          [[lights]]\ntype = 'rectangle'\ncenter = [0, 0.2, 1.3]\nsize = [1, 0.5]\nnormal = [0, 0, -1]\ntangent = [1, 0, 0]\ncolor = [2, 3, 4]\n",
     ];
-    let many = many_lights();
+    let many_lights_text = many_lights();
     // The last shape and the many lights are tested with all materials, the other shapes with one material each.
     let (single_material_count, many_lights_index) = (shapes.len() - 1, shapes.len());
-    let shapes = shapes.into_iter().chain([many.as_str()]);
+    let shapes = shapes.into_iter().chain([many_lights_text.as_str()]);
     for (i, shape) in shapes.enumerate() {
         let materials = [
             "type = 'diffuse', color = [0.7, 0.6, 0.5]",
@@ -130,20 +130,20 @@ fn light_and_bsdf_sampling_agree() {
                 let found = rendered(strategy);
                 [0, 1, 2].map(|i| found[i] - direct[i])
             };
-            let [both, light, bsdf, wrong] = [MIS, LIGHT, BSDF, WRONG].map(reflected);
+            let [with_mis, light, bsdf, wrong] = [MIS, LIGHT, BSDF, WRONG].map(reflected);
             for i in 0..3 {
-                let near = |x: f64, tolerance: f64| (x - both[i]).abs() < tolerance * both[i];
+                let is_near = |x: f64, tolerance: f64| (x - with_mis[i]).abs() < tolerance * with_mis[i];
                 assert!(
-                    near(light[i], 1e-2),
-                    "light sampling alone differs: {light:?}, expected {both:?}\n{shape}{material}"
+                    is_near(light[i], 1e-2),
+                    "light sampling alone differs: {light:?}, expected {with_mis:?}\n{shape}{material}"
                 );
                 assert!(
-                    near(bsdf[i], 1e-2),
-                    "BSDF sampling alone differs: {bsdf:?}, expected {both:?}\n{shape}{material}"
+                    is_near(bsdf[i], 1e-2),
+                    "BSDF sampling alone differs: {bsdf:?}, expected {with_mis:?}\n{shape}{material}"
                 );
                 assert!(
-                    !near(wrong[i], 1e-2),
-                    "a wrong weight is accepted: {wrong:?}, expected {both:?}\n{shape}{material}"
+                    !is_near(wrong[i], 1e-2),
+                    "a wrong weight is accepted: {wrong:?}, expected {with_mis:?}\n{shape}{material}"
                 );
             }
         }

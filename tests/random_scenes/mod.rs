@@ -34,9 +34,12 @@ fn check(description: &Description, shaders: &Shaders) -> Result<(), String> {
         return Err("a pixel is NaN or infinite".into());
     }
     for mode in [RenderMode::Baked, RenderMode::Buffers] {
-        let differ = differing(&render_with(&packed, mode, shaders), &cpu);
-        if differ > 0 {
-            return Err(format!("{differ} of {} pixels differ, {mode:?}", cpu.sums.len()));
+        let differing_count = differing(&render_with(&packed, mode, shaders), &cpu);
+        if differing_count > 0 {
+            return Err(format!(
+                "{differing_count} of {} pixels differ, {mode:?}",
+                cpu.sums.len()
+            ));
         }
     }
     // First hits are compared only in some scenes, because they need another kernel.
@@ -168,9 +171,9 @@ fn random_scenes_are_within_tolerance_without_guaranteed_bits() {
                 &cpu,
             ));
         }
-        let mut moved = cpu.clone();
-        moved.sums.rotate_right(1);
-        shifted.add(FilmDifference::loose(&packed, &moved, &cpu));
+        let mut shifted_film = cpu.clone();
+        shifted_film.sums.rotate_right(1);
+        shifted.add(FilmDifference::loose(&packed, &shifted_film, &cpu));
     }
     println!("random scenes: with plain WGSL {plain}; with imprecise quotients {imprecise}");
     assert!(plain.judge().is_ok(), "plain WGSL: {}", plain.judge().unwrap_err());

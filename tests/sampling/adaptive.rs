@@ -172,7 +172,7 @@ fn sample_counts_follow_the_pilot_samples_of_neighbors() {
 
 #[test]
 fn extreme_errors_give_the_minimum_or_maximum_samples() {
-    let uniform = |count| {
+    let uniform_scene = |count| {
         cornell(Pattern::Sobol, count, |description| {
             // Light samples continue the sequence of the previous pixel sample, whatever the number of pixel samples.
             description.render.adaptive = None;
@@ -180,7 +180,7 @@ fn extreme_errors_give_the_minimum_or_maximum_samples() {
     };
     for (error, count) in [(1.0, 16), (0.0, 64)] {
         let adaptive = reference(&adaptive(Pattern::Sobol, error, 64));
-        assert_eq!(adaptive.sums, reference(&uniform(count)).sums);
+        assert_eq!(adaptive.sums, reference(&uniform_scene(count)).sums);
         assert!(adaptive.sample_counts().all(|n| n == count));
     }
 }

@@ -138,9 +138,12 @@ fn positions_and_weights_have_the_moments_of_their_filters() {
 
 #[test]
 fn the_box_filter_needs_no_table_and_a_table_gives_equal_samples() {
-    let plain = filtered_scene(PixelFilterKind::Box, 0.5);
+    let box_scene = filtered_scene(PixelFilterKind::Box, 0.5);
     assert_eq!(
-        (plain.specialization.filter_bins, plain.sampling.filter_table.len()),
+        (
+            box_scene.specialization.filter_bins,
+            box_scene.sampling.filter_table.len()
+        ),
         (0, 0)
     );
     let mut with_table = filtered_scene(PixelFilterKind::Box, 0.51);
@@ -148,8 +151,11 @@ fn the_box_filter_needs_no_table_and_a_table_gives_equal_samples() {
     assert_eq!(with_table.specialization.filter_bins, FILTER_TABLE_SIZE);
     for i in 0..1000 {
         let u = sobol_sample(i, [5, 6].into());
-        let (plain, with_table) = (filtered(&plain, u), filtered(&with_table, u));
-        assert!((plain - with_table).length() < 2e-6, "{plain} {with_table}");
+        let (without_table, with_table) = (filtered(&box_scene, u), filtered(&with_table, u));
+        assert!(
+            (without_table - with_table).length() < 2e-6,
+            "{without_table} {with_table}"
+        );
     }
 }
 

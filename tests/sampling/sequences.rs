@@ -192,42 +192,42 @@ fn star_discrepancy(points: &[Vec2]) -> f64 {
     let n = points.len() as f64;
     let mut by_x: Vec<Vec2> = points.to_vec();
     by_x.sort_by(|p, q| p.x.total_cmp(&q.x));
-    let ends = |values: Vec<f32>| {
-        let mut ends: Vec<f64> = values.into_iter().map(f64::from).collect();
-        ends.push(1.0);
-        ends.sort_by(f64::total_cmp);
-        ends.dedup();
-        ends
+    let coordinates = |values: Vec<f32>| {
+        let mut coordinates: Vec<f64> = values.into_iter().map(f64::from).collect();
+        coordinates.push(1.0);
+        coordinates.sort_by(f64::total_cmp);
+        coordinates.dedup();
+        coordinates
     };
-    let ys = ends(points.iter().map(|p| p.y).collect());
-    let mut worst = 0.0f64;
-    for a in ends(points.iter().map(|p| p.x).collect()) {
-        let count = |keep: &dyn Fn(f64) -> bool| {
-            let mut inside: Vec<f64> = by_x
+    let ys = coordinates(points.iter().map(|p| p.y).collect());
+    let mut max_deviation = 0.0f64;
+    for a in coordinates(points.iter().map(|p| p.x).collect()) {
+        let sorted_ys_where = |keep: &dyn Fn(f64) -> bool| {
+            let mut selected_ys: Vec<f64> = by_x
                 .iter()
                 .filter(|p| keep(f64::from(p.x)))
                 .map(|p| f64::from(p.y))
                 .collect();
-            inside.sort_by(f64::total_cmp);
-            inside
+            selected_ys.sort_by(f64::total_cmp);
+            selected_ys
         };
-        let (open, closed) = (count(&|x| x < a), count(&|x| x <= a));
+        let (open, closed) = (sorted_ys_where(&|x| x < a), sorted_ys_where(&|x| x <= a));
         for &b in &ys {
             let below = open.partition_point(|y| *y < b) as f64 / n;
             let covered = closed.partition_point(|y| *y <= b) as f64 / n;
-            worst = worst.max(a * b - below).max(covered - a * b);
+            max_deviation = max_deviation.max(a * b - below).max(covered - a * b);
         }
     }
-    worst
+    max_deviation
 }
 
 fn discrepancies(pattern: u32, side: u32, count: u32) -> Vec<f64> {
-    let set = |key| {
+    let points = |key| {
         (0..count)
             .map(|i| sample_square(pattern, side, i, 0, key))
             .collect::<Vec<Vec2>>()
     };
-    keys(8).map(|key| star_discrepancy(&set(key))).collect()
+    keys(8).map(|key| star_discrepancy(&points(key))).collect()
 }
 
 #[test]

@@ -9,7 +9,7 @@ use wgray_render::records::Packed;
 use crate::pictures::reference;
 use crate::scenes;
 
-/// Sobol' samples per round, and the target error of adaptive sampling.
+/// Number of Sobol' samples per round, and the target error of adaptive sampling.
 #[derive(Clone, Copy, Debug)]
 struct Sampling {
     samples_per_round: u32,

@@ -9,14 +9,14 @@ use super::{write_exr, write_png};
 
 const PAGE: &str = include_str!("../../docs/scene-format.md");
 
-const START: &str = "\
+const SCENE_START: &str = "\
 image = { width = 4, height = 4 }
 camera = { position = [0, -3, 1], look_at = [0, 0, 1], fov = 45 }
 ";
 
 fn load(folder: &Path, text: &str) -> Result<Scene, String> {
     let path = folder.join("s.toml");
-    std::fs::write(&path, format!("{START}{text}")).unwrap();
+    std::fs::write(&path, format!("{SCENE_START}{text}")).unwrap();
     let strict = Overrides {
         strict: true,
         ..Overrides::default()
@@ -173,9 +173,9 @@ fn the_total_size_of_images_is_limited() {
         format!("[textures.{name}]\ntype = 'image'\nfilter = '{filter}'\nfile = '{file}'\n")
     };
     let error = |text: &str| load(folder.path(), text).unwrap_err();
-    let small = texture("a", "a.png", "nearest");
+    let small_texture = texture("a", "a.png", "nearest");
     assert_eq!(
-        error(&(small.clone() + &texture("b", "huge.png", "nearest"))),
+        error(&(small_texture.clone() + &texture("b", "huge.png", "nearest"))),
         "10: textures.b.file: \"huge.png\" (16384 x 16384 texels) needs 1024.0 MiB and the previous textures 1.0 MiB; \
          the limit is 1024.0 MiB"
     );
@@ -194,9 +194,9 @@ fn files_are_loaded_once() {
              color = {{ texture = '{name}' }}\n"
         )
     };
-    let packed = |text: &str| wgray_render::pack::pack(&load(folder.path(), text).unwrap());
-    let one_texture = packed(&image("a", "a.png", ""));
-    let three_textures = packed(&format!(
+    let pack = |text: &str| wgray_render::pack::pack(&load(folder.path(), text).unwrap());
+    let one_texture = pack(&image("a", "a.png", ""));
+    let three_textures = pack(&format!(
         "{}{}{}",
         image("a", "a.png", "filter = 'nearest'"),
         image("b", "inner/../a.png", "wrap = 'clamp'"),
@@ -211,7 +211,7 @@ fn files_are_loaded_once() {
         .collect();
     assert_eq!((three_textures.textures.records.len(), levels), (3, vec![1, 7, 7]));
     // Another encoding needs other mip levels.
-    let two_encodings = packed(&(image("a", "a.png", "") + &image("b", "a.png", "encoding = 'linear'")));
+    let two_encodings = pack(&(image("a", "a.png", "") + &image("b", "a.png", "encoding = 'linear'")));
     assert_eq!(
         two_encodings.textures.texels.len(),
         2 * one_texture.textures.texels.len()
@@ -418,7 +418,7 @@ fn invalid_values_are_rejected() {
         ),
         (
             format!("{image}{mapped}"),
-            "9: materials.m.normal_map.texture: \"t\" must have encoding = \"linear\" as a normal map",
+            "9: materials.m.normal_map.texture: \"t\" is used as a normal map; its encoding must be \"linear\"",
         ),
         (
             format!("{checker}{mapped}"),

@@ -7,7 +7,7 @@ use wgray::scene::{Color, Overrides, Reflection, Scene, Texels, TextureKind};
 
 use super::{write_exr, write_png};
 
-const START: &str = "\
+const SCENE_START: &str = "\
 image = { width = 4, height = 4 }
 camera = { position = [0, -3, 1], look_at = [0, 0, 1], fov = 45 }
 [render]
@@ -16,7 +16,7 @@ integrator = 'path'
 
 fn load(folder: &Path, text: &str, strict: bool) -> Result<Scene, String> {
     let path = folder.join("s.toml");
-    std::fs::write(&path, format!("{START}{text}")).unwrap();
+    std::fs::write(&path, format!("{SCENE_START}{text}")).unwrap();
     let overrides = Overrides {
         strict,
         ..Overrides::default()

@@ -63,7 +63,7 @@ fn a_constant_image_is_constant_under_every_filter_and_footprint() {
     write_png(&path("spot.png"), 7, 13, |x, y| {
         if (x, y) == (3, 6) { [0; 3] } else { [200, 31, 5] }
     });
-    let mut changed = 0;
+    let mut changed_count = 0;
     for file in ["even.png", "odd.png", "line.exr", "spot.png"] {
         for filter in FILTERS {
             for wrap in WRAPS {
@@ -73,7 +73,7 @@ fn a_constant_image_is_constant_under_every_filter_and_footprint() {
                 for (uv, dx, dy) in footprints() {
                     let found = color(&scene, uv, dx, dy);
                     if file == "spot.png" {
-                        changed += u32::from(found != expected); // negative control: a single texel is visible
+                        changed_count += u32::from(found != expected); // negative control: a single texel is visible
                     } else {
                         assert_eq!(found, expected, "{keys}\n{uv} {dx} {dy}");
                     }
@@ -82,7 +82,7 @@ fn a_constant_image_is_constant_under_every_filter_and_footprint() {
         }
     }
     // Clamped footprints beyond the edge do not cover the texel.
-    assert!(changed > 800, "{changed}");
+    assert!(changed_count > 800, "{changed_count}");
 }
 
 #[test]
@@ -105,7 +105,7 @@ fn cached_weights_give_the_colors_of_the_reference() {
         "file = 'd.exr'",
     ]
     .map(|keys| textured(folder.path(), &format!("type = 'image'\nfilter = 'ewa'\n{keys}")));
-    let mut different = 0;
+    let mut differing_count = 0;
     for (uv, dx, dy) in footprints() {
         let colors = scenes.each_ref().map(|scene| color(scene, uv, dx, dy));
         for (scene, found) in scenes.iter().zip(colors) {
@@ -117,9 +117,9 @@ fn cached_weights_give_the_colors_of_the_reference() {
                 "{uv} {dx} {dy}"
             );
         }
-        different += u32::from((1..colors.len()).all(|i| colors[i] != colors[0]));
+        differing_count += u32::from((1..colors.len()).all(|i| colors[i] != colors[0]));
     }
-    assert!(different > 100, "{different}"); // negative control: the lookups differ
+    assert!(differing_count > 100, "{differing_count}"); // negative control: the lookups differ
 }
 
 #[test]
@@ -192,7 +192,7 @@ fn ewa_is_a_gaussian_mean_over_the_ellipse() {
     let scene = textured(folder.path(), "type = 'image'\nfile = 'noise.exr'\nfilter = 'ewa'");
     // The weight is exp(-2 q) - exp(-2) if q = p^T (M + I)^-1 p < 1, where M is the footprint and I the reconstruction
     // filter, in texels.
-    let exact = |uv: DVec2, dx: DVec2, dy: DVec2| {
+    let exact_color = |uv: DVec2, dx: DVec2, dy: DVec2| {
         let edges = DMat2::from_cols(dx, dy) * f64::from(n);
         let inverse = (edges * edges.transpose() + DMat2::IDENTITY).inverse();
         let (mut sum, mut total) = (0.0, 0.0);
@@ -224,11 +224,11 @@ fn ewa_is_a_gaussian_mean_over_the_ellipse() {
             );
             let found = f64::from(color(&scene, uv, dx, dy).x);
             let (uv, dx, dy) = (uv.as_dvec2(), dx.as_dvec2(), dy.as_dvec2());
-            let expected = exact(uv, dx, dy);
+            let expected = exact_color(uv, dx, dy);
             assert!((found - expected).abs() < 2e-5, "{uv} {dx} {dy}: {found} {expected}");
-            changed_by_size += u32::from((found - exact(uv, dx * 0.7, dy * 0.7)).abs() > 0.01);
+            changed_by_size += u32::from((found - exact_color(uv, dx * 0.7, dy * 0.7)).abs() > 0.01);
             let mirror = DVec2::new(-1.0, 1.0);
-            changed_by_mirroring += u32::from((found - exact(uv, dx * mirror, dy * mirror)).abs() > 0.01);
+            changed_by_mirroring += u32::from((found - exact_color(uv, dx * mirror, dy * mirror)).abs() > 0.01);
         }
         assert!(changed_by_size > 20, "{changed_by_size}");
         // A circle is its own mirror image.
@@ -296,8 +296,8 @@ fn texel_at(texels: &[f64], x: i64, y: i64) -> f64 {
 
 /// Integrates the bilinear interpolation over a parallelogram with coordinates in texels.
 fn mean_over(texels: &[f64], p: DVec2, dx: DVec2, dy: DVec2) -> f64 {
-    let points = |edge: DVec2| (edge.length() * 1.5).ceil().max(16.0);
-    let (columns, rows) = (points(dx), points(dy));
+    let point_count = |edge: DVec2| (edge.length() * 1.5).ceil().max(16.0);
+    let (columns, rows) = (point_count(dx), point_count(dy));
     let mut sum = 0.0;
     for i in 0..columns as u32 {
         for j in 0..rows as u32 {
@@ -511,8 +511,8 @@ fn the_ellipse_of_a_footprint_has_the_footprint_as_conjugate_diameters() {
 #[test]
 fn beyond_a_clamped_edge_only_the_color_of_the_edge_is_visible() {
     let folder = tempfile::tempdir().unwrap();
-    let border = |i: u32| !(4..60).contains(&i);
-    let framed = |x, y| if border(x) || border(y) { [0; 3] } else { [255; 3] };
+    let is_border = |i: u32| !(4..60).contains(&i);
+    let framed = |x, y| if is_border(x) || is_border(y) { [0; 3] } else { [255; 3] };
     write_png(&folder.path().join("framed.png"), 64, 64, framed);
     for filter in ["bilinear", "trilinear", "ewa"] {
         for (wrap, inside) in [("clamp", 0.0), ("repeat", 1.0)] {

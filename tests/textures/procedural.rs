@@ -26,8 +26,8 @@ fn numeric_mean(kind: u32, width: f64, f: Footprint, n: i32) -> f64 {
     let mut sum = 0.0;
     for i in 0..n {
         for j in 0..n {
-            let step = |k: i32| (f64::from(k) + 0.5) / f64::from(n) - 0.5;
-            let p = f.uv.as_dvec2() + f.dx.as_dvec2() * step(i) + f.dy.as_dvec2() * step(j);
+            let offset = |k: i32| (f64::from(k) + 0.5) / f64::from(n) - 0.5;
+            let p = f.uv.as_dvec2() + f.dx.as_dvec2() * offset(i) + f.dy.as_dvec2() * offset(j);
             sum += pattern_value(kind, width, p.x, p.y);
         }
     }
@@ -111,12 +111,12 @@ fn random_footprint(size: f64, aspects: &[f64], numbers: &Random) -> Footprint {
     } else {
         TAU / 8.0 + numbers.between(-0.02, 0.02)
     };
-    let long = DVec2::from_angle(angle) * size;
-    let short = (long.perp() + long * numbers.between(-0.5, 0.5)) / numbers.pick(aspects);
-    let corner = numbers.once_in(3);
+    let long_edge = DVec2::from_angle(angle) * size;
+    let short_edge = (long_edge.perp() + long_edge * numbers.between(-0.5, 0.5)) / numbers.pick(aspects);
+    let is_near_corner = numbers.once_in(3);
     let coordinate = || {
         let x = numbers.between(-9.0, 9.0);
-        (if corner {
+        (if is_near_corner {
             x.round() + numbers.between(-size, size)
         } else {
             x
@@ -124,8 +124,8 @@ fn random_footprint(size: f64, aspects: &[f64], numbers: &Random) -> Footprint {
     };
     Footprint {
         uv: Vec2::new(coordinate(), coordinate()),
-        dx: short.as_vec2(),
-        dy: long.as_vec2(),
+        dx: short_edge.as_vec2(),
+        dy: long_edge.as_vec2(),
     }
 }
 
@@ -135,7 +135,7 @@ fn footprints_of_any_size_and_angle_have_the_exact_mean() {
     let numbers = Random::new(11);
     let aspects = [1.0, 1.7, 8.0, 64.0, 900.0];
     for (kind, width) in [(CHECKER, 0.0), (LINES, 0.2), (LINES, 0.02f32), (LINES, 0.7)] {
-        let mut control = 0.0f64;
+        let mut max_control_error = 0.0f64;
         for size in [
             3e-4, 1e-3, 0.016, 0.0625, 0.25, 0.5, 1.0, 1.5, 2.0, 4.0, 16.0, 31.0, 63.0, 100.0, 300.0, 2000.0,
         ] {
@@ -148,10 +148,11 @@ fn footprints_of_any_size_and_angle_have_the_exact_mean() {
                 let error = f64::from(procedural_share(kind, width, f)) - expected;
                 assert!(error.abs() < tolerance, "{kind} {width} {size} {f:?}: {error}");
                 let longer = Footprint { dx: f.dx * 1.2, ..f };
-                control = control.max((f64::from(procedural_share(kind, width, longer)) - expected).abs());
+                max_control_error =
+                    max_control_error.max((f64::from(procedural_share(kind, width, longer)) - expected).abs());
             }
         }
-        assert!(control > 0.02, "{kind} {width}: {control}");
+        assert!(max_control_error > 0.02, "{kind} {width}: {max_control_error}");
     }
 }
 
@@ -286,7 +287,7 @@ fn unbounded_footprints_average_the_full_pattern() {
 fn textures_are_scaled_then_rotated_then_translated() {
     let keys = "type = 'checker'\neven = [1, 0, 0]\nodd = [0, 1, 0]\nscale = [2, 1]\nrotate = 90\noffset = [0.5, 3]";
     let scene = textured(Path::new("."), keys);
-    let mut odd = 0;
+    let mut odd_count = 0;
     for i in 0..100 {
         let (u, v) = (f64::from(i) * 0.1 + 0.01, f64::from(i % 7) * 0.3 + 0.02);
         // (u, v) -> (2 u, v) -> (-v, 2 u) -> (0.5 - v, 3 + 2 u)
@@ -302,7 +303,7 @@ fn textures_are_scaled_then_rotated_then_translated() {
             },
         );
         assert_eq!([found.x, found.y], [1.0 - expected as f32, expected as f32]);
-        odd += expected as u32;
+        odd_count += expected as u32;
     }
-    assert!(odd > 20 && odd < 80);
+    assert!(odd_count > 20 && odd_count < 80);
 }

@@ -1,4 +1,4 @@
-//! Mirrors and glass: closed forms, energy conservation and visible objects.
+//! Mirrors and glass: Fresnel reflectance, energy conservation, reflected lights, shadows and split paths.
 
 use std::path::Path;
 

@@ -36,11 +36,11 @@ const TILES_PER_SIDE: usize = 8;
 /// The numbers of invalid pixels of an image.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct BadPixels {
-    /// Pixels with a NaN.
+    /// Number of pixels with a NaN.
     pub nan: usize,
-    /// Pixels with an infinite value but no NaN.
+    /// Number of pixels with an infinite value but no NaN.
     pub infinite: usize,
-    /// Pixels with a negative value but no NaN and no infinite value.
+    /// Number of pixels with a negative value but no NaN and no infinite value.
     pub negative: usize,
     /// The locations of invalid pixels, at most one per tile.
     pub places: Vec<[u32; 2]>,

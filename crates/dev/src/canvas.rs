@@ -110,7 +110,7 @@ impl Canvas {
         Ok(canvas)
     }
 
-    /// Returns whether the CPU renders the image.
+    /// Returns true if the CPU renders the image.
     pub fn is_on_cpu(&self) -> bool {
         self.engine.is_cpu()
     }
@@ -129,7 +129,7 @@ impl Canvas {
         self.engine.backend().resume(film)
     }
 
-    /// Returns whether this scene is being rendered.
+    /// Returns true if the canvas renders `scene`, from its camera.
     pub fn renders(&self, scene: &Packed) -> bool {
         scene.camera == self.camera && scene.same_but_camera(&self.scene)
     }
@@ -276,7 +276,7 @@ impl Canvas {
         }
     }
 
-    /// Performs one dispatch. Returns whether the result must be shown without delay.
+    /// Performs one dispatch. Returns true if the result must be shown without delay.
     pub fn step(&mut self, view: View) -> Result<bool, RenderError> {
         let show = match self.hit_layer(view) {
             Some(_) => self.step_hits(view)?,

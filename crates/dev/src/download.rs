@@ -12,7 +12,7 @@ use wgray_image::Pixels;
 use wgray_render::output::Channel;
 
 /// Encodes a frame as PNG, without marks. For a comparison, encodes the first image.
-pub fn png_file(frame: &Frame) -> Vec<u8> {
+pub fn encode_png(frame: &Frame) -> Vec<u8> {
     match &frame.content {
         Content::Color(pixels) | Content::Compare(pixels, _) => png_of(pixels, frame.display),
         Content::Film(layer) => png(layer.values.width, layer.values.height, &layer.bytes(&frame.display)),
@@ -28,7 +28,7 @@ pub fn png_file(frame: &Frame) -> Vec<u8> {
 /// # Errors
 ///
 /// Errors of the EXR library.
-pub fn exr_file(frame: &Frame) -> io::Result<Vec<u8>> {
+pub fn encode_exr(frame: &Frame) -> io::Result<Vec<u8>> {
     let [width, height] = frame.header.sent;
     let channels: SmallVec<[AnyChannel<FlatSamples>; 4]> = match &frame.content {
         Content::Color(pixels) | Content::Compare(pixels, _) => colors(pixels, ["R", "G", "B"]),
@@ -123,7 +123,7 @@ mod tests {
                 Names::default(),
                 DisplaySettings::default(),
             );
-            let file = exr_file(&frame).unwrap();
+            let file = encode_exr(&frame).unwrap();
             let image = ::exr::prelude::read()
                 .no_deep_data()
                 .largest_resolution_level()
@@ -147,7 +147,7 @@ mod tests {
                 .zip(expected.map(Vec::from))
                 .collect();
             assert_eq!(found, expected);
-            assert_eq!(png_file(&frame)[1..4], *b"PNG");
+            assert_eq!(encode_png(&frame)[1..4], *b"PNG");
         }
     }
 }

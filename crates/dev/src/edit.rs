@@ -115,7 +115,7 @@ impl<'a> Node<'a> {
         }
     }
 
-    /// Returns whether a table is defined by dotted keys.
+    /// Returns true if a table is defined by dotted keys.
     fn is_dotted(self) -> bool {
         match self {
             Node::Table(table) => table.is_dotted(),

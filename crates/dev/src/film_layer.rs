@@ -38,12 +38,12 @@ impl FilmLayer {
         }
     }
 
-    /// Returns whether the layer is a component of the image's radiance.
+    /// Returns true if the layer is a component of the image's radiance.
     pub fn is_light(&self) -> bool {
         matches!(self.aov, Aov::Direct | Aov::Indirect | Aov::Emission)
     }
 
-    /// Returns whether the values may be negative.
+    /// Returns true if the values may be negative.
     pub fn may_be_negative(&self) -> bool {
         self.aov == Aov::ShadingNormal
     }

@@ -49,7 +49,7 @@ impl Guard {
         }
     }
 
-    /// Returns whether a host may be used: an address, `localhost` or the name of the server. Other names may be
+    /// Returns true if a host may be used: an address, `localhost` or the name of the server. Other names may be
     /// redirected to this machine by DNS. Any port is accepted, because tunnels change the port.
     fn accepts(&self, host: &Authority) -> bool {
         if host.as_str().contains('@') {

@@ -77,7 +77,7 @@ impl History {
         }
     }
 
-    /// Drops all steps, because another program changed the file. Returns whether any steps existed.
+    /// Drops all steps, because another program changed the file. Returns true if any steps existed.
     pub fn forget(&mut self) -> bool {
         let History { done, undone } = std::mem::take(self);
         !(done.is_empty() && undone.is_empty())

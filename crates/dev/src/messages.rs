@@ -205,9 +205,9 @@ pub struct State {
     pub missing_views: Vec<(View, &'static str)>,
     /// The template of links to an editor, with `{file}`, `{line}` and `{column}`; absent if there are no links.
     pub editor: Option<String>,
-    /// True while a kernel is compiled.
+    /// True during the compilation of a kernel.
     pub compiling: bool,
-    /// True while changed files of the scene are read.
+    /// True while the session reads changed files of the scene.
     pub reading: bool,
     /// Seconds spent on the last compilation.
     pub compile_seconds: Option<f64>,

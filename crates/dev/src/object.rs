@@ -72,7 +72,7 @@ pub struct Group {
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct ObjectList {
     /// The query.
-    pub part: String,
+    pub query: String,
     /// The name of each object, and its type, file or material.
     pub objects: Vec<(String, String)>,
     /// Number of objects that `objects` omits.
@@ -263,7 +263,7 @@ impl SceneView {
         let description = &self.loaded.description;
         let lowercase_query = query.to_lowercase();
         let mut list = ObjectList {
-            part: query.to_owned(),
+            query: query.to_owned(),
             objects: Vec::new(),
             more: 0,
         };

@@ -37,11 +37,11 @@ pub enum View {
     Barycentric,
     /// The fraction of light that the first surface reflects.
     Albedo,
-    /// Light after one reflection.
+    /// The radiance after exactly one reflection.
     Direct,
-    /// Light after two or more reflections.
+    /// The radiance after two or more reflections.
     Indirect,
-    /// Light without reflections.
+    /// The radiance without reflections.
     Emission,
     /// The variance of a pixel's mean.
     Variance,
@@ -109,7 +109,7 @@ impl View {
         }
     }
 
-    /// Returns whether both the GPU and the CPU render this view.
+    /// Returns true if both the GPU and the CPU render this view.
     pub fn is_rendered_twice(self) -> bool {
         self == View::Compare(Against::Cpu)
     }

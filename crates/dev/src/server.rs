@@ -23,7 +23,7 @@ use hyper_util::service::TowerToHyperService;
 use tokio::sync::Semaphore;
 use tokio::task::AbortHandle;
 
-use super::download::{exr_file, png_file};
+use super::download::{encode_exr, encode_png};
 use super::guard::Guard;
 use super::picture::Frame;
 use super::reference::Reference;
@@ -202,11 +202,11 @@ async fn picture(shared: Shared, kind: &'static str, encode: fn(&Frame) -> io::R
 }
 
 async fn picture_png(State(shared): State<Shared>) -> Response {
-    picture(shared, "image/png", |frame| Ok(png_file(frame))).await
+    picture(shared, "image/png", |frame| Ok(encode_png(frame))).await
 }
 
 async fn picture_exr(State(shared): State<Shared>) -> Response {
-    picture(shared, "image/x-exr", exr_file).await
+    picture(shared, "image/x-exr", encode_exr).await
 }
 
 /// Receives a reference file from the viewer's machine.

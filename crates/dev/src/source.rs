@@ -86,7 +86,7 @@ impl Loaded {
     }
 }
 
-/// Returns whether only the camera's record has to be packed again.
+/// Returns true if only the camera's record has to be packed again.
 fn differ_only_in_camera(previous: &Loaded, scene: &Scene) -> bool {
     let mut moved = previous.scene.clone();
     moved.camera = scene.camera;
@@ -133,7 +133,7 @@ impl KernelChoice {
         }
     }
 
-    /// Returns whether two kernel choices differ only in the supported views. Ignores whether the CPU renders.
+    /// Returns true if two kernel choices differ only in the supported views. Ignores whether the CPU renders.
     pub fn differs_only_in_views(&self, other: &KernelChoice) -> bool {
         let without_view = |kernel_choice: &KernelChoice| KernelChoice {
             specialization: Specialization {

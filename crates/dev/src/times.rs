@@ -41,13 +41,14 @@ pub struct Time {
     pub kernel: bool,
     /// Number of measurements.
     pub count: u64,
-    /// Seconds of the last measurement.
+    /// Duration of the last measurement in seconds.
     pub last: f64,
     /// The median of the last measurements, in seconds.
     pub median: f64,
     /// The fraction of the last second spent in the kernel or stage; above 1 if several threads work at the same stage.
     pub share: f64,
-    /// Samples of a kernel's last dispatch.
+    /// Number of pixel samples in a kernel's last dispatch, or number of pixels for kernels that take no samples; 0 for
+    /// a stage.
     pub samples: u64,
     /// True if the device measured the times; otherwise, the times include the notification of the host.
     pub by_device: bool,

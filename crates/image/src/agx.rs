@@ -18,14 +18,14 @@ const TO_REC2020: [[f64; 3]; 3] = [
     [0.016_391_4, 0.088_013_3, 0.895_595_3],
 ];
 
-/// Matrix that moves the primaries inwards and rotates them, which reduces hue shifts of bright saturated colors.
+/// Matrix that moves the primaries inwards and rotates them. This reduces hue shifts of bright saturated colors.
 const INSET: [[f64; 3]; 3] = [
     [0.856_627_153_315_983, 0.095_121_240_538_158_8, 0.048_251_606_145_858_3],
     [0.137_318_972_929_847, 0.761_241_990_602_591, 0.101_439_036_467_562],
     [0.111_898_212_999_95, 0.076_799_418_603_190_3, 0.811_302_368_396_859],
 ];
 
-/// Inverse of the outset matrix, which restores saturation after the curve.
+/// Inverse of the outset matrix. The outset restores saturation after the curve.
 const OUTSET_INVERSE: [[f64; 3]; 3] = [
     [0.899_796_955_911_611, 0.087_199_619_202_835_1, 0.013_003_424_885_555],
     [0.111_420_988_957_48, 0.875_575_586_156_966, 0.013_003_424_885_554_8],
@@ -67,7 +67,8 @@ fn log_position(value: f64) -> f64 {
     ((stops + STOPS_BELOW) / (STOPS_BELOW + STOPS_ABOVE)).clamp(0.0, 1.0)
 }
 
-/// Returns the value of the sigmoid from (0, 0) to (1, 1) that is steepest at middle gray, which is a fixed point.
+/// Returns the value of the sigmoid from (0, 0) to (1, 1) that is steepest at middle gray and maps
+/// middle gray to itself.
 fn curve(x: f64) -> f64 {
     let BranchScales { below, above } = &*BRANCH_SCALES;
     let (middle, gray) = pivot();

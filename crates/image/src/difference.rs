@@ -79,7 +79,7 @@ mod tests {
         assert_eq!(
             difference(&b, &b, 0.0).unwrap().beyond,
             0,
-            "equal bits count as a difference"
+            "equal NaN bits count as different"
         );
     }
 

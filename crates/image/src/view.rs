@@ -57,7 +57,7 @@ pub struct ViewSettings {
 }
 
 impl ViewSettings {
-    /// Maximum magnitude of the exposure in stops, which keeps light far from the limits of 64-bit floats.
+    /// Maximum magnitude of the exposure in stops, which keeps radiance far from the limits of 64-bit floats.
     pub const MAX_STOPS: f64 = 100.0;
 
     /// Returns the exposure, or the rule that it violates.
@@ -75,7 +75,7 @@ impl ViewSettings {
         transformed(self.transform, self.exposed(linear))
     }
 
-    /// Returns the light that is displayed as this color, whose components are 0 to 1. The result is approximate for
+    /// Returns the radiance that is displayed as this color, whose components are 0 to 1. The result is approximate for
     /// colors outside the range of the transform.
     pub fn light_of(&self, display: [f64; 3]) -> [f64; 3] {
         let factor = self.exposure.exp2();
@@ -128,7 +128,7 @@ fn transformed(transform: ViewTransform, light: Rgb) -> Rgb {
     }
 }
 
-/// Returns the light that is displayed as a color. If no such light exists, returns the candidate that is displayed
+/// Returns the radiance that is displayed as a color. If no such radiance exists, returns the candidate displayed
 /// closest to the color: the result of [`solution`], or a multiple of the linear color.
 fn inverse(transform: ViewTransform, display: Rgb) -> Rgb {
     const MAX_DISTANCE: f64 = 0.5 / 255.0;
@@ -149,15 +149,15 @@ fn inverse(transform: ViewTransform, display: Rgb) -> Rgb {
 }
 
 /// Solves `transformed(transform, light) == display` by coordinate-wise bisection, because each display channel
-/// increases with the light of the channel.
+/// increases with the radiance of the channel.
 fn solution(transform: ViewTransform, display: Rgb) -> Rgb {
-    /// Maximum light of a channel. PBR Neutral only approaches white.
-    const MAX_LIGHT: f64 = 1e3;
+    /// Maximum radiance of a channel. PBR Neutral only approaches white.
+    const MAX_RADIANCE: f64 = 1e3;
     /// A display value that rounds to white in 8 bits.
     const NEARLY_WHITE: f64 = 1.0 - 0.25 / 255.0;
     const SWEEPS: usize = 100;
     const BISECTIONS: usize = 60;
-    let [white, ..] = transformed(transform, [MAX_LIGHT; 3]);
+    let [white, ..] = transformed(transform, [MAX_RADIANCE; 3]);
     let target = display.map(|value| {
         if value <= white + 1e-9 {
             value.min(white)
@@ -168,7 +168,7 @@ fn solution(transform: ViewTransform, display: Rgb) -> Rgb {
     let mut light = [0.18; 3];
     for _ in 0..SWEEPS {
         for channel in 0..3 {
-            let (mut low, mut high) = (0.0, MAX_LIGHT);
+            let (mut low, mut high) = (0.0, MAX_RADIANCE);
             for _ in 0..BISECTIONS {
                 light[channel] = 0.5 * (low + high);
                 match transformed(transform, light)[channel] < target[channel] {

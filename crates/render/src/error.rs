@@ -139,11 +139,11 @@ pub enum RenderError {
     Outside {
         /// Name of the region.
         what: &'static str,
-        /// Pixels of the region.
+        /// The region.
         region: Region,
         /// Name of the containing region.
         of: &'static str,
-        /// Pixels of the containing region.
+        /// The containing region.
         limits: Region,
     },
     /// The film cannot be resumed for this scene.

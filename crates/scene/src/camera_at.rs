@@ -37,7 +37,7 @@ impl Scene {
                 line: *line,
                 problem: problem.at("camera"),
             },
-            None => SceneError::Override(problem.at("camera").at("frame")),
+            None => SceneError::Override(problem.at("camera")),
         })
     }
 }

@@ -71,7 +71,7 @@ impl Format {
     }
 }
 
-/// Size and precision of an image, which are known before its texels are decoded.
+/// Size and precision of an image, from its header, before its texels are decoded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Header {
     pub width: u32,

@@ -149,7 +149,7 @@ impl AssetSource for FolderFiles {
 /// Length and modification time of a file.
 pub(crate) type FileStamp = Option<(u64, SystemTime)>;
 
-/// The operations on files that loaders need. Paths of a source are relative.
+/// The files that loaders read: files on disk, or files of an asset source, whose paths are relative.
 #[derive(Clone, Default)]
 pub(crate) enum FileSystem {
     /// The file system of the operating system.

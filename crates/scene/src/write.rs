@@ -1,4 +1,5 @@
-//! Writes scenes as short TOML files: defaults are omitted, and file names are relative to the new folder.
+//! Writes scenes as short TOML files: defaults are omitted, and file names are relative to the folder
+//! of the TOML file.
 
 use std::io;
 use std::path::{Component, Path};

@@ -46,7 +46,7 @@ impl Metric {
         found.ok_or_else(|| format!("must be one of {}", METRICS.map(Metric::name).join(", ")))
     }
 
-    /// Returns whether the metric needs red, green and blue.
+    /// Returns true if the metric needs red, green and blue.
     pub fn needs_colors(self) -> bool {
         matches!(self, Metric::Ssim | Metric::Flip)
     }

@@ -46,7 +46,7 @@ pub struct ImageInfo {
     pub integrator: &'static str,
     pub pixel_pattern: &'static str,
     pub pixel_samples: u32,
-    /// Maximum samples per pixel; differs from `pixel_samples` if sampling is adaptive.
+    /// Maximum number of samples per pixel; differs from `pixel_samples` if sampling is adaptive.
     pub max_samples: u32,
     /// The former name of `max_samples`, kept until version 0.3.
     #[serde(rename = "most_samples")]
@@ -104,9 +104,9 @@ pub struct Shapes {
     /// The former name of `instanced_triangles`, kept until version 0.3.
     #[serde(rename = "placed_mesh_triangles")]
     former_instanced_triangles: u64,
-    /// Triangles of all mesh instances, triangle shapes and tetrahedra.
+    /// Number of triangles of all mesh instances, triangle shapes and tetrahedra.
     pub triangles: u64,
-    /// Primitives that are not part of meshes: shapes (a tetrahedron counts as four triangles) and area lights.
+    /// Number of primitives that are not part of meshes: shapes (a tetrahedron is four triangles) and area lights.
     pub primitives: u64,
 }
 
@@ -132,7 +132,7 @@ pub struct Lights {
 
 #[derive(Debug, Serialize)]
 pub struct Memory {
-    /// Sum of the packed scene and the largest film.
+    /// Bytes of the packed scene and the largest film.
     pub total: u64,
     /// The packed scene, which includes BVHs and texels.
     pub scene: u64,
@@ -152,7 +152,7 @@ pub struct Kernel {
     pub entry: Option<&'static str>,
     /// True if the scene is compiled into the kernel as constants.
     pub baked: Option<bool>,
-    /// Lines of WGSL before dead code is removed.
+    /// Number of lines of WGSL before dead code is removed.
     pub lines: Option<usize>,
     pub uses: Vec<&'static str>,
     pub leaves_out: Vec<&'static str>,

@@ -38,7 +38,7 @@ export const sendQuery = (query) => send(query, false);
 // Resolves to the values of a pixel: {x, y, values}.
 export const queryPixel = (pixel) => sendQuery({ pixel });
 
-// Returns whether the program has executed all commands of this page. Until then, the program's state must not replace
+// Returns true if the program has executed all commands of this page. Until then, the program's state must not replace
 // newer input.
 export const isUpToDate = () => !answers.some(({ isCommand }) => isCommand) && state !== null && state.executed >= lastCommand;
 export const lastState = () => state;
@@ -60,7 +60,7 @@ export function connect() {
   };
 }
 
-// Returns whether the program answers HTTP requests. If the program answers, but closes the socket, the maximum number
+// Returns true if the program answers HTTP requests. If the program answers, but closes the socket, the maximum number
 // of viewers is reached.
 async function isServed() {
   try {

@@ -25,7 +25,7 @@ export function fit({ kind, range, gap, squares }, x, old) {
 // Returns the square number that is `steps` squares away from `x`.
 const square = (x, steps) => Math.max((steps > 0 ? Math.floor : Math.ceil)(Math.sqrt(Math.max(x, 0))) + steps, 0) ** 2;
 
-// Returns the step size of a number, which depends on the largest magnitude in its list.
+// Returns the step size of a number. The step depends on the largest magnitude in the list of the number.
 function stepOf({ kind, unit, range }, list) {
   if (kind === "whole") return 1;
   const largest = Math.max(0, ...list.map((x) => Math.abs(x ?? 0)));

@@ -138,7 +138,7 @@ function release() {
   stale = false;
 }
 
-// Returns whether a value is being changed. Its control then shows the user's value instead of the value in the file.
+// Returns true if a value is being changed. Its control then shows the user's value instead of the value in the file.
 const isBusy = (path) => path === held || [sending, ...waiting.values()].some((change) => change?.field === path);
 
 function showObject(object) {

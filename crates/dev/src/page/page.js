@@ -141,7 +141,7 @@ function duration(seconds) {
   return seconds < 1 ? `${Math.round(seconds * 1000)} ms` : `${seconds.toFixed(2)} s`;
 }
 
-// Returns whether a control handles a key. In the value editor, an accidental key press must not trigger an
+// Returns true if a control handles a key. In the value editor, an accidental key press must not trigger an
 // action that affects all viewers.
 function handlesKey(control, key) {
   if (control.closest("#object-groups, #sliders")) return true;

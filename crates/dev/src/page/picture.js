@@ -131,7 +131,7 @@ export class Picture {
     this.#schedule();
   }
 
-  // Returns whether all input has been sent and drawn.
+  // Returns true if all input has been sent and drawn.
   isSettled() {
     return !this.scheduled;
   }
@@ -214,7 +214,7 @@ export class Picture {
     divider(context, x, -view.top, canvas.clientHeight - view.top);
   }
 
-  // Returns whether a pointer is at the divider of a wipe.
+  // Returns true if a pointer is at the divider of a wipe.
   #isAtDivider(panel, event) {
     const grip = GRIP_DISTANCE[event.pointerType] ?? GRIP_DISTANCE.mouse;
     return panel.part === "first" && this.#isWiping() && Math.abs(event.offsetX - this.dividerPosition * panel.canvas.clientWidth) <= grip;

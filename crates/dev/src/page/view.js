@@ -124,7 +124,8 @@ function showMissing(rules) {
 }
 
 const SUPERSCRIPTS = { "-": "⁻", 0: "⁰", 1: "¹", 2: "²", 3: "³", 4: "⁴", 5: "⁵", 6: "⁶", 7: "⁷", 8: "⁸", 9: "⁹" };
-const power = (n) => (Number.isInteger(n) ? `2${[...String(n)].map((c) => SUPERSCRIPTS[c]).join("")}` : `2^${n}`);
+const powerOfTwoText = (exponent) =>
+  Number.isInteger(exponent) ? `2${[...String(exponent)].map((c) => SUPERSCRIPTS[c]).join("")}` : `2^${exponent}`;
 
 function showLegend(legend) {
   element("legend").hidden = !legend;
@@ -137,7 +138,7 @@ function showLegend(legend) {
   });
   const [first, last] = legend.stops;
   [...element("legend").querySelectorAll("span")].forEach((span, i) => {
-    span.textContent = power(Number((first + ((last - first) * i) / 2).toFixed(1)));
+    span.textContent = powerOfTwoText(Number((first + ((last - first) * i) / 2).toFixed(1)));
   });
 }
 
@@ -171,7 +172,7 @@ function drawHistogram(header = lastHeader) {
   context.fillStyle = style.color;
   context.fillRect(Math.round(x(white)), 0, Math.max(1, ratio), canvas.height);
   const clipped = Math.max(...above_white) / Math.max(1, header.sent[0] * header.sent[1]);
-  const stop = (bin) => power(first + Math.floor(bin / of_a_stop));
+  const stop = (bin) => powerOfTwoText(first + Math.floor(bin / of_a_stop));
   const isUsed = counts[0].map((_, bin) => counts.some((channel) => channel[bin] > 0));
   const [low, high] = [isUsed.indexOf(true), isUsed.lastIndexOf(true)];
   const range = low < 0 ? "No light" : `Range ${stop(low)} to ${stop(high + of_a_stop)}`;

@@ -19,7 +19,7 @@ impl Painter {
         KernelChoice::of(&loaded.packed, self.view, on_cpu)
     }
 
-    /// Returns whether the CPU renders the scene faster than the adapter.
+    /// Returns true if the CPU renders the scene faster than the adapter.
     fn is_faster_on_cpu(&self, loaded: &Loaded) -> bool {
         self.may_use_cpu && self.adapter.is_software() && has_bvh(loaded)
     }
@@ -60,7 +60,7 @@ impl Painter {
     }
 
     /// Renders on the CPU while the kernel is compiled, unless an earlier kernel still shows its image. Scenes without
-    /// a BVH wait for their kernels, which are compiled in less than a second.
+    /// a BVH wait for their kernels, because the compilation takes less than a second.
     pub(super) fn render_on_cpu_while_compiling(
         &mut self,
         loaded: &Loaded,
@@ -85,7 +85,7 @@ impl Painter {
         }
     }
 
-    /// Returns whether the CPU renders only until a kernel is compiled.
+    /// Returns true if the CPU renders only until a kernel is compiled.
     fn is_interim(&self, running: &Running) -> bool {
         let is_faster_on_cpu = self.loaded.as_ref().is_some_and(|loaded| self.is_faster_on_cpu(loaded));
         running.canvas.is_on_cpu() && !is_faster_on_cpu

@@ -167,8 +167,7 @@ impl Painter {
     }
 
     /// Handles a render error. If the running shaders caused the error, the last shaders without errors are used again;
-    /// without such shaders, rendering halts. After other errors, a device is opened again, up to a maximum number of
-    /// attempts.
+    /// without such shaders, rendering halts. After other errors, the device counts as lost.
     pub(super) fn fail(&mut self, error: &RenderError) {
         if let (RenderError::LoopTruncated { .. } | RenderError::Shader(_), Some(running)) = (error, &mut self.running)
         {
@@ -191,7 +190,8 @@ impl Painter {
         self.publish();
     }
 
-    /// Drops the lost device. Renders on a new device or on the CPU, up to a maximum number of attempts.
+    /// Drops the lost device and renders on the CPU or requests a new device; gives up after more than [`MAX_ATTEMPTS`]
+    /// failures.
     fn lose_device(&mut self, error: &RenderError) {
         drop_guarded(self.parked.take());
         self.problems.device = Some(error.into());

@@ -72,7 +72,7 @@ pub struct Painter {
     device: Option<Device>,
     /// The adapter of the last device.
     adapter: GpuInfo,
-    /// True if the CPU may replace software Vulkan.
+    /// True if the CPU may render in place of a software Vulkan adapter.
     may_use_cpu: bool,
     /// The built-in shaders, which have twins on the CPU.
     built_in: Shaders,

@@ -64,7 +64,7 @@ impl Painter {
         }
     }
 
-    /// Switches to the parked kernel if it has these shaders and this kernel choice. Returns whether the kernel was
+    /// Switches to the parked kernel if it has these shaders and this kernel choice. Returns true if the kernel was
     /// switched.
     pub(super) fn unpark(&mut self, shaders: &Arc<Shaders>, kernel_choice: &KernelChoice) -> bool {
         let matches = |parked: &Running| parked.shaders == *shaders && parked.kernel_choice == *kernel_choice;

@@ -21,7 +21,7 @@ pub struct Problems {
     pub scene: Vec<Diagnostic>,
     pub files: Option<Diagnostic>,
     pub shader: Vec<Diagnostic>,
-    /// An error because the driver truncates loops of the kernel, which leaves the image incomplete.
+    /// The error if the driver truncates loops of the kernel, so that the image is incomplete.
     pub truncated: Option<Diagnostic>,
     pub device: Option<Diagnostic>,
     pub out: Option<Diagnostic>,

@@ -18,7 +18,7 @@ const CHUNK: usize = 1 << 14;
 const MIN_JOIN_ITEMS: usize = 1 << 11;
 /// Maximum number of items of a node that is split by a sweep along each axis.
 const MAX_SMALL_ITEMS: usize = 8;
-/// Bins per axis, a power of two.
+/// Number of bins per axis, a power of two.
 const BINS: usize = 16;
 
 /// A box and its index. The index is stored as the bits of `low.w`, which no arithmetic uses; `high.w` is 1.

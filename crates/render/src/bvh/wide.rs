@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::binary::{Binary, BuildItem, Inner};
 use super::{Aabb, Node, Tree};
 
-/// Maximum children per node.
+/// Maximum number of children per node.
 pub const SLOTS: usize = 8;
 /// SAH cost of testing a node's boxes.
 const NODE_COST: f32 = 1.0;

@@ -68,7 +68,7 @@ pub fn instance_of(scene: &Packed, hit: Hit) -> &Instance {
 pub fn group_word(scene: &Packed, i: &Instance, slot: u32) -> u32 {
     let groups = &scene.bvh.meshes[i.mesh as usize].groups;
     let group = groups.get(slot as usize).copied().unwrap_or(0);
-    scene.bvh.group_words[(i.materials + group) as usize]
+    scene.bvh.group_words[(i.first_group_word + group) as usize]
 }
 
 pub fn triangle_casts(scene: &Packed, i: &Instance, slot: u32) -> bool {
@@ -187,12 +187,12 @@ pub fn skip_camera_invisible(scene: &Packed, start: Path) -> Path {
             break;
         }
         let prim = fetch_hit_primitive(scene, hit);
-        let visibility = material_of(scene, &prim).camera_visibility;
-        if visibility == 0 {
+        let culling = material_of(scene, &prim).camera_culling;
+        if culling == 0 {
             break;
         }
         let surface = surface_of(scene, &prim, hit, path.ray);
-        if (visibility == CULL_BACKFACE) & (surface.side > 0.0) {
+        if (culling == CULL_BACKFACE) & (surface.side > 0.0) {
             break;
         }
         let hit_diff = hit_differential(scene, &prim, hit, surface, path.ray, path.differential);

@@ -1,6 +1,6 @@
-//! Number and vector types of the shared functions that run for a single path and for several paths in SIMD lanes: a
-//! [`Real`] is an `f32`, or a vector with an `f32` in each lane. Generic functions over these types select values
-//! instead of branching, like the WGSL functions. Each lane gives the bits of the `f32` version.
+//! Types of numbers and vectors for functions that trace either a single path or several paths in SIMD lanes: a
+//! [`Real`] is an `f32`, or a vector with an `f32` in each lane. Functions that are generic over these types select
+//! values instead of branching, like the WGSL functions. The result in a lane has the same bits as the `f32` result.
 
 use std::ops::{Add, BitAnd, BitOr, BitXor, Div, Mul, Neg, Not, Shl, Shr, Sub};
 

@@ -6,6 +6,8 @@ use super::lanes::{Real, Vector2, Vector3, constant, select};
 use super::math::{max, min};
 use crate::records::INFINITE_T;
 
+/// Precomputed terms of a ray for box tests: the origin for lower and upper sides, offset by the padding, and 1 over
+/// the direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Slabs<V = Vec3> {
     pub low_origin: V,
@@ -48,6 +50,8 @@ pub fn interval_hits<V: Vector2>(interval: V, limit: V::Real) -> <V::Real as Rea
     near.le(far) & far.ge(far.splat(0.0)) & near.le(limit)
 }
 
+/// A bundle of rays with a common origin, whose direction components are in given ranges, as precomputed terms for box
+/// tests. `shaders/slab.wgsl` documents the fields.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RayInterval {
     pub low_origin: Vec3,

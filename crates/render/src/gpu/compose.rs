@@ -200,7 +200,7 @@ impl Shaders {
         }
     }
 
-    /// Returns a file's contents, or an empty text.
+    /// Returns the contents of a file, or an empty text if no file has this name.
     pub fn text(&self, name: &str) -> &str {
         self.files
             .iter()

@@ -27,7 +27,7 @@ impl FloatControls {
         denormals: true,
     };
 
-    /// Returns an adapter's float controls, which require Vulkan 1.2.
+    /// Returns the float controls of an adapter. They require Vulkan 1.2.
     #[cfg(any(windows, target_os = "linux", target_os = "android", target_os = "freebsd"))]
     pub(super) fn of(adapter: &wgpu::Adapter) -> FloatControls {
         use ash::vk;

@@ -13,9 +13,9 @@ pub struct KernelPlan {
     pub entry: &'static str,
     /// True if the source contains the scene as constants.
     pub baked: bool,
-    /// Lines of WGSL.
+    /// Number of lines of WGSL.
     pub lines: usize,
-    /// Bytes of the scene's buffers.
+    /// Size of the scene's buffers in bytes.
     pub scene_bytes: u64,
 }
 

@@ -6,7 +6,7 @@ use wgpu::BufferUsages;
 
 use super::device::Device;
 
-/// Bytes of a dispatch's timestamps: start and end.
+/// Size of a dispatch's two timestamps, start and end, in bytes.
 pub const TIMESTAMP_BYTES: u64 = 2 * size_of::<u64>() as u64;
 
 pub struct Timer {

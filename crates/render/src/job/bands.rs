@@ -57,17 +57,17 @@ pub struct Bands<S> {
     total_samples: f64,
     /// End and duration of the last checkpoint.
     last_checkpoint: (Instant, Duration),
-    /// Samples over all pixels that were rendered, not loaded from a checkpoint.
+    /// Number of samples over all pixels that were rendered, not loaded from a checkpoint.
     rendered_samples: f64,
 }
 
 /// A rendered band.
 pub struct FinishedBand {
-    /// Pixels of the band.
+    /// The film of the band.
     pub film: Film,
     /// Minimum number of samples of a pixel.
     pub min_samples: u32,
-    /// Samples requested per pixel so far; with adaptive sampling a maximum.
+    /// Number of samples requested per pixel so far; with adaptive sampling, the maximum.
     pub requested_samples: u32,
     /// Number of camera rays.
     pub camera_rays: u64,
@@ -124,7 +124,8 @@ enum Outcome {
 /// Target duration of a pass, at the end of which the films are copied.
 const PASS_DURATION: Duration = Duration::from_secs(1);
 
-/// Minimum rows of a shortened band, without and with adaptive sampling, which adds two rows of neighbors.
+/// Minimum number of rows of a shortened band, without and with adaptive sampling. Adaptive sampling adds two rows of
+/// neighbors.
 const MIN_ROWS: [u32; 2] = [16, 64];
 
 impl<S: CheckpointStore> Bands<S> {

@@ -348,10 +348,7 @@ impl<'a> Checkpoint<'a> {
         if let Err(error) = result {
             // Readers drop an incomplete piece, but the piece takes space.
             let _ = self.file.set_len(self.end);
-            self.report_once(
-                0,
-                &format!("a piece could not be written; rendering continues: {error}"),
-            );
+            self.report_once(0, &format!("progress could not be saved: {error}; rendering continues"));
         }
     }
 }

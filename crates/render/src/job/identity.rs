@@ -7,10 +7,10 @@ use crate::film::FilmLayout;
 use crate::records::{Packed, PackedMesh, Specialization};
 use wgray_image::Region;
 
-/// Maximum image side in pixels, and maximum samples per pixel. Scenes have the same limits.
+/// Maximum width and height of an image in pixels, and maximum number of samples per pixel. Scenes have equal limits.
 const MAX_COUNT: u32 = 65_536;
 
-/// Everything that determines a film's bits, which do not depend on the device.
+/// Everything that determines the bits of a film. The device is not part, because it does not affect the bits.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Identity {
@@ -24,15 +24,15 @@ pub struct Identity {
     pub picture: [u32; 2],
     /// Rendered pixels: x0, y0, x1, y1.
     pub region: [u32; 4],
-    /// Samples per pixel; with adaptive sampling the maximum.
+    /// Number of samples per pixel; with adaptive sampling, the maximum number.
     pub pixel_samples: u32,
-    /// True if sampling is adaptive.
+    /// True with adaptive sampling.
     pub adaptive: bool,
-    /// True if the film has layers.
+    /// True if the film contains layers in addition to the image.
     pub layers: bool,
     /// True if the film has noise estimates.
     pub noise: bool,
-    /// True for rounding in software.
+    /// True if square roots and divisions are rounded in software.
     pub exact_rounding: bool,
 }
 

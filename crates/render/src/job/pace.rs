@@ -1,4 +1,4 @@
-//! Size of dispatches, adapted to the measured speed.
+//! The amount of work per dispatch, adapted to the measured speed.
 
 use std::time::Duration;
 

@@ -182,12 +182,12 @@ pub fn write_header(out: &mut impl Write, header: &Header) -> io::Result<(Key, u
 /// Reads what [`write_header`] writes. Errors distinguish damaged headers from files of other formats.
 pub fn read_header(input: &mut impl Read) -> io::Result<(Header, Key, u64)> {
     let invalid = |message: &str| io::Error::new(io::ErrorKind::InvalidData, message.to_owned());
-    let foreign = |_| invalid("it is not a part or checkpoint that wgray wrote");
+    let unknown_format = |_| invalid("it is not a part or checkpoint that wgray wrote");
     let damaged = |_| invalid("its header is damaged or truncated");
     let mut magic = [0; MAGIC.len()];
-    input.read_exact(&mut magic).map_err(foreign)?;
+    input.read_exact(&mut magic).map_err(unknown_format)?;
     if magic != *MAGIC {
-        return Err(foreign(io::ErrorKind::InvalidData.into()));
+        return Err(unknown_format(io::ErrorKind::InvalidData.into()));
     }
     let mut input = HashingStream::new(input);
     let mut length = [0];

@@ -20,10 +20,10 @@ pub enum Order {
     Pixels,
 }
 
-/// Minimum rows of a dispatch with [`Order::Rows`]: two rows of workgroups on a GPU.
+/// Minimum number of rows of a dispatch with [`Order::Rows`]: two rows of workgroups on a GPU.
 const MIN_DISPATCH_ROWS: u32 = 16;
 
-/// Samples that the pixels of a film have so far.
+/// Number of samples that the pixels of a film have so far.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SampleProgress {
     /// Samples in progress; all earlier samples are complete. Empty when all samples are complete.

@@ -65,7 +65,7 @@ enum Column {
     Aov(&'static Channel),
 }
 
-/// Returns the channels in alphabetical order, which the format requires.
+/// Returns the channels in alphabetical order, as the format requires.
 fn columns(layout: &Layout) -> Vec<(&'static str, Column)> {
     let mut columns: Vec<_> = ["R", "G", "B"].into_iter().zip((0..).map(Column::Radiance)).collect();
     if layout.alpha {

@@ -26,7 +26,7 @@ pub use target::{Format, Layers, SaveReport, Target, files, save, write_to};
 /// Contents of an image file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Layout {
-    /// Size of the whole image in pixels.
+    /// Width and height of the full image in pixels.
     pub picture: (u32, u32),
     /// Pixels to write.
     pub region: Region,

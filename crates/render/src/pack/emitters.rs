@@ -94,7 +94,7 @@ pub fn emitters(
         let columns = DMat3::from_cols(instance.u.as_dvec3(), instance.v.as_dvec3(), instance.w.as_dvec3());
         for (slot, triangle) in (0..).zip(&mesh.triangles) {
             let mesh_group = mesh.groups.get(slot as usize).copied().unwrap_or(0);
-            let material = bvh.group_words[(instance.materials + mesh_group) as usize] & !NO_SHADOW;
+            let material = bvh.group_words[(instance.first_group_word + mesh_group) as usize] & !NO_SHADOW;
             let strength = strengths[material as usize];
             if strength > 0.0 {
                 let [a, b, c] = [triangle.x, triangle.y, triangle.z]
@@ -330,7 +330,7 @@ fn instance_triangle(bvh: &PackedBvh, number: usize, slot: u32) -> ([DVec3; 3], 
     let group = mesh.groups.get(slot as usize).copied().unwrap_or(0);
     (
         corners,
-        bvh.group_words[(instance.materials + group) as usize] & !NO_SHADOW,
+        bvh.group_words[(instance.first_group_word + group) as usize] & !NO_SHADOW,
     )
 }
 

@@ -89,15 +89,15 @@ fn schlick_albedo(alpha: Vec2, wo: Vec3, facets: &[Vec2]) -> DVec2 {
     sum / facets.len() as f64
 }
 
-/// Lobes of a material that have tables, in the order of the tables.
+/// The lobes of a material that have albedo tables. Each variant lists its tables in order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum TableLobes {
-    /// Reflection, for a Fresnel term of 1.
-    Mirror,
-    /// Rough glass from outside, then from inside, with the bits of the index of refraction.
+    /// Reflection with a Fresnel term of 1.
+    Reflection,
+    /// Rough glass, seen from outside and from inside. The value is the index of refraction, as bits.
     Glass(u32),
-    /// The F0 and F90 parts of reflection; also rough glass, if there is an index of refraction (as bits).
-    PrincipledLobes(Option<u32>),
+    /// The F0 part and the F90 part of reflection. With an index of refraction (as bits), the tables of `Glass` follow.
+    Principled(Option<u32>),
 }
 
 /// Numbers of rows for textured roughness and for textured anisotropy.
@@ -115,7 +115,7 @@ pub fn aniso_table(lobes: TableLobes, roughness: Option<f32>, anisotropy: Option
         if anisotropy.is_none() { TEXTURED_ROWS.1 } else { 1 },
     ];
     let facets = points(match (roughness, anisotropy) {
-        (Some(_), Some(_)) if lobes == TableLobes::Mirror => 1024,
+        (Some(_), Some(_)) if lobes == TableLobes::Reflection => 1024,
         (Some(_), Some(_)) => 2048,
         (None, None) => 64,
         _ => 128,
@@ -142,31 +142,29 @@ pub fn aniso_table(lobes: TableLobes, roughness: Option<f32>, anisotropy: Option
         }
     }
     let mut words = rows.to_vec();
-    let glass = |words: &mut Vec<u32>, index: u32| {
-        let ior = f32::from_bits(index);
-        for index in [ior, 1.0 / ior] {
-            words.extend(
-                nodes
-                    .iter()
-                    .map(|(alpha, wo)| (glass_albedo_aniso(index, *alpha, *wo, &facets) * KINK_CORRECTION).to_bits()),
-            );
+    let glass = |words: &mut Vec<u32>, ior_bits: u32| {
+        let ior = f32::from_bits(ior_bits);
+        for relative_ior in [ior, 1.0 / ior] {
+            words.extend(nodes.iter().map(|(alpha, wo)| {
+                (glass_albedo_aniso(relative_ior, *alpha, *wo, &facets) * KINK_CORRECTION).to_bits()
+            }));
         }
     };
     match lobes {
-        TableLobes::Glass(index) => glass(&mut words, index),
-        TableLobes::Mirror => words.extend(nodes.iter().map(|(alpha, wo)| {
+        TableLobes::Glass(ior_bits) => glass(&mut words, ior_bits),
+        TableLobes::Reflection => words.extend(nodes.iter().map(|(alpha, wo)| {
             let albedo = schlick_albedo(*alpha, *wo, &facets);
             ((albedo.x + albedo.y) as f32).to_bits()
         })),
-        TableLobes::PrincipledLobes(index) => {
+        TableLobes::Principled(ior_bits) => {
             let albedos: Vec<DVec2> = nodes
                 .iter()
                 .map(|(alpha, wo)| schlick_albedo(*alpha, *wo, &facets))
                 .collect();
             words.extend(albedos.iter().map(|albedo| (albedo.x as f32).to_bits()));
             words.extend(albedos.iter().map(|albedo| (albedo.y as f32).to_bits()));
-            if let Some(index) = index {
-                glass(&mut words, index);
+            if let Some(ior_bits) = ior_bits {
+                glass(&mut words, ior_bits);
             }
         }
     }

@@ -52,7 +52,7 @@ pub fn build_bvh(
         items.push(item(kind, bvh.instances.len() as u32, box_in_world(mesh, to_world)));
         bvh.instances.push(Instance {
             mesh: mesh_index as u32,
-            materials: bvh.group_words.len() as u32,
+            first_group_word: bvh.group_words.len() as u32,
             shape: number as u32,
             shadows: if casters < words.len() { SOME_SHADOWS } else { 0 },
             has_uvs: (!mesh.uvs.is_empty()).into(),

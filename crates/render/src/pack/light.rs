@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use bytemuck::Zeroable as _;
 
 use super::primitive::parallelogram;
-use super::{DIRECTIONAL, EMITTER, Light, Material, NO_INDEX, POINT, Primitive, RECTANGLE, SPOT};
+use super::{CULL_BOTH_FACES, DIRECTIONAL, EMITTER, Light, Material, NO_INDEX, POINT, Primitive, RECTANGLE, SPOT};
 use wgray_scene::{self as scene, Scene};
 
 /// `t_max` of shadow rays to directional lights: beyond any scene, but with a finite square.
@@ -41,7 +41,7 @@ pub(super) fn pack_lights(
             materials.push(Material {
                 kind: EMITTER,
                 emission: color.as_vec3(),
-                camera_visibility: (!visible).into(),
+                camera_culling: if *visible { 0 } else { CULL_BOTH_FACES },
                 ..Material::zeroed()
             });
         }

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use super::{LightNode, NO_INDEX};
 
-/// Buckets per axis for split candidates, section 4.4.
+/// Number of buckets per axis for split candidates (section 4.4).
 const BUCKETS: usize = 12;
 /// Binary splits after which nodes are split at the median, to bound the depth.
 const LIGHT_TREE_MAX_DEPTH: u32 = 48;
@@ -19,9 +19,9 @@ const LIGHT_TREE_MAX_DEPTH: u32 = 48;
 pub struct Cone {
     /// Unit length.
     pub axis: DVec3,
-    /// θ_o, 0 to pi.
+    /// Maximum angle between the axis and a normal (θ_o in the paper), 0 to pi.
     pub spread: f64,
-    /// θ_e, 0 to pi / 2.
+    /// Maximum angle between a normal and the emission (θ_e in the paper), 0 to pi / 2.
     pub edge: f64,
     /// True if the opposite directions belong to the cone too.
     pub two_sided: bool,

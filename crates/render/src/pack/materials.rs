@@ -34,15 +34,16 @@ pub struct Appearances {
     aniso_tables: BTreeMap<(TableLobes, Option<u32>, Option<u32>), u32>,
 }
 
-fn camera_visibility(material: &scene::Material) -> u32 {
+fn camera_culling(material: &scene::Material) -> u32 {
     match &material.reflection {
-        _ if !material.visible => 1,
+        _ if !material.visible => CULL_BOTH_FACES,
         Reflection::Principled(principled) if !principled.double_sided => CULL_BACKFACE,
         _ => 0,
     }
 }
 
-/// Returns a record with the fields of microfacets; the other fields are zero. `resolve` looks up a textured roughness.
+/// Returns a material record with only its microfacet fields set; the other fields are zero. `resolve` looks up a
+/// textured roughness.
 fn microfacet_record(
     facets: &Facets,
     resolve: &mut impl FnMut(&Color, u32, Option<(Channel, u32)>) -> Vec3,
@@ -217,12 +218,12 @@ impl Appearances {
         let has = |purpose: u32| lookups.0.iter().any(|lookup| lookup.purposes & purpose != 0);
         let textured = has(FOR_ROUGHNESS);
         let mut record = reduce_to_delta(record, textured);
-        record.camera_visibility = camera_visibility(material);
+        record.camera_culling = camera_culling(material);
         let transmits = record.thin == 0 && (record.transmission > 0.0 || has(FOR_TRANSMISSION));
         let lobes = match record.kind {
-            METAL | THIN if record.energy != NO_INDEX => Some(TableLobes::Mirror),
+            METAL | THIN if record.energy != NO_INDEX => Some(TableLobes::Reflection),
             ROUGH_GLASS if record.energy != NO_INDEX => Some(TableLobes::Glass(record.ior.to_bits())),
-            PRINCIPLED => Some(TableLobes::PrincipledLobes(transmits.then_some(record.ior.to_bits()))),
+            PRINCIPLED => Some(TableLobes::Principled(transmits.then_some(record.ior.to_bits()))),
             _ => None,
         };
         if let Some(lobes) = lobes {

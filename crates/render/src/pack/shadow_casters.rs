@@ -35,7 +35,7 @@ pub fn casts_shadow(scene: &Scene, material: usize) -> bool {
     scene.render.shadows == Shadows::Opaque || !is_glass
 }
 
-/// Returns true for an environment map, which lights both sides of every plane.
+/// Returns true for an environment map. Environment maps light both sides of every plane.
 fn has_environment_map(scene: &Scene) -> bool {
     scene
         .environment

@@ -56,7 +56,7 @@ impl Parts<'_> {
             lights: u32::from(area_lights > 0)
                 | u32::from(lights.len() > area_lights) << 1
                 | u32::from(lights.iter().any(|light| light.kind == SPOT)) << 2,
-            camera_invisible: materials.iter().any(|material| material.camera_visibility != 0).into(),
+            camera_invisible: materials.iter().any(|material| material.camera_culling != 0).into(),
             pixel_pattern: pattern(pixels),
             pixel_side: side(pixels),
             pixel_samples: pixels.count,

@@ -94,11 +94,13 @@ constants! {
     pub const BACKGROUND: u32 = 4;
     /// Maximum number of blocks of the environment map per row or column, a power of two.
     pub const ENVIRONMENT_BLOCKS: u32 = 32;
-    /// Bins of normals per side of the octahedral map; odd, to center the axes.
+    /// Number of bins of normals along each side of the octahedral map; odd, to center the axes.
     pub const NORMAL_BINS: u32 = 17;
     /// [`Light::kind`](super::Light::kind): a spot light.
     pub const SPOT: u32 = KINDS + 4;
-    /// [`Material::camera_visibility`]: camera rays skip its back faces.
+    /// [`Material::camera_culling`]: camera rays skip both faces.
+    pub const CULL_BOTH_FACES: u32 = 1;
+    /// [`Material::camera_culling`]: camera rays skip back faces.
     pub const CULL_BACKFACE: u32 = 2;
     /// [`Material::vertex_colors`]: ignored.
     pub const NO_COLORS: u32 = 0;

@@ -174,8 +174,8 @@ records! {
         pub alpha_mode: u32,
         /// 1 for a thin sheet, else 0.
         pub thin: u32,
-        /// 1 if invisible to the camera, [`CULL_BACKFACE`] if only its back faces are, else 0.
-        pub camera_visibility: u32,
+        /// Faces that camera rays skip: [`CULL_BOTH_FACES`], [`CULL_BACKFACE`] or 0.
+        pub camera_culling: u32,
         /// 1 + offset of the anisotropic albedo table in the texels, or 0 without a table.
         pub aniso_table: u32,
         /// [`COLORS_OF_BASE`], [`COLORS_OF_EMISSION`] or [`NO_COLORS`].
@@ -245,8 +245,8 @@ records! {
         pub normal: Vec3,
         /// Kind of the primitive (for `path`), or [`POINT`], [`DIRECTIONAL`], [`SPOT`] or [`ENVIRONMENT`].
         pub kind: u32,
-        /// For `path`: [`Material::density`], or the probability of a delta light or the environment; 0 for lights in a
-        /// light tree.
+        /// With `path`: area lights: pdf of light samples per area, like [`Material::density`]; other lights: the
+        /// probability of selecting the light, or 0 for lights in a light tree.
         pub density: f32,
         /// Emitting sides: 1 (front) or 2.
         pub sides: u32,
@@ -381,8 +381,9 @@ records! {
         pub groups: u32,
         /// First column of the object-to-world matrix.
         pub u: Vec3,
-        /// Index of the first group's word in `PackedBvh::group_words`.
-        pub materials: u32,
+        /// Index of the mesh's first group word in `PackedBvh::group_words`. A group word contains the material index
+        /// of a triangle group and the flag [`NO_SHADOW`].
+        pub first_group_word: u32,
         /// Second column.
         pub v: Vec3,
         /// Index of the shape in the scene file.

@@ -54,7 +54,7 @@ pub struct PackedBvh {
     pub instances: Vec<Instance>,
     /// The meshes.
     pub meshes: Vec<Arc<PackedMesh>>,
-    /// Material index of each group of each instance, combined with the flag [`NO_SHADOW`].
+    /// A word for each triangle group of each instance: the material index, combined with the flag [`NO_SHADOW`].
     pub group_words: Vec<u32>,
 }
 

@@ -53,7 +53,7 @@ specialization! {
     light_side = "LIGHT_SIDE",
     /// Samples per area light.
     light_samples = "LIGHT_SAMPLES",
-    /// Bins of the filter table; 0 for a box filter of one pixel.
+    /// Number of bins of the filter table; 0 for a box filter of one pixel.
     filter_bins = "FILTER_BINS",
     /// Pilot samples per pixel; all samples if sampling is not adaptive.
     pilot_samples = "PILOT_SAMPLES",

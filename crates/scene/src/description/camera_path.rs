@@ -1,4 +1,4 @@
-//! `[camera.path]`: camera animation by keys.
+//! `[camera.path]`: a camera animation with keys.
 
 use glam::DVec3;
 use schemars::JsonSchema;
@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::description::kinds::{Aperture, Fov, FrameNumber, Length, Point, Vector};
 
-/// A camera animation by keys. The camera does not move before the first key and after the last key.
+/// A camera animation with keys. Before the first key and after the last key, the camera does not move.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CameraPathDescription {

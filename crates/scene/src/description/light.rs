@@ -40,7 +40,7 @@ pub struct RectangleLightDescription {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Vector>")]
     pub tangent: Option<DVec3>,
-    /// Radiance under `"path"`, else the light at every point.
+    /// Radiance under `"path"`; under `"phong"`, the light color of Phong's formula at any distance.
     #[schemars(with = "Rgb")]
     pub color: DVec3,
     /// Visible to the camera.
@@ -79,7 +79,7 @@ pub struct PointLightDescription {
     /// Position.
     #[schemars(with = "Point")]
     pub position: DVec3,
-    /// Radiant intensity under `"path"`, else the light at every point.
+    /// Radiant intensity under `"path"`; under `"phong"`, the light color of Phong's formula at any distance.
     #[schemars(with = "Rgb")]
     pub color: DVec3,
 }
@@ -101,7 +101,7 @@ pub struct DirectionalLightDescription {
     /// Direction of propagation: `[0, 0, -1]` is light from straight above.
     #[schemars(with = "Vector")]
     pub direction: DVec3,
-    /// Irradiance under `"path"`, else the light at every point.
+    /// Irradiance under `"path"`; under `"phong"`, the light color of Phong's formula.
     #[schemars(with = "Rgb")]
     pub color: DVec3,
 }
@@ -132,7 +132,7 @@ pub struct SpotLightDescription {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Point>")]
     pub look_at: Option<DVec3>,
-    /// Radiant intensity on the axis under `"path"`, else the light at every point of the axis.
+    /// Radiant intensity on the axis under `"path"`; under `"phong"`, the light color of Phong's formula on the axis.
     #[schemars(with = "Rgb")]
     pub color: DVec3,
     /// Angle between axis and edge of the cone, in degrees.

@@ -5,12 +5,12 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Resource {
-    /// Bytes of accessor reads.
+    /// Number of bytes that accessors read.
     Read,
-    /// Triangles of all meshes, counted for each combination of skin and weights.
+    /// Number of triangles of all meshes, counted for each combination of skin and weights.
     Triangles,
     Instances,
-    /// Bytes of decompressed buffer views.
+    /// Size of decompressed buffer views in bytes.
     Decompressed,
 }
 

@@ -158,7 +158,7 @@ impl Adjacency {
 pub(super) struct Edges {
     /// Number of edges with more than two triangles.
     pub non_manifold: usize,
-    /// Number of edges with two triangles in which the edge has the same direction.
+    /// Number of edges that both of their triangles traverse in the same direction: the winding is inconsistent.
     pub inconsistent: usize,
     /// Triangles with the same points, winding and group as an earlier triangle, unsorted. The numbers of edges ignore
     /// these triangles.

@@ -17,7 +17,7 @@ use super::{Group, MAX_ELEMENTS};
 use super::{damage, tokens};
 use wgray_image::color::srgb_to_linear;
 
-/// Missing index of a vertex attribute.
+/// Index of an attribute that a corner lacks.
 const NONE: u32 = u32::MAX;
 /// Maximum number of unknown keywords that are counted.
 const MAX_KEYWORDS: usize = 100;

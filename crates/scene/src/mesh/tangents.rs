@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use super::Mesh;
 use super::neighbours::Adjacency;
 
-/// Maximum number of vertices at a point that are joined. The number is limited because joining compares all pairs.
+/// Maximum number of vertices with the same position that are joined, because joining compares all pairs.
 const MAX_JOINED: usize = 64;
 /// Minimum cosine of the angle between normals that count as equal: 1 degree.
 const MIN_NORMAL_COSINE: f64 = 0.9998;

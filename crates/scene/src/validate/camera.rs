@@ -333,10 +333,7 @@ mod tests {
         assert_eq!(scene.camera.position, DVec3::X);
         assert_eq!(scene.camera_at(-1.0).unwrap().position, DVec3::NEG_Y);
         let message = scene.camera_at(0.0).unwrap_err().to_string();
-        assert!(
-            message.starts_with("frame.camera.path: at frame 0, look_at: "),
-            "{message}"
-        );
+        assert!(message.starts_with("camera.path: at frame 0, look_at: "), "{message}");
     }
 
     #[test]
@@ -421,8 +418,9 @@ mod tests {
         let expected =
             "s.toml:7: camera.path.keys[0].fov: does not apply to a camera of this type, which has \"height\"";
         assert_eq!(scene(orthographic).unwrap_err().to_string(), expected);
-        let closest = format!("{start}{{ frame = 1.000002, fov = 4 }}]");
-        scene(&format!("{STATIC_CAMERA}{closest}")).unwrap();
+        // The distance of these keys is twice MIN_KEY_DISTANCE.
+        let close_keys = format!("{start}{{ frame = 1.000002, fov = 4 }}]");
+        scene(&format!("{STATIC_CAMERA}{close_keys}")).unwrap();
     }
 
     #[test]

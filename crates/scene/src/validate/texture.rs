@@ -231,11 +231,11 @@ impl Textures<'_> {
             return Err(Problem::new(format!("{name:?} must be a texture of type \"image\"")).at("texture"));
         };
         check(!matches!(image.texels, Texels::Bytes(Encoding::Srgb, _)), || {
-            format!("{name:?} must have encoding = \"linear\" as a normal map")
+            format!("{name:?} is used as a normal map; its encoding must be \"linear\"")
         })
         .at("texture")?;
         check(*factor == DVec3::ONE, || {
-            format!("{name:?} must have no factor as a normal map; use strength instead")
+            format!("{name:?} is used as a normal map; its factor must be 1; use strength instead")
         })
         .at("texture")?;
         let strength = between(*strength, STRENGTHS).at("strength")?;
@@ -254,10 +254,10 @@ impl Textures<'_> {
             return Err(Problem::new(format!("{name:?} must be a texture of type \"image\"")));
         };
         check(!matches!(image.texels, Texels::Bytes(Encoding::Srgb, _)), || {
-            format!("{name:?} must have encoding = \"linear\" as a direction map")
+            format!("{name:?} is used as an anisotropy direction; its encoding must be \"linear\"")
         })?;
         check(factor.x == 1.0 && factor.y == 1.0, || {
-            format!("{name:?} must have a red and green factor of 1 as a direction map")
+            format!("{name:?} is used as an anisotropy direction; the red and green components of its factor must be 1")
         })?;
         Ok(Some(texture))
     }

@@ -14,7 +14,7 @@ use crate::memory::fallible;
 /// Memory limit of a decoder in addition to the image, in bytes.
 const MAX_DECODER_BYTES: usize = 64 << 20;
 
-/// Maximum pixels per byte of a JPEG: each block of 8 x 8 values takes at least one bit and covers up to 32 x 32
+/// Maximum pixel count per byte of a JPEG: each block of 8 x 8 values takes at least one bit and covers up to 32 x 32
 /// pixels.
 const MAX_JPEG_PIXELS_PER_BYTE: u64 = 8 * 32 * 32;
 
@@ -46,9 +46,9 @@ pub enum Unreadable {
     /// The image has too many pixels.
     #[error("has {width} x {height} pixels; the limit is {limit} pixels")]
     Pixels {
-        /// Columns.
+        /// Number of columns.
         width: u64,
-        /// Rows.
+        /// Number of rows.
         height: u64,
         /// Maximum number of pixels.
         limit: u64,
@@ -58,25 +58,25 @@ pub enum Unreadable {
         "has {width} x {height} pixels, which take {bytes} bytes; the limit for a file of {length} bytes is {limit} bytes"
     )]
     Large {
-        /// Columns.
+        /// Number of columns.
         width: u64,
-        /// Rows.
+        /// Number of rows.
         height: u64,
-        /// Bytes of its values.
+        /// Size of the values in bytes.
         bytes: u64,
-        /// Bytes of the file.
+        /// Size of the file in bytes.
         length: u64,
-        /// Maximum bytes of the values.
+        /// Maximum size of the values in bytes.
         limit: u64,
     },
     /// The image does not fit into memory.
     #[error("does not fit into memory: {width} x {height} pixels take {bytes} bytes")]
     Memory {
-        /// Columns.
+        /// Number of columns.
         width: u64,
-        /// Rows.
+        /// Number of rows.
         height: u64,
-        /// Bytes of its values.
+        /// Size of the values in bytes.
         bytes: u64,
     },
 }

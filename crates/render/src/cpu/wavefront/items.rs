@@ -28,7 +28,7 @@ impl Default for Items {
 }
 
 impl Items {
-    /// Restarts with another ray, given by its slabs.
+    /// Restarts the traversal with another ray. `slabs` contains the terms of the ray for box tests.
     #[inline(always)]
     pub fn start(&mut self, slabs: Slabs) {
         self.leaf_items = 0..0;
