@@ -28,7 +28,7 @@ fn selection_is_three_quarters_by_power_and_one_quarter_uniform() {
     assert_eq!(packed.lighting.emitters.len(), 16, "the black light is an emitter");
     let mut counts = vec![0.0; packed.lighting.lights.len()];
     let selection_count = 400_000;
-    for i in 0..calls {
+    for i in 0..selection_count {
         let bits = hash4(glam::UVec4::new(i, 1, 2, 3));
         let emitter = select_emitter(&packed, UVec2::new(bits.x, bits.y));
         counts[emitter.index as usize] += 1.0;
