@@ -143,6 +143,7 @@ pub use wgray_image::Region;
 pub use wgray_render::film;
 #[cfg(feature = "gpu")]
 pub use wgray_render::gpu::{GpuInfo, adapters};
+pub use wgray_render::noise::Noise;
 pub use wgray_scene as scene;
 pub use wgray_scene::mesh;
 

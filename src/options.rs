@@ -18,6 +18,9 @@ pub struct Options {
     pub crop: Option<Region>,
     /// The layers to render in addition to the radiance. Duplicates are ignored.
     pub aovs: Vec<Aov>,
+    /// Keep noise estimates in the film, for the noise of the image and for
+    /// [`run_until_noise`](crate::ProgressiveRender::run_until_noise). Renders take up to 3 % longer.
+    pub noise: bool,
     /// Round quotients and square roots correctly in software, because results of GPUs may be wrong by one unit in the
     /// last place. Requires Vulkan; has no effect on the CPU.
     pub exact_rounding: bool,
@@ -51,7 +54,7 @@ impl Options {
     }
 
     /// Returns the layout of the film. It has layers for alpha, and for requested layers that are means over samples. It
-    /// has noise estimates for requested statistics, unless sampling is adaptive.
+    /// has noise estimates if requested, or for requested statistics unless sampling is adaptive.
     pub(crate) fn film_layout(&self, scene: &Scene) -> FilmLayout {
         let integrator = scene.render.integrator;
         let aovs = self.layers(scene);
@@ -61,7 +64,7 @@ impl Options {
         FilmLayout {
             adaptive,
             layers: integrator.has_layers() && (scene.render.alpha || denoise || requests(AovSource::Samples)),
-            noise: denoise || (requests(AovSource::Statistics) && !adaptive),
+            noise: self.noise || denoise || (requests(AovSource::Statistics) && !adaptive),
         }
     }
 

@@ -8,6 +8,7 @@ use crate::error::{Error, RenderError};
 use crate::image::{self, Aov, Band, Format, Layout, Output, Pending, Pixels, SaveOptions, Target};
 use wgray_image::Region;
 use wgray_render::film::Film;
+use wgray_render::noise::{Noise, NoiseMeter};
 use wgray_render::records::FirstHit;
 
 /// A rendered image, or a region of one: linear radiance and additional layers (AOVs).
@@ -111,6 +112,15 @@ impl Picture {
         Some(match channel.is_whole() {
             true => Channel::Whole(bytes.map(u32::from_ne_bytes).collect()),
             false => Channel::Floats(bytes.map(f32::from_ne_bytes).collect()),
+        })
+    }
+
+    /// Returns the noise of the image; `None` unless [`Options::noise`](crate::Options::noise) requested estimates.
+    pub fn noise(&self) -> Option<Noise> {
+        self.film.has_noise().then(|| {
+            let mut meter = NoiseMeter::new(self.layout.view.exposure);
+            meter.add(&self.film);
+            meter.noise()
         })
     }
 

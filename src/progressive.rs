@@ -7,6 +7,7 @@ use wgray_render::backend::Backend;
 use wgray_render::denoise::denoise;
 use wgray_render::film::{Film, FilmLayout};
 use wgray_render::job::{Bands, Flow, NoCheckpoint, Order, WorkSplit};
+use wgray_render::noise::{Noise, NoiseMeter, is_decision};
 use wgray_scene::Problem;
 
 use crate::cancel::CancelToken;
@@ -31,6 +32,8 @@ pub enum Status {
     Running,
     /// All samples are rendered.
     Finished,
+    /// The noise is below the limit of [`ProgressiveRender::run_until_noise`].
+    Converged,
     /// The token was cancelled. The samples of the incomplete step are kept, and the next step continues it.
     Cancelled,
 }
@@ -131,6 +134,42 @@ impl<'s> ProgressiveRender<'s> {
                 status => return Ok(status),
             }
         }
+    }
+
+    /// Renders until the noise of the image, [`Noise::percentile_95`], is below a limit, or until all samples are
+    /// rendered. Decides after 16, 32, 64, ... samples per pixel, so that the image does not depend on timing.
+    ///
+    /// # Errors
+    ///
+    /// The errors of [`ProgressiveRender::step`]. [`Options::noise`](crate::Options::noise) is not set, the limit is not
+    /// above 0, or the scene uses adaptive sampling, whose pixels have different numbers of samples.
+    pub fn run_until_noise(&mut self, limit: f64, cancel: &CancelToken) -> Result<Status, Error> {
+        let rule = match self.film_layout {
+            FilmLayout { adaptive: true, .. } => "cannot be combined with adaptive sampling",
+            FilmLayout { noise: false, .. } => "needs Options::noise",
+            _ if limit > 0.0 => "",
+            _ => "must be greater than 0",
+        };
+        if !rule.is_empty() {
+            return Err(Error::Option(Problem::of("noise", format!("{limit} {rule}"))));
+        }
+        loop {
+            let is_decision = self.bands.uniform_samples().is_some_and(is_decision);
+            if is_decision && self.noise().is_some_and(|noise| noise.percentile_95 < limit) {
+                return Ok(Status::Converged);
+            }
+            match self.step(cancel)? {
+                Status::Running => {}
+                status => return Ok(status),
+            }
+        }
+    }
+
+    /// Returns the noise of the image so far; `None` unless [`Options::noise`](crate::Options::noise) is set.
+    pub fn noise(&self) -> Option<Noise> {
+        let mut meter = NoiseMeter::new(self.setup.layout.view.exposure);
+        self.bands.films(&mut |film| meter.add(&film));
+        self.film_layout.noise.then(|| meter.noise())
     }
 
     /// Returns the number of samples that every pixel has. With adaptive sampling, pixels that needed no more samples

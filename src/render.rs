@@ -17,8 +17,8 @@ use wgray_render::job::{self, Bands, Flow, NoCheckpoint, Order, WorkSplit};
 use wgray_render::records::{FirstHit, Packed};
 use wgray_scene::Scene;
 
-/// Renders a scene. The image takes 16 bytes of memory per pixel, and 80 more if it has alpha or layers that are
-/// averaged over samples.
+/// Renders a scene. The image takes 16 bytes of memory per pixel, 80 more if it has alpha or layers that are averaged
+/// over samples, and 32 or 64 more with noise estimates, without or with such layers.
 ///
 /// With [`Device::Auto`](crate::Device::Auto), the CPU renders if no adapter exists, if the CPU is faster than the
 /// adapter for this scene, or if the scene or image does not fit into the adapter's memory. With any device, the CPU

@@ -170,7 +170,7 @@ impl Session {
         let mut render = self.start(options, cancel)?;
         match render.run(cancel)? {
             Status::Cancelled => Err(RenderError::Cancelled.into()),
-            Status::Running | Status::Finished => Ok(render.finish()),
+            Status::Running | Status::Converged | Status::Finished => Ok(render.finish()),
         }
     }
 

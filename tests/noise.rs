@@ -2,7 +2,7 @@
 
 use glam::{DVec4, UVec2, Vec3, Vec4};
 use wgray::scene::{Overrides, Scene};
-use wgray::{Aov, Channel, Device, Options, Picture};
+use wgray::{Aov, CancelToken, Channel, Context, Device, Options, Picture, Session, Status};
 use wgray_image::Region;
 use wgray_render::cpu::pixel::pixel_radiance;
 use wgray_render::film::{Film, FilmLayout, Half, Layer};
@@ -278,7 +278,7 @@ fn the_depth_is_the_distance_along_the_camera_ray() {
         for mode in exact_modes() {
             let film = render(&packed, mode);
             assert!(
-                (film.depth(0) - expected).abs() < 1e-5,
+                (film.depth(0) - expected).abs() < 1e-4,
                 "{mode:?}: {}, {more}",
                 film.depth(0)
             );
@@ -412,4 +412,110 @@ fn files_of_a_single_sample_have_an_infinite_variance() {
     picture.save(path("a.png")).expect("a PNG");
     let layer = image::open(path("a.variance.png")).expect("a PNG").to_rgb8();
     assert!(layer.pixels().all(|pixel| pixel.0 == [255; 3]));
+}
+
+/// Returns the noise of each pixel from its samples, in f64.
+fn pixel_noise(packed: &Packed, count: u32, exposure: f64) -> Vec<f64> {
+    let luminance = |color: DVec4| 0.2126 * color.x + 0.7152 * color.y + 0.0722 * color.z;
+    let pixels = (0..packed.camera.width * packed.camera.height).map(|i| {
+        let position = UVec2::new(i % packed.camera.width, i / packed.camera.width);
+        let samples = samples(packed, position, count);
+        let mean = samples.iter().map(|(values, _)| values[0]).sum::<DVec4>() / f64::from(count);
+        let [variance, ..] = variances(&samples);
+        let error = DVec4::from_array(variance.to_array().map(f64::sqrt));
+        luminance(error) * exposure.exp2() / (luminance(mean) * exposure.exp2()).max(0.01)
+    });
+    pixels.collect()
+}
+
+#[test]
+fn the_noise_matches_the_samples() {
+    for exposure in [0.0, -5.0, 3.5] {
+        let text = SCENE.replace("height = 16 }", &format!("height = 16, exposure = {exposure} }}"));
+        let scene = Scene::parse(&text, "s.toml").unwrap_or_else(|error| panic!("{error}"));
+        let options = Options {
+            device: Device::Cpu,
+            noise: true,
+            ..Options::default()
+        };
+        let picture = wgray::render(&scene, &options).unwrap_or_else(|error| panic!("{error}"));
+        let found = picture.noise().expect("estimates");
+        let mut pixels = pixel_noise(&parse(&text), 8, exposure);
+        pixels.sort_by(f64::total_cmp);
+        // 384 pixels: 95 % are 364.8, half are 192.
+        for (found, expected) in [(found.percentile_95, pixels[364]), (found.median, pixels[191])] {
+            assert!(
+                (found - expected).abs() < 1e-3 * expected + 1e-6,
+                "{exposure}: {found}, expected {expected}"
+            );
+        }
+        assert!(
+            (found.percentile_95 / pixels[360] - 1.0).abs() > 1e-3,
+            "the comparison cannot fail"
+        );
+    }
+    assert_eq!(picture(SCENE, &[], 8).noise(), None);
+}
+
+#[test]
+fn the_library_renders_until_the_noise_is_low() {
+    let scene = |count: u32| {
+        let overrides = Overrides {
+            pixel_samples: Some(count),
+            ..Overrides::default()
+        };
+        Scene::parse_with(SCENE, "s.toml", &overrides).unwrap_or_else(|error| panic!("{error}"))
+    };
+    let options = Options {
+        device: Device::Cpu,
+        noise: true,
+        ..Options::default()
+    };
+    let cancel = CancelToken::new();
+    let mut session = Session::new(&Context::new(), scene(512));
+    let mut render = session.start(&options, &cancel).expect("a render");
+    assert_eq!(
+        render.run_until_noise(0.2, &cancel).expect("samples"),
+        Status::Converged
+    );
+    let (count, noise) = (render.samples(), render.noise().expect("the noise"));
+    assert!(
+        count >= 16 && count.is_power_of_two() && noise.percentile_95 < 0.2,
+        "{count}: {noise:?}"
+    );
+    let picture = render.snapshot();
+    assert_eq!(picture.noise(), Some(noise));
+    let plain = wgray::render(&scene(count), &options).expect("an image");
+    assert_eq!(picture.pixels().colors, plain.pixels().colors);
+    let half = wgray::render(&scene(count / 2), &options).expect("an image");
+    assert!(half.noise().expect("the noise").percentile_95 >= 0.2);
+    // A lower limit continues; a limit that is not reached ends with all samples.
+    assert_eq!(
+        render.run_until_noise(0.15, &cancel).expect("samples"),
+        Status::Converged
+    );
+    assert!(render.samples() >= count);
+    assert_eq!(
+        render.run_until_noise(1e-6, &cancel).expect("samples"),
+        Status::Finished
+    );
+    assert_eq!(render.samples(), 512);
+    for (limit, rule) in [
+        (0.0, "noise: 0 must be greater than 0"),
+        (f64::NAN, "noise: NaN must be greater than 0"),
+    ] {
+        let message = render
+            .run_until_noise(limit, &cancel)
+            .map_err(|error| error.to_string());
+        assert_eq!(message, Err(rule.to_owned()));
+    }
+    let mut session = Session::new(&Context::new(), scene(512));
+    let plain_options = Options {
+        noise: false,
+        ..options
+    };
+    let mut render = session.start(&plain_options, &cancel).expect("a render");
+    assert_eq!(render.noise(), None);
+    let message = render.run_until_noise(0.1, &cancel).map_err(|error| error.to_string());
+    assert_eq!(message, Err("noise: 0.1 needs Options::noise".to_owned()));
 }

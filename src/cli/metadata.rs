@@ -7,10 +7,16 @@ use crate::device::DeviceInfo;
 use crate::image::{Metadata, is_complete, read_metadata};
 use crate::scene::Scene;
 use wgray_render::job::hash_of_scene;
+use wgray_render::noise::Noise;
 use wgray_render::records::Packed;
+
+use super::numbers::significant;
 
 /// Name of the metadata that marks an incomplete image, with a value such as `32 of 64 samples`.
 const PARTIAL: &str = "partial";
+
+/// Name of the metadata of an image with a noise limit, with a value such as `64 of 4096 samples, 0.0187, median 0.0041`.
+const NOISE: &str = "noise";
 
 /// Returns true if an image file is complete and contains all samples.
 pub fn is_finished(path: &Path) -> bool {
@@ -21,20 +27,26 @@ pub fn is_finished(path: &Path) -> bool {
 /// the file.
 pub fn samples_of(path: &Path) -> Option<u32> {
     let metadata = read_metadata(path)?;
-    let text = match (metadata.get(PARTIAL), metadata.get("adaptive")) {
-        (Some(partial), _) => partial,
+    let text = match (metadata.get(PARTIAL).or(metadata.get(NOISE)), metadata.get("adaptive")) {
+        (Some(samples), _) => samples,
         (None, Some(adaptive)) => adaptive.split_once("up to ")?.1,
         (None, None) => metadata.get("pixel_samples")?,
     };
     text.split(' ').next()?.parse().ok()
 }
 
+#[derive(Clone)]
 pub struct RenderMetadata {
     metadata: Metadata,
 }
 
 impl RenderMetadata {
-    pub fn of(scene: &Scene, packed: &Packed, time_limit: Option<Duration>) -> RenderMetadata {
+    pub fn of(
+        scene: &Scene,
+        packed: &Packed,
+        time_limit: Option<Duration>,
+        noise_limit: Option<f64>,
+    ) -> RenderMetadata {
         let mut pairs = vec![(
             Metadata::SOFTWARE.to_owned(),
             concat!("wgray ", env!("CARGO_PKG_VERSION")).to_owned(),
@@ -56,6 +68,9 @@ impl RenderMetadata {
         if let Some(limit) = time_limit {
             add("time_limit", format!("{} s", limit.as_secs_f64()));
         }
+        if let Some(limit) = noise_limit {
+            add("noise_limit", limit.to_string());
+        }
         RenderMetadata {
             metadata: Metadata { pairs },
         }
@@ -64,6 +79,13 @@ impl RenderMetadata {
     /// Returns the metadata without the device and the driver.
     pub fn without_device(&self) -> Metadata {
         self.metadata.clone()
+    }
+
+    /// Adds the noise of an image with a noise limit, and its samples per pixel: so far, and the maximum.
+    pub fn add_noise(&mut self, noise: &Noise, (samples, max): (u32, u32)) {
+        let [percentile, median] = [noise.percentile_95, noise.median].map(significant);
+        let text = format!("{samples} of {max} samples, {percentile}, median {median}");
+        self.metadata.pairs.push((NOISE.to_owned(), text));
     }
 
     /// Like [`RenderMetadata::with_device`], for an image with fewer samples than requested.

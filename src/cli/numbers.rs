@@ -1,4 +1,4 @@
-//! Parsers of integers.
+//! Parsers of integers, and the text of estimates.
 
 use std::ops::RangeInclusive;
 
@@ -21,4 +21,35 @@ pub fn samples(text: &str) -> Result<u32, String> {
 pub fn bounces(text: &str) -> Result<u32, String> {
     let number = text.parse();
     number.map_err(|_| "must be a whole number, such as 8".to_owned())
+}
+
+/// Returns the text of a positive number with three significant digits.
+pub fn significant(number: f64) -> String {
+    let digits = (2.0 - number.log10().floor()).clamp(0.0, 9.0); // 9 for zero, 0 for infinity
+    let text = format!("{number:.*}", digits as usize);
+    match number == 0.0 {
+        true => "0".to_owned(),
+        false => text,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn estimates_have_three_significant_digits() {
+        for (number, text) in [
+            (0.0, "0"),
+            (0.012_345, "0.0123"),
+            (0.5, "0.500"),
+            (1.0, "1.00"),
+            (17.25, "17.2"),
+            (4321.0, "4321"),
+            (1e-7, "0.000000100"),
+            (f64::INFINITY, "inf"),
+        ] {
+            assert_eq!(significant(number), text);
+        }
+    }
 }

@@ -10,6 +10,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use super::facts_of;
 use super::log::{self, Level};
+use super::numbers::significant;
 
 /// The display of progress: a bar, lines or none.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -42,6 +43,8 @@ pub struct Progress {
     start: Instant,
     /// The fraction at the first update; above 0 if the render was resumed from a checkpoint.
     first_fraction: Option<f64>,
+    /// The noise of the image at the last decision, if the render has a noise limit.
+    noise: Option<f64>,
     /// The tenths (or hundredths) that were completed when the last line was printed, and the time of this line.
     printed: (u32, Instant),
 }
@@ -71,8 +74,14 @@ impl Progress {
             frame,
             start,
             first_fraction: None,
+            noise: None,
             printed: (0, start),
         }
+    }
+
+    /// Sets the noise to show.
+    pub fn set_noise(&mut self, noise: f64) {
+        self.noise = Some(noise);
     }
 
     /// Reports the fraction of the work that is done, from 0 to 1.
@@ -80,13 +89,15 @@ impl Progress {
         let elapsed = self.start.elapsed();
         let first_fraction = *self.first_fraction.get_or_insert(fraction);
         let remaining = remaining(elapsed, first_fraction, fraction);
+        let noise = self.noise_text();
         match &mut self.display {
             // With several frames, the bar appears at once, so that short frames have a bar too.
             Display::Bar(bar) if elapsed > BAR_DELAY || !self.label.is_empty() => {
                 let bar = bar.get_or_insert_with(|| new_bar(elapsed, &self.label));
                 bar.set_position((fraction * STEPS) as u64);
-                if let Some(remaining) = remaining {
-                    bar.set_message(format!(", about {} left", format_duration(remaining)));
+                let left = remaining.map(|remaining| format!(", about {} left", format_duration(remaining)));
+                if left.is_some() || !noise.is_empty() {
+                    bar.set_message(noise + &left.unwrap_or_default());
                 }
             }
             Display::Lines { at_tenths } => {
@@ -107,14 +118,20 @@ impl Progress {
         }
     }
 
+    fn noise_text(&self) -> String {
+        let text = self.noise.map(|noise| format!(", noise {}", significant(noise)));
+        text.unwrap_or_default()
+    }
+
     fn print(&self, fraction: f64, remaining: Option<Duration>) {
         let seconds = self.start.elapsed().as_secs_f64();
         let width = if log::is_json() { 0 } else { 3 }; // aligns the lines
         let remaining_text = remaining.map(|remaining| format!(", about {} left", format_duration(remaining)));
         let line = format!(
-            "{}{:width$.0} % done after {seconds:.1} s{}",
+            "{}{:width$.0} % done after {seconds:.1} s{}{}",
             self.label,
             fraction * 100.0,
+            self.noise_text(),
             remaining_text.unwrap_or_default()
         );
         let mut facts = facts_of([
@@ -122,6 +139,7 @@ impl Progress {
             ("share", fraction.into()), // the former name, kept until version 0.3
             ("seconds", seconds.into()),
         ]);
+        facts.extend(self.noise.map(|noise| ("noise".to_owned(), noise.into())));
         facts.extend(self.frame.map(|frame| ("frame".to_owned(), frame.into())));
         log::print_with(Level::Progress, &line, facts);
     }

@@ -27,6 +27,12 @@ pub struct Stats {
     /// The former name of `min_samples`, kept until version 0.3.
     #[serde(rename = "least_samples")]
     pub former_min_samples: u32,
+    /// Noise that 95 % of the pixels do not exceed, with `--noise`; null if a pixel has a single sample.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub noise: Option<f64>,
+    /// Noise that half of the pixels do not exceed, with `--noise`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub noise_median: Option<f64>,
     /// True if a signal ended a render with `--preview`.
     pub partial: bool,
     /// Light samples per hit, summed over all lights.

@@ -17,7 +17,7 @@ const LONG_RENDER: [&str; 8] = [
     "--spp",
     "300",
     "--aov",
-    "normal,variance",
+    "normal",
 ];
 
 fn render_expected(folder: &TestFolder) -> Vec<u8> {
@@ -628,21 +628,28 @@ fn parts_merge_to_the_same_image() {
         &["seed.part", "p2.part"],
         "p2.part: belongs to a different image than seed.part: its scene or an option",
     );
-    folder.run_quietly(&[
-        "render",
-        "small.toml",
-        "--size",
-        "30x23",
-        "--device",
-        "cpu",
-        "--tile",
-        "1/7",
-        "-o",
-        "bare.part",
-    ]);
+    let render_bare = |extra: &[&str]| {
+        let options = [
+            "render",
+            "small.toml",
+            "--size",
+            "30x23",
+            "--device",
+            "cpu",
+            "--tile",
+            "1/7",
+        ];
+        folder.run_quietly(&[&options[..], extra].concat());
+    };
+    render_bare(&["--aov", "variance", "-o", "bare.part"]);
     assert_rejected(
         &["bare.part", "p2.part"],
         "p2.part: has different layers than bare.part",
+    );
+    render_bare(&["--aov", "normal,depth,instance", "-o", "other.part"]);
+    assert_rejected(
+        &["other.part", "p2.part"],
+        "p2.part: belongs to a different image than other.part: it was rendered with, not without, noise estimates",
     );
     render(&["--tile", "1/7", "-D", "image.exposure=1", "-o", "bright.part"]);
     let bright: Vec<&str> = ["bright.part"]

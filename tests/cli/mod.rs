@@ -15,6 +15,7 @@ mod jobs;
 mod log;
 mod manual;
 mod messages;
+mod noise;
 mod options;
 #[cfg(target_os = "linux")]
 mod out_of_memory;
@@ -71,12 +72,15 @@ pub fn without_summary(stderr: &str) -> String {
     stderr.split_inclusive('\n').filter(|line| !is_summary(line)).collect()
 }
 
-/// Returns true for `NAMES: WIDTH x HEIGHT, SAMPLES spp, SECONDS s`.
+/// Returns true for `NAMES: WIDTH x HEIGHT, SAMPLES spp, SECONDS s`, also with the noise after the samples.
 fn is_summary(line: &str) -> bool {
     let Some((_, rest)) = line.trim_end().rsplit_once(": ") else {
         return false;
     };
-    let words: Vec<&str> = rest.split(' ').collect();
+    let mut words: Vec<&str> = rest.split(' ').collect();
+    if words.get(5) == Some(&"noise") {
+        words.drain(5..9); // `noise 0.0187 (median 0.0041),`
+    }
     let is_number = |text: &str| text.parse::<f64>().is_ok();
     match words.as_slice() {
         [width, "x", height, samples, "spp,", seconds, "s"] => {

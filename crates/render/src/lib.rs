@@ -11,6 +11,7 @@ pub mod film;
 #[cfg(feature = "gpu")]
 pub mod gpu;
 pub mod job;
+pub mod noise;
 pub mod output;
 pub mod pack;
 pub mod records;

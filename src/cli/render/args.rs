@@ -48,6 +48,10 @@ pub struct Args {
     #[arg(long, display_order = 6, value_name = "TIME", value_parser = parse_duration, conflicts_with = "tile")]
     pub time_limit: Option<Duration>,
 
+    /// Stop when 95 % of the pixels have a relative error below X, such as 0.02
+    #[arg(long, display_order = 6, value_name = "X", value_parser = parse_noise, conflicts_with_all = ["tile", "adaptive"])]
+    pub noise: Option<f64>,
+
     /// Also write intermediate images; Ctrl+C writes the last complete pass
     #[arg(long, display_order = 7, conflicts_with = "tile")]
     pub preview: bool,
@@ -185,6 +189,7 @@ impl Args {
             device: Device::from(self.device.as_str()),
             crop: self.crop,
             aovs: self.aovs(),
+            noise: self.noise.is_some(),
             exact_rounding: self.exact_rounding,
         }
     }
@@ -285,6 +290,12 @@ impl Args {
 fn parse_error(text: &str) -> Result<f64, String> {
     let error = text.parse().ok().filter(|error| (0.0..=1.0).contains(error));
     error.ok_or("must be a number from 0 to 1, such as 0.01".to_owned())
+}
+
+/// Parses the limit of the noise.
+fn parse_noise(text: &str) -> Result<f64, String> {
+    let limit = text.parse().ok().filter(|limit: &f64| *limit > 0.0 && *limit <= 1.0);
+    limit.ok_or("must be a number greater than 0 and at most 1, such as 0.02".to_owned())
 }
 
 /// Parses an image size.

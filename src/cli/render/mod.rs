@@ -25,6 +25,7 @@ use self::preview::Previews;
 use self::work::RenderTotals;
 use super::frames::Frame;
 use super::log::{self, Level};
+use super::numbers::significant;
 use super::outputs::Outputs;
 use super::signal::{Signals, Stop};
 use super::stats::Stats;
@@ -229,16 +230,23 @@ fn render_image(
     let totals = totals?;
     let total = start.elapsed().as_secs_f64();
     let stats = stats(plan, renderer.info(), &totals, setup, total);
-    let (requested, all) = (totals.requested_samples, plan.scene.sampling.pixel_samples);
+    let (requested, all) = (totals.requested_samples, plan.samples);
     let (image_names, files, message) = match totals.partial.is_empty() {
         true => (image_names, files, "render done"),
         false => (totals.partial.clone(), totals.partial.clone(), "render interrupted"),
     };
+    let is_converged = stats.noise.zip(plan.noise).is_some_and(|(noise, limit)| noise < limit);
     if stats.partial {
         let note = format!("interrupted: the image has {requested} of {all} samples per pixel");
         plan.log.log(Level::Note, &note);
-    } else if requested < all {
+    } else if requested < all && !is_converged {
         let note = format!("time limit reached: every pixel has at least {requested} of {all} samples");
+        plan.log.log(Level::Note, &note);
+    } else if let (Some(noise), Some(limit), false) = (stats.noise, plan.noise, is_converged) {
+        let note = format!(
+            "the noise, {}, is not below {limit} after the maximum of {all} samples per pixel",
+            significant(noise)
+        );
         plan.log.log(Level::Note, &note);
     }
     match log::is_json() {
@@ -263,10 +271,15 @@ fn summary(image_names: &[String], stats: &Stats, requested: u32) -> String {
         min if min < requested => format!("{min}-{requested}"), // adaptive sampling
         _ => requested.to_string(),
     };
+    let noise = stats.noise.zip(stats.noise_median).map(|(percentile, median)| {
+        let [percentile, median] = [percentile, median].map(significant);
+        format!("noise {percentile} (median {median}), ")
+    });
     let (width, height) = (stats.width, stats.height);
     format!(
-        "{}: {width} x {height}, {samples} spp, {:.1} s",
+        "{}: {width} x {height}, {samples} spp, {}{:.1} s",
         image_names.join(", "),
+        noise.unwrap_or_default(),
         stats.total_s
     )
 }
@@ -290,9 +303,11 @@ fn stats(plan: &Plan, device: &DeviceInfo, totals: &RenderTotals, setup: f64, to
         backend: device.interface.clone(),
         width: region.width(),
         height: region.height(),
-        pixel_samples: scene.sampling.pixel_samples,
+        pixel_samples: plan.samples,
         min_samples: totals.min_samples,
         former_min_samples: totals.min_samples,
+        noise: totals.noise.map(|noise| noise.percentile_95),
+        noise_median: totals.noise.map(|noise| noise.median),
         partial: !totals.partial.is_empty(),
         light_samples: scene.light_samples(),
         setup_s: setup,

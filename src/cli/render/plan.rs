@@ -27,6 +27,9 @@ use crate::cli::progress::{self, Mode};
 use crate::cli::signal::Stop;
 use crate::cli::{Interrupted, Usage, cli_error, option_error};
 
+/// Maximum samples per pixel with a noise limit, unless `--spp` is given.
+const MAX_NOISE_SAMPLES: u32 = 4096;
+
 /// The settings of a render, except its destinations.
 pub struct Plan<'a> {
     pub scene: Arc<Packed>,
@@ -35,6 +38,10 @@ pub struct Plan<'a> {
     /// The part to render, and its rows.
     pub tile: Option<(Tile, Region)>,
     pub options: Options,
+    /// Samples per pixel; with adaptive sampling or a noise limit the maximum.
+    pub samples: u32,
+    /// The limit of the noise.
+    pub noise: Option<f64>,
     pub deadline: Option<Instant>,
     /// Write intermediate images.
     pub preview: bool,
@@ -59,9 +66,18 @@ impl<'a> Plan<'a> {
         start: Instant,
     ) -> anyhow::Result<Self> {
         let scene = &Arc::clone(session.scene());
-        let early_stops = [("--time-limit", args.time_limit.is_some()), ("--preview", args.preview)];
+        let early_stops = [
+            ("--noise", args.noise.is_some()),
+            ("--time-limit", args.time_limit.is_some()),
+            ("--preview", args.preview),
+        ];
         for (option, _) in early_stops.into_iter().filter(|(_, is_set)| *is_set) {
             check_early_stop(option, scene)?;
+        }
+        if args.noise.is_some() && scene.render.adaptive.is_some() {
+            let rule =
+                "--noise: cannot be combined with adaptive sampling, whose pixels have different numbers of samples";
+            return Err(Usage(rule.to_owned()).into());
         }
         let mut options = args.rendering();
         options.aovs = options.layers(scene);
@@ -78,6 +94,11 @@ impl<'a> Plan<'a> {
             image_region,
             tile,
             options,
+            samples: match args.noise {
+                Some(_) => args.pixel_samples.unwrap_or(MAX_NOISE_SAMPLES),
+                None => packed.sampling.pixel_samples,
+            },
+            noise: args.noise,
             deadline: args.time_limit.and_then(|limit| start.checked_add(limit)),
             preview: args.preview,
             checkpoint: args.checkpoint(frame)?,
@@ -85,7 +106,7 @@ impl<'a> Plan<'a> {
             resume: args.resume,
             view: args.picture_options.view(scene.view),
             picture_options: args.picture_options.clone(),
-            metadata: RenderMetadata::of(scene, &packed, args.time_limit),
+            metadata: RenderMetadata::of(scene, &packed, args.time_limit, args.noise),
             scene: packed,
             progress,
             log,
@@ -106,7 +127,7 @@ impl<'a> Plan<'a> {
             aovs: self.options.aovs.clone(),
             alpha: self.scene.has_alpha(),
             middle_depth,
-            max_samples: self.scene.sampling.pixel_samples,
+            max_samples: self.samples,
             view: self.view,
         }
     }
@@ -127,7 +148,14 @@ impl<'a> Plan<'a> {
 
     /// Returns the identity of the image, which all of its parts share.
     pub fn identity(&self) -> Identity {
-        Identity::of(&self.scene, self.image_region, self.options.exact_rounding)
+        self.identity_of(self.image_region)
+    }
+
+    fn identity_of(&self, region: Region) -> Identity {
+        Identity {
+            pixel_samples: self.samples,
+            ..Identity::of(&self.scene, region, self.options.exact_rounding)
+        }
     }
 
     /// Opens the checkpoint, if requested; waits while another process uses the file. A part has the same checkpoint as
@@ -146,8 +174,7 @@ impl<'a> Plan<'a> {
             wait: Box::new(move || signal().is_none() && self.deadline.is_none_or(|end| Instant::now() < end)),
             report: Box::new(|message| self.log.log(Level::Warning, message)),
         };
-        let identity = Identity::of(&self.scene, self.region(), self.options.exact_rounding);
-        match Checkpoint::open(options, identity, self.scene.film_layout()) {
+        match Checkpoint::open(options, self.identity_of(self.region()), self.scene.film_layout()) {
             Ok(checkpoint) => Ok(Some(checkpoint)),
             Err(error @ CheckpointError::Busy(_)) => Err(match signal() {
                 Some(signal) => Interrupted(signal).into(),

@@ -11,6 +11,7 @@ use wgray_render::backend::Backend;
 use wgray_render::denoise;
 use wgray_render::film::Film;
 use wgray_render::job::{self, Bands, CheckpointStore, FinishedBand, Flow, Order, PartHeader, WorkSplit};
+use wgray_render::noise::{self, Noise, NoiseMeter};
 use wgray_render::records::FirstHit;
 
 use super::plan::Plan;
@@ -34,6 +35,8 @@ pub struct RenderTotals {
     pub min_samples: u32,
     /// Requested samples per pixel: fewer than in the scene if the time limit was reached or the image is partial.
     pub requested_samples: u32,
+    /// The noise of the complete image, if it has a limit.
+    pub noise: Option<Noise>,
     /// After a signal, the files that contain the last complete pass.
     pub partial: Vec<String>,
 }
@@ -59,37 +62,62 @@ pub fn write(
 ) -> Result<RenderTotals, RenderError> {
     let middle_depth = renderer.work(|backend, _| middle_depth(&plan.scene, &plan.options.aovs, backend))?;
     let layout = plan.layout(middle_depth);
-    let mut totals = RenderTotals::new(plan.scene.sampling.pixel_samples);
+    let mut totals = RenderTotals::new(plan.samples);
     let name = files.name().unwrap_or_default().to_owned();
-    let metadata = plan
-        .metadata
-        .with_device(renderer.info(), plan.picture_options.reproducible);
-    let mut render_to = |sink: &mut Sink| {
-        let mut previews = previews.as_mut().map(|previews| (previews, &layout));
-        match plan.denoises() && plan.tile.is_none() {
-            true => {
-                let (film, hits) = denoise::collect(layout.region, plan.scene.film_layout(), &mut |sink| {
-                    let previews = previews.as_mut().map(|(previews, layout)| (&mut **previews, *layout));
-                    render(plan, renderer, store, stop, &mut totals, previews, sink)
-                })?;
-                let start = Instant::now();
-                write_denoised(renderer, (film, hits), sink)?;
-                totals.time += start.elapsed();
-                Ok(())
+    let mut watcher = Watcher::new(plan, stop);
+    let mut bands = bands(plan, renderer.largest_film(), store, previews.is_some())?;
+    let (mut metadata, device) = (plan.metadata.clone(), renderer.info().clone());
+    // The metadata, with which a file begins, contain the noise of the complete image.
+    let passes = match plan.noise {
+        Some(_) => {
+            let passes = render_passes(
+                plan,
+                renderer,
+                &mut bands,
+                &mut watcher,
+                &mut totals,
+                previews.take(),
+                &layout,
+            );
+            if let Some(noise) = &totals.noise {
+                metadata.add_noise(noise, (bands.completed_samples(), plan.samples));
             }
-            false => render(plan, renderer, store, stop, &mut totals, previews, sink),
+            passes
         }
+        None => Ok(()),
     };
-    match files {
-        Files::Images(targets) => {
-            let options = plan.picture_options.save_options(metadata);
-            match image::save(targets, &layout, &options, &mut render_to) {
-                Err(RenderError::Cancelled) if !totals.partial.is_empty() => {} // these files have been written
-                saved => (plan.picture_options).warn(&saved?, &mut |line| plan.log.log(Level::Warning, line)),
-            }
+    let mut render_to = |sink: &mut Sink| {
+        if previews.is_some() {
+            let previews = previews.take();
+            render_passes(plan, renderer, &mut bands, &mut watcher, &mut totals, previews, &layout)?;
         }
-        Files::Part(file) => write_part(plan, &layout, file, &mut render_to)?,
+        if !plan.denoises() || plan.tile.is_some() {
+            return render_bands(plan, renderer, &mut bands, &mut watcher, &mut totals, sink);
+        }
+        let film_layout = plan.scene.film_layout();
+        let (film, hits) = denoise::collect(layout.region, film_layout, &mut |sink| {
+            render_bands(plan, renderer, &mut bands, &mut watcher, &mut totals, sink)
+        })?;
+        let start = Instant::now();
+        write_denoised(renderer, (film, hits), sink)?;
+        totals.time += start.elapsed();
+        Ok(())
+    };
+    let written = passes.and_then(|()| match files {
+        Files::Images(targets) => {
+            let metadata = metadata.with_device(&device, plan.picture_options.reproducible);
+            let options = plan.picture_options.save_options(metadata);
+            let report = image::save(targets, &layout, &options, &mut render_to)?;
+            (plan.picture_options).warn(&report, &mut |line| plan.log.log(Level::Warning, line));
+            Ok(())
+        }
+        Files::Part(file) => write_part(plan, &layout, file, &mut render_to),
+    });
+    match written {
+        Err(RenderError::Cancelled) if !totals.partial.is_empty() => {} // these files have been written
+        written => written?,
     }
+    drop(watcher);
     if totals.invalid_pixels > 0 {
         let count = totals.invalid_pixels;
         plan.log.log(
@@ -113,77 +141,162 @@ fn write_part(
     job::write_part(file, &plan.identity(), &header, render_to)
 }
 
-/// Renders all bands, and passes each finished band to a sink.
-fn render(
+/// Returns the bands of the image or part, which are rendered together if the render may end early.
+fn bands<'a>(
     plan: &Plan,
-    renderer: &mut Renderer,
-    store: &mut dyn CheckpointStore,
-    stop: &Stop,
-    totals: &mut RenderTotals,
-    previews: Option<(&mut Previews, &Layout)>,
-    sink: &mut Sink,
-) -> Result<(), RenderError> {
-    let mut progress = Progress::new(plan.progress, plan.frame.label(), plan.frame.number);
-    let (scene, samples) = (&plan.scene, plan.scene.sampling.pixel_samples);
-    let (split, largest_film) = (WorkSplit::of(scene.film_layout()), renderer.largest_film());
-    let order = match plan.deadline.is_some() || previews.is_some() {
+    largest_film: u64,
+    store: &'a mut dyn CheckpointStore,
+    has_previews: bool,
+) -> Result<Bands<&'a mut dyn CheckpointStore>, RenderError> {
+    let film_layout = plan.scene.film_layout();
+    let split = WorkSplit::of(film_layout);
+    let order = match plan.deadline.is_some() || plan.noise.is_some() || has_previews {
         true => Order::Pixels,
         false => Order::Rows,
     };
-    let mut bands = Bands::new(plan.region(), samples, &split, order, largest_film, store);
-    if previews.is_some() {
-        bands = bands.in_passes(scene.film_layout())?;
+    let bands = Bands::new(plan.region(), plan.samples, &split, order, largest_film, store);
+    if has_previews {
+        bands.in_passes(film_layout)
+    } else if plan.noise.is_some() {
+        bands.in_passes_of(PASS_DURATION, film_layout)
     } else if plan.deadline.is_some() {
-        bands = bands.as_a_whole(scene.film_layout())?;
+        bands.as_a_whole(film_layout)
+    } else {
+        Ok(bands)
     }
-    let begin = Instant::now();
-    let mut watch = |_: &mut dyn Backend, _: Region, fraction: f64| {
-        let now = Instant::now();
-        let time_fraction = plan.deadline.map_or(0.0, |end| {
-            let limit = end.saturating_duration_since(begin).as_secs_f64();
-            (now.duration_since(begin).as_secs_f64() / limit).min(1.0)
-        });
-        progress.update(fraction.max(time_fraction));
-        Ok(match plan.deadline {
-            _ if stop.signal().is_some() => Flow::Cancel,
-            Some(end) if now >= end => Flow::TimeIsUp,
-            _ => Flow::Continue,
-        })
-    };
-    if let Some((previews, layout)) = previews {
-        loop {
-            let start = Instant::now();
-            let counter = renderer.progress_counter();
-            let pass = renderer.work(|backend, _| bands.next_pass(backend, &mut watch, &mut || counter.increment()));
-            totals.time += start.elapsed();
-            match pass {
-                Ok(Some(count)) if count < samples => {
-                    if previews.is_due(count) {
-                        save_pass(plan, renderer, &mut bands, previews, layout)?;
-                    }
-                }
-                Ok(_) => break,
-                Err(RenderError::Cancelled) if plan.checkpoint.is_none() => {
-                    if bands.completed_samples() == 0 {
-                        let note = "some pixels have no complete sample yet, so no image was written";
-                        plan.log.log(Level::Note, note);
-                    } else if let Some(partial) = save_pass(plan, renderer, &mut bands, previews, layout)? {
-                        let time = totals.time;
-                        *totals = RenderTotals { time, ..partial };
-                    }
-                    return Err(RenderError::Cancelled);
-                }
-                Err(error) => return Err(error),
-            }
+}
+
+/// Target duration of a pass with a noise limit.
+const PASS_DURATION: Duration = Duration::from_secs(1);
+
+/// Shows the progress, and ends a render after a signal or at the deadline.
+struct Watcher<'a> {
+    plan: &'a Plan<'a>,
+    stop: &'a Stop,
+    /// `None` after the render.
+    progress: Option<Progress>,
+    begin: Instant,
+    /// Estimated fraction of the maximum samples that the render needs.
+    expected_fraction: f64,
+}
+
+impl<'a> Watcher<'a> {
+    fn new(plan: &'a Plan<'a>, stop: &'a Stop) -> Watcher<'a> {
+        Watcher {
+            plan,
+            stop,
+            progress: Some(Progress::new(plan.progress, plan.frame.label(), plan.frame.number)),
+            begin: Instant::now(),
+            expected_fraction: 1.0,
         }
     }
+
+    /// `fraction` is the finished fraction of the maximum samples.
+    fn watch(&mut self, fraction: f64) -> Flow {
+        let (now, deadline) = (Instant::now(), self.plan.deadline);
+        let time_fraction = deadline.map_or(0.0, |end| {
+            let limit = end.saturating_duration_since(self.begin).as_secs_f64();
+            (now.duration_since(self.begin).as_secs_f64() / limit).min(1.0)
+        });
+        let fraction = (fraction / self.expected_fraction).min(1.0);
+        if let Some(progress) = &mut self.progress {
+            progress.update(fraction.max(time_fraction));
+        }
+        match deadline {
+            _ if self.stop.signal().is_some() => Flow::Cancel,
+            Some(end) if now >= end => Flow::TimeIsUp,
+            _ => Flow::Continue,
+        }
+    }
+
+    /// Updates the estimate of the remaining work.
+    fn set_noise(&mut self, samples: u32, noise: f64, limit: f64) {
+        let expected = noise::estimated_samples(samples, noise, limit) / f64::from(self.plan.samples);
+        self.expected_fraction = expected.min(1.0);
+        if let Some(progress) = &mut self.progress {
+            progress.set_noise(noise);
+        }
+    }
+}
+
+/// Renders passes over all bands until all samples are complete, the noise is below its limit or the time is up.
+fn render_passes(
+    plan: &Plan,
+    renderer: &mut Renderer,
+    bands: &mut Bands<&mut dyn CheckpointStore>,
+    watcher: &mut Watcher,
+    totals: &mut RenderTotals,
+    mut previews: Option<Previews>,
+    layout: &Layout,
+) -> Result<(), RenderError> {
     loop {
+        // Not only after a pass: a checkpoint may have the samples of a decision.
+        let decision = bands.uniform_samples().filter(|samples| noise::is_decision(*samples));
+        if let (Some(limit), Some(samples)) = (plan.noise, decision) {
+            let noise = measured_noise(plan, bands)?;
+            watcher.set_noise(samples, noise.percentile_95, limit);
+            if noise.percentile_95 < limit {
+                totals.noise = Some(noise);
+                bands.end_passes();
+                return Ok(());
+            }
+        }
+        let start = Instant::now();
+        let counter = renderer.progress_counter();
+        let mut watch = |_: &mut dyn Backend, _: Region, fraction: f64| Ok(watcher.watch(fraction));
+        let pass = renderer.work(|backend, _| bands.next_pass(backend, &mut watch, &mut || counter.increment()));
+        totals.time += start.elapsed();
+        match (pass, &mut previews) {
+            (Ok(Some(count)), _) if count >= plan.samples => break,
+            (Ok(Some(count)), Some(previews)) if previews.is_due(count) => {
+                save_pass(plan, renderer, bands, previews, layout)?;
+            }
+            (Ok(Some(_)), _) => {}
+            (Ok(None), _) => break,
+            (Err(RenderError::Cancelled), Some(previews)) if plan.checkpoint.is_none() => {
+                if bands.completed_samples() == 0 {
+                    let note = "some pixels have no complete sample yet, so no image was written";
+                    plan.log.log(Level::Note, note);
+                } else if let Some(partial) = save_pass(plan, renderer, bands, previews, layout)? {
+                    let time = totals.time;
+                    *totals = RenderTotals { time, ..partial };
+                }
+                return Err(RenderError::Cancelled);
+            }
+            (Err(error), _) => return Err(error),
+        }
+    }
+    if plan.noise.is_some() {
+        totals.noise = Some(measured_noise(plan, bands)?);
+    }
+    Ok(())
+}
+
+/// Returns the noise of the image so far.
+fn measured_noise(plan: &Plan, bands: &mut Bands<&mut dyn CheckpointStore>) -> Result<Noise, RenderError> {
+    let mut meter = NoiseMeter::new(plan.view.exposure);
+    bands.visit_films(&mut |film| meter.add(film))?;
+    Ok(meter.noise())
+}
+
+/// Renders all bands, unless passes have rendered them, and passes each finished band to a sink.
+fn render_bands(
+    plan: &Plan,
+    renderer: &mut Renderer,
+    bands: &mut Bands<&mut dyn CheckpointStore>,
+    watcher: &mut Watcher,
+    totals: &mut RenderTotals,
+    sink: &mut Sink,
+) -> Result<(), RenderError> {
+    loop {
+        let mut watch = |_: &mut dyn Backend, _: Region, fraction: f64| Ok(watcher.watch(fraction));
         let start = Instant::now();
         let counter = renderer.progress_counter();
         let next = renderer.work(|backend, _| bands.render_next(backend, &mut watch, &mut || counter.increment()));
         totals.time += start.elapsed();
         let Some(band) = next? else {
             totals.fraction_rendered = bands.fraction_rendered();
+            watcher.progress = None; // removes the bar
             return Ok(());
         };
         write_band(plan, renderer, band, totals, sink)?;
@@ -238,7 +351,7 @@ fn save_pass(
     previews: &mut Previews,
     layout: &Layout,
 ) -> Result<Option<RenderTotals>, RenderError> {
-    let (samples, all) = (bands.completed_samples(), plan.scene.sampling.pixel_samples);
+    let (samples, all) = (bands.completed_samples(), plan.samples);
     let metadata = (plan.metadata).partial(renderer.info(), plan.picture_options.reproducible, (samples, all));
     let options = plan.picture_options.save_options(metadata);
     let mut totals = RenderTotals {

@@ -6,7 +6,7 @@ use std::sync::{Arc, OnceLock};
 use glam::{UVec2, Vec4};
 use rayon::prelude::*;
 
-use super::adaptive::{layer_moments_with, moments_with, pilot_add, pilot_finish, samples_wanted};
+use super::adaptive::{layer_mean, pilot_add, pilot_finish, samples_wanted};
 use super::geometry::pixel_first_hit;
 use super::integrators::path::{path_layers, path_value};
 use super::pixel::{Layers, pixel_radiance};
@@ -246,7 +246,19 @@ struct Run<'a> {
     half_sums: &'a mut [Vec4],
     /// Moments of albedo and normal.
     layer_moments: [&'a mut [Vec4]; 2],
+    /// Means of the pixel with the last sample.
+    means: Option<(usize, Means)>,
 }
+
+/// Means over the samples of a pixel so far: of radiance, albedo and normal.
+#[derive(Clone, Copy, Default)]
+struct Means {
+    color: Vec4,
+    layers: [Vec4; 2],
+}
+
+/// Layers with moments.
+const MEASURED: [Layer; 2] = [Layer::Albedo, Layer::Normal];
 
 impl Run<'_> {
     /// Adds a sample to pixel `x`. Samples of a pixel are added in order.
@@ -255,23 +267,47 @@ impl Run<'_> {
         if let Some(pilot_sum) = self.pilot_sums.get_mut(x) {
             *pilot_sum = pilot_add(*pilot_sum, sum, value);
         }
-        if let Some(moments) = self.moments.get_mut(x) {
-            *moments = moments_with(*moments, sum, value);
+        if !self.moments.is_empty() {
+            self.add_to_moments(x, value, &layers);
         }
         if sample.is_multiple_of(2)
             && let Some(half_sum) = self.half_sums.get_mut(x)
         {
             *half_sum += value;
         }
-        let values = [(Layer::Albedo, layers.albedo), (Layer::Normal, layers.normal)];
-        for (moments, (layer, value_of_layer)) in self.layer_moments.iter_mut().zip(values) {
-            if let Some(moments) = moments.get_mut(x) {
-                let layer_sum = self.layers[layer as usize][x];
-                *moments = layer_moments_with(*moments, layer_sum, sum.w, value_of_layer, value.w);
-            }
-        }
         self.sums[x] = sum + value;
         self.add_layers(x, layers);
+    }
+
+    /// Adds a sample to the moments, before it is added to the sums. Gives the bits of `moments_with` and
+    /// `layer_moments_with`, but computes each mean once: the mean after a sample is the mean before the next one.
+    fn add_to_moments(&mut self, x: usize, value: Vec4, layers: &Layers) {
+        let has_layer_moments = !self.layer_moments[0].is_empty();
+        let (sum, weight) = (self.sums[x], value.w);
+        let layer_sums = MEASURED.map(|layer| match has_layer_moments {
+            true => self.layers[layer as usize][x],
+            false => Vec4::ZERO,
+        });
+        let means_of = |sum: Vec4, layer_sums: [Vec4; 2]| Means {
+            color: layer_mean(sum, sum.w),
+            layers: match has_layer_moments {
+                true => layer_sums.map(|layer_sum| layer_mean(layer_sum, sum.w)),
+                false => [Vec4::ZERO; 2],
+            },
+        };
+        let before = match self.means {
+            Some((pixel, means)) if pixel == x => means,
+            _ => means_of(sum, layer_sums),
+        };
+        let values = [layers.albedo, layers.normal];
+        let after = means_of(sum + value, [layer_sums[0] + values[0], layer_sums[1] + values[1]]);
+        self.moments[x] += deviation(before.color, after.color, value, weight).with_w(1.0);
+        if has_layer_moments {
+            for i in 0..MEASURED.len() {
+                self.layer_moments[i][x] += deviation(before.layers[i], after.layers[i], values[i], weight);
+            }
+        }
+        self.means = Some((x, after));
     }
 
     fn finish_pilot(&mut self) {
@@ -295,6 +331,13 @@ impl Run<'_> {
             }
         }
     }
+}
+
+/// Returns the increment of the squared deviations by a sample, from the means before and after it.
+#[inline(always)]
+fn deviation(mean_before: Vec4, mean_after: Vec4, value: Vec4, weight: f32) -> Vec4 {
+    let product = (value - mean_before * weight) * (value - mean_after * weight);
+    Vec4::select(product.cmplt(Vec4::ZERO), Vec4::ZERO, product)
 }
 
 /// Splits the records of a tile into row segments, each paired with the position of its first pixel. `region` is the

@@ -222,6 +222,46 @@ impl<S: CheckpointStore> Bands<S> {
         }
     }
 
+    /// Returns the samples of every pixel; `None` if some pixels have more than others. Requires uniform sampling.
+    pub fn uniform_samples(&self) -> Option<u32> {
+        let samples = |band: &Band| match band.reached() {
+            None => Some(0),
+            Some(reached) if reached.next == [band.region.x0, band.region.y0] => Some(reached.pass.start),
+            Some(_) => None, // within a pass
+        };
+        let mut counts = self.bands.iter().map(samples);
+        let first = counts.next()??;
+        counts.all(|count| count == Some(first)).then_some(first)
+    }
+
+    /// Passes the films of all bands to `visit`, from top to bottom. Requires uniform sampling.
+    ///
+    /// # Errors
+    ///
+    /// A piece of the store cannot be loaded.
+    pub fn visit_films(&mut self, visit: &mut dyn FnMut(&Film)) -> Result<(), RenderError> {
+        for band in &mut self.bands {
+            if let State::Stored(stored) = &band.state {
+                band.state = State::InMemory(self.store.load(stored.number)?);
+            }
+            if let State::InMemory(piece) = &band.state {
+                visit(&piece.film);
+            }
+        }
+        Ok(())
+    }
+
+    /// Ends a render in passes after a complete pass: [`Bands::render_next`] returns the bands with the samples so far.
+    /// Stores the bands.
+    pub fn end_passes(&mut self) {
+        let samples = self.completed_samples();
+        self.total_samples *= f64::from(samples) / f64::from(self.samples);
+        self.samples = samples;
+        self.joint_rendering_ended = Some(true);
+        self.keep_others(usize::MAX);
+        self.store.sync();
+    }
+
     /// Returns the finished fraction of the samples, not counting incomplete passes: 0 to 1.
     pub fn fraction(&self) -> f64 {
         let totals = self.bands.iter().map(|band| band.sample_total(self.samples));
@@ -528,7 +568,7 @@ impl<S: CheckpointStore> Bands<S> {
         Ok(())
     }
 
-    /// Stores the bands in memory that have changed, except band `i`.
+    /// Stores the bands in memory that have changed, except band `i`, if it exists.
     fn keep_others(&mut self, i: usize) {
         let stored = self.store.pieces();
         for (k, band) in self.bands.iter().enumerate() {
