@@ -135,7 +135,7 @@ fn the_library_denoises_with_equal_bits_on_all_devices() {
 }
 
 #[test]
-fn a_crop_is_denoised_by_itself() {
+fn a_crop_is_denoised_on_its_own() {
     let region = Region {
         x0: 3,
         y0: 2,

@@ -142,7 +142,7 @@ fn pixels_that_are_not_finite_stay_and_do_not_spread() {
     }
 }
 
-/// The method in f64, from the definitions: every pixel, window and patch by itself, without planes, tiles and lanes.
+/// The method in f64, from the definitions: every pixel, window and patch on its own, without planes, tiles and lanes.
 /// `guides` returns plane `k` of a pixel, mirrored at the borders.
 fn definition(guides: &Guides, x: i32, y: i32) -> DVec3 {
     let mirrored = |x: i32, size: usize| {
