@@ -49,9 +49,8 @@ fn store_noise(noise: Noise, index: u32, first_layer: u32) {
     film[start + 2u * pixels] = noise.normal_moments;
 }
 
-// Adds a sample. `layers` and `sum` do not include the sample.
-fn noise_with(noise: Noise, layers: Layers, sum: vec4f, path: PathState) -> Noise {
-    let value = path_value(path);
+// Adds a path with its value. `layers` and `sum` do not include the path.
+fn noise_with(noise: Noise, layers: Layers, sum: vec4f, path: PathState, value: vec4f) -> Noise {
     let half_sum = noise.half_sum + select(value, vec4f(0.0), (path.sample & 1u) != 0u);
     if LAYERS == 0u {
         return Noise(half_sum, vec4f(0.0), vec4f(0.0));

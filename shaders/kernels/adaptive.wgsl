@@ -35,7 +35,7 @@ fn adaptive(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_
         if path.ended {
             let value = path_value(path);
             if NOISE != 0u {
-                noise = noise_with(noise, layers, sum, path);
+                noise = noise_with(noise, layers, sum, path, value);
             }
             pilot = pilot_add(pilot, sum, value);
             moments = moments_with(moments, sum, value);

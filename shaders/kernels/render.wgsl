@@ -28,11 +28,12 @@ fn render(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_in
     while sample < params.samples.y {
         path = advance(path, pixel);
         if path.ended {
+            let value = path_value(path);
             if NOISE != 0u {
-                noise = noise_with(noise, layers, sum, path);
-                moments = moments_with(moments, sum, path_value(path));
+                noise = noise_with(noise, layers, sum, path, value);
+                moments = moments_with(moments, sum, value);
             }
-            sum += path_value(path);
+            sum += value;
             if LAYERS != 0u {
                 layers = layers_sum(layers, path_layers(path));
             }
