@@ -4,6 +4,8 @@ use std::sync::Arc;
 
 use wgray_render::backend::Backend;
 use wgray_render::cpu::Cpu;
+use wgray_render::denoise::denoise;
+use wgray_render::film::Film;
 #[cfg(feature = "gpu")]
 use wgray_render::gpu::{self, Gpu, Rounding, compose::Shaders};
 use wgray_render::records::Packed;
@@ -35,6 +37,16 @@ impl Engine {
             #[cfg(feature = "gpu")]
             Engine::Gpu(gpu, _) => &mut **gpu,
         }
+    }
+
+    /// Denoises a finished film with noise estimates.
+    pub(crate) fn denoise(&self, film: &mut Film) -> Result<(), RenderError> {
+        film.denoised = match self {
+            Engine::Cpu(_) => denoise(film),
+            #[cfg(feature = "gpu")]
+            Engine::Gpu(gpu, _) => gpu.denoise(film)?,
+        };
+        Ok(())
     }
 
     pub(crate) fn scene(&self) -> &Arc<Packed> {

@@ -12,6 +12,7 @@ use crate::picture::Picture;
 use crate::renderer::{OpenScene, Renderer, warnings};
 use wgray_image::Region;
 use wgray_render::backend::Backend;
+use wgray_render::denoise::denoise;
 use wgray_render::film::{Film, FilmLayout};
 use wgray_render::job::{self, Bands, Flow, NoCheckpoint, Order, WorkSplit};
 use wgray_render::records::{FirstHit, Packed};
@@ -188,7 +189,7 @@ impl Progressive<'_> {
         self.full_film.copy_rows(&self.backend.film()?.part(self.band));
         let mut film = self.full_film.clone();
         if self.layout.aovs.contains(&Aov::Denoised) {
-            self.backend.denoise(&mut film)?;
+            film.denoised = denoise(&film);
         }
         Ok(Picture {
             film,
@@ -241,7 +242,7 @@ impl<'a> RenderSetup<'a> {
 
     fn picture(mut self, mut film: Film) -> Result<Picture, Error> {
         if self.layout.aovs.contains(&Aov::Denoised) {
-            self.renderer.work(|backend, _| backend.denoise(&mut film))?;
+            self.renderer.denoise(&mut film)?;
         }
         Ok(Picture {
             film,

@@ -8,7 +8,7 @@ use tracing::warn;
 use web_time::Instant;
 use wgray_image::panic_guard::catch_panic;
 use wgray_render::backend::Backend;
-use wgray_render::film::FilmLayout;
+use wgray_render::film::{Film, FilmLayout};
 use wgray_render::records::Packed;
 
 use crate::context::Context;
@@ -317,6 +317,18 @@ impl<'a> Renderer<'a> {
 
     pub fn progress_counter(&self) -> ProgressCounter {
         self.open.progress_counter()
+    }
+
+    /// Denoises a finished film with noise estimates, and recovers from faults like [`Renderer::work`].
+    ///
+    /// # Errors
+    ///
+    /// The errors of [`Renderer::work`].
+    pub fn denoise(&mut self, film: &mut Film) -> Result<(), RenderError> {
+        while let Err(error) = self.open.engine.denoise(film) {
+            self.open.recover(error, &mut self.on_fault)?;
+        }
+        Ok(())
     }
 
     /// Runs `work`, and repeats it after reopening a lost device. With [`Device::Auto`], the CPU takes over permanently

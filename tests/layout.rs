@@ -4,8 +4,8 @@ use wgray_render::gpu::compose::{KERNELS, Source, built_in};
 use wgray_render::gpu::naga::proc::Layouter;
 use wgray_render::gpu::naga::{Expression, Literal, Module, TypeInner};
 use wgray_render::records::{
-    BvhItem, Camera, Counts, DispatchParams, Emitter, Environment, FirstHit, Instance, Light, LightNode, Lookup,
-    Material, Node, Primitive, Record, Specialization, Sphere, Texture,
+    BvhItem, Camera, Counts, DenoiseParams, DispatchParams, Emitter, Environment, FirstHit, Instance, Light, LightNode,
+    Lookup, Material, Node, Primitive, Record, Specialization, Sphere, Texture,
 };
 
 use wgray::scene::Integrator;
@@ -66,6 +66,7 @@ fn records_have_the_same_layout_in_wgsl_and_rust() {
         name_and_size::<Instance>(),
         name_and_size::<FirstHit>(),
         name_and_size::<DispatchParams>(),
+        name_and_size::<DenoiseParams>(),
     ];
     let declared = wgray_render::records::declarations().matches("struct ").count();
     assert_eq!(records.len(), declared, "some records are not compared");

@@ -72,6 +72,7 @@ rr_depth = 2
 clamp = 3
 alpha = true
 ray_differentials = true
+denoise = true
 seed = 7
 pixel_samples = { pattern = "sobol", count = 4 }
 light_samples = { pattern = "random", count = 4 }

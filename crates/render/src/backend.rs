@@ -2,7 +2,6 @@
 
 use std::ops::Range;
 
-use crate::denoise::denoise;
 use crate::error::RenderError;
 use crate::film::{Film, FilmLayout, Layer};
 use crate::records::{FirstHit, Packed};
@@ -79,13 +78,6 @@ pub trait Backend {
     /// Returns the first hits through the pixel centers, in row-major order, top row first. Waits until they are
     /// available; [`job::first_hits`](crate::job::first_hits) splits a large region.
     fn first_hits(&mut self, region: Region) -> Result<Vec<FirstHit>, RenderError>;
-
-    /// Denoises a finished film with noise estimates: sets [`Film::denoised`]. Neither needs nor changes the backend's
-    /// film. All backends give the same bits.
-    fn denoise(&mut self, film: &mut Film) -> Result<(), RenderError> {
-        film.denoised = denoise(film);
-        Ok(())
-    }
 
     /// Returns the maximum number of pixels of a region whose film fits, including the pixels that
     /// [`around`](Backend::around) adds.

@@ -309,7 +309,7 @@ fn write_denoised(
     (mut film, hits): (Film, Vec<FirstHit>),
     sink: &mut Sink,
 ) -> Result<(), RenderError> {
-    renderer.work(|backend, _| backend.denoise(&mut film))?;
+    renderer.denoise(&mut film)?;
     sink(Band {
         film: &film,
         hits: &hits,

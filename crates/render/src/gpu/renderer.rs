@@ -4,7 +4,7 @@ use std::ops::Range;
 use std::time::Duration;
 
 use bytemuck::{bytes_of, cast_slice};
-use glam::{UVec2, Vec4};
+use glam::{UVec2, Vec3, Vec4};
 use web_time::Instant;
 use wgpu::BufferUsages;
 
@@ -234,6 +234,19 @@ impl Gpu {
                 .device
                 .checked(|| self.device.queue.write_buffer(buffer, 0, cast_slice(values))),
             None => Ok(()),
+        }
+    }
+
+    /// Denoises a finished film with noise estimates. Software Vulkan uses the CPU path, which is faster and has the
+    /// same bits.
+    ///
+    /// # Errors
+    ///
+    /// The device is lost, or its driver reports an error.
+    pub fn denoise(&self, film: &Film) -> Result<Vec<Vec3>, RenderError> {
+        match self.device.info.is_software() {
+            true => Ok(denoise(film)),
+            false => super::denoise::denoise(&self.device, film, self.kernels.exact),
         }
     }
 
@@ -626,15 +639,6 @@ impl Backend for Gpu {
         }
         let result = self.find_first_hits(region);
         self.discard_film_on_error(result)
-    }
-
-    fn denoise(&mut self, film: &mut Film) -> Result<(), RenderError> {
-        // On software Vulkan, the CPU path is faster.
-        film.denoised = match self.device.info.is_software() {
-            true => denoise(film),
-            false => super::denoise::denoise(&self.device, film, self.kernels.exact)?,
-        };
-        Ok(())
     }
 
     fn samples_of_all(&self) -> u32 {
