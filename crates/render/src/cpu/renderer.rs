@@ -303,8 +303,9 @@ impl Run<'_> {
         let after = means_of(sum + value, [layer_sums[0] + values[0], layer_sums[1] + values[1]]);
         self.moments[x] += deviation(before.color, after.color, value, weight).with_w(1.0);
         if has_layer_moments {
-            for i in 0..MEASURED.len() {
-                self.layer_moments[i][x] += deviation(before.layers[i], after.layers[i], values[i], weight);
+            let means = before.layers.into_iter().zip(after.layers);
+            for ((moments, (before, after)), value) in self.layer_moments.iter_mut().zip(means).zip(values) {
+                moments[x] += deviation(before, after, value, weight);
             }
         }
         self.means = Some((x, after));

@@ -128,7 +128,7 @@ impl Tile {
             for x in (0..TILE_WIDTH).step_by(LANES) {
                 let mut sum = load(simd, &self.distances, x);
                 for i in 1..PATCH {
-                    sum = sum + load(simd, &self.distances, x + i);
+                    sum += load(simd, &self.distances, x + i);
                 }
                 let start = row * TILE_WIDTH + x;
                 sum.store_slice(&mut self.row_sums[start..start + LANES]);
@@ -146,7 +146,7 @@ impl Tile {
                 let i = row * TILE_WIDTH + x;
                 let mut patch = load(simd, &self.row_sums, i);
                 for j in 1..PATCH {
-                    patch = patch + load(simd, &self.row_sums, i + j * TILE_WIDTH);
+                    patch += load(simd, &self.row_sums, i + j * TILE_WIDTH);
                 }
                 let planes = Loader {
                     simd,

@@ -109,6 +109,7 @@ struct Band {
     last_pass: Option<FilmPiece>,
 }
 
+#[expect(clippy::large_enum_variant, reason = "few bands exist, and most are in memory")]
 enum State {
     New,
     Stored(StoredPiece),
