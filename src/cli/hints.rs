@@ -27,11 +27,6 @@ const OPTIONS: [(&str, &str); 21] = [
     ("--hdr", "--environment FILE.hdr"),
     ("--envmap", "--environment FILE.hdr"),
     ("--out", "--output FILE"),
-    (
-        "--denoise",
-        "--spp N; more samples reduce noise, and there is no denoiser",
-    ),
-    ("--noise", "--adaptive ERROR"),
 ];
 
 /// Extensions that suggest an omitted subcommand `render`.
