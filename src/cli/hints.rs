@@ -7,7 +7,7 @@ use clap::error::{ContextKind, ContextValue, ErrorKind};
 use wgray_image::sanitize::escape_control;
 
 /// Options of other renderers, and the equivalent options of wgray.
-const OPTIONS: [(&str, &str); 21] = [
+const OPTIONS: [(&str, &str); 19] = [
     ("--width", "--size WIDTHxHEIGHT"),
     ("--height", "--size WIDTHxHEIGHT"),
     ("--resolution", "--size WIDTHxHEIGHT"),

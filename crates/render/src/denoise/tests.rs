@@ -147,7 +147,7 @@ fn pixels_that_are_not_finite_stay_and_do_not_spread() {
 fn definition(guides: &Guides, x: i32, y: i32) -> DVec3 {
     let mirrored = |x: i32, size: usize| {
         let last = size as i32 - 1;
-        let mut x = x;
+        let mut x = if last == 0 { 0 } else { x };
         while x < 0 || x > last {
             x = if x < 0 { -x } else { 2 * last - x };
         }
