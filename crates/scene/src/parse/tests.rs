@@ -408,13 +408,13 @@ fn the_page_has_the_defaults_of_the_render_settings() {
     });
     // Other defaults are described in words.
     let rows = rows.filter(|line| line.parse::<toml::Table>().is_ok());
-    // In the default description, keys of the path tracer have no value.
-    let (path_keys, other_keys): (Vec<_>, Vec<_>) =
-        rows.partition(|line| ["rr_depth", "alpha"].contains(&line.split(' ').next().unwrap_or_default()));
+    // In the default description, these keys have no value.
+    let (optional_keys, other_keys): (Vec<_>, Vec<_>) =
+        rows.partition(|line| ["rr_depth", "alpha", "denoise"].contains(&line.split(' ').next().unwrap_or_default()));
     assert_eq!(
-        (path_keys.len(), other_keys.len()),
-        (2, 10),
-        "{path_keys:?} {other_keys:?}"
+        (optional_keys.len(), other_keys.len()),
+        (3, 10),
+        "{optional_keys:?} {other_keys:?}"
     );
     let written: RenderDescription = toml::from_str(&other_keys.concat()).unwrap();
     assert_eq!(written, RenderDescription::default());
@@ -422,7 +422,7 @@ fn the_page_has_the_defaults_of_the_render_settings() {
         let text = format!("{START}[render]\nintegrator = 'path'\n{lines}");
         Scene::parse(&text, "s.toml").unwrap()
     };
-    assert_eq!(scene(&path_keys.concat()).render, scene("").render);
+    assert_eq!(scene(&optional_keys.concat()).render, scene("").render);
 }
 
 #[test]
