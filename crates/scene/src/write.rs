@@ -1,5 +1,4 @@
-//! Writes scenes as short TOML files: defaults are omitted, and file names are relative to the folder
-//! of the TOML file.
+//! Writes scenes as short TOML files, without defaults. The TOML file's folder is the base of relative file names.
 
 use std::io;
 use std::path::{Component, Path};

@@ -170,9 +170,9 @@ fn feature_variance(variance: f32) -> f32 {
     }
 }
 
-/// Corrects the estimated variances of colors. Pixels whose few samples are equal by chance get a part of the variance
-/// of the pixels around them. At edges, stratified samples have much less noise than independent samples, for which the
-/// variance is estimated; the mean squared difference of the halves is a limit there.
+/// Corrects the estimated variances of colors. The mean variance of the neighbors sets a minimum, because the few samples
+/// of a pixel may be equal by chance. At edges, the mean squared difference of the halves sets a maximum, because
+/// stratified samples have much less noise there than the independent samples that the estimate assumes.
 fn limit_variances(film: &Film, guides: &mut [[f32; PLANES]]) {
     let width = film.region.width() as usize;
     let variances: Vec<f32> = guides.iter().map(|guides| guides[COLOR_VARIANCE]).collect();
