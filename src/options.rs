@@ -39,7 +39,7 @@ impl Options {
         let Region { x0, y0, x1, y1 } = region;
         let integrator = scene.render.integrator;
         let unsupported = self.aovs.iter().find_map(|aov| {
-            let rule = aov.missing(integrator, true); // the film gets noise estimates if necessary
+            let rule = aov.missing(integrator);
             rule.map(|rule| (aov, rule))
         });
         let rule = if x0 >= x1 || y0 >= y1 {

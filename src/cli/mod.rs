@@ -26,6 +26,7 @@ mod signal;
 mod stats;
 
 use crate::scene::Note;
+use std::ffi::OsString;
 use std::io::{self, Write};
 use std::path::Path;
 use std::process::ExitCode;
@@ -170,8 +171,24 @@ fn parse() -> Result<Cli, clap::Error> {
         true => with_all_options(Cli::command()),
         false => Cli::command(),
     };
-    let matches = command.try_get_matches_from_mut(std::env::args_os())?;
+    let matches = command.try_get_matches_from_mut(arguments())?;
     Cli::from_arg_matches(&matches).map_err(|error| error.format(&mut command))
+}
+
+/// Returns the arguments of the program. Joins `--denoise off` to `--denoise=off`: the value is optional, so clap would
+/// also accept the name of a scene as the value if the two were separate.
+fn arguments() -> Vec<OsString> {
+    let mut arguments: Vec<OsString> = Vec::new();
+    for argument in std::env::args_os() {
+        match arguments.last_mut() {
+            Some(option) if option == "--denoise" && (argument == "on" || argument == "off") => {
+                option.push("=");
+                option.push(argument);
+            }
+            _ => arguments.push(argument),
+        }
+    }
+    arguments
 }
 
 /// Includes the options that `-h` hides in the help of a command and its subcommands.

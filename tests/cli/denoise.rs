@@ -43,6 +43,7 @@ fn the_option_overrides_the_scene() {
     for (name, arguments) in [
         ("raw", &["s.toml"][..]),
         ("off", &["on.toml", "--denoise=off"]),
+        ("separate", &["on.toml", "--denoise", "off"]),
         ("on", &["on.toml"]),
         ("option", &["s.toml", "--denoise=on"]),
         ("define", &["s.toml", "-D", "render.denoise=true"]),
@@ -52,10 +53,45 @@ fn the_option_overrides_the_scene() {
     }
     let pixels = |name: &str| read_png(&folder.path(name));
     assert_eq!(pixels("raw.png"), pixels("off.png"));
+    assert_eq!(pixels("raw.png"), pixels("separate.png"));
     for name in ["option.png", "define.png"] {
         assert_eq!(pixels("on.png"), pixels(name), "{name}");
     }
     assert_ne!(pixels("on.png"), pixels("off.png"));
+}
+
+#[test]
+fn a_model_is_denoised_by_default() {
+    let folder = TestFolder::with_file("m.obj", "v -1 0 1\nv 1 0 1\nv 0 1.5 0\nf 1 2 3\n");
+    let render = |arguments: &[&str]| {
+        let base = [
+            "render",
+            "m.obj",
+            "--size",
+            "24x16",
+            "--device",
+            "cpu",
+            "--reproducible",
+        ];
+        folder.run_quietly(&[&base[..], arguments].concat());
+    };
+    render(&["-o", "default.png"]);
+    render(&["--denoise", "--spp", "16", "-o", "denoised.png"]);
+    render(&["--denoise", "off", "-o", "raw.png"]);
+    let pixels = |name: &str| read_png(&folder.path(name));
+    assert_eq!(pixels("default.png"), pixels("denoised.png"));
+    assert_ne!(pixels("default.png"), pixels("raw.png"));
+}
+
+#[test]
+fn a_model_whose_film_would_need_too_much_memory_is_not_denoised_by_default() {
+    let folder = TestFolder::with_file("m.obj", "v -1 0 1\nv 1 0 1\nv 0 1.5 0\nf 1 2 3\n");
+    for (size, is_denoised) in [("4096x4096", true), ("4096x4097", false), ("65536x65536", false)] {
+        let output = format!("{size}.toml");
+        folder.run_quietly(&["convert", "m.obj", "--size", size, "-o", &output]);
+        let scene = String::from_utf8(folder.read(&output)).unwrap();
+        assert_eq!(scene.contains("denoise = true"), is_denoised, "{scene}");
+    }
 }
 
 #[test]

@@ -4,6 +4,10 @@
 use std::sync::Arc;
 
 use wgray_dev::{Command, Content, FilmLayer, Frame, View};
+use wgray_image::Region;
+use wgray_render::backend::Backend as _;
+use wgray_render::cpu::Cpu;
+use wgray_render::denoise::denoise;
 use wgray_render::film::{Film, Layer};
 
 use super::running::{Files, KERNEL, RADIANCE, SCENE, TestSession};
@@ -103,25 +107,21 @@ fn layers_equal_the_layers_of_render_and_sum_to_the_image() {
         });
         assert_eq!(session.state().compile_seconds, layer_compile_seconds.unwrap());
         session.inner.send(Command::View(View::Variance));
-        if scene == path_scene() {
-            let notice = session.wait("a notice", |session| session.state().notice.clone());
-            assert!(
-                notice.bad && notice.text == "view `variance`: needs adaptive sampling",
-                "{}",
-                notice.text
-            );
-        } else {
-            let (found, frame) = wait_layer(&session, View::Variance);
-            let expected = files.render_values(&files.packed(), &Film::variance);
-            assert_eq!(found.values.colors, expected);
-            assert!(expected.iter().any(|variance| *variance != expected[0]));
-            assert!(frame.header.legend.is_some() && frame.header.histogram.is_none());
-            assert_eq!(
-                session.state().compile_seconds,
-                layer_compile_seconds.unwrap(),
-                "the variance needed another compilation"
-            );
-        }
+        let (found, frame) = wait_layer(&session, View::Variance);
+        let is_adaptive = files.packed().sampling.adaptive;
+        let packed = match is_adaptive {
+            true => files.packed(),
+            false => files.packed().with_noise(),
+        };
+        let expected = files.render_values(&packed, &Film::variance);
+        assert_eq!(found.values.colors, expected);
+        assert!(expected.iter().any(|variance| *variance != expected[0]));
+        assert!(frame.header.legend.is_some() && frame.header.histogram.is_none());
+        assert_eq!(
+            session.state().compile_seconds == layer_compile_seconds.unwrap(),
+            is_adaptive,
+            "only a film without variances needs another kernel"
+        );
         assert_eq!(session.state().problems, []);
     }
 }
@@ -158,9 +158,8 @@ fn missing_layers_are_rejected_until_an_edit_adds_them() {
     let session = files.start();
     session.wait_for_rendered_image(&files);
     let path_views = [View::Albedo, View::Direct, View::Indirect, View::Emission];
-    let variance = (View::Variance, "needs adaptive sampling");
     let missing = path_views.map(|view| (view, "needs integrator = \"path\""));
-    assert_eq!(session.state().missing_views, [&missing[..], &[variance]].concat());
+    assert_eq!(session.state().missing_views, missing);
     session.inner.send(Command::View(View::Direct));
     let notice = session.wait("a notice", |session| session.state().notice.clone());
     assert!(
@@ -178,7 +177,7 @@ fn missing_layers_are_rejected_until_an_edit_adds_them() {
     session.inner.send(Command::View(View::Color));
     files.write("scene.toml", &path_scene());
     session.wait_for_rendered_image(&files);
-    assert_eq!(session.state().missing_views, [variance]);
+    assert_eq!(session.state().missing_views, []);
     session.inner.send(Command::View(View::Direct));
     let (before, _) = wait_layer(&session, View::Direct);
     // The layer follows edits of the scene and of shaders.
@@ -210,5 +209,51 @@ fn missing_layers_are_rejected_until_an_edit_adds_them() {
     files.write("scene.toml", SCENE);
     session.wait_for_rendered_image(&files);
     assert_eq!(session.state().view, View::Color);
-    assert_eq!(session.state().missing_views.len(), 5);
+    assert_eq!(session.state().missing_views.len(), 4);
+}
+
+/// Returns the denoised image of a scene, computed from the definition of the view.
+fn denoised_image(files: &Files) -> Vec<[f32; 3]> {
+    let packed = files.packed().with_layers().with_noise();
+    let mut cpu = Cpu::new(&packed);
+    let region = Region::whole(packed.camera.width, packed.camera.height);
+    cpu.begin(region).unwrap();
+    cpu.render(region, 0..packed.sampling.pixel_samples).unwrap();
+    let mut film = cpu.film().unwrap();
+    film.denoised = denoise(&film);
+    (0..film.sums.len()).map(|i| film.color(i)).collect()
+}
+
+#[test]
+fn the_denoised_view_shows_the_denoised_image_and_is_initial_if_the_scene_denoises() {
+    let files = Files::new(&path_scene());
+    let session = files.start();
+    session.wait_for_rendered_image(&files);
+    let shown = |view: View| {
+        session.wait("the view", |session| {
+            let frame = session.frame()?;
+            let Content::Color(pixels) = &frame.content else {
+                return None;
+            };
+            (frame.header.done && frame.header.view == view).then(|| pixels.colors.clone())
+        })
+    };
+    let raw = shown(View::Color);
+    session.inner.send(Command::View(View::Denoised));
+    let denoised = shown(View::Denoised);
+    assert_eq!(denoised, denoised_image(&files));
+    assert_ne!(denoised, raw);
+    session.inner.send(Command::View(View::Color));
+    assert_eq!(shown(View::Color), raw);
+    // The key of the scene selects the view, in a new session too.
+    files.edit("scene.toml", "[render]", "[render]\ndenoise = true");
+    assert_eq!(shown(View::Denoised), denoised);
+    let second = files.start();
+    second.wait("the denoised view", |session| {
+        let frame = session.frame()?;
+        (frame.header.done && frame.header.view == View::Denoised).then_some(())
+    });
+    files.edit("scene.toml", "denoise = true", "denoise = false");
+    assert_eq!(shown(View::Color), raw);
+    assert_eq!(session.state().problems, []);
 }

@@ -4,7 +4,7 @@
 use std::ops::Range;
 use std::time::Duration;
 
-use wgray_image::Region;
+use wgray_image::{Pixels, Region};
 use wgray_render::backend::Backend;
 use wgray_render::cpu::Cpu;
 use wgray_render::error::RenderError;
@@ -30,6 +30,8 @@ const MAX_SCALE: u32 = 32;
 /// Maximum number of displayed pixels, and maximum side length, because browsers do not show larger images.
 const MAX_PIXELS: u64 = 1 << 24;
 const MAX_SIDE: u32 = 1 << 14;
+/// Number of samples from which an unfinished image is denoised. With fewer samples, the camera is probably moving.
+const MIN_DENOISED_SAMPLES: u32 = 4;
 /// Number of first hits per dispatch.
 const HITS_PER_DISPATCH: u32 = 1 << 17;
 
@@ -342,6 +344,16 @@ impl Canvas {
             };
             return Ok((Content::Samples(counts, self.scene.sampling.pixel_samples), size));
         }
+        if view == View::Denoised && self.has_noise_estimates() {
+            let mut film = self.engine.backend().film()?;
+            film.denoised = self.engine.denoise(&film)?;
+            let pixels = Pixels {
+                width: size[0],
+                height: size[1],
+                colors: (0..film.sums.len()).map(|i| film.color(i)).collect(),
+            };
+            return Ok((Content::Color(pixels), size));
+        }
         let stage_film;
         let coarser = self.coarser.as_ref();
         // Until the stage has a result, the film of the lower resolution is shown.
@@ -370,6 +382,12 @@ impl Canvas {
             }
             None => (Content::Color(colors), size),
         })
+    }
+
+    /// Returns true if all pixels of the full-size film have enough samples to be denoised.
+    fn has_noise_estimates(&self) -> bool {
+        let (samples, total) = self.samples();
+        samples > 0 && samples >= MIN_DENOISED_SAMPLES.min(total)
     }
 
     fn hits_so_far(&self, aov: Aov) -> Content {

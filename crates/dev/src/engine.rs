@@ -1,8 +1,11 @@
 //! The device that renders a scene: an adapter with a compiled kernel, or the CPU.
 
+use glam::Vec3;
 use wgray_render::backend::Backend;
 use wgray_render::cpu::Cpu;
+use wgray_render::denoise::denoise;
 use wgray_render::error::RenderError;
+use wgray_render::film::Film;
 use wgray_render::gpu::{Dispatch, Gpu};
 use wgray_render::records::{Camera, Packed};
 
@@ -59,6 +62,14 @@ impl Engine {
         match self {
             Engine::Gpu(gpu) => gpu.set_sliders(values),
             Engine::Cpu(_) => Ok(()),
+        }
+    }
+
+    /// Denoises a film with noise estimates.
+    pub fn denoise(&self, film: &Film) -> Result<Vec<Vec3>, RenderError> {
+        match self {
+            Engine::Gpu(gpu) => gpu.denoise(film),
+            Engine::Cpu(_) => Ok(denoise(film)),
         }
     }
 

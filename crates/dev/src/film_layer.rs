@@ -1,4 +1,4 @@
-//! Film layers as images: means over the samples of a pixel, and the variance from adaptive sampling.
+//! Film layers as images: means over the samples of a pixel, and the variance of the mean.
 
 use glam::Vec3;
 use rayon::prelude::*;
@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::display_settings::DisplaySettings;
 use super::pixel_values::{bits, bytes, film_values, numbers};
 use wgray_image::{Pixels, to_8_bits};
-use wgray_render::film::{Film, Layer, variance_of_mean};
+use wgray_render::film::{Film, Layer};
 use wgray_render::output::Aov;
 
 /// A film layer, as written by `wgray render --aov`.
@@ -104,8 +104,8 @@ fn standard_error(variance: [f32; 3]) -> [f32; 3] {
 /// Returns the values of a pixel; 0 if the film does not contain the layer.
 fn value(aov: Aov, film: &Film, i: usize) -> [f32; 3] {
     match aov {
-        Aov::Variance => match film.moments.get(i).filter(|moments| moments.w >= 2.0) {
-            Some(moments) => variance_of_mean(film.sums[i], *moments).to_array(),
+        Aov::Variance => match film.moments.get(i).filter(|_| film.sample_count(i) >= 2) {
+            Some(_) => film.variance(i),
             None => [0.0; 3], // a variance needs two samples
         },
         Aov::ShadingNormal => film.layer(Layer::Normal, i),

@@ -8,6 +8,9 @@
 //!                                    └──> State, Frame, SceneView ──> server ──> page
 //! ```
 
+// The checks that the types of the server are `Send` reach the default limit in naga's types.
+#![recursion_limit = "256"]
+
 mod bad_pixels;
 mod build;
 mod camera;

@@ -45,6 +45,8 @@ pub enum View {
     Emission,
     /// The variance of a pixel's mean.
     Variance,
+    /// The denoised image.
+    Denoised,
     /// The number of samples of a pixel.
     Samples,
     /// Radiance, a second image, and their difference.
@@ -65,7 +67,7 @@ pub enum Against {
 
 impl View {
     /// The views that are layers of `wgray render --aov`.
-    pub const LAYERS: [View; 12] = [
+    pub const LAYERS: [View; 13] = [
         View::Normal,
         View::ShadingNormal,
         View::Depth,
@@ -78,6 +80,7 @@ impl View {
         View::Indirect,
         View::Emission,
         View::Variance,
+        View::Denoised,
     ];
 
     /// Returns the first-hit layer that the view shows, if any.
@@ -85,9 +88,10 @@ impl View {
         self.aov().filter(|aov| aov.source(integrator) == AovSource::FirstHit)
     }
 
-    /// Returns the film layer that the view shows, if any.
+    /// Returns the film layer that the view shows, if any. The denoised image is not a layer of the film.
     pub fn film_layer(self, integrator: Integrator) -> Option<Aov> {
-        self.aov().filter(|aov| aov.source(integrator) != AovSource::FirstHit)
+        let aov = self.aov().filter(|_| self != View::Denoised);
+        aov.filter(|aov| aov.source(integrator) != AovSource::FirstHit)
     }
 
     /// Returns the layer of `wgray render --aov` that the view shows, if any.
@@ -105,6 +109,7 @@ impl View {
             View::Indirect => Some(Aov::Indirect),
             View::Emission => Some(Aov::Emission),
             View::Variance => Some(Aov::Variance),
+            View::Denoised => Some(Aov::Denoised),
             View::Color | View::Samples | View::Compare(_) => None,
         }
     }
@@ -118,7 +123,7 @@ impl View {
 /// The values of a frame.
 #[derive(Clone, Debug)]
 pub enum Content {
-    /// [`View::Color`]: the linear colors.
+    /// [`View::Color`] and [`View::Denoised`]: the linear colors.
     Color(Pixels),
     /// [`View::Samples`]: the sample counts, and the final number of samples.
     Samples(Vec<u32>, u32),

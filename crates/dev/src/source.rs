@@ -108,17 +108,19 @@ pub struct KernelChoice {
 
 impl KernelChoice {
     pub fn of(packed: &Packed, view: View, on_cpu: bool) -> KernelChoice {
-        let integrator = packed.integrator;
-        let is_sample_layer = view
-            .aov()
-            .is_some_and(|aov| aov.source(integrator) == AovSource::Samples);
+        let (integrator, adaptive) = (packed.integrator, packed.sampling.adaptive);
+        let source = view.aov().map(|aov| aov.source(integrator));
+        let denoises = view == View::Denoised;
+        let needs_layers = denoises || source == Some(AovSource::Samples);
+        let needs_noise = denoises || (source == Some(AovSource::Statistics) && !adaptive);
         KernelChoice {
             specialization: Specialization {
-                layers: (is_sample_layer && integrator.has_layers()).into(),
+                layers: (needs_layers && integrator.has_layers()).into(),
+                noise: needs_noise.into(),
                 ..packed.specialization
             },
             integrator,
-            adaptive: packed.sampling.adaptive,
+            adaptive,
             on_cpu,
         }
     }
@@ -127,7 +129,11 @@ impl KernelChoice {
     pub fn supported_view(&self, view: View) -> View {
         match view.aov().map(|aov| aov.source(self.integrator)) {
             Some(AovSource::Samples) if self.specialization.layers == 0 => View::Color,
-            Some(AovSource::Statistics) if !self.adaptive => View::Color,
+            Some(AovSource::Statistics)
+                if self.specialization.noise == 0 && !(self.adaptive && view == View::Variance) =>
+            {
+                View::Color
+            }
             None if self.on_cpu && view.is_rendered_twice() => View::Color,
             _ => view,
         }
@@ -138,6 +144,7 @@ impl KernelChoice {
         let without_view = |kernel_choice: &KernelChoice| KernelChoice {
             specialization: Specialization {
                 layers: 0,
+                noise: 0,
                 ..kernel_choice.specialization
             },
             on_cpu: false,

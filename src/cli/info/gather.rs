@@ -10,6 +10,7 @@ use crate::scene::{
 };
 use serde::Serialize;
 use wgray_image::Region;
+use wgray_render::denoise;
 use wgray_render::job::{WorkSplit, bands};
 use wgray_render::records::Packed;
 
@@ -140,7 +141,7 @@ pub struct Memory {
     pub texels: u64,
     /// The scene in device memory; `None` for the CPU.
     pub scene_on_device: Option<u64>,
-    /// Film memory of the largest band.
+    /// Memory of the largest band, and of the whole film and the denoiser if the image is denoised.
     pub film: u64,
     pub bands: u64,
 }
@@ -174,7 +175,11 @@ impl Info {
         let full = Region::whole(scene.width, scene.height);
         let split = WorkSplit::of(packed.film_layout());
         let films: Vec<u64> = bands(full, &split, u64::MAX).map(|band| band.pixels()).collect();
-        let film = films.iter().max().unwrap_or(&0) * packed.film_layout().bytes() as u64;
+        let band = films.iter().max().unwrap_or(&0) * packed.film_layout().bytes() as u64;
+        let film = match scene.render.denoise {
+            true => denoise::memory(full, packed.film_layout()).saturating_add(band),
+            false => band,
+        };
         let kernel = kernel(packed, plan);
         Info {
             scene: path.display().to_string(),

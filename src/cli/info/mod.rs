@@ -10,11 +10,11 @@ use std::process::ExitCode;
 
 use crate::device::Device;
 use crate::device_plan::plan_device;
+use crate::options::Options;
 use crate::scene::{Define, Overrides};
 use clap::ValueHint;
 use clap::builder::NonEmptyStringValueParser;
 use wgray_image::sanitize::escape_control_in_lines;
-use wgray_render::pack::pack;
 
 use super::numbers::samples;
 use super::render::parse_size;
@@ -68,7 +68,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         ..Overrides::default()
     });
     let scene = super::load(&args.scene, &overrides)?;
-    let packed = pack(&scene);
+    let packed = Options::default().pack(&scene);
     let plan = plan_device(&packed, &Device::from(args.device.as_str()))?;
     let info = Info::of(&args.scene, &scene, &packed, &plan);
     let text = match args.json {

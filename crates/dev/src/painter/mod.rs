@@ -318,6 +318,12 @@ impl Painter {
                     (self.report)(Report::Note(note.to_string()));
                 }
                 display_changed = old.is_some_and(|old| old.scene.view != loaded.scene.view);
+                let denoised_before = old.is_some_and(|old| old.scene.render.denoise);
+                self.view = match (denoised_before, loaded.scene.render.denoise, self.view) {
+                    (false, true, View::Color) => View::Denoised,
+                    (true, false, View::Denoised) => View::Color,
+                    (.., view) => view,
+                };
                 self.loaded = Some(loaded);
                 self.state.scenes += 1;
             }

@@ -46,7 +46,11 @@ impl Painter {
         let Some(running) = &mut self.running else { return };
         let canvas = &mut running.canvas;
         let start = Instant::now();
-        let (content, sent) = match guarded(|| self.times.measure("read back", || canvas.content(view))) {
+        let stage = match view {
+            View::Denoised => "read back, denoise",
+            _ => "read back",
+        };
+        let (content, sent) = match guarded(|| self.times.measure(stage, || canvas.content(view))) {
             Ok(content) => content,
             Err(error) => return self.fail(&error),
         };
@@ -122,7 +126,10 @@ impl Painter {
                 });
             }
         }
-        if let Some(first) = self.first_frame.take_if(|_| done && view == View::Color) {
+        if let Some(first) = self
+            .first_frame
+            .take_if(|_| done && matches!(view, View::Color | View::Denoised))
+        {
             (self.report)(Report::Finished {
                 seconds: first.elapsed().as_secs_f64(),
             });

@@ -48,7 +48,7 @@ impl Painter {
     /// Returns the reason if the scene does not provide a view.
     fn missing(&self, view: View) -> Option<&'static str> {
         let packed = &self.loaded.as_ref()?.packed;
-        view.aov()?.missing(packed.integrator, packed.sampling.adaptive)
+        view.aov()?.missing(packed.integrator)
     }
 
     /// Returns the views that the scene does not provide, and the reasons.

@@ -28,6 +28,11 @@ pub fn denoise(film: &Film) -> Vec<Vec3> {
     guides.colors(film, &filter::filter(&guides))
 }
 
+/// Returns the bytes of memory for a film and for the denoiser.
+pub fn memory(region: Region, film_layout: FilmLayout) -> u64 {
+    region.pixels().saturating_mul(film_layout.bytes() as u64 + GUIDE_BYTES)
+}
+
 /// Joins the bands that `render` produces, since the denoiser needs the whole film. Also returns the first hits.
 ///
 /// # Errors
@@ -38,7 +43,7 @@ pub fn collect(
     film_layout: FilmLayout,
     render: &mut dyn FnMut(&mut Sink) -> Result<(), RenderError>,
 ) -> Result<(Film, Vec<FirstHit>), RenderError> {
-    check_memory(region.pixels().saturating_mul(film_layout.bytes() as u64 + GUIDE_BYTES))?;
+    check_memory(memory(region, film_layout))?;
     let mut film = Film::of(region, film_layout);
     let mut hits = Vec::new();
     render(&mut |band| {

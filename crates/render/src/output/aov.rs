@@ -159,11 +159,9 @@ impl Aov {
         }
     }
 
-    /// Returns the reason why renders with these settings lack the variable; `None` if the renders have the variable.
-    /// `has_statistics` is true if sampling is adaptive or the film has noise estimates.
-    pub fn missing(self, integrator: Integrator, has_statistics: bool) -> Option<&'static str> {
+    /// Returns the reason why renders with the integrator cannot have the variable; `None` if they can.
+    pub fn missing(self, integrator: Integrator) -> Option<&'static str> {
         match self.source(integrator) {
-            AovSource::Statistics if !has_statistics => Some("needs adaptive sampling"),
             AovSource::Samples if !integrator.has_layers() => Some("needs integrator = \"path\""),
             _ => None,
         }

@@ -20,8 +20,11 @@ use crate::{
 
 /// Default length of the longer side of the image in pixels.
 pub(super) const SIDE: u32 = 720;
-/// Default number of samples per pixel.
-const SAMPLES: u32 = 32;
+/// Default number of samples per pixel; the image is denoised.
+const SAMPLES: u32 = 16;
+/// Largest number of pixels of an image that is denoised by default, because the denoiser needs the whole film in
+/// memory.
+const MAX_DENOISED_PIXELS: u64 = 1 << 24;
 /// Radiance of the background: middle gray.
 const BACKGROUND: DVec3 = DVec3::splat(0.18);
 
@@ -159,6 +162,7 @@ pub(super) fn scene(
         .with_render(RenderDescription {
             integrator: Some(Integrator::Path),
             pixel_samples: SamplesDescription::new(SAMPLES),
+            denoise: (u64::from(width) * u64::from(height) <= MAX_DENOISED_PIXELS).then_some(true),
             ..RenderDescription::default()
         })
         .with_shape(shape);
