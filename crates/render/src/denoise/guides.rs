@@ -5,6 +5,7 @@ use std::ops::Range;
 use glam::Vec3;
 use rayon::prelude::*;
 
+use super::coverage::{Coverage, around, colors_of, coverages, surface_variance, window};
 use crate::film::{Film, Half, Layer, mean};
 use crate::records::{
     DENOISE_PATCH_RADIUS, DENOISE_RADIUS, GUIDE_ALBEDO, GUIDE_COLOR, GUIDE_COLOR_VARIANCE, GUIDE_DEPTH, GUIDE_NORMAL,
@@ -31,8 +32,6 @@ const EDGE_VARIANCE: f32 = 1e-4;
 const MIN_RELATIVE_VARIANCE: f32 = 0.25;
 /// Radius of the mean of squared half differences.
 const HALF_RADIUS: usize = 4;
-/// Larger components of colors are treated like infinity, because their squares would overflow.
-const MAX_COLOR: f32 = 1e15;
 /// Depth of pixels that are not averaged with any other pixel.
 const EXCLUDED_DEPTH: f32 = 1e15;
 
@@ -54,6 +53,7 @@ pub struct Guides {
     pub height: usize,
     /// Floats per row of a plane.
     pub stride: usize,
+    coverages: Vec<Coverage>,
     planes: Vec<Vec<f32>>,
 }
 
@@ -64,11 +64,14 @@ impl Guides {
     /// Returns the guides of a film with noise estimates.
     pub fn of(film: &Film) -> Guides {
         let (width, height) = (film.region.width() as usize, film.region.height() as usize);
-        let mut values: Vec<[f32; PLANES]> = (0..width * height)
-            .into_par_iter()
-            .map(|i| guides_of(film, i))
+        let coverages = coverages(film);
+        let mut values: Vec<[f32; PLANES]> = coverages
+            .par_iter()
+            .enumerate()
+            .map(|(i, coverage)| guides_of(film, i, *coverage))
             .collect();
-        limit_variances(film, &mut values);
+        limit_variances(film, &coverages, &mut values);
+        extend_surfaces(width, &coverages, &mut values);
         let stride = width + 2 * MARGIN;
         let plane = |k: usize| {
             let mut plane = Vec::with_capacity(stride * (height + 2 * MARGIN));
@@ -82,6 +85,7 @@ impl Guides {
             width,
             height,
             stride,
+            coverages,
             planes: (0..PLANES).into_par_iter().map(plane).collect(),
         }
     }
@@ -101,11 +105,14 @@ impl Guides {
             .collect()
     }
 
-    /// Multiplies filtered colors by the albedo.
+    /// Multiplies filtered colors by the albedo, and adds the light that was not filtered.
     pub fn colors(&self, film: &Film, filtered: &[Vec3]) -> Vec<Vec3> {
-        let color = |(i, filtered): (usize, &Vec3)| match usable_color(film, i) {
-            Some(_) => *filtered * divisor(film, i),
-            None => Vec3::from(mean(film.sums[i])),
+        let color = |(i, filtered): (usize, &Vec3)| match self.coverages[i] {
+            Coverage::Excluded | Coverage::Background => Vec3::from(mean(film.sums[i])),
+            Coverage::Full => *filtered * divisor(film, i, 1.0),
+            Coverage::Partial(fraction) => {
+                Vec3::from(film.layer(Layer::Emission, i)) + *filtered * (fraction * divisor(film, i, fraction))
+            }
         };
         filtered.iter().enumerate().map(color).collect()
     }
@@ -121,27 +128,48 @@ fn padded(size: usize) -> impl Iterator<Item = usize> {
     })
 }
 
-/// Returns a pixel's color, if the denoiser can average it.
-fn usable_color(film: &Film, i: usize) -> Option<Vec3> {
-    let color = Vec3::from(mean(film.sums[i]));
-    (film.sums[i].w != 0.0 && color.abs().cmple(Vec3::splat(MAX_COLOR)).all()).then_some(color)
-}
-
-/// Returns the albedo by which a pixel's color is divided.
-fn divisor(film: &Film, i: usize) -> Vec3 {
-    Vec3::from(film.layer(Layer::Albedo, i)).max(Vec3::ZERO) + ALBEDO_OFFSET
-}
-
-fn guides_of(film: &Film, i: usize) -> [f32; PLANES] {
-    let mut guides = [0.0; PLANES];
-    let Some(color) = usable_color(film, i) else {
-        guides[DEPTH] = EXCLUDED_DEPTH;
-        guides[DEPTH + 2] = 1.0 / EXCLUDED_DEPTH;
-        return guides;
+/// Continues the colors of surfaces into the background by the radius of a patch, so that the patches of pixels at the
+/// edge of a surface are similar to those inside.
+fn extend_surfaces(width: usize, coverages: &[Coverage], guides: &mut [[f32; PLANES]]) {
+    const VALUES: usize = COLOR_VARIANCE - COLOR + 1;
+    let extended = |i: usize| {
+        let around = window(i, width, coverages.len(), DENOISE_PATCH_RADIUS as usize);
+        let surfaces = around.filter(|j| matches!(coverages[*j], Coverage::Full | Coverage::Partial(_)));
+        let (sum, count) = surfaces.fold(([0.0; VALUES], 0.0), |(sum, count), j| {
+            (std::array::from_fn(|k| sum[k] + guides[j][COLOR + k]), count + 1.0)
+        });
+        (count > 0.0).then(|| (i, sum.map(|value: f32| value / count)))
     };
+    let background = (0..coverages.len()).into_par_iter();
+    let background = background.filter(|i| coverages[*i] == Coverage::Background);
+    let extensions: Vec<(usize, [f32; VALUES])> = background.filter_map(extended).collect();
+    for (i, values) in extensions {
+        guides[i][COLOR..COLOR + VALUES].copy_from_slice(&values);
+    }
+}
+
+/// Returns the albedo of the surfaces in a pixel, by which their color is divided. `fraction` is the covered part.
+fn divisor(film: &Film, i: usize, fraction: f32) -> Vec3 {
+    (Vec3::from(film.layer(Layer::Albedo, i)) / fraction).max(Vec3::ZERO) + ALBEDO_OFFSET
+}
+
+fn guides_of(film: &Film, i: usize, coverage: Coverage) -> [f32; PLANES] {
+    let mut guides = [0.0; PLANES];
+    let fraction = match coverage {
+        Coverage::Full => 1.0,
+        Coverage::Partial(fraction) => fraction,
+        Coverage::Excluded | Coverage::Background => {
+            guides[DEPTH] = EXCLUDED_DEPTH;
+            guides[DEPTH + 2] = 1.0 / EXCLUDED_DEPTH;
+            return guides;
+        }
+    };
+    let samples = film.sample_count(i) as f32;
+    let of_surfaces = |mean: Vec3, variance: Vec3| surface_variance(mean, variance, samples, fraction);
     let mut set = |first: usize, values: &[f32]| guides[first..first + values.len()].copy_from_slice(values);
-    let divisor = divisor(film, i);
-    let variance = Vec3::from(film.variance(i));
+    let divisor = divisor(film, i, fraction);
+    let (color, behind) = colors_of(film, i, fraction);
+    let variance = of_surfaces(color - behind, Vec3::from(film.variance(i)));
     // The variance of a single sample is unknown; a standard error of 100 % is assumed.
     let variance = if variance.is_finite() { variance } else { color * color };
     set(COLOR, &(color / divisor).to_array());
@@ -150,11 +178,14 @@ fn guides_of(film: &Film, i: usize) -> [f32; PLANES] {
         let normal = (NORMAL, Layer::Normal, film.normal_variance(i), NORMAL_TOLERANCE);
         let albedo = (ALBEDO, Layer::Albedo, film.albedo_variance(i), ALBEDO_TOLERANCE);
         for (first, layer, variance, tolerance) in [normal, albedo] {
-            let variance = feature_variance(Vec3::from(variance).element_sum());
-            set(first, &film.layer(layer, i));
+            let value = Vec3::from(film.layer(layer, i)) / fraction;
+            let variance = feature_variance(of_surfaces(value, Vec3::from(variance)).element_sum());
+            set(first, &value.to_array());
             set(first + 3, &[variance, 1.0 / variance.max(tolerance)]);
         }
-        let (depth, variance) = (film.depth(i), feature_variance(film.depth_variance(i)));
+        let depth = film.depth(i) / fraction;
+        let variance = of_surfaces(Vec3::splat(depth), Vec3::splat(film.depth_variance(i)));
+        let variance = feature_variance(variance.x);
         let tolerance = variance.max(DEPTH_TOLERANCE * depth * depth);
         set(DEPTH, &[depth, variance, 1.0 / tolerance.max(f32::MIN_POSITIVE)]);
     }
@@ -173,12 +204,16 @@ fn feature_variance(variance: f32) -> f32 {
 /// Corrects the estimated variances of colors. The mean variance of the neighbors sets a minimum, because the few samples
 /// of a pixel may be equal by chance. At edges, the mean squared difference of the halves sets a maximum, because
 /// stratified samples have much less noise there than the independent samples that the estimate assumes.
-fn limit_variances(film: &Film, guides: &mut [[f32; PLANES]]) {
+fn limit_variances(film: &Film, coverages: &[Coverage], guides: &mut [[f32; PLANES]]) {
     let width = film.region.width() as usize;
     let variances: Vec<f32> = guides.iter().map(|guides| guides[COLOR_VARIANCE]).collect();
     let half_variances: Vec<f32> = (0..guides.len())
         .into_par_iter()
-        .map(|i| half_variance(film, i))
+        .map(|i| match coverages[i] {
+            Coverage::Full => half_variance(film, i),
+            Coverage::Partial(_) => variances[i],
+            Coverage::Excluded | Coverage::Background => 0.0,
+        })
         .collect();
     let (local, limits) = (
         box_means(&variances, width, 1),
@@ -197,11 +232,8 @@ fn limit_variances(film: &Film, guides: &mut [[f32; PLANES]]) {
 
 /// Returns the variance of a pixel's color, divided by the albedo, that the difference of the halves suggests.
 fn half_variance(film: &Film, i: usize) -> f32 {
-    if usable_color(film, i).is_none() {
-        return 0.0;
-    }
     let [even, odd] = [Half::Even, Half::Odd].map(|half| Vec3::from(film.half_mean(half, i)));
-    let difference = (even - odd) * 0.5 / divisor(film, i);
+    let difference = (even - odd) * 0.5 / divisor(film, i, 1.0);
     let variance = difference.length_squared();
     if variance.is_finite() { variance } else { 0.0 }
 }
@@ -209,14 +241,16 @@ fn half_variance(film: &Film, i: usize) -> f32 {
 /// Returns the means of squares of 2 * `radius` + 1 pixels, clipped to the image.
 fn box_means(values: &[f32], width: usize, radius: usize) -> Vec<f32> {
     let height = values.len() / width.max(1);
-    let window = |i: usize, size: usize| i.saturating_sub(radius)..(i + radius + 1).min(size);
     let row_sum = |i: usize| {
         let row = i - i % width;
-        window(i % width, width).map(|x| values[row + x]).sum()
+        around(i % width, width, radius).map(|x| values[row + x]).sum()
     };
     let row_sums: Vec<f32> = (0..values.len()).into_par_iter().map(row_sum).collect();
     let mean = |i: usize| {
-        let (rows, columns) = (window(i / width, height), window(i % width, width).len());
+        let (rows, columns) = (
+            around(i / width, height, radius),
+            around(i % width, width, radius).len(),
+        );
         let count = (rows.len() * columns) as f32;
         rows.map(|y| row_sums[y * width + i % width]).sum::<f32>() / count
     };

@@ -5,6 +5,7 @@
 //!
 //! [`denoise`] has the bits of `shaders/kernels/denoise.wgsl`.
 
+mod coverage;
 mod filter;
 mod guides;
 #[cfg(test)]
