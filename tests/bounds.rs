@@ -10,7 +10,7 @@ use crate::sources::{parse, shared_source};
 struct Bound {
     function: &'static str,
     unit: &'static str,
-    /// The bound documented at the WGSL function and in `docs/agreement.md`.
+    /// The bound documented at the WGSL function and in `docs/decisions/exact-arithmetic.md`.
     max_error: f64,
     arguments: fn(&Random) -> Vec<f32>,
     /// Returns the error of a result in `unit`.

@@ -43,7 +43,7 @@ const DEPTH: usize = GUIDE_DEPTH as usize;
 const PLANES: usize = GUIDE_PLANES as usize;
 
 /// Bytes per pixel of the guides, while they are computed.
-pub const GUIDE_BYTES: u64 = 2 * (PLANES * size_of::<f32>()) as u64;
+pub const GUIDE_BYTES: u64 = (2 * PLANES * size_of::<f32>() + size_of::<Coverage>()) as u64;
 
 /// Planes of floats, each with a margin that mirrors the image.
 pub struct Guides {
