@@ -76,7 +76,7 @@ fn a_model_is_denoised_by_default() {
         folder.run_quietly(&[&base[..], arguments].concat());
     };
     render(&["-o", "default.png"]);
-    render(&["--denoise", "--spp", "16", "-o", "denoised.png"]);
+    render(&["--denoise", "--spp", "32", "-o", "denoised.png"]);
     render(&["--denoise", "off", "-o", "raw.png"]);
     let pixels = |name: &str| read_png(&folder.path(name));
     assert_eq!(pixels("default.png"), pixels("denoised.png"));

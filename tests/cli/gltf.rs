@@ -58,7 +58,7 @@ fn a_model_renders_without_a_scene() {
     let result = folder.run(&["check", "box.glb", "box.gltf"]);
     assert_eq!((result.code, result.stderr.as_str()), (0, ""));
     for line in result.stdout.lines() {
-        assert!(line.contains(": ok: 720 x 720 pixels, 16 samples per pixel"), "{line}");
+        assert!(line.contains(": ok: 720 x 720 pixels, 32 samples per pixel"), "{line}");
         assert!(
             line.contains("2 shapes, including 2 instances of 2 meshes (24 triangles"),
             "{line}"

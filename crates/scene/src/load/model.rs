@@ -21,7 +21,7 @@ use crate::{
 /// Default length of the longer side of the image in pixels.
 pub(super) const SIDE: u32 = 720;
 /// Default number of samples per pixel; the image is denoised.
-const SAMPLES: u32 = 16;
+const SAMPLES: u32 = 32;
 /// Largest number of pixels of an image that is denoised by default, because the denoiser needs the whole film in
 /// memory.
 const MAX_DENOISED_PIXELS: u64 = 1 << 24;
