@@ -3,6 +3,7 @@
 use glam::{Vec2, Vec3};
 
 use super::ggx::{ggx_albedo_along, ggx_d, ggx_length};
+use super::lanes::{Real, Vector3, constant};
 use super::math::{atan2, cross, dot, max, min, normalize, sine};
 use super::primitive::Tangents;
 use super::surface::Surface;
@@ -10,11 +11,11 @@ use super::warp::frame_around;
 use crate::records::{Material, SMALLEST_ALPHA};
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LobeSample {
-    pub wi: Vec3,
-    pub weight: Vec3,
-    pub pdf: f32,
-    pub eta: f32,
+pub struct LobeSample<F: Real = f32> {
+    pub wi: F::Vec3,
+    pub weight: F::Vec3,
+    pub pdf: F,
+    pub eta: F,
 }
 
 pub fn plain_alpha(material: &Material) -> Vec2 {
@@ -58,38 +59,42 @@ pub fn direction_turn(color: Vec3) -> f32 {
     atan2(2.0 * color.y - 1.0, 2.0 * color.x - 1.0) * std::f32::consts::FRAC_1_PI
 }
 
-pub fn vector_to_lobe(frame: Tangents, n: Vec3, w: Vec3) -> Vec3 {
-    Vec3::new(dot(frame.u, w), dot(frame.v, w), dot(n, w))
+#[inline(always)]
+pub fn vector_to_lobe<V: Vector3>(frame: Tangents<V>, n: V, w: V) -> V {
+    V::new(dot(frame.u, w), dot(frame.v, w), dot(n, w))
 }
 
-pub fn vector_from_lobe(frame: Tangents, n: Vec3, w: Vec3) -> Vec3 {
-    frame.u * w.x + frame.v * w.y + n * w.z
+#[inline(always)]
+pub fn vector_from_lobe<V: Vector3>(frame: Tangents<V>, n: V, w: V) -> V {
+    frame.u * w.x() + frame.v * w.y() + n * w.z()
 }
 
-pub fn half_vector(wo: Vec3, wi: Vec3) -> Vec3 {
+#[inline(always)]
+pub fn half_vector<V: Vector3>(wo: V, wi: V) -> V {
     let sum = wo + wi;
     let length2 = dot(sum, sum);
-    if length2 > 1e-20 {
-        sum * (1.0 / length2.sqrt())
-    } else {
-        Vec3::Z
-    }
+    let unit = sum * (constant(1.0) / length2.sqrt());
+    V::select(sum.broadcast(Vec3::Z), unit, length2.gt(length2.splat(1e-20)))
 }
 
-pub fn facet_eval(alpha: Vec2, wo: Vec3, wi: Vec3) -> f32 {
-    let o = wo.z.abs();
-    let i = wi.z.abs();
-    let masking = 0.5 * i / max(o * ggx_length(alpha, wi) + i * ggx_length(alpha, wo), 1e-30);
+#[inline(always)]
+pub fn facet_eval<V: Vector3>(alpha: <V::Real as Real>::Vec2, wo: V, wi: V) -> V::Real {
+    let o = wo.z().abs();
+    let i = wi.z().abs();
+    let masking = constant(0.5) * i / max(o * ggx_length(alpha, wi) + i * ggx_length(alpha, wo), o.splat(1e-30));
     ggx_d(alpha, half_vector(wo, wi)) * masking
 }
 
-pub fn facet_pdf(alpha: Vec2, wo: Vec3, wi: Vec3) -> f32 {
-    ggx_d(alpha, half_vector(wo, wi)) * 0.5 / max(wo.z + ggx_length(alpha, wo), 1e-30)
+#[inline(always)]
+pub fn facet_pdf<V: Vector3>(alpha: <V::Real as Real>::Vec2, wo: V, wi: V) -> V::Real {
+    let length = ggx_length(alpha, wo);
+    ggx_d(alpha, half_vector(wo, wi)) * 0.5 / max(wo.z() + length, length.splat(1e-30))
 }
 
-pub fn facet_weight(alpha: Vec2, wo: Vec3, wi: Vec3) -> f32 {
+#[inline(always)]
+pub fn facet_weight<V: Vector3>(alpha: <V::Real as Real>::Vec2, wo: V, wi: V) -> V::Real {
     let length = ggx_length(alpha, wo);
-    wi.z * (wo.z + length) / max(wo.z * ggx_length(alpha, wi) + wi.z * length, 1e-30)
+    wi.z() * (wo.z() + length) / max(wo.z() * ggx_length(alpha, wi) + wi.z() * length, length.splat(1e-30))
 }
 
 pub fn aniso_table_position(alpha: Vec2, w: Vec3) -> Vec2 {
