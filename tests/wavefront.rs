@@ -11,8 +11,8 @@ use wgray_render::cpu::integrators::path::{path_layers, path_value};
 use wgray_render::cpu::pixel::{Layers, pixel_radiance};
 use wgray_render::cpu::wavefront::{BatchMeshes, LaneHits, MaterialKind, SurfaceKind, Wavefront};
 use wgray_render::records::{
-    DIFFUSE, EMITTER, LOBE_ANISOTROPY, LOBE_COAT, LOBE_SHEEN, LOBE_SPECULAR, Material, NO_COLORS, OPAQUE, PRINCIPLED,
-    Packed, RANDOM, SOBOL,
+    DIFFUSE, EMITTER, LOBE_ANISOTROPY, LOBE_COAT, LOBE_SHEEN, LOBE_SPECULAR, METAL, Material, NO_COLORS, NO_INDEX,
+    OPAQUE, PRINCIPLED, Packed, RANDOM, SOBOL,
 };
 
 use crate::random_scenes::any_scene;
@@ -79,11 +79,10 @@ fn count_differing(paths: &[PathBits], expected: &[PathBits]) -> usize {
     paths.iter().zip(expected).filter(|(a, b)| a != b).count()
 }
 
-/// Makes most materials diffuse or `principled`, so that their hits are shaded in lanes. Half of these materials get no
+/// Makes most materials diffuse, `principled` or metal, so that their hits are shaded in lanes. Half of these materials get no
 /// emission, and two thirds get no textures. The maximum number of bounces is at least 3. A third of the scenes get a
 /// pinhole camera with Sobol' points.
 fn with_lane_materials(mut packed: Packed, scene_index: usize, kind: MaterialKind) -> Packed {
-    packed.specialization.absorption = 0;
     packed.specialization.bounces = packed.specialization.bounces.max(3);
     if scene_index.is_multiple_of(3) {
         let s = &mut packed.specialization;
@@ -101,6 +100,7 @@ fn with_lane_materials(mut packed: Packed, scene_index: usize, kind: MaterialKin
                 material.roughness = 0.0;
             }
             MaterialKind::Principled => make_principled(material, scene_index + i),
+            MaterialKind::Metal => make_metal(material, scene_index + i),
         }
         material.alpha_mode = OPAQUE;
         if i % 2 == 0 {
@@ -111,14 +111,14 @@ fn with_lane_materials(mut packed: Packed, scene_index: usize, kind: MaterialKin
             material.vertex_colors = NO_COLORS;
         }
     }
+    let s = &mut packed.specialization;
+    s.materials |= 1 << PRINCIPLED | 1 << METAL;
     if kind == MaterialKind::Principled {
-        let s = &mut packed.specialization;
-        s.materials |= 1 << PRINCIPLED;
         s.lobes |= LOBE_SPECULAR | [LOBE_COAT, LOBE_SHEEN, LOBE_COAT | LOBE_SHEEN, 0][scene_index % 4];
-        if scene_index % 5 == 0 {
-            s.lobes |= LOBE_ANISOTROPY;
-            s.anisotropic = 1;
-        }
+        s.lobes |= if scene_index % 5 == 0 { LOBE_ANISOTROPY } else { 0 };
+    }
+    if kind != MaterialKind::Diffuse && scene_index % 5 == 0 {
+        s.anisotropic = 1;
     }
     packed
 }
@@ -136,7 +136,21 @@ fn make_principled(material: &mut Material, variant: usize) {
     (material.transmission, material.aniso_table) = (0.0, 0);
 }
 
-const MATERIALS: [MaterialKind; 2] = [MaterialKind::Diffuse, MaterialKind::Principled];
+/// Makes a material a rough conductor. `variant` selects the parameters.
+fn make_metal(material: &mut Material, variant: usize) {
+    material.kind = METAL;
+    material.tint = Vec3::new(0.9, 0.6, 0.3);
+    (material.eta, material.k) = match variant % 2 {
+        0 => (Vec3::ZERO, Vec3::ZERO),
+        _ => (Vec3::new(0.2, 0.4, 1.4), Vec3::new(3.9, 2.4, 1.6)),
+    };
+    material.roughness = [0.05, 0.3, 0.6, 1.0][variant % 4];
+    material.anisotropy = if variant.is_multiple_of(3) { 0.7 } else { 0.0 };
+    material.aniso_table = 0;
+    material.energy = if variant.is_multiple_of(5) { NO_INDEX } else { 0 };
+}
+
+const MATERIALS: [MaterialKind; 3] = [MaterialKind::Diffuse, MaterialKind::Principled, MaterialKind::Metal];
 const SURFACES: [SurfaceKind; 3] = [SurfaceKind::Flat, SurfaceKind::Face, SurfaceKind::Evaluated];
 
 /// For each feature, the number of scenes with this feature in which hits are shaded in lanes.
@@ -144,10 +158,12 @@ const SURFACES: [SurfaceKind; 3] = [SurfaceKind::Flat, SurfaceKind::Face, Surfac
 struct LaneCoverage {
     camera: usize,
     /// Scenes with hits on each kind of material (rows) and surface.
-    kinds: [[usize; 3]; 2],
+    kinds: [[usize; 3]; 3],
     coat: usize,
     sheen: usize,
     anisotropy: usize,
+    absorption: usize,
+    emission: usize,
     without_lights: usize,
     one_emitter: usize,
     several_emitters: usize,
@@ -182,6 +198,8 @@ impl LaneCoverage {
             (&mut self.coat, is_principled && s.lobes & LOBE_COAT != 0),
             (&mut self.sheen, is_principled && s.lobes & LOBE_SHEEN != 0),
             (&mut self.anisotropy, is_principled && s.lobes & LOBE_ANISOTROPY != 0),
+            (&mut self.absorption, s.absorption != 0),
+            (&mut self.emission, s.emissive != 0),
             (&mut self.without_lights, s.emitters == 0),
             (&mut self.one_emitter, s.emitters == 1),
             (&mut self.several_emitters, s.emitters > 1 && s.light_tree == 0),
@@ -204,6 +222,8 @@ impl LaneCoverage {
             coat,
             sheen,
             anisotropy,
+            absorption,
+            emission,
             without_lights,
             one_emitter,
             several_emitters,
@@ -220,6 +240,8 @@ impl LaneCoverage {
             coat,
             sheen,
             anisotropy,
+            absorption,
+            emission,
             one_emitter,
             several_emitters,
             light_tree,
@@ -316,8 +338,8 @@ fn random_scenes_have_the_paths_of_the_scalar_integrator() {
         let packed = if i % 2 == 0 { packed.with_layers() } else { packed };
         let packed = if i % 3 == 0 { packed.with_noise() } else { packed }; // layers then contain the depth
         let batch_size = [1, 7, 64, 1024][i % 4];
-        let [diffuse, principled] = MATERIALS.map(|kind| with_lane_materials(packed.clone(), i, kind));
-        for (packed, step) in [(&packed, 2), (&diffuse, 3), (&principled, 3)] {
+        let [diffuse, principled, metal] = MATERIALS.map(|kind| with_lane_materials(packed.clone(), i, kind));
+        for (packed, step) in [(&packed, 2), (&diffuse, 3), (&principled, 3), (&metal, 3)] {
             let samples = samples(packed, step, 3);
             let (paths, lane_hits) = wavefront_with(BatchMeshes::new(packed), packed, &samples, batch_size);
             let differing = count_differing(&paths, &scalar(packed, &samples));

@@ -3,7 +3,7 @@
 use glam::{Vec2, Vec3};
 
 use super::ggx::{ggx_albedo_along, ggx_d, ggx_length};
-use super::lanes::{Real, Vector3, constant};
+use super::lanes::{MaterialFields, Real, Vector2, Vector3, constant};
 use super::math::{atan2, cross, dot, max, min, normalize, sine};
 use super::primitive::Tangents;
 use super::surface::Surface;
@@ -18,19 +18,23 @@ pub struct LobeSample<F: Real = f32> {
     pub eta: F,
 }
 
-pub fn plain_alpha(material: &Material) -> Vec2 {
-    let alpha_v = material.roughness * material.roughness;
-    let alpha_u = alpha_v + (1.0 - alpha_v) * (material.anisotropy * material.anisotropy);
-    Vec2::new(alpha_u, alpha_v)
+#[inline(always)]
+pub fn plain_alpha<F: Real, M: MaterialFields<Real = F>>(material: &M) -> F::Vec2 {
+    let (roughness, anisotropy) = (material.roughness(), material.anisotropy());
+    let alpha_v = roughness * roughness;
+    let alpha_u = alpha_v + (constant(1.0) - alpha_v) * (anisotropy * anisotropy);
+    Vector2::new(alpha_u, alpha_v)
 }
 
 pub fn is_polished(material: &Material) -> bool {
     plain_alpha(material).x < SMALLEST_ALPHA
 }
 
-pub fn facet_alpha(material: &Material) -> Vec2 {
+#[inline(always)]
+pub fn facet_alpha<F: Real, M: MaterialFields<Real = F>>(material: &M) -> F::Vec2 {
     let alpha = plain_alpha(material);
-    Vec2::new(max(alpha.x, SMALLEST_ALPHA), max(alpha.y, SMALLEST_ALPHA))
+    let smallest = alpha.x().splat(SMALLEST_ALPHA);
+    Vector2::new(max(alpha.x(), smallest), max(alpha.y(), smallest))
 }
 
 pub fn lobe_frame(surface: &Surface, rotation: f32) -> Tangents {
@@ -108,7 +112,9 @@ pub fn aniso_table_position(alpha: Vec2, w: Vec3) -> Vec2 {
     Vec2::new(line, 0.5 * (cosine + cosine * (1.0 + half_way) / (cosine + half_way)))
 }
 
-pub fn facet_loss(alpha: Vec2, wo: Vec3) -> f32 {
+#[inline(always)]
+pub fn facet_loss<V: Vector3>(alpha: <V::Real as Real>::Vec2, wo: V) -> V::Real {
     let albedo = ggx_albedo_along(alpha, wo);
-    max(1.0 / (albedo.x + albedo.y) - 1.005, 0.0)
+    let excess = constant(1.0) / (albedo.x() + albedo.y()) - 1.005;
+    max(excess, excess.splat(0.0))
 }

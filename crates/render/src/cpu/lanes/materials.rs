@@ -4,8 +4,8 @@ use fearless_simd::prelude::*;
 use fearless_simd::{f32x8, mask32x8};
 use glam::Vec3;
 
-use super::{Lanes3, Real, Vector3};
-use crate::records::Material;
+use super::{Lanes3, Real, Vector3, select};
+use crate::records::{Material, NO_INDEX};
 
 macro_rules! material_fields {
     (reals: $($real:ident)*; vectors: $($vector:ident)*;) => {
@@ -53,6 +53,8 @@ macro_rules! material_fields {
             is_thin: [f32; 8],
             /// 1 with an anisotropic albedo table, else 0.
             has_aniso_table: [f32; 8],
+            /// 1 with multiple-scattering compensation that depends on the directions, else 0.
+            has_energy: [f32; 8],
         }
 
         impl MaterialRows {
@@ -67,6 +69,23 @@ macro_rules! material_fields {
                 })*
                 self.is_thin[lane] = if material.is_thin() { 1.0 } else { 0.0 };
                 self.has_aniso_table[lane] = if material.has_aniso_table() { 1.0 } else { 0.0 };
+                self.has_energy[lane] = if material.energy != NO_INDEX { 1.0 } else { 0.0 };
+            }
+
+            /// Sets the color of a diffuse material. Its other parameters have no effect.
+            #[inline(always)]
+            pub fn set_diffuse(&mut self, lane: usize, color: Vec3) {
+                self.diffuse[0][lane] = color.x;
+                self.diffuse[1][lane] = color.y;
+                self.diffuse[2][lane] = color.z;
+            }
+
+            /// Sets the losses of the materials with compensation.
+            #[inline(always)]
+            pub fn set_loss<S: Simd>(&mut self, loss: f32x8<S>) {
+                let has_energy = f32x8::simd_from(loss.simd, self.has_energy);
+                let before = f32x8::simd_from(loss.simd, self.loss);
+                self.loss = select(before, loss, has_energy.gt(Real::splat(loss, 0.0))).into();
             }
         }
 

@@ -7,9 +7,12 @@ use super::*;
 use crate::cpu::diffuse::{angles_at, diffuse_pdf, diffuse_sample};
 use crate::cpu::ggx::{ggx_albedo, ggx_albedo_along, ggx_d, ggx_g1, ggx_g2, ggx_length, ggx_pdf, ggx_sample};
 use crate::cpu::light_sample::{power_heuristic, solid_angle_pdf};
-use crate::cpu::lobe::{facet_eval, facet_pdf, facet_weight, half_vector, vector_from_lobe, vector_to_lobe};
+use crate::cpu::lobe::{
+    facet_alpha, facet_eval, facet_loss, facet_pdf, facet_weight, half_vector, vector_from_lobe, vector_to_lobe,
+};
 use crate::cpu::math::{cross, dot, max, min, normalize, power};
 use crate::cpu::mesh::{flipped_to, lift};
+use crate::cpu::metal::{conductor_fresnel, metal_eval, metal_fresnel, metal_pdf, metal_sample};
 use crate::cpu::path::usable_normal;
 use crate::cpu::principled::{
     PrincipledLobes, evaluated_sample, glass_eval, glass_pdf, mirrored_pdf, principled_direction, principled_eval,
@@ -168,6 +171,9 @@ fn append_facet_results<F: Real>(n: [F; 9], u: F::Vec2, mut append: impl FnMut(&
         ("mirrored_pdf", mirrored_pdf(alpha, wo, normal)),
         ("refracting_density", refracting_density(wo, wi, normal, n[0])),
         ("sheen_albedo", sheen_albedo(n[0], n[1])),
+        ("conductor_fresnel", conductor_fresnel(n[0], n[1], n[2])),
+        ("metal_pdf", metal_pdf(&parameters, wo, wi)),
+        ("facet_loss", facet_loss(alpha, wo)),
         ("power", power(n[0], n[1])),
         ("fresnel", fresnel(n[0], n[1], n[2])),
         ("refracted_cosine", refracted_cosine(n[0], n[1])),
@@ -177,10 +183,13 @@ fn append_facet_results<F: Real>(n: [F; 9], u: F::Vec2, mut append: impl FnMut(&
     for (name, v) in [
         ("ggx_albedo", ggx_albedo(n[0], n[1])),
         ("ggx_albedo_along", ggx_albedo_along(alpha, wo)),
+        ("facet_alpha", facet_alpha(&parameters)),
     ] {
         append(name, &[v.x(), v.y()]);
     }
     let frame = frame_around(normal);
+    let metal_sample = metal_sample(&parameters, wo, u);
+    append("metal_sample pdf", &[metal_sample.pdf]);
     for (name, v) in [
         ("ggx_sample", ggx_sample(alpha, wo, u)),
         ("cap_sample", cap_sample(u, n[0])),
@@ -190,6 +199,10 @@ fn append_facet_results<F: Real>(n: [F; 9], u: F::Vec2, mut append: impl FnMut(&
         ("reflected_direction", reflected_direction(wo, normal)),
         ("refracted_direction", refracted_direction(wo, normal, n[0], n[1], n[2])),
         ("usable_normal", usable_normal(parameters, wi)),
+        ("metal_fresnel", metal_fresnel(&parameters, n[0])),
+        ("metal_eval", metal_eval(&parameters, wo, wi)),
+        ("metal_sample", metal_sample.wi),
+        ("metal_sample weight", metal_sample.weight),
     ] {
         append(name, &[v.x(), v.y(), v.z()]);
     }

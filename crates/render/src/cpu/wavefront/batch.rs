@@ -7,26 +7,27 @@ use glam::{UVec2, Vec3};
 use super::super::differential::Differential;
 use super::super::energy::principled_energy;
 use super::super::geometry::{fetch_hit_primitive, hit_differential, material_of, surface_of};
-use super::super::integrators::path::{PathState, add_radiance, decision, decision_set};
+use super::super::integrators::path::{PathState, add_emission, add_radiance, decision, decision_set};
 use super::super::lanes::{LaneMaterials, Lanes2, MaterialRows, Real, Vector3, Word, constant, select};
 use super::super::light_sample::power_heuristic;
 use super::super::math::{min, normalize};
 use super::super::mesh::HitPrimitive;
 use super::super::path::{Path, usable_normal};
+use super::super::principled::bounded_color;
 use super::super::ray::{Hit, Ray};
 use super::super::rng::{hash4, unit_float};
-use super::super::scattering::{bounded, facet_frame, local_wo, shaded_normal};
+use super::super::scattering::{bounded, facet_frame, facets_of, local_wo, shaded_normal};
 use super::super::shadow_ray::ShadowRay;
 use super::super::surface::{Surface, largest};
 use super::super::texture::evaluate_material;
 use super::super::vertices::with_vertex_colors;
 use super::QueuedShadowRay;
 use super::lights::{LightChoices, LightRows, only_light};
-use super::materials::{Diffuse, Directions, Principled};
+use super::materials::{Diffuse, Directions, Metal, Principled};
 use super::rows::{F, LANES, Row, Rows3, get3, load3, set3, store3};
 use super::shade::{MaterialKind, QueuedHit, ShadingQueues, SurfaceKind};
 use super::surfaces::{EvaluatedHits, FaceHits, FlatHits, LaneSurfaces};
-use crate::records::{DIFFUSE, ENVIRONMENT_MAP, INFINITE_T, INSTANCE, Material, NO_INDEX, Packed};
+use crate::records::{DIFFUSE, ENVIRONMENT_MAP, INFINITE_T, INSTANCE, METAL, Material, NO_INDEX, Packed};
 
 /// The paths of a batch, and the queue of their shadow rays.
 pub struct Batch<'a> {
@@ -82,7 +83,12 @@ fn evaluate(scene: &Packed, path: &Path, hit: Hit) -> Evaluated {
         surface.shading_normal = shaded_normal(surface, &material, surface.shading_normal);
         let frame = facet_frame(scene, surface, &material);
         (surface.du, surface.dv) = (frame.u, frame.v);
-        energy = principled_energy(scene, &material, local_wo(&surface), surface.side);
+        if material.kind == METAL {
+            material = facets_of(scene, &surface, material);
+            material.energy = NO_INDEX; // the loss is known
+        } else {
+            energy = principled_energy(scene, &material, local_wo(&surface), surface.side);
+        }
     }
     Evaluated {
         prim,
@@ -105,16 +111,24 @@ impl HitMaterials {
     /// Sets a material of the scene.
     #[inline(always)]
     fn set(&mut self, scene: &Packed, lane: usize, index: u32) {
+        let s = &scene.specialization;
+        let material = &scene.materials[index as usize];
+        let is_bounded = (s.lookups != 0) | (s.vertex_colors != 0);
+        if material.kind == DIFFUSE {
+            self.index_of_lane[lane] = NO_INDEX; // only the color is set
+            let color = material.diffuse;
+            self.rows
+                .set_diffuse(lane, if is_bounded { bounded_color(color) } else { color });
+            return;
+        }
         if self.index_of_lane[lane] == index {
             return;
         }
         self.index_of_lane[lane] = index;
-        let s = &scene.specialization;
-        let material = &scene.materials[index as usize];
-        if (s.lookups == 0) & (s.vertex_colors == 0) {
-            self.rows.set(lane, material);
-        } else {
+        if is_bounded {
             self.rows.set(lane, &bounded(*material));
+        } else {
+            self.rows.set(lane, material);
         }
         set3(&mut self.energy, lane, Vec3::ONE);
     }
@@ -146,12 +160,16 @@ impl Batch<'_> {
                 let mut rows = PathRows::default();
                 for (lane, queued) in hits.iter().enumerate() {
                     self.gather(&mut rows, lane, queued);
-                    let path = &self.paths[queued.path as usize].path;
+                    let state = &mut self.paths[queued.path as usize];
+                    let path = &state.path;
                     match surface_kind {
                         SurfaceKind::Flat => flat.set(scene, lane, path.ray, queued.hit),
                         SurfaceKind::Face => faces.set(scene, lane, path.ray, queued.hit),
                         SurfaceKind::Evaluated => {
                             let hit = evaluate(scene, path, queued.hit);
+                            if scene.specialization.emissive != 0 {
+                                add_emission(scene, state, &hit.prim, queued.hit, hit.surface, &hit.material, true);
+                            }
                             evaluated.set(lane, &hit.surface, &hit.prim, hit.coat_normal);
                             materials.set_evaluated(lane, &hit);
                             rows.exclude_front[lane] = hit.surface.exclude_front;
@@ -168,7 +186,7 @@ impl Batch<'_> {
                     SurfaceKind::Face => faces.surfaces(simd, epsilon),
                     SurfaceKind::Evaluated => evaluated.surfaces(simd, scene.specialization.anisotropic != 0),
                 };
-                self.shade(simd, hits, &rows, &mut lights, surfaces, material_kind, &materials);
+                self.shade(simd, hits, &rows, &mut lights, surfaces, material_kind, &mut materials);
             }
         }
     }
@@ -196,13 +214,9 @@ impl Batch<'_> {
         lights: &mut LightRows,
         mut surface: LaneSurfaces<S>,
         material_kind: MaterialKind,
-        materials: &HitMaterials,
+        materials: &mut HitMaterials,
     ) {
         let scene = self.scene;
-        let material = &LaneMaterials {
-            simd,
-            rows: &materials.rows,
-        };
         let s = &scene.specialization;
         let words = |words: &[u32; LANES]| u32x8::simd_from(simd, *words);
         let (x, y, depth, sample) = (
@@ -265,11 +279,23 @@ impl Batch<'_> {
             u: decision(scene, Lanes2 { x: key[2], y: key[3] }, sample),
             random,
         };
+        let rows_of_materials = &mut materials.rows;
         let scattered = match material_kind {
-            MaterialKind::Diffuse => Diffuse::new(material).scatter(&surface, directions),
-            MaterialKind::Principled => {
-                Principled::new(scene, material, &surface, &materials.energy).scatter(&surface, directions)
+            MaterialKind::Diffuse => {
+                let material = LaneMaterials {
+                    simd,
+                    rows: rows_of_materials,
+                };
+                Diffuse::new(&material).scatter(&surface, directions)
             }
+            MaterialKind::Principled => {
+                let material = LaneMaterials {
+                    simd,
+                    rows: rows_of_materials,
+                };
+                Principled::new(scene, &material, &surface, &materials.energy).scatter(&surface, directions)
+            }
+            MaterialKind::Metal => Metal::new(simd, rows_of_materials, &surface).scatter(&surface, directions),
         };
 
         let mut contributions = Rows3::default();

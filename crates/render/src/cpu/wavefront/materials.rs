@@ -4,9 +4,10 @@ use fearless_simd::Simd;
 use glam::Vec3;
 
 use super::super::diffuse::{angles_at, diffuse_pdf, diffuse_sample};
-use super::super::lanes::{LaneMaterials, Lanes2, MaterialFields, Real, Vector3, constant, select};
-use super::super::lobe::{vector_from_lobe, vector_to_lobe};
+use super::super::lanes::{LaneMaterials, Lanes2, MaterialFields, MaterialRows, Real, Vector3, constant, select};
+use super::super::lobe::{facet_alpha, facet_loss, vector_from_lobe, vector_to_lobe};
 use super::super::math::{max, normalize};
+use super::super::metal::{metal_eval, metal_pdf, metal_sample};
 use super::super::path::usable_normal;
 use super::super::primitive::Tangents;
 use super::super::principled::{
@@ -145,6 +146,51 @@ impl<S: Simd> Principled<S> {
             reflections: directions.to_light.map(|wi| Reflections {
                 value: surface.where_allowed(wi, reflected),
                 pdf: pdfs[0],
+            }),
+            next_rays: NextRays {
+                wi,
+                weight: surface.where_allowed(wi, sample.weight),
+                pdf: sample.pdf,
+            },
+        }
+    }
+}
+
+/// Rough conductors.
+pub struct Metal<'a, S: Simd> {
+    material: LaneMaterials<'a, S>,
+    frame: Tangents<V<S>>,
+    wo: V<S>,
+}
+
+impl<'a, S: Simd> Metal<'a, S> {
+    /// Returns the materials, like the scalar `facets_of`. The shading normals of the surfaces are usable.
+    #[inline(always)]
+    pub fn new(simd: S, rows: &'a mut MaterialRows, surface: &LaneSurfaces<S>) -> Self {
+        let normal = surface.shading_normal;
+        let frame = surface.tangents.unwrap_or_else(|| frame_around(normal));
+        let wo = vector_to_lobe(frame, normal, surface.wo);
+        let alpha = facet_alpha(&LaneMaterials { simd, rows });
+        rows.set_loss(facet_loss(alpha, wo));
+        Metal {
+            material: LaneMaterials { simd, rows },
+            frame,
+            wo,
+        }
+    }
+
+    #[inline(always)]
+    pub fn scatter(&self, surface: &LaneSurfaces<S>, directions: Directions<S>) -> Scattered<S> {
+        let normal = surface.shading_normal;
+        let sample = metal_sample(&self.material, self.wo, directions.u);
+        let wi = normalize(vector_from_lobe(self.frame, normal, sample.wi));
+        Scattered {
+            reflections: directions.to_light.map(|wi| {
+                let local = vector_to_lobe(self.frame, normal, wi);
+                Reflections {
+                    value: surface.where_allowed(wi, metal_eval(&self.material, self.wo, local)),
+                    pdf: metal_pdf(&self.material, self.wo, local),
+                }
             }),
             next_rays: NextRays {
                 wi,

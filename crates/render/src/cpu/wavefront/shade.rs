@@ -4,17 +4,19 @@
 use std::ops::AddAssign;
 
 use fearless_simd::Simd as _;
-use glam::UVec2;
+use glam::{UVec2, Vec3};
 
 use super::super::geometry::{group_word, instance_of, is_on_mesh};
 use super::super::integrators::path::{PathState, shade};
+use super::super::lobe::is_polished;
 use super::super::primitive::is_solid;
 use super::super::ray::Hit;
 use super::super::samples::LEVEL;
 use super::QueuedShadowRay;
 use super::batch::Batch;
 use crate::records::{
-    DIFFUSE, FOR_ROUGHNESS, FOR_TRANSMISSION, Material, NO_COLORS, NO_SHADOW, OPAQUE, PRINCIPLED, Packed,
+    DIFFUSE, FOR_ANISOTROPY, FOR_ROUGHNESS, FOR_TRANSMISSION, METAL, Material, NO_COLORS, NO_SHADOW, OPAQUE,
+    PRINCIPLED, Packed,
 };
 
 /// Hits to shade in lanes, for each kind of material and each kind of surface.
@@ -26,10 +28,12 @@ pub struct ShadingQueues([[Vec<QueuedHit>; SurfaceKind::ALL.len()]; MaterialKind
 pub enum MaterialKind {
     Diffuse,
     Principled,
+    /// A rough conductor.
+    Metal,
 }
 
 impl MaterialKind {
-    const ALL: [MaterialKind; 2] = [MaterialKind::Diffuse, MaterialKind::Principled];
+    const ALL: [MaterialKind; 3] = [MaterialKind::Diffuse, MaterialKind::Principled, MaterialKind::Metal];
 }
 
 /// The kind of surface of a hit.
@@ -39,7 +43,7 @@ pub enum SurfaceKind {
     Flat,
     /// A triangle of a mesh.
     Face,
-    /// A solid, or a surface with a texture, vertex colors or anisotropy. Its surface and material are evaluated one by
+    /// A solid, or a surface with emission, a texture, vertex colors or anisotropy. Its surface and material are evaluated one by
     /// one.
     Evaluated,
 }
@@ -91,7 +95,7 @@ pub fn shade_hits(
 ) -> LaneHits {
     shadow_rays.clear();
     queues.0.as_flattened_mut().iter_mut().for_each(Vec::clear);
-    let has_lanes = scene.specialization.absorption == 0 && has_lane_instructions();
+    let has_lanes = has_lane_instructions();
     for (&path, &hit) in active.iter().zip(hits) {
         let state = &mut paths[path as usize];
         let found = if has_lanes { lane_queue(scene, state, hit) } else { None };
@@ -181,8 +185,9 @@ fn lane_queue(scene: &Packed, state: &PathState, hit: Hit) -> Option<(MaterialKi
         };
         (surface_kind, q.material)
     };
-    // Only the scalar `shade` records layers.
-    if s.layers != 0 && (state.path.depth == 0 || !state.albedo_recorded) {
+    // Only the scalar `shade` records layers and computes absorption. Without absorption, the factor is exactly 1.
+    let records_layers = s.layers != 0 && (state.path.depth == 0 || !state.albedo_recorded);
+    if records_layers || s.absorption != 0 && state.absorption != Vec3::ZERO {
         return None;
     }
     let material = &scene.materials[index as usize];
@@ -191,7 +196,11 @@ fn lane_queue(scene: &Packed, state: &PathState, hit: Hit) -> Option<(MaterialKi
     if lookups.any(|lookup| lookup.purposes & scalar_purposes != 0) {
         return None;
     }
-    let has_plain_surface = material.lookups.y == 0 && material.vertex_colors == NO_COLORS;
+    let is_emissive = material.density > 0.0;
+    if is_emissive && state.path.depth >= s.bounces {
+        return None; // emission is added to the last hit
+    }
+    let has_plain_surface = material.lookups.y == 0 && material.vertex_colors == NO_COLORS && !is_emissive;
     let has_frame = material_kind != MaterialKind::Diffuse && s.anisotropic != 0;
     if has_plain_surface && !has_frame {
         return Some((material_kind, surface_kind, index));
@@ -199,12 +208,11 @@ fn lane_queue(scene: &Packed, state: &PathState, hit: Hit) -> Option<(MaterialKi
     Some((material_kind, SurfaceKind::Evaluated, index))
 }
 
-/// Returns the kind of a material without emission and alpha, if its hits can be shaded in lanes. Hits on materials that
-/// have a texture lookup with any of the returned purposes are shaded one by one.
+/// Returns the kind of a material without alpha, if its hits can be shaded in lanes. Hits on materials that have a texture
+/// lookup with any of the returned purposes are shaded one by one.
 #[inline(always)]
 fn lane_material(material: &Material) -> Option<(MaterialKind, u32)> {
-    let is_emissive = material.density > 0.0;
-    if is_emissive || material.alpha_mode != OPAQUE {
+    if material.alpha_mode != OPAQUE {
         return None;
     }
     let is_rough = material.roughness > 0.0;
@@ -212,6 +220,7 @@ fn lane_material(material: &Material) -> Option<(MaterialKind, u32)> {
     match material.kind {
         DIFFUSE if !is_rough => Some((MaterialKind::Diffuse, FOR_ROUGHNESS)),
         PRINCIPLED if !is_transmissive => Some((MaterialKind::Principled, FOR_TRANSMISSION)),
+        METAL if !is_polished(material) => Some((MaterialKind::Metal, FOR_ROUGHNESS | FOR_ANISOTROPY)),
         _ => None,
     }
 }
