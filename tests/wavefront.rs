@@ -115,9 +115,13 @@ fn with_lane_materials(mut packed: Packed, scene_index: usize, kind: MaterialKin
     s.materials |= 1 << PRINCIPLED | 1 << METAL;
     if kind == MaterialKind::Principled {
         s.lobes |= LOBE_SPECULAR | [LOBE_COAT, LOBE_SHEEN, LOBE_COAT | LOBE_SHEEN, 0][scene_index % 4];
-        s.lobes |= if scene_index % 5 == 0 { LOBE_ANISOTROPY } else { 0 };
+        s.lobes |= if scene_index.is_multiple_of(5) {
+            LOBE_ANISOTROPY
+        } else {
+            0
+        };
     }
-    if kind != MaterialKind::Diffuse && scene_index % 5 == 0 {
+    if kind != MaterialKind::Diffuse && scene_index.is_multiple_of(5) {
         s.anisotropic = 1;
     }
     packed
