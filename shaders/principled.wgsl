@@ -294,8 +294,9 @@ fn no_sample() -> LobeSample {
     return LobeSample(vec3f(0.0, 0.0, 1.0), vec3f(0.0), 0.0, 1.0);
 }
 
-// Samples wi from the lobe that `random` selects.
-fn principled_sample(m: PrincipledLobes, wo: vec3f, u: vec2f, random: f32, lobes: u32) -> LobeSample {
+// Samples wi from the lobe that `random` selects. The pdf is 0 if the sample is complete: for delta lobes, and without a
+// direction. Otherwise it is 1, and `evaluated_sample` returns the complete sample.
+fn principled_direction(m: PrincipledLobes, wo: vec3f, u: vec2f, random: f32, lobes: u32) -> LobeSample {
     let p = disk_sample(u);
     var wi = vec3f(p, sqrt(max(1.0 - p.x * p.x - p.y * p.y, 0.0)));
     var is_delta = false;
@@ -357,13 +358,26 @@ fn principled_sample(m: PrincipledLobes, wo: vec3f, u: vec2f, random: f32, lobes
             is_delta = false;
         }
     }
-    if is_delta {
-        return LobeSample(wi, weight, 0.0, eta);
+    return LobeSample(wi, weight, select(1.0, 0.0, is_delta), eta);
+}
+
+// Returns the sample of `principled_direction` with the weight and the pdf of all lobes.
+fn evaluated_sample(direction: LobeSample, value: vec3f, pdf: f32) -> LobeSample {
+    if direction.pdf == 0.0 {
+        return direction;
     }
-    let pdf = principled_pdf(m, wo, wi, lobes);
-    let value = principled_eval(m, wo, wi, lobes);
     let factor = select(0.0, 1.0 / max(pdf, 1e-30), pdf > 1e-30);
-    return LobeSample(wi, value * factor, pdf, eta);
+    return LobeSample(direction.wi, value * factor, pdf, direction.eta);
+}
+
+// Samples wi, with a probability density of all lobes.
+fn principled_sample(m: PrincipledLobes, wo: vec3f, u: vec2f, random: f32, lobes: u32) -> LobeSample {
+    let direction = principled_direction(m, wo, u, random, lobes);
+    if direction.pdf == 0.0 {
+        return direction;
+    }
+    let value = principled_eval(m, wo, direction.wi, lobes);
+    return evaluated_sample(direction, value, principled_pdf(m, wo, direction.wi, lobes));
 }
 
 // Returns the sheen BRDF: the distribution "Charlie" of Estevez and Kulla, "Production Friendly Microfacet Sheen BRDF",

@@ -76,10 +76,10 @@ use wgray_render::cpu::primitive::{
     primitive_normal, primitive_uv, solid_gradient, solid_gradient_derivative, solid_levels, uv_derivative,
 };
 use wgray_render::cpu::principled::{
-    PrincipledLobes, bounded_color, coat_eval, facets_eval, glass_eval, glass_fresnel, glass_pdf, glass_probability,
-    half_between, is_flat, luminance, mirrored_pdf, principled_eval, principled_mixture, principled_pdf,
-    principled_sample, refracting_density, refracting_half, schlick, sheen_albedo, sheen_lobe, sheen_probability,
-    to_frame_around, transmits_straight,
+    PrincipledLobes, bounded_color, coat_eval, evaluated_sample, facets_eval, glass_eval, glass_fresnel, glass_pdf,
+    glass_probability, half_between, is_flat, luminance, mirrored_pdf, principled_direction, principled_eval,
+    principled_mixture, principled_pdf, principled_sample, refracting_density, refracting_half, schlick, sheen_albedo,
+    sheen_lobe, sheen_probability, to_frame_around, transmits_straight,
 };
 use wgray_render::cpu::procedural::{
     edge_integral, far_product, nearest_step, phase, procedural_share, product_integral, sine_ratio, wave_integral,
@@ -346,6 +346,8 @@ probes! {
     to_frame_around(n: Vec3, v: Vec3) -> Vec3;
     principled_pdf(m: &PrincipledLobes, wo: Vec3, wi: Vec3, lobes: u32) -> f32;
     mirrored_pdf(alpha: Vec2, wo: Vec3, half: Vec3) -> f32;
+    principled_direction(m: &PrincipledLobes, wo: Vec3, u: Vec2, random: f32, lobes: u32) -> LobeSample;
+    evaluated_sample(direction: LobeSample, value: Vec3, pdf: f32) -> LobeSample;
     principled_sample(m: &PrincipledLobes, wo: Vec3, u: Vec2, random: f32, lobes: u32) -> LobeSample;
     sheen_lobe(alpha: f32, wo: Vec3, wi: Vec3) -> f32;
     sheen_albedo(roughness: f32, cosine: f32) -> f32;

@@ -214,8 +214,8 @@ pub fn rust_records(file: &syn::File) -> Vec<Signature> {
     file.items.iter().filter_map(record).collect()
 }
 
-/// Traits of numbers and vectors of one path or of several paths in lanes (`lanes.rs`) and the associated type of
-/// conditions, with the WGSL types that they stand for. The associated types `Real` and `Word` have the types of the
+/// Traits of numbers, vectors and records of one path or of several paths in lanes (`lanes.rs`) and the associated type
+/// of conditions, with the WGSL types that they stand for. The associated types `Real` and `Word` have the types of the
 /// traits, and other associated types those of glam's vectors with their names.
 const NUMBER_TRAITS: &[(&str, &str)] = &[
     ("Real", "f32"),
@@ -224,7 +224,10 @@ const NUMBER_TRAITS: &[(&str, &str)] = &[
     ("Vector3", "vec3<f32>"),
     ("WordVector2", "vec2<u32>"),
     ("WordVector4", "vec4<u32>"),
+    ("Vector4", "vec4<f32>"),
     ("Mask", "bool"),
+    ("MaterialFields", "Material"),
+    ("SurfaceVectors", "Surface"),
 ];
 
 /// Returns the WGSL type of a type parameter.

@@ -211,7 +211,12 @@ fn a_changed_twin_is_detected() {
             "cross<V: Vector3>(b: V, a: V)",
         ),
         ("another type", "ray.rs", "t: f32, i: u32", "t: f32, i: i32"),
-        ("another result", "specular.rs", "eta: f32) -> f32", "eta: f32) -> f64"),
+        (
+            "another result",
+            "math.rs",
+            "log2(x: f32) -> f32",
+            "log2(x: f32) -> f64",
+        ),
         ("another generic result", "rng.rs", "-> W::Real", "-> W"),
         ("another bound", "math.rs", "max<F: Real>", "max<F: Word>"),
         ("a function that is not generic", "math.rs", "min<F: Real>", "min"),

@@ -9,8 +9,11 @@ use proptest::test_runner::TestRunner;
 use wgray::scene::Integrator;
 use wgray_render::cpu::integrators::path::{path_layers, path_value};
 use wgray_render::cpu::pixel::{Layers, pixel_radiance};
-use wgray_render::cpu::wavefront::{BatchMeshes, LaneHits, Wavefront};
-use wgray_render::records::{DIFFUSE, EMITTER, NO_COLORS, OPAQUE, Packed, RANDOM, SOBOL};
+use wgray_render::cpu::wavefront::{BatchMeshes, LaneHits, MaterialKind, SurfaceKind, Wavefront};
+use wgray_render::records::{
+    DIFFUSE, EMITTER, LOBE_ANISOTROPY, LOBE_COAT, LOBE_SHEEN, LOBE_SPECULAR, METAL, Material, NO_COLORS, NO_INDEX,
+    OPAQUE, PRINCIPLED, Packed, RANDOM, SOBOL,
+};
 
 use crate::random_scenes::any_scene;
 use crate::scenes;
@@ -76,11 +79,10 @@ fn count_differing(paths: &[PathBits], expected: &[PathBits]) -> usize {
     paths.iter().zip(expected).filter(|(a, b)| a != b).count()
 }
 
-/// Makes most materials diffuse, so that their hits are shaded in lanes. Half of these materials get no emission, and
-/// two thirds get no textures. The maximum number of bounces is at least 3. A third of the scenes get a pinhole camera
-/// with Sobol' points.
-fn with_diffuse_materials(mut packed: Packed, scene_index: usize) -> Packed {
-    packed.specialization.absorption = 0;
+/// Makes most materials diffuse, `principled` or metal, so that their hits are shaded in lanes. Half of these materials get no
+/// emission, and two thirds get no textures. The maximum number of bounces is at least 3. A third of the scenes get a
+/// pinhole camera with Sobol' points.
+fn with_lane_materials(mut packed: Packed, scene_index: usize, kind: MaterialKind) -> Packed {
     packed.specialization.bounces = packed.specialization.bounces.max(3);
     if scene_index.is_multiple_of(3) {
         let s = &mut packed.specialization;
@@ -91,9 +93,15 @@ fn with_diffuse_materials(mut packed: Packed, scene_index: usize) -> Packed {
         if material.kind == EMITTER || (scene_index + i) % 4 == 3 {
             continue;
         }
-        material.kind = DIFFUSE;
-        material.diffuse = Vec3::new(0.9, 0.6, 0.3);
-        material.roughness = 0.0;
+        match kind {
+            MaterialKind::Diffuse => {
+                material.kind = DIFFUSE;
+                material.diffuse = Vec3::new(0.9, 0.6, 0.3);
+                material.roughness = 0.0;
+            }
+            MaterialKind::Principled => make_principled(material, scene_index + i),
+            MaterialKind::Metal => make_metal(material, scene_index + i),
+        }
         material.alpha_mode = OPAQUE;
         if i % 2 == 0 {
             material.density = 0.0;
@@ -103,16 +111,63 @@ fn with_diffuse_materials(mut packed: Packed, scene_index: usize) -> Packed {
             material.vertex_colors = NO_COLORS;
         }
     }
+    let s = &mut packed.specialization;
+    s.materials |= 1 << PRINCIPLED | 1 << METAL;
+    if kind == MaterialKind::Principled {
+        s.lobes |= LOBE_SPECULAR | [LOBE_COAT, LOBE_SHEEN, LOBE_COAT | LOBE_SHEEN, 0][scene_index % 4];
+        s.lobes |= if scene_index.is_multiple_of(5) {
+            LOBE_ANISOTROPY
+        } else {
+            0
+        };
+    }
+    if kind != MaterialKind::Diffuse && scene_index.is_multiple_of(5) {
+        s.anisotropic = 1;
+    }
     packed
 }
+
+/// Makes a material `principled`, without transmission. `variant` selects the parameters.
+fn make_principled(material: &mut Material, variant: usize) {
+    let fraction = |step: usize| (variant * step % 8) as f32 / 7.0;
+    material.kind = PRINCIPLED;
+    material.diffuse = Vec3::new(0.9, 0.6, 0.3);
+    material.specular = Vec3::new(1.0, 0.5, 1.5);
+    material.sheen = Vec3::new(0.0, 0.5, 0.2) * fraction(5);
+    (material.roughness, material.metallic, material.anisotropy) = (fraction(1), fraction(3), fraction(5));
+    (material.clearcoat, material.clearcoat_roughness) = (fraction(3), fraction(7));
+    (material.specular_weight, material.sheen_roughness, material.ior) = (fraction(7), fraction(3), 1.5);
+    (material.transmission, material.aniso_table) = (0.0, 0);
+}
+
+/// Makes a material a rough conductor. `variant` selects the parameters.
+fn make_metal(material: &mut Material, variant: usize) {
+    material.kind = METAL;
+    material.tint = Vec3::new(0.9, 0.6, 0.3);
+    (material.eta, material.k) = match variant % 2 {
+        0 => (Vec3::ZERO, Vec3::ZERO),
+        _ => (Vec3::new(0.2, 0.4, 1.4), Vec3::new(3.9, 2.4, 1.6)),
+    };
+    material.roughness = [0.05, 0.3, 0.6, 1.0][variant % 4];
+    material.anisotropy = if variant.is_multiple_of(3) { 0.7 } else { 0.0 };
+    material.aniso_table = 0;
+    material.energy = if variant.is_multiple_of(5) { NO_INDEX } else { 0 };
+}
+
+const MATERIALS: [MaterialKind; 3] = [MaterialKind::Diffuse, MaterialKind::Principled, MaterialKind::Metal];
+const SURFACES: [SurfaceKind; 3] = [SurfaceKind::Flat, SurfaceKind::Face, SurfaceKind::Evaluated];
 
 /// For each feature, the number of scenes with this feature in which hits are shaded in lanes.
 #[derive(Debug, Default)]
 struct LaneCoverage {
     camera: usize,
-    flat: usize,
-    faces: usize,
-    evaluated: usize,
+    /// Scenes with hits on each kind of material (rows) and surface.
+    kinds: [[usize; 3]; 3],
+    coat: usize,
+    sheen: usize,
+    anisotropy: usize,
+    absorption: usize,
+    emission: usize,
     without_lights: usize,
     one_emitter: usize,
     several_emitters: usize,
@@ -134,11 +189,21 @@ impl LaneCoverage {
         if hits == LaneHits::default() {
             return;
         }
+        let mut is_principled = false;
+        for (material, counts) in MATERIALS.into_iter().zip(&mut self.kinds) {
+            for (surface, count) in SURFACES.into_iter().zip(counts) {
+                let has_hits = hits.count(material, surface) > 0;
+                *count += usize::from(has_hits);
+                is_principled |= has_hits && material == MaterialKind::Principled;
+            }
+        }
         for (count, has_feature) in [
             (&mut self.camera, has_lane_camera),
-            (&mut self.flat, hits.flat > 0),
-            (&mut self.faces, hits.faces > 0),
-            (&mut self.evaluated, hits.evaluated > 0),
+            (&mut self.coat, is_principled && s.lobes & LOBE_COAT != 0),
+            (&mut self.sheen, is_principled && s.lobes & LOBE_SHEEN != 0),
+            (&mut self.anisotropy, is_principled && s.lobes & LOBE_ANISOTROPY != 0),
+            (&mut self.absorption, s.absorption != 0),
+            (&mut self.emission, s.emissive != 0),
             (&mut self.without_lights, s.emitters == 0),
             (&mut self.one_emitter, s.emitters == 1),
             (&mut self.several_emitters, s.emitters > 1 && s.light_tree == 0),
@@ -157,9 +222,12 @@ impl LaneCoverage {
     fn assert_all_covered(&self) {
         let LaneCoverage {
             camera,
-            flat,
-            faces,
-            evaluated,
+            kinds,
+            coat,
+            sheen,
+            anisotropy,
+            absorption,
+            emission,
             without_lights,
             one_emitter,
             several_emitters,
@@ -173,6 +241,11 @@ impl LaneCoverage {
         } = *self;
         let features = [
             camera,
+            coat,
+            sheen,
+            anisotropy,
+            absorption,
+            emission,
             one_emitter,
             several_emitters,
             light_tree,
@@ -184,7 +257,7 @@ impl LaneCoverage {
             alpha,
             layers,
         ];
-        assert!(flat > 30 && faces > 20 && evaluated > 30, "{self:?}");
+        assert!(kinds.as_flattened().iter().all(|count| *count > 10), "{self:?}");
         assert!(features.into_iter().all(|count| count > 5), "{self:?}");
     }
 }
@@ -269,8 +342,8 @@ fn random_scenes_have_the_paths_of_the_scalar_integrator() {
         let packed = if i % 2 == 0 { packed.with_layers() } else { packed };
         let packed = if i % 3 == 0 { packed.with_noise() } else { packed }; // layers then contain the depth
         let batch_size = [1, 7, 64, 1024][i % 4];
-        let diffuse = with_diffuse_materials(packed.clone(), i);
-        for (packed, step) in [(&packed, 2), (&diffuse, 3)] {
+        let [diffuse, principled, metal] = MATERIALS.map(|kind| with_lane_materials(packed.clone(), i, kind));
+        for (packed, step) in [(&packed, 2), (&diffuse, 3), (&principled, 3), (&metal, 3)] {
             let samples = samples(packed, step, 3);
             let (paths, lane_hits) = wavefront_with(BatchMeshes::new(packed), packed, &samples, batch_size);
             let differing = count_differing(&paths, &scalar(packed, &samples));
@@ -330,8 +403,9 @@ fn changed_scenes_are_detected() {
     let expected = scalar(&packed, &samples);
     let (paths, lane_hits) = wavefront_with(BatchMeshes::new(&packed), &packed, &samples, 256);
     assert_eq!(count_differing(&paths, &expected), 0);
-    let LaneHits { flat, faces, evaluated } = lane_hits;
-    assert!(flat > 50 && faces > 50 && evaluated > 50, "{lane_hits:?}");
+    for surface in SURFACES {
+        assert!(lane_hits.count(MaterialKind::Diffuse, surface) > 50, "{lane_hits:?}");
+    }
     let count_after = |change: fn(&mut Packed)| {
         let mut packed = packed.clone();
         change(&mut packed);

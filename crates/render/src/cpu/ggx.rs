@@ -2,91 +2,100 @@
 
 use std::f32::consts::FRAC_1_PI;
 
-use glam::{Vec2, Vec3};
+use glam::Vec3;
 
+use super::lanes::{Real, Vector2, Vector3, constant, select};
 use super::math::{dot, max, normalize};
 use super::warp::{cap_sample, disk_sample};
 
-pub fn ggx_d(alpha: Vec2, m: Vec3) -> f32 {
-    let x = m.x / alpha.x;
-    let y = m.y / alpha.y;
-    let s = x * x + y * y + m.z * m.z;
-    if m.z > 0.0 {
-        FRAC_1_PI / (alpha.x * alpha.y * s * s)
-    } else {
-        0.0
-    }
+#[inline(always)]
+pub fn ggx_d<V: Vector3>(alpha: <V::Real as Real>::Vec2, m: V) -> V::Real {
+    let x = m.x() / alpha.x();
+    let y = m.y() / alpha.y();
+    let s = x * x + y * y + m.z() * m.z();
+    let density = constant(FRAC_1_PI) / (alpha.x() * alpha.y() * s * s);
+    select(s.splat(0.0), density, m.z().gt(s.splat(0.0)))
 }
 
-pub fn ggx_length(alpha: Vec2, w: Vec3) -> f32 {
-    let x = w.x * alpha.x;
-    let y = w.y * alpha.y;
-    (x * x + y * y + w.z * w.z).sqrt()
+#[inline(always)]
+pub fn ggx_length<V: Vector3>(alpha: <V::Real as Real>::Vec2, w: V) -> V::Real {
+    let x = w.x() * alpha.x();
+    let y = w.y() * alpha.y();
+    (x * x + y * y + w.z() * w.z()).sqrt()
 }
 
-pub fn ggx_g1(alpha: Vec2, w: Vec3) -> f32 {
-    let cosine = w.z.abs();
-    2.0 * cosine / max(cosine + ggx_length(alpha, w), 1e-30)
+#[inline(always)]
+pub fn ggx_g1<V: Vector3>(alpha: <V::Real as Real>::Vec2, w: V) -> V::Real {
+    let cosine = w.z().abs();
+    constant(2.0) * cosine / max(cosine + ggx_length(alpha, w), cosine.splat(1e-30))
 }
 
-pub fn ggx_g2(alpha: Vec2, wo: Vec3, wi: Vec3) -> f32 {
-    let o = wo.z.abs();
-    let i = wi.z.abs();
-    2.0 * i * o / max(o * ggx_length(alpha, wi) + i * ggx_length(alpha, wo), 1e-30)
+#[inline(always)]
+pub fn ggx_g2<V: Vector3>(alpha: <V::Real as Real>::Vec2, wo: V, wi: V) -> V::Real {
+    let o = wo.z().abs();
+    let i = wi.z().abs();
+    constant(2.0) * i * o / max(o * ggx_length(alpha, wi) + i * ggx_length(alpha, wo), o.splat(1e-30))
 }
 
-pub fn ggx_sample(alpha: Vec2, wo: Vec3, u: Vec2) -> Vec3 {
-    let stretched = normalize(Vec3::new(wo.x * alpha.x, wo.y * alpha.y, wo.z));
-    let middle = cap_sample(disk_sample(u), 1.0 + stretched.z) + stretched;
-    let m = Vec3::new(middle.x * alpha.x, middle.y * alpha.y, max(middle.z, 0.0));
+#[inline(always)]
+pub fn ggx_sample<V: Vector3>(alpha: <V::Real as Real>::Vec2, wo: V, u: <V::Real as Real>::Vec2) -> V {
+    let stretched = normalize(V::new(wo.x() * alpha.x(), wo.y() * alpha.y(), wo.z()));
+    let middle = cap_sample(disk_sample(u), constant(1.0) + stretched.z()) + stretched;
+    let height = max(middle.z(), middle.z().splat(0.0));
+    let m = V::new(middle.x() * alpha.x(), middle.y() * alpha.y(), height);
     let length2 = dot(m, m);
-    if length2 > 1e-20 {
-        m * (1.0 / length2.sqrt())
-    } else {
-        Vec3::Z
-    }
+    let unit = m * (constant(1.0) / length2.sqrt());
+    V::select(m.broadcast(Vec3::Z), unit, length2.gt(length2.splat(1e-20)))
 }
 
-pub fn ggx_pdf(alpha: Vec2, wo: Vec3, m: Vec3) -> f32 {
-    2.0 * max(dot(wo, m), 0.0) * ggx_d(alpha, m) / max(wo.z + ggx_length(alpha, wo), 1e-30)
+#[inline(always)]
+pub fn ggx_pdf<V: Vector3>(alpha: <V::Real as Real>::Vec2, wo: V, m: V) -> V::Real {
+    let cosine = dot(wo, m);
+    constant(2.0) * max(cosine, cosine.splat(0.0)) * ggx_d(alpha, m)
+        / max(wo.z() + ggx_length(alpha, wo), cosine.splat(1e-30))
 }
 
-pub fn ggx_albedo(alpha: f32, mu: f32) -> Vec2 {
-    let length = (alpha * alpha * (1.0 - mu * mu) + mu * mu).sqrt();
+#[inline(always)]
+pub fn ggx_albedo<F: Real>(alpha: F, mu: F) -> F::Vec2 {
+    let length = (alpha * alpha * (constant(1.0) - mu * mu) + mu * mu).sqrt();
     ggx_albedo_fit(alpha, mu / length, length)
 }
 
-pub fn ggx_albedo_along(alpha: Vec2, w: Vec3) -> Vec2 {
-    let square = 0.5 * (alpha.x * alpha.x + alpha.y * alpha.y);
-    let length = (square * (1.0 - w.z * w.z) + w.z * w.z).sqrt();
-    ggx_albedo_fit(square.sqrt(), w.z.abs() / ggx_length(alpha, w), length)
+#[inline(always)]
+pub fn ggx_albedo_along<V: Vector3>(alpha: <V::Real as Real>::Vec2, w: V) -> <V::Real as Real>::Vec2 {
+    let square = constant(0.5) * (alpha.x() * alpha.x() + alpha.y() * alpha.y());
+    let length = (square * (constant(1.0) - w.z() * w.z()) + w.z() * w.z()).sqrt();
+    ggx_albedo_fit(square.sqrt(), w.z().abs() / ggx_length(alpha, w), length)
 }
 
-pub fn ggx_albedo_fit(alpha: f32, t: f32, l: f32) -> Vec2 {
+#[inline(always)]
+pub fn ggx_albedo_fit<F: Real>(alpha: F, t: F, l: F) -> F::Vec2 {
     let a = alpha;
-    let lost_0 = 0.005_480_34 + t * (0.063_229_1 + t * (1.183_11 - t * 1.249_38));
-    let lost_1 = -0.009_514_8 + t * (0.365_153 - t * (0.350_613 + t * 0.129_283));
-    let lost_2 = 0.008_129_75 + t * (1.568_84 + t * (1.185_46 - t * 1.092_09));
-    let divisor_0 = 1.0 + t * (3.349_08 - t * (1.559_2 + t * 1.920_2));
+    let c = constant;
+    let lost_0 = c(0.005_480_34) + t * (c(0.063_229_1) + t * (c(1.183_11) - t * 1.249_38));
+    let lost_1 = c(-0.009_514_8) + t * (c(0.365_153) - t * (c(0.350_613) + t * 0.129_283));
+    let lost_2 = c(0.008_129_75) + t * (c(1.568_84) + t * (c(1.185_46) - t * 1.092_09));
+    let divisor_0 = c(1.0) + t * (c(3.349_08) - t * (c(1.559_2) + t * 1.920_2));
     let divisor_1 = t * (t * 1.209_1 - 0.391_082) - 1.120_89;
-    let divisor_2 = 0.644_689 + t * 1.026_91;
+    let divisor_2 = c(0.644_689) + t * 1.026_91;
     let lost = (lost_0 + a * (lost_1 + a * lost_2)) / (divisor_0 + a * (divisor_1 + a * divisor_2));
-    let edge_0 = 0.966_613 + l * (2.475_01 - l * (12.614_7 - l * (22.980_2 - l * (18.285_2 - l * 5.389_7))));
-    let edge_1 = -0.386_341 - l * (7.148_16 - l * (8.055_95 - l * (7.343_51 - l * 1.950_36)));
-    let edge_2 = -0.489_888 + l * (9.380_23 - l * (2.590_02 - l * 2.932_96));
-    let edge_3 = 0.498_131 - l * (5.664_61 + l * 1.885_25);
-    let edge_4 = -0.553_876 + l * 2.072_51;
+    let edge_0 =
+        c(0.966_613) + l * (c(2.475_01) - l * (c(12.614_7) - l * (c(22.980_2) - l * (c(18.285_2) - l * 5.389_7))));
+    let edge_1 = c(-0.386_341) - l * (c(7.148_16) - l * (c(8.055_95) - l * (c(7.343_51) - l * 1.950_36)));
+    let edge_2 = c(-0.489_888) + l * (c(9.380_23) - l * (c(2.590_02) - l * 2.932_96));
+    let edge_3 = c(0.498_131) - l * (c(5.664_61) + l * 1.885_25);
+    let edge_4 = c(-0.553_876) + l * 2.072_51;
     let edge = edge_0 + t * (edge_1 + t * (edge_2 + t * (edge_3 + t * (edge_4 + t * 0.267_055))));
-    let edge_divisor = 1.0 + l * (17.865 + l * 1.841_66) - t * (0.237_295 + l * 15.323_6 + t * 0.459_621);
-    let y = max(edge / edge_divisor, 0.0);
-    Vec2::new(max(1.0 - lost - y, 0.0), y)
+    let edge_divisor = c(1.0) + l * (c(17.865) + l * 1.841_66) - t * (c(0.237_295) + l * 15.323_6 + t * 0.459_621);
+    let y = max(edge / edge_divisor, a.splat(0.0));
+    Vector2::new(max(c(1.0) - lost - y, a.splat(0.0)), y)
 }
 
 #[cfg(test)]
 mod tests {
     use std::f64::consts::{PI, TAU};
 
-    use glam::DVec3;
+    use glam::{DVec3, Vec2};
 
     use super::*;
     use crate::cpu::rng::{hash4, unit_float};

@@ -2,11 +2,19 @@
 //! [`Real`] is an `f32`, or a vector with an `f32` in each lane. Functions that are generic over these types select
 //! values instead of branching, like the WGSL functions. The result in a lane has the same bits as the `f32` result.
 
+mod materials;
+mod surfaces;
+mod vectors;
+
 use std::ops::{Add, BitAnd, BitOr, BitXor, Div, Mul, Neg, Not, Shl, Shr, Sub};
 
 use fearless_simd::prelude::*;
 use fearless_simd::{f32x8, i32x8, mask32x8, u32x8};
-use glam::{UVec2, UVec4, Vec2, Vec3};
+use glam::{UVec2, UVec4, Vec2, Vec3, Vec4};
+
+pub use self::materials::{LaneMaterials, MaterialFields, MaterialRows};
+pub use self::surfaces::SurfaceVectors;
+pub use self::vectors::{Lanes2, Lanes3};
 
 /// A floating-point number.
 pub trait Real:
@@ -21,13 +29,10 @@ pub trait Real:
     + Mul<f32, Output = Self>
 {
     /// The result of a comparison: a `bool`, or one in each lane.
-    type Mask: Copy
-        + BitAnd<Output = Self::Mask>
-        + BitOr<Output = Self::Mask>
-        + BitXor<Output = Self::Mask>
-        + Not<Output = Self::Mask>;
+    type Mask: Condition;
     type Vec2: Vector2<Real = Self>;
     type Vec3: Vector3<Real = Self>;
+    type Vec4: Vector4<Real = Self>;
 
     /// Returns `value` in all lanes. The value of `self` is not used.
     fn splat(self, value: f32) -> Self;
@@ -44,6 +49,8 @@ pub trait Real:
     fn le(self, other: Self) -> Self::Mask;
     fn eq(self, other: Self) -> Self::Mask;
     fn select(if_false: Self, if_true: Self, mask: Self::Mask) -> Self;
+    /// Calls `function` for the number of each lane.
+    fn map(self, function: impl FnMut(f32) -> f32) -> Self;
 
     #[inline(always)]
     fn gt(self, other: Self) -> Self::Mask {
@@ -54,6 +61,14 @@ pub trait Real:
     fn ge(self, other: Self) -> Self::Mask {
         other.le(self)
     }
+}
+
+/// The result of a comparison.
+pub trait Condition:
+    Copy + BitAnd<Output = Self> + BitOr<Output = Self> + BitXor<Output = Self> + Not<Output = Self>
+{
+    /// Returns true if the condition is true in any lane. Functions use it only to skip values that no lane selects.
+    fn any(self) -> bool;
 }
 
 /// A constant as the left operand of an operator. Rust does not allow operators of `f32` and any [`Real`].
@@ -154,6 +169,12 @@ pub trait Vector3:
         Self::new(x.splat(value.x), x.splat(value.y), x.splat(value.z))
     }
 
+    /// Returns a vector with equal components.
+    #[inline(always)]
+    fn repeat(value: Self::Real) -> Self {
+        Self::new(value, value, value)
+    }
+
     /// Returns `if_true` where the mask is set, else `if_false`.
     #[inline(always)]
     fn select(if_false: Self, if_true: Self, mask: <Self::Real as Real>::Mask) -> Self {
@@ -163,6 +184,17 @@ pub trait Vector3:
             select(if_false.z(), if_true.z(), mask),
         )
     }
+}
+
+/// A vector of four floating-point numbers.
+pub trait Vector4: Copy {
+    type Real: Real<Vec4 = Self>;
+
+    fn new(x: Self::Real, y: Self::Real, z: Self::Real, w: Self::Real) -> Self;
+    fn x(self) -> Self::Real;
+    fn y(self) -> Self::Real;
+    fn z(self) -> Self::Real;
+    fn w(self) -> Self::Real;
 }
 
 /// A vector of two integers.
@@ -186,6 +218,7 @@ impl Real for f32 {
     type Mask = bool;
     type Vec2 = Vec2;
     type Vec3 = Vec3;
+    type Vec4 = Vec4;
 
     #[inline(always)]
     fn splat(self, value: f32) -> f32 {
@@ -220,6 +253,18 @@ impl Real for f32 {
     #[inline(always)]
     fn select(if_false: f32, if_true: f32, mask: bool) -> f32 {
         if mask { if_true } else { if_false }
+    }
+
+    #[inline(always)]
+    fn map(self, mut function: impl FnMut(f32) -> f32) -> f32 {
+        function(self)
+    }
+}
+
+impl Condition for bool {
+    #[inline(always)]
+    fn any(self) -> bool {
+        self
     }
 }
 
@@ -297,6 +342,35 @@ impl Vector3 for Vec3 {
     }
 }
 
+impl Vector4 for Vec4 {
+    type Real = f32;
+
+    #[inline(always)]
+    fn new(x: f32, y: f32, z: f32, w: f32) -> Vec4 {
+        Vec4::new(x, y, z, w)
+    }
+
+    #[inline(always)]
+    fn x(self) -> f32 {
+        self.x
+    }
+
+    #[inline(always)]
+    fn y(self) -> f32 {
+        self.y
+    }
+
+    #[inline(always)]
+    fn z(self) -> f32 {
+        self.z
+    }
+
+    #[inline(always)]
+    fn w(self) -> f32 {
+        self.w
+    }
+}
+
 impl WordVector2 for UVec2 {
     type Word = u32;
 
@@ -334,6 +408,7 @@ impl<S: Simd> Real for f32x8<S> {
     type Mask = mask32x8<S>;
     type Vec2 = Lanes2<Self>;
     type Vec3 = Lanes3<Self>;
+    type Vec4 = [Self; 4];
 
     #[inline(always)]
     fn splat(self, value: f32) -> Self {
@@ -368,6 +443,19 @@ impl<S: Simd> Real for f32x8<S> {
     #[inline(always)]
     fn select(if_false: Self, if_true: Self, mask: mask32x8<S>) -> Self {
         mask.select(if_true, if_false)
+    }
+
+    #[inline(always)]
+    fn map(self, function: impl FnMut(f32) -> f32) -> Self {
+        let lanes: [f32; 8] = self.into();
+        Self::simd_from(self.simd, lanes.map(function))
+    }
+}
+
+impl<S: Simd> Condition for mask32x8<S> {
+    #[inline(always)]
+    fn any(self) -> bool {
+        self.any_true()
     }
 }
 
@@ -410,160 +498,6 @@ impl<S: Simd> Word for u32x8<S> {
 #[inline(always)]
 fn swapped<W: Word>(x: W, width: u32, mask: u32) -> W {
     ((x >> width) & mask) | ((x & mask) << width)
-}
-
-/// A vector of two numbers in each lane.
-#[derive(Clone, Copy, Debug)]
-pub struct Lanes2<T> {
-    pub x: T,
-    pub y: T,
-}
-
-/// A vector of three numbers in each lane.
-#[derive(Clone, Copy, Debug)]
-pub struct Lanes3<F> {
-    pub x: F,
-    pub y: F,
-    pub z: F,
-}
-
-impl<S: Simd> Vector2 for Lanes2<f32x8<S>> {
-    type Real = f32x8<S>;
-
-    #[inline(always)]
-    fn new(x: f32x8<S>, y: f32x8<S>) -> Self {
-        Lanes2 { x, y }
-    }
-
-    #[inline(always)]
-    fn x(self) -> f32x8<S> {
-        self.x
-    }
-
-    #[inline(always)]
-    fn y(self) -> f32x8<S> {
-        self.y
-    }
-}
-
-impl<S: Simd> WordVector2 for Lanes2<u32x8<S>> {
-    type Word = u32x8<S>;
-
-    #[inline(always)]
-    fn new(x: u32x8<S>, y: u32x8<S>) -> Self {
-        Lanes2 { x, y }
-    }
-
-    #[inline(always)]
-    fn x(self) -> u32x8<S> {
-        self.x
-    }
-
-    #[inline(always)]
-    fn y(self) -> u32x8<S> {
-        self.y
-    }
-}
-
-impl<S: Simd> WordVector4 for [u32x8<S>; 4] {
-    type Word = u32x8<S>;
-
-    #[inline(always)]
-    fn from_words(words: [u32x8<S>; 4]) -> Self {
-        words
-    }
-
-    #[inline(always)]
-    fn words(self) -> [u32x8<S>; 4] {
-        self
-    }
-}
-
-impl<S: Simd> Vector3 for Lanes3<f32x8<S>> {
-    type Real = f32x8<S>;
-
-    #[inline(always)]
-    fn new(x: f32x8<S>, y: f32x8<S>, z: f32x8<S>) -> Self {
-        Lanes3 { x, y, z }
-    }
-
-    #[inline(always)]
-    fn x(self) -> f32x8<S> {
-        self.x
-    }
-
-    #[inline(always)]
-    fn y(self) -> f32x8<S> {
-        self.y
-    }
-
-    #[inline(always)]
-    fn z(self) -> f32x8<S> {
-        self.z
-    }
-}
-
-impl<F: Real> Neg for Lanes3<F> {
-    type Output = Lanes3<F>;
-
-    #[inline(always)]
-    fn neg(self) -> Lanes3<F> {
-        Lanes3 {
-            x: -self.x,
-            y: -self.y,
-            z: -self.z,
-        }
-    }
-}
-
-macro_rules! vector_operators {
-    ($($operator:ident $function:ident;)*) => {
-        $(impl<F: Real> $operator for Lanes3<F> {
-            type Output = Lanes3<F>;
-
-            #[inline(always)]
-            fn $function(self, other: Lanes3<F>) -> Lanes3<F> {
-                Lanes3 {
-                    x: $operator::$function(self.x, other.x),
-                    y: $operator::$function(self.y, other.y),
-                    z: $operator::$function(self.z, other.z),
-                }
-            }
-        })*
-    };
-}
-
-vector_operators! { Add add; Sub sub; Mul mul; }
-
-macro_rules! scalar_operators {
-    ($($operator:ident $function:ident;)*) => {
-        $(impl<F: Real> $operator<F> for Lanes3<F> {
-            type Output = Lanes3<F>;
-
-            #[inline(always)]
-            fn $function(self, scalar: F) -> Lanes3<F> {
-                Lanes3 {
-                    x: $operator::$function(self.x, scalar),
-                    y: $operator::$function(self.y, scalar),
-                    z: $operator::$function(self.z, scalar),
-                }
-            }
-        })*
-    };
-}
-
-scalar_operators! { Add add; Sub sub; Mul mul; Div div; }
-
-impl<F: Real> Mul<F> for Lanes2<F> {
-    type Output = Lanes2<F>;
-
-    #[inline(always)]
-    fn mul(self, factor: F) -> Lanes2<F> {
-        Lanes2 {
-            x: self.x * factor,
-            y: self.y * factor,
-        }
-    }
 }
 
 #[cfg(test)]

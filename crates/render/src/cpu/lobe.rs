@@ -3,6 +3,7 @@
 use glam::{Vec2, Vec3};
 
 use super::ggx::{ggx_albedo_along, ggx_d, ggx_length};
+use super::lanes::{MaterialFields, Real, Vector2, Vector3, constant};
 use super::math::{atan2, cross, dot, max, min, normalize, sine};
 use super::primitive::Tangents;
 use super::surface::Surface;
@@ -10,26 +11,30 @@ use super::warp::frame_around;
 use crate::records::{Material, SMALLEST_ALPHA};
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LobeSample {
-    pub wi: Vec3,
-    pub weight: Vec3,
-    pub pdf: f32,
-    pub eta: f32,
+pub struct LobeSample<F: Real = f32> {
+    pub wi: F::Vec3,
+    pub weight: F::Vec3,
+    pub pdf: F,
+    pub eta: F,
 }
 
-pub fn plain_alpha(material: &Material) -> Vec2 {
-    let alpha_v = material.roughness * material.roughness;
-    let alpha_u = alpha_v + (1.0 - alpha_v) * (material.anisotropy * material.anisotropy);
-    Vec2::new(alpha_u, alpha_v)
+#[inline(always)]
+pub fn plain_alpha<F: Real, M: MaterialFields<Real = F>>(material: &M) -> F::Vec2 {
+    let (roughness, anisotropy) = (material.roughness(), material.anisotropy());
+    let alpha_v = roughness * roughness;
+    let alpha_u = alpha_v + (constant(1.0) - alpha_v) * (anisotropy * anisotropy);
+    Vector2::new(alpha_u, alpha_v)
 }
 
 pub fn is_polished(material: &Material) -> bool {
     plain_alpha(material).x < SMALLEST_ALPHA
 }
 
-pub fn facet_alpha(material: &Material) -> Vec2 {
+#[inline(always)]
+pub fn facet_alpha<F: Real, M: MaterialFields<Real = F>>(material: &M) -> F::Vec2 {
     let alpha = plain_alpha(material);
-    Vec2::new(max(alpha.x, SMALLEST_ALPHA), max(alpha.y, SMALLEST_ALPHA))
+    let smallest = alpha.x().splat(SMALLEST_ALPHA);
+    Vector2::new(max(alpha.x(), smallest), max(alpha.y(), smallest))
 }
 
 pub fn lobe_frame(surface: &Surface, rotation: f32) -> Tangents {
@@ -58,38 +63,42 @@ pub fn direction_turn(color: Vec3) -> f32 {
     atan2(2.0 * color.y - 1.0, 2.0 * color.x - 1.0) * std::f32::consts::FRAC_1_PI
 }
 
-pub fn vector_to_lobe(frame: Tangents, n: Vec3, w: Vec3) -> Vec3 {
-    Vec3::new(dot(frame.u, w), dot(frame.v, w), dot(n, w))
+#[inline(always)]
+pub fn vector_to_lobe<V: Vector3>(frame: Tangents<V>, n: V, w: V) -> V {
+    V::new(dot(frame.u, w), dot(frame.v, w), dot(n, w))
 }
 
-pub fn vector_from_lobe(frame: Tangents, n: Vec3, w: Vec3) -> Vec3 {
-    frame.u * w.x + frame.v * w.y + n * w.z
+#[inline(always)]
+pub fn vector_from_lobe<V: Vector3>(frame: Tangents<V>, n: V, w: V) -> V {
+    frame.u * w.x() + frame.v * w.y() + n * w.z()
 }
 
-pub fn half_vector(wo: Vec3, wi: Vec3) -> Vec3 {
+#[inline(always)]
+pub fn half_vector<V: Vector3>(wo: V, wi: V) -> V {
     let sum = wo + wi;
     let length2 = dot(sum, sum);
-    if length2 > 1e-20 {
-        sum * (1.0 / length2.sqrt())
-    } else {
-        Vec3::Z
-    }
+    let unit = sum * (constant(1.0) / length2.sqrt());
+    V::select(sum.broadcast(Vec3::Z), unit, length2.gt(length2.splat(1e-20)))
 }
 
-pub fn facet_eval(alpha: Vec2, wo: Vec3, wi: Vec3) -> f32 {
-    let o = wo.z.abs();
-    let i = wi.z.abs();
-    let masking = 0.5 * i / max(o * ggx_length(alpha, wi) + i * ggx_length(alpha, wo), 1e-30);
+#[inline(always)]
+pub fn facet_eval<V: Vector3>(alpha: <V::Real as Real>::Vec2, wo: V, wi: V) -> V::Real {
+    let o = wo.z().abs();
+    let i = wi.z().abs();
+    let masking = constant(0.5) * i / max(o * ggx_length(alpha, wi) + i * ggx_length(alpha, wo), o.splat(1e-30));
     ggx_d(alpha, half_vector(wo, wi)) * masking
 }
 
-pub fn facet_pdf(alpha: Vec2, wo: Vec3, wi: Vec3) -> f32 {
-    ggx_d(alpha, half_vector(wo, wi)) * 0.5 / max(wo.z + ggx_length(alpha, wo), 1e-30)
+#[inline(always)]
+pub fn facet_pdf<V: Vector3>(alpha: <V::Real as Real>::Vec2, wo: V, wi: V) -> V::Real {
+    let length = ggx_length(alpha, wo);
+    ggx_d(alpha, half_vector(wo, wi)) * 0.5 / max(wo.z() + length, length.splat(1e-30))
 }
 
-pub fn facet_weight(alpha: Vec2, wo: Vec3, wi: Vec3) -> f32 {
+#[inline(always)]
+pub fn facet_weight<V: Vector3>(alpha: <V::Real as Real>::Vec2, wo: V, wi: V) -> V::Real {
     let length = ggx_length(alpha, wo);
-    wi.z * (wo.z + length) / max(wo.z * ggx_length(alpha, wi) + wi.z * length, 1e-30)
+    wi.z() * (wo.z() + length) / max(wo.z() * ggx_length(alpha, wi) + wi.z() * length, length.splat(1e-30))
 }
 
 pub fn aniso_table_position(alpha: Vec2, w: Vec3) -> Vec2 {
@@ -103,7 +112,9 @@ pub fn aniso_table_position(alpha: Vec2, w: Vec3) -> Vec2 {
     Vec2::new(line, 0.5 * (cosine + cosine * (1.0 + half_way) / (cosine + half_way)))
 }
 
-pub fn facet_loss(alpha: Vec2, wo: Vec3) -> f32 {
+#[inline(always)]
+pub fn facet_loss<V: Vector3>(alpha: <V::Real as Real>::Vec2, wo: V) -> V::Real {
     let albedo = ggx_albedo_along(alpha, wo);
-    max(1.0 / (albedo.x + albedo.y) - 1.005, 0.0)
+    let excess = constant(1.0) / (albedo.x() + albedo.y()) - 1.005;
+    max(excess, excess.splat(0.0))
 }

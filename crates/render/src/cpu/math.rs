@@ -4,7 +4,7 @@ use std::f32::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 
 use glam::Vec4;
 
-use super::lanes::{Real, Vector3, constant, select};
+use super::lanes::{Condition, Real, Vector3, constant, select};
 
 #[inline(always)]
 pub fn dot<V: Vector3>(a: V, b: V) -> V::Real {
@@ -65,8 +65,13 @@ pub fn power_whole(x: f32, n: u32, bits: u32) -> f32 {
     result
 }
 
-pub fn power(x: f32, y: f32) -> f32 {
-    if x >= f32::MIN_POSITIVE { exp2(y * log2(x)) } else { 0.0 }
+#[inline(always)]
+pub fn power<F: Real>(x: F, y: F) -> F {
+    let is_positive = x.ge(x.splat(f32::MIN_POSITIVE));
+    if !is_positive.any() {
+        return x.splat(0.0);
+    }
+    select(x.splat(0.0), (y * x.map(log2)).map(exp2), is_positive)
 }
 
 pub fn log2(x: f32) -> f32 {

@@ -1,72 +1,82 @@
 //! Twin of `shaders/metal.wgsl`.
 
-use glam::{Vec2, Vec3};
-
 use super::ggx::{ggx_d, ggx_length, ggx_sample};
+use super::lanes::{Condition, MaterialFields, Real, Vector3, constant, select};
 use super::lobe::{LobeSample, facet_alpha, facet_eval, facet_pdf, facet_weight, half_vector};
 use super::math::{dot, max, min};
-use crate::records::Material;
 
-pub fn conductor_fresnel(eta: f32, k: f32, cosine: f32) -> f32 {
+#[inline(always)]
+pub fn conductor_fresnel<F: Real>(eta: F, k: F, cosine: F) -> F {
+    let zero = cosine.splat(0.0);
     let c2 = cosine * cosine;
-    let s2 = 1.0 - c2;
+    let s2 = constant(1.0) - c2;
     let real = eta * eta - k * k - s2;
-    let magnitude = (real * real + 4.0 * (eta * eta) * (k * k)).sqrt();
-    let a = 2.0 * cosine * max(0.5 * (magnitude + real), 0.0).sqrt();
+    let magnitude = (real * real + constant(4.0) * (eta * eta) * (k * k)).sqrt();
+    let a = constant(2.0) * cosine * max(constant(0.5) * (magnitude + real), zero).sqrt();
     let s = (magnitude + c2 - a) / (magnitude + c2 + a);
     let p = s * ((c2 * magnitude + s2 * s2 - a * s2) / (c2 * magnitude + s2 * s2 + a * s2));
-    max(0.5 * (s + p), 0.0)
+    max(constant(0.5) * (s + p), zero)
 }
 
-pub fn metal_fresnel(material: &Material, cosine: f32) -> Vec3 {
-    let eta = material.eta;
-    let k = material.k;
-    let c = min(max(cosine, 0.0), 1.0);
-    if eta.x > 0.0 {
-        material.tint
-            * Vec3::new(
-                conductor_fresnel(eta.x, k.x, c),
-                conductor_fresnel(eta.y, k.y, c),
-                conductor_fresnel(eta.z, k.z, c),
-            )
-    } else {
-        material.tint
+#[inline(always)]
+pub fn metal_fresnel<F: Real, M: MaterialFields<Real = F>>(material: &M, cosine: F) -> F::Vec3 {
+    let (tint, eta, k) = (material.tint(), material.eta(), material.k());
+    let has_index = eta.x().gt(cosine.splat(0.0));
+    if !has_index.any() {
+        return tint;
     }
+    let c = min(max(cosine, cosine.splat(0.0)), cosine.splat(1.0));
+    let reflected = F::Vec3::new(
+        conductor_fresnel(eta.x(), k.x(), c),
+        conductor_fresnel(eta.y(), k.y(), c),
+        conductor_fresnel(eta.z(), k.z(), c),
+    );
+    Vector3::select(tint, tint * reflected, has_index)
 }
 
-pub fn metal_factor(material: &Material, cosine: f32) -> Vec3 {
-    metal_fresnel(material, cosine) * (Vec3::ONE + metal_fresnel(material, 1.0) * material.loss)
+#[inline(always)]
+pub fn metal_factor<F: Real, M: MaterialFields<Real = F>>(material: &M, cosine: F) -> F::Vec3 {
+    let one = cosine.splat(1.0);
+    let gain = F::Vec3::repeat(one) + metal_fresnel(material, one) * material.loss();
+    metal_fresnel(material, cosine) * gain
 }
 
-pub fn metal_eval(material: &Material, wo: Vec3, wi: Vec3) -> Vec3 {
-    if (wo.z > 0.0) & (wi.z > 0.0) {
-        metal_factor(material, dot(wo, half_vector(wo, wi))) * facet_eval(facet_alpha(material), wo, wi)
-    } else {
-        Vec3::ZERO
+#[inline(always)]
+pub fn metal_eval<F: Real, M: MaterialFields<Real = F>>(material: &M, wo: F::Vec3, wi: F::Vec3) -> F::Vec3 {
+    let zero = wo.z().splat(0.0);
+    let lit = wo.z().gt(zero) & wi.z().gt(zero);
+    if !lit.any() {
+        return F::Vec3::repeat(zero);
     }
+    let reflected = metal_factor(material, dot(wo, half_vector(wo, wi))) * facet_eval(facet_alpha(material), wo, wi);
+    Vector3::select(F::Vec3::repeat(zero), reflected, lit)
 }
 
-pub fn metal_pdf(material: &Material, wo: Vec3, wi: Vec3) -> f32 {
-    if (wo.z > 0.0) & (wi.z > 0.0) {
-        facet_pdf(facet_alpha(material), wo, wi)
-    } else {
-        0.0
+#[inline(always)]
+pub fn metal_pdf<F: Real, M: MaterialFields<Real = F>>(material: &M, wo: F::Vec3, wi: F::Vec3) -> F {
+    let zero = wo.z().splat(0.0);
+    let lit = wo.z().gt(zero) & wi.z().gt(zero);
+    if !lit.any() {
+        return zero;
     }
+    select(zero, facet_pdf(facet_alpha(material), wo, wi), lit)
 }
 
-pub fn metal_sample(material: &Material, wo: Vec3, u: Vec2) -> LobeSample {
+#[inline(always)]
+pub fn metal_sample<F: Real, M: MaterialFields<Real = F>>(material: &M, wo: F::Vec3, u: F::Vec2) -> LobeSample<F> {
     let alpha = facet_alpha(material);
     let m = ggx_sample(alpha, wo, u);
     let cosine = dot(wo, m);
-    let wi = m * (2.0 * cosine) - wo;
-    let lit = (wo.z > 0.0) & (wi.z > 0.0) & (cosine > 0.0);
+    let zero = cosine.splat(0.0);
+    let wi = m * (constant(2.0) * cosine) - wo;
+    let lit = wo.z().gt(zero) & wi.z().gt(zero) & cosine.gt(zero);
     let weight = metal_factor(material, cosine) * facet_weight(alpha, wo, wi);
-    let pdf = ggx_d(alpha, m) * 0.5 / max(wo.z + ggx_length(alpha, wo), 1e-30);
+    let pdf = ggx_d(alpha, m) * 0.5 / max(wo.z() + ggx_length(alpha, wo), cosine.splat(1e-30));
     LobeSample {
         wi,
-        weight: if lit { weight } else { Vec3::ZERO },
-        pdf: if lit { pdf } else { 0.0 },
-        eta: 1.0,
+        weight: Vector3::select(F::Vec3::repeat(zero), weight, lit),
+        pdf: select(zero, pdf, lit),
+        eta: cosine.splat(1.0),
     }
 }
 

@@ -3,6 +3,7 @@
 use glam::{UVec2, Vec3};
 
 use super::differential::{Differential, HitDifferential, reflected_differential, refracted_differential};
+use super::lanes::{Condition, Real, SurfaceVectors, Vector3};
 use super::math::{dot, max};
 use super::ray::Ray;
 use super::specular::{fresnel, reflected_direction, refracted_cosine, refracted_direction};
@@ -40,19 +41,23 @@ pub fn mirrored_path(path: Path, surface: Surface, hit_diff: HitDifferential, ma
     }
 }
 
-pub fn usable_normal(surface: Surface, normal: Vec3) -> Vec3 {
-    if is_usable(surface, normal) {
-        normal
-    } else if is_usable(surface, surface.smooth_normal) {
-        surface.smooth_normal
-    } else {
-        surface.normal
+#[inline(always)]
+pub fn usable_normal<F: Real, T: SurfaceVectors<Real = F>>(surface: T, normal: F::Vec3) -> F::Vec3 {
+    let usable = is_usable(surface, normal);
+    if !(!usable).any() {
+        return normal;
     }
+    let smooth = surface.smooth_normal();
+    let fallback = Vector3::select(surface.normal(), smooth, is_usable(surface, smooth));
+    Vector3::select(fallback, normal, usable)
 }
 
-pub fn is_usable(surface: Surface, normal: Vec3) -> bool {
-    let outward = dot(reflected_direction(-surface.wo, normal), surface.normal) > 0.0;
-    outward & (dot(surface.wo, normal) > 0.0)
+#[inline(always)]
+pub fn is_usable<F: Real, T: SurfaceVectors<Real = F>>(surface: T, normal: F::Vec3) -> F::Mask {
+    let wo = surface.wo();
+    let height = dot(reflected_direction(-wo, normal), surface.normal());
+    let zero = height.splat(0.0);
+    height.gt(zero) & dot(wo, normal).gt(zero)
 }
 
 pub fn glass_path(

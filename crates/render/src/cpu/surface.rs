@@ -2,7 +2,7 @@
 
 use glam::{UVec2, Vec2, Vec3};
 
-use super::lanes::{Real, Vector3};
+use super::lanes::{Real, SurfaceVectors, Vector3};
 use super::math::{dot, max, positive_zero};
 use super::primitive::{
     is_solid, local_tangents, primitive_gradient, primitive_height, primitive_normal, primitive_uv,
@@ -25,6 +25,25 @@ pub struct Surface {
     pub uv: Vec2,
     pub du: Vec3,
     pub dv: Vec3,
+}
+
+impl SurfaceVectors for Surface {
+    type Real = f32;
+
+    #[inline(always)]
+    fn normal(&self) -> Vec3 {
+        self.normal
+    }
+
+    #[inline(always)]
+    fn smooth_normal(&self) -> Vec3 {
+        self.smooth_normal
+    }
+
+    #[inline(always)]
+    fn wo(&self) -> Vec3 {
+        self.wo
+    }
 }
 
 #[inline(always)]

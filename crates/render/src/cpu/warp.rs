@@ -1,7 +1,5 @@
 //! Twin of `shaders/warp.wgsl`.
 
-use glam::{Vec2, Vec3};
-
 use super::lanes::{Real, Vector2, Vector3, constant, select};
 use super::math::max;
 use super::primitive::Tangents;
@@ -60,7 +58,9 @@ pub fn hemisphere_sample<V: Vector3>(n: V, u: <V::Real as Real>::Vec2) -> V {
     vector_around(n, V::new(x, y, max(height2, height2.splat(0.0)).sqrt()))
 }
 
-pub fn cap_sample(p: Vec2, cap_height: f32) -> Vec3 {
-    let h = (p.x * p.x + p.y * p.y) * cap_height;
-    (p * max(cap_height * (2.0 - h), 0.0).sqrt()).extend(1.0 - h)
+#[inline(always)]
+pub fn cap_sample<V: Vector2>(p: V, cap_height: V::Real) -> <V::Real as Real>::Vec3 {
+    let h = (p.x() * p.x() + p.y() * p.y()) * cap_height;
+    let q = p * max(cap_height * (constant(2.0) - h), h.splat(0.0)).sqrt();
+    Vector3::new(q.x(), q.y(), constant(1.0) - h)
 }

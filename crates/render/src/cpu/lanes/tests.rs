@@ -5,14 +5,26 @@ use glam::{UVec2, UVec4, Vec2, Vec3};
 
 use super::*;
 use crate::cpu::diffuse::{angles_at, diffuse_pdf, diffuse_sample};
+use crate::cpu::ggx::{ggx_albedo, ggx_albedo_along, ggx_d, ggx_g1, ggx_g2, ggx_length, ggx_pdf, ggx_sample};
 use crate::cpu::light_sample::{power_heuristic, solid_angle_pdf};
-use crate::cpu::math::{cross, dot, max, min, normalize};
+use crate::cpu::lobe::{
+    facet_alpha, facet_eval, facet_loss, facet_pdf, facet_weight, half_vector, vector_from_lobe, vector_to_lobe,
+};
+use crate::cpu::math::{cross, dot, max, min, normalize, power};
 use crate::cpu::mesh::{flipped_to, lift};
+use crate::cpu::metal::{conductor_fresnel, metal_eval, metal_fresnel, metal_pdf, metal_sample};
+use crate::cpu::path::usable_normal;
+use crate::cpu::principled::{
+    PrincipledLobes, evaluated_sample, glass_eval, glass_pdf, mirrored_pdf, principled_direction, principled_eval,
+    principled_mixture, principled_pdf, refracting_density, sheen_albedo, sheen_probability,
+};
 use crate::cpu::rng::{hash4, unit_float};
 use crate::cpu::sequence::{scramble, shuffled_index, sobol_bits, sobol_reversed};
+use crate::cpu::specular::{fresnel, reflected_direction, refracted_cosine, refracted_direction};
 use crate::cpu::surface::largest;
 use crate::cpu::traversal::levels;
-use crate::cpu::warp::{disk_sample, frame_around, hemisphere_sample, triangle_sample, vector_around};
+use crate::cpu::warp::{cap_sample, disk_sample, frame_around, hemisphere_sample, triangle_sample, vector_around};
+use crate::records::{LOBE_ANISOTROPY, LOBE_COAT, LOBE_SHEEN, LOBE_SPECULAR, LOBE_TRANSMISSION};
 
 const LANES: usize = 8;
 
@@ -71,6 +83,9 @@ where
     ] {
         reals.extend([(name, v.x()), (name, v.y()), (name, v.z())]);
     }
+    append_facet_results(a.numbers, u, |name, results| {
+        reals.extend(results.iter().map(|&x| (name, x)))
+    });
     let sobol: W::UVec2 = sobol_bits(i, WordVector2::new(j, k));
     words.extend([
         ("sobol_bits", sobol.x()),
@@ -80,6 +95,165 @@ where
         ("shuffled_index", shuffled_index(i, j)),
     ]);
     words.extend(hash4(K::from_words([i, j, k, l])).words().map(|word| ("hash4", word)));
+}
+
+/// A material and a surface with arbitrary parameters.
+#[derive(Clone, Copy)]
+struct Parameters<F>([F; 9]);
+
+macro_rules! parameters {
+    ($($real:ident $i:literal)*; $($vector:ident $first:literal)*) => {
+        impl<F: Real> MaterialFields for Parameters<F> {
+            type Real = F;
+
+            $(fn $real(&self) -> F {
+                self.0[$i]
+            })*
+
+            $(fn $vector(&self) -> F::Vec3 {
+                Vector3::new(self.0[$first], self.0[$first + 1], self.0[$first + 2])
+            })*
+
+            fn is_thin(&self) -> F::Mask {
+                self.0[0].gt(self.0[1])
+            }
+
+            fn has_aniso_table(&self) -> F::Mask {
+                self.0[2].gt(self.0[3])
+            }
+        }
+    };
+}
+
+parameters! {
+    roughness 0 anisotropy 1 ior 2 sheen_roughness 3 metallic 4 transmission 5 clearcoat 6 clearcoat_roughness 7
+    specular_weight 8 loss 0;
+    diffuse 0 specular 3 sheen 6 tint 1 eta 2 k 5
+}
+
+impl<F: Real> SurfaceVectors for Parameters<F> {
+    type Real = F;
+
+    fn normal(&self) -> F::Vec3 {
+        self.diffuse()
+    }
+
+    fn smooth_normal(&self) -> F::Vec3 {
+        self.specular()
+    }
+
+    fn wo(&self) -> F::Vec3 {
+        self.sheen()
+    }
+}
+
+/// Calls the functions of microfacets and of `principled` materials. `append` gets the name and the results of each
+/// call.
+#[inline(always)]
+fn append_facet_results<F: Real>(n: [F; 9], u: F::Vec2, mut append: impl FnMut(&'static str, &[F])) {
+    let parameters = Parameters(n);
+    let alpha: F::Vec2 = Vector2::new(n[1].abs(), n[4].abs());
+    let unit = |v: F::Vec3| normalize(v);
+    let (normal, wo, wi) = (
+        unit(parameters.diffuse()),
+        unit(parameters.specular()),
+        unit(parameters.sheen()),
+    );
+    for (name, x) in [
+        ("ggx_d", ggx_d(alpha, normal)),
+        ("ggx_length", ggx_length(alpha, wo)),
+        ("ggx_g1", ggx_g1(alpha, wo)),
+        ("ggx_g2", ggx_g2(alpha, wo, wi)),
+        ("ggx_pdf", ggx_pdf(alpha, wo, normal)),
+        ("facet_eval", facet_eval(alpha, wo, wi)),
+        ("facet_pdf", facet_pdf(alpha, wo, wi)),
+        ("facet_weight", facet_weight(alpha, wo, wi)),
+        ("mirrored_pdf", mirrored_pdf(alpha, wo, normal)),
+        ("refracting_density", refracting_density(wo, wi, normal, n[0])),
+        ("sheen_albedo", sheen_albedo(n[0], n[1])),
+        ("conductor_fresnel", conductor_fresnel(n[0], n[1], n[2])),
+        ("metal_pdf", metal_pdf(&parameters, wo, wi)),
+        ("facet_loss", facet_loss(alpha, wo)),
+        ("power", power(n[0], n[1])),
+        ("fresnel", fresnel(n[0], n[1], n[2])),
+        ("refracted_cosine", refracted_cosine(n[0], n[1])),
+    ] {
+        append(name, &[x]);
+    }
+    for (name, v) in [
+        ("ggx_albedo", ggx_albedo(n[0], n[1])),
+        ("ggx_albedo_along", ggx_albedo_along(alpha, wo)),
+        ("facet_alpha", facet_alpha(&parameters)),
+    ] {
+        append(name, &[v.x(), v.y()]);
+    }
+    let frame = frame_around(normal);
+    let metal_sample = metal_sample(&parameters, wo, u);
+    append("metal_sample pdf", &[metal_sample.pdf]);
+    for (name, v) in [
+        ("ggx_sample", ggx_sample(alpha, wo, u)),
+        ("cap_sample", cap_sample(u, n[0])),
+        ("half_vector", half_vector(wo, wi)),
+        ("vector_to_lobe", vector_to_lobe(frame, normal, wi)),
+        ("vector_from_lobe", vector_from_lobe(frame, normal, wi)),
+        ("reflected_direction", reflected_direction(wo, normal)),
+        ("refracted_direction", refracted_direction(wo, normal, n[0], n[1], n[2])),
+        ("usable_normal", usable_normal(parameters, wi)),
+        ("metal_fresnel", metal_fresnel(&parameters, n[0])),
+        ("metal_eval", metal_eval(&parameters, wo, wi)),
+        ("metal_sample", metal_sample.wi),
+        ("metal_sample weight", metal_sample.weight),
+    ] {
+        append(name, &[v.x(), v.y(), v.z()]);
+    }
+    let all = LOBE_SPECULAR | LOBE_TRANSMISSION | LOBE_COAT | LOBE_SHEEN | LOBE_ANISOTROPY;
+    for lobes in [
+        0,
+        LOBE_SPECULAR,
+        LOBE_SPECULAR | LOBE_COAT,
+        LOBE_TRANSMISSION,
+        LOBE_SHEEN,
+        all,
+    ] {
+        let m = principled_mixture(&parameters, wo, n[0].lt(n[3]), normal, lobes, parameters.diffuse());
+        append_lobes(&m, &mut append);
+        let direction = principled_direction(&m, wo, u, n[8].abs(), lobes);
+        let sample = evaluated_sample(direction, parameters.tint(), n[7]);
+        for (name, v) in [
+            ("principled_eval", principled_eval(&m, wo, wi, lobes)),
+            ("glass_eval", glass_eval(&m, wo, wi)),
+            ("principled_direction", direction.wi),
+            ("principled_direction weight", direction.weight),
+            ("evaluated_sample weight", sample.weight),
+        ] {
+            append(name, &[v.x(), v.y(), v.z()]);
+        }
+        append("principled_pdf", &[principled_pdf(&m, wo, wi, lobes)]);
+        append("glass_pdf", &[glass_pdf(&m, wo, wi)]);
+        append("principled_direction pdf", &[direction.pdf, direction.eta, sample.pdf]);
+    }
+}
+
+#[inline(always)]
+fn append_lobes<F: Real>(m: &PrincipledLobes<F>, append: &mut impl FnMut(&'static str, &[F])) {
+    for v in [m.diffuse, m.f0, m.f90, m.transmission_tint, m.glass_f0, m.sheen] {
+        append("principled_mixture", &[v.x(), v.y(), v.z()]);
+    }
+    let p = m.lobe_probs;
+    append("principled_mixture probabilities", &[p.x(), p.y(), p.z(), p.w()]);
+    append("sheen_probability", &[sheen_probability(m)]);
+    let numbers = [
+        m.glass,
+        m.glass_f90,
+        m.f0_ior,
+        m.ratio,
+        m.eta,
+        m.coat,
+        m.coat_alpha,
+        m.sheen_alpha,
+    ];
+    append("principled_mixture numbers", &numbers);
+    append("principled_mixture alpha", &[m.alpha.x(), m.alpha.y()]);
 }
 
 struct Random(u64);

@@ -3,10 +3,13 @@
 //! [`advance`](super::integrators::path::advance). Batches are faster, because their rays are traced interleaved and
 //! their hits are shaded in SIMD lanes.
 
+mod batch;
 mod begin;
 mod closest_hits;
 mod items;
+mod lights;
 mod linear;
+mod materials;
 mod meshes;
 mod occlusion;
 mod rows;
@@ -23,7 +26,7 @@ use self::closest_hits::closest_hits;
 pub use self::meshes::BatchMeshes;
 use self::occlusion::occluded_rays;
 use self::scratch::Scratch;
-pub use self::shade::LaneHits;
+pub use self::shade::{LaneHits, MaterialKind, SurfaceKind};
 use self::shade::{ShadingQueues, shade_hits};
 use super::integrators::path::{PathState, add_radiance};
 use super::ray::Hit;

@@ -1,13 +1,14 @@
-//! Surfaces at the hits of several paths in SIMD lanes, without texture coordinates and tangents.
+//! Surfaces at the hits of several paths in SIMD lanes, without texture coordinates.
 
 use fearless_simd::prelude::*;
 use fearless_simd::{f32x8, mask32x8};
 use glam::{Vec3, Vec4Swizzles as _};
 
 use super::super::geometry::instance_of;
-use super::super::lanes::{Real, Vector3, constant, select};
+use super::super::lanes::{Real, SurfaceVectors, Vector3, constant, select};
 use super::super::math::{cross, dot, max, normalize};
 use super::super::mesh::{HitPrimitive, flipped_to, lift};
+use super::super::primitive::Tangents;
 use super::super::ray::{Hit, Ray};
 use super::super::surface::{Surface, largest};
 use super::rows::{F, LANES, Row, Rows3, V, load3, set3, splat3};
@@ -22,6 +23,14 @@ pub struct LaneSurfaces<S: Simd> {
     pub shading_normal: V<S>,
     pub ray_origin: V<S>,
     pub terminator_offset: V<S>,
+    /// The normal of the clear coat, before it is made usable.
+    pub coat_normal: V<S>,
+    /// Unit vectors towards the previous vertices.
+    pub wo: V<S>,
+    /// 1 where the front of a surface is hit, else -1.
+    pub side: F<S>,
+    /// [`None`] if tangents follow from the shading normal.
+    pub tangents: Option<Tangents<V<S>>>,
     /// [`None`] if no hit is on a mesh.
     pub face: Option<LaneFaces<S>>,
 }
@@ -34,7 +43,32 @@ pub struct LaneFaces<S: Simd> {
     y: V<S>,
 }
 
+impl<S: Simd> SurfaceVectors for LaneSurfaces<S> {
+    type Real = F<S>;
+
+    #[inline(always)]
+    fn normal(&self) -> V<S> {
+        self.normal
+    }
+
+    #[inline(always)]
+    fn smooth_normal(&self) -> V<S> {
+        self.smooth_normal
+    }
+
+    #[inline(always)]
+    fn wo(&self) -> V<S> {
+        self.wo
+    }
+}
+
 impl<S: Simd> LaneSurfaces<S> {
+    /// Returns `value` where a surface may reflect light from `wi`, else zero.
+    #[inline(always)]
+    pub fn where_allowed(&self, wi: V<S>, value: V<S>) -> V<S> {
+        Vector3::select(splat3(wi.x.simd, Vec3::ZERO), value, self.direction_allowed(wi))
+    }
+
     /// Returns true where a surface may reflect light from `wi`, like the scalar `direction_allowed`.
     #[inline(always)]
     pub fn direction_allowed(&self, wi: V<S>) -> mask32x8<S> {
@@ -94,7 +128,8 @@ impl FlatHits {
         let outward = gradient * inverse_slope;
         let height = dot(gradient, offset);
         let position = point - outward * (height * inverse_slope);
-        let normal = outward * side_towards(outward, direction);
+        let side = side_towards(outward, direction);
+        let normal = outward * side;
         let size = max(largest(position), largest(offset));
         LaneSurfaces {
             position,
@@ -103,6 +138,10 @@ impl FlatHits {
             shading_normal: normal,
             ray_origin: position + normal * (constant(epsilon) * size),
             terminator_offset: splat3(simd, Vec3::ZERO),
+            coat_normal: normal,
+            wo: -direction,
+            side,
+            tangents: None,
             face: None,
         }
     }
@@ -267,6 +306,10 @@ impl FaceHits {
             shading_normal: smooth_normal,
             ray_origin,
             terminator_offset: lift_0 * b_0 + lift_1 * b_x + lift_2 * b_y,
+            coat_normal: smooth_normal,
+            wo: -d,
+            side,
+            tangents: None,
             face: Some(face),
         }
     }
@@ -281,6 +324,11 @@ pub struct EvaluatedHits {
     shading_normal: Rows3,
     ray_origin: Rows3,
     terminator_offset: Rows3,
+    coat_normal: Rows3,
+    wo: Rows3,
+    side: Row,
+    du: Rows3,
+    dv: Rows3,
     face_anchor: Rows3,
     face_x: Rows3,
     face_y: Rows3,
@@ -288,7 +336,8 @@ pub struct EvaluatedHits {
 
 impl EvaluatedHits {
     #[inline(always)]
-    pub fn set(&mut self, lane: usize, surface: &Surface, prim: &HitPrimitive) {
+    pub fn set(&mut self, lane: usize, surface: &Surface, prim: &HitPrimitive, coat_normal: Vec3) {
+        self.side[lane] = surface.side;
         for (rows, v) in [
             (&mut self.position, surface.position),
             (&mut self.normal, surface.normal),
@@ -296,6 +345,10 @@ impl EvaluatedHits {
             (&mut self.shading_normal, surface.shading_normal),
             (&mut self.ray_origin, surface.ray_origin),
             (&mut self.terminator_offset, surface.terminator_offset),
+            (&mut self.coat_normal, coat_normal),
+            (&mut self.wo, surface.wo),
+            (&mut self.du, surface.du),
+            (&mut self.dv, surface.dv),
             (&mut self.face_anchor, prim.primitive.anchor),
             (&mut self.face_x, prim.primitive.x),
             (&mut self.face_y, prim.primitive.y),
@@ -304,8 +357,9 @@ impl EvaluatedHits {
         }
     }
 
+    /// Returns the surfaces. `has_tangents` is true if the evaluated tangents are frames around the shading normals.
     #[inline(always)]
-    pub fn surfaces<S: Simd>(&self, simd: S) -> LaneSurfaces<S> {
+    pub fn surfaces<S: Simd>(&self, simd: S, has_tangents: bool) -> LaneSurfaces<S> {
         LaneSurfaces {
             position: load3(simd, &self.position),
             normal: load3(simd, &self.normal),
@@ -313,6 +367,13 @@ impl EvaluatedHits {
             shading_normal: load3(simd, &self.shading_normal),
             ray_origin: load3(simd, &self.ray_origin),
             terminator_offset: load3(simd, &self.terminator_offset),
+            coat_normal: load3(simd, &self.coat_normal),
+            wo: load3(simd, &self.wo),
+            side: f32x8::simd_from(simd, self.side),
+            tangents: has_tangents.then(|| Tangents {
+                u: load3(simd, &self.du),
+                v: load3(simd, &self.dv),
+            }),
             face: Some(LaneFaces {
                 anchor: load3(simd, &self.face_anchor),
                 x: load3(simd, &self.face_x),

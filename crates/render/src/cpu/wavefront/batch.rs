@@ -1,0 +1,375 @@
+//! Shading of queued hits in SIMD lanes.
+
+use fearless_simd::prelude::*;
+use fearless_simd::{f32x8, u32x8};
+use glam::{UVec2, Vec3};
+
+use super::super::differential::Differential;
+use super::super::energy::principled_energy;
+use super::super::geometry::{fetch_hit_primitive, hit_differential, material_of, surface_of};
+use super::super::integrators::path::{PathState, add_emission, add_radiance, decision, decision_set};
+use super::super::lanes::{LaneMaterials, Lanes2, MaterialRows, Real, Vector3, Word, constant, select};
+use super::super::light_sample::power_heuristic;
+use super::super::math::{min, normalize};
+use super::super::mesh::HitPrimitive;
+use super::super::path::{Path, usable_normal};
+use super::super::principled::bounded_color;
+use super::super::ray::{Hit, Ray};
+use super::super::rng::{hash4, unit_float};
+use super::super::scattering::{bounded, facet_frame, facets_of, local_wo, shaded_normal};
+use super::super::shadow_ray::ShadowRay;
+use super::super::surface::{Surface, largest};
+use super::super::texture::evaluate_material;
+use super::super::vertices::with_vertex_colors;
+use super::QueuedShadowRay;
+use super::lights::{LightChoices, LightRows, only_light};
+use super::materials::{Diffuse, Directions, Metal, Principled};
+use super::rows::{F, LANES, Row, Rows3, get3, load3, set3, store3};
+use super::shade::{MaterialKind, QueuedHit, ShadingQueues, SurfaceKind};
+use super::surfaces::{EvaluatedHits, FaceHits, FlatHits, LaneSurfaces};
+use crate::records::{DIFFUSE, ENVIRONMENT_MAP, INFINITE_T, INSTANCE, METAL, Material, NO_INDEX, Packed};
+
+/// The paths of a batch, and the queue of their shadow rays.
+pub struct Batch<'a> {
+    pub scene: &'a Packed,
+    pub paths: &'a mut [PathState],
+    pub pixels: &'a [UVec2],
+    pub shadow_rays: &'a mut Vec<QueuedShadowRay>,
+}
+
+/// Path states before a bounce.
+#[derive(Default)]
+struct PathRows {
+    throughput: Rows3,
+    eta2: Row,
+    pixel_x: [u32; LANES],
+    pixel_y: [u32; LANES],
+    sample: [u32; LANES],
+    depth: [u32; LANES],
+    exclude_front: [UVec2; LANES],
+    exclude_back: [UVec2; LANES],
+}
+
+/// A surface and its material, evaluated by scalar functions.
+struct Evaluated {
+    prim: HitPrimitive,
+    /// If the scene has anisotropic materials, the tangents are the frame of the material.
+    surface: Surface,
+    material: Material,
+    coat_normal: Vec3,
+    /// Albedos of `principled_energy`.
+    energy: Vec3,
+}
+
+/// Evaluates a surface and its material, like the first part of the scalar `shade`.
+fn evaluate(scene: &Packed, path: &Path, hit: Hit) -> Evaluated {
+    let s = &scene.specialization;
+    let prim = fetch_hit_primitive(scene, hit);
+    let mut surface = surface_of(scene, &prim, hit, path.ray);
+    let mut material = *material_of(scene, &prim);
+    let mut coat_normal = surface.shading_normal;
+    if (s.lookups != 0) | (s.vertex_colors != 0) {
+        let hit_diff = hit_differential(scene, &prim, hit, surface, path.ray, path.differential);
+        let mut shading = evaluate_material(scene, &prim, hit, &material, surface, hit_diff, s.lookups);
+        if s.vertex_colors != 0 {
+            shading.material = with_vertex_colors(scene, &shading.material, hit);
+        }
+        material = bounded(shading.material);
+        surface.shading_normal = shading.normal;
+        coat_normal = shading.coat_normal;
+    }
+    let mut energy = Vec3::ONE;
+    if material.kind != DIFFUSE && s.anisotropic != 0 {
+        surface.shading_normal = shaded_normal(surface, &material, surface.shading_normal);
+        let frame = facet_frame(scene, surface, &material);
+        (surface.du, surface.dv) = (frame.u, frame.v);
+        if material.kind == METAL {
+            material = facets_of(scene, &surface, material);
+            material.energy = NO_INDEX; // the loss is known
+        } else {
+            energy = principled_energy(scene, &material, local_wo(&surface), surface.side);
+        }
+    }
+    Evaluated {
+        prim,
+        surface,
+        material,
+        coat_normal,
+        energy,
+    }
+}
+
+/// The materials at the hits, one per lane.
+struct HitMaterials {
+    rows: MaterialRows,
+    /// Indices of the materials in the scene. [`NO_INDEX`] after a material that was evaluated for a hit.
+    index_of_lane: [u32; LANES],
+    energy: Rows3,
+}
+
+impl HitMaterials {
+    /// Sets a material of the scene.
+    #[inline(always)]
+    fn set(&mut self, scene: &Packed, lane: usize, index: u32) {
+        let s = &scene.specialization;
+        let material = &scene.materials[index as usize];
+        let is_bounded = (s.lookups != 0) | (s.vertex_colors != 0);
+        if material.kind == DIFFUSE {
+            self.index_of_lane[lane] = NO_INDEX; // only the color is set
+            let color = material.diffuse;
+            self.rows
+                .set_diffuse(lane, if is_bounded { bounded_color(color) } else { color });
+            return;
+        }
+        if self.index_of_lane[lane] == index {
+            return;
+        }
+        self.index_of_lane[lane] = index;
+        if is_bounded {
+            self.rows.set(lane, &bounded(*material));
+        } else {
+            self.rows.set(lane, material);
+        }
+        set3(&mut self.energy, lane, Vec3::ONE);
+    }
+
+    /// Sets a material that was evaluated for a hit.
+    #[inline(always)]
+    fn set_evaluated(&mut self, lane: usize, evaluated: &Evaluated) {
+        self.index_of_lane[lane] = NO_INDEX;
+        self.rows.set(lane, &evaluated.material);
+        set3(&mut self.energy, lane, evaluated.energy);
+    }
+}
+
+impl Batch<'_> {
+    /// Shades all queued hits. Only one loop contains the code for all kinds, so that it is compiled only once.
+    #[inline(always)]
+    pub fn shade_queues<S: Simd>(&mut self, simd: S, queues: &ShadingQueues) {
+        let scene = self.scene;
+        let epsilon = scene.environment.shadow_epsilon;
+        let (mut flat, mut faces, mut evaluated) = (FlatHits::new(), FaceHits::new(), EvaluatedHits::default());
+        let mut lights = LightRows::new(only_light(scene));
+        let mut materials = HitMaterials {
+            rows: MaterialRows::default(),
+            index_of_lane: [NO_INDEX; LANES],
+            energy: Default::default(),
+        };
+        for (material_kind, surface_kind, queue) in queues.filled() {
+            for hits in queue.chunks(LANES) {
+                let mut rows = PathRows::default();
+                for (lane, queued) in hits.iter().enumerate() {
+                    self.gather(&mut rows, lane, queued);
+                    let state = &mut self.paths[queued.path as usize];
+                    let path = &state.path;
+                    match surface_kind {
+                        SurfaceKind::Flat => flat.set(scene, lane, path.ray, queued.hit),
+                        SurfaceKind::Face => faces.set(scene, lane, path.ray, queued.hit),
+                        SurfaceKind::Evaluated => {
+                            let hit = evaluate(scene, path, queued.hit);
+                            if scene.specialization.emissive != 0 {
+                                add_emission(scene, state, &hit.prim, queued.hit, hit.surface, &hit.material, true);
+                            }
+                            evaluated.set(lane, &hit.surface, &hit.prim, hit.coat_normal);
+                            materials.set_evaluated(lane, &hit);
+                            rows.exclude_front[lane] = hit.surface.exclude_front;
+                            rows.exclude_back[lane] = hit.surface.exclude_back;
+                            continue;
+                        }
+                    }
+                    materials.set(scene, lane, queued.material);
+                    let prim_id = UVec2::new(queued.hit.instance, queued.hit.primitive);
+                    (rows.exclude_front[lane], rows.exclude_back[lane]) = (prim_id, prim_id);
+                }
+                let surfaces = match surface_kind {
+                    SurfaceKind::Flat => flat.surfaces(simd, epsilon),
+                    SurfaceKind::Face => faces.surfaces(simd, epsilon),
+                    SurfaceKind::Evaluated => evaluated.surfaces(simd, scene.specialization.anisotropic != 0),
+                };
+                self.shade(simd, hits, &rows, &mut lights, surfaces, material_kind, &mut materials);
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn gather(&self, rows: &mut PathRows, lane: usize, queued: &QueuedHit) {
+        let i = queued.path as usize;
+        let state = &self.paths[i];
+        set3(&mut rows.throughput, lane, state.path.throughput);
+        rows.eta2[lane] = state.eta2;
+        rows.pixel_x[lane] = self.pixels[i].x;
+        rows.pixel_y[lane] = self.pixels[i].y;
+        rows.sample[lane] = state.sample;
+        rows.depth[lane] = state.path.depth;
+    }
+
+    /// Samples lights and the next rays, like the part of the scalar `shade` after emission is added.
+    #[expect(clippy::too_many_arguments, reason = "the rows of the hits")]
+    #[inline(always)]
+    fn shade<S: Simd>(
+        &mut self,
+        simd: S,
+        hits: &[QueuedHit],
+        rows: &PathRows,
+        lights: &mut LightRows,
+        mut surface: LaneSurfaces<S>,
+        material_kind: MaterialKind,
+        materials: &mut HitMaterials,
+    ) {
+        let scene = self.scene;
+        let s = &scene.specialization;
+        let words = |words: &[u32; LANES]| u32x8::simd_from(simd, *words);
+        let (x, y, depth, sample) = (
+            words(&rows.pixel_x),
+            words(&rows.pixel_y),
+            words(&rows.depth),
+            words(&rows.sample),
+        );
+        let seed = x.splat(scene.camera.seed);
+        let key = hash4([x, y, seed, (depth << 1) + 1]);
+        let zero: F<S> = SimdBase::splat(simd, 0.0);
+        let one = zero.splat(1.0);
+        let has_roulette = s.rr_depth < s.bounces;
+        let is_diffuse = material_kind == MaterialKind::Diffuse;
+        let decision_key = if has_roulette || !is_diffuse || s.emitters > 1 || s.light_tree != 0 {
+            hash4([x, y, seed, (depth << 1) + 2])
+        } else {
+            key // not used
+        };
+        if !is_diffuse {
+            surface.shading_normal = usable_normal(surface, surface.shading_normal);
+        }
+        if s.tlas_kinds & (1 << INSTANCE) != 0 {
+            surface.ray_origin = surface.ray_origin + surface.terminator_offset;
+        }
+        let throughput = load3(simd, &rows.throughput);
+        let (mut random, mut roulette_random) = (zero, zero);
+        if has_roulette || !is_diffuse {
+            let [.., x, y] = decision_key;
+            let choices = decision_set(scene, Lanes2 { x, y }, sample);
+            (random, roulette_random) = (unit_float(choices.x), unit_float(choices.y));
+        }
+        let mut light = None;
+        if s.emitters != 0 {
+            let tree_key = Lanes2 {
+                x: decision_key[0],
+                y: decision_key[1],
+            };
+            let choices = LightChoices {
+                emitter: if s.emitters > 1 {
+                    decision_set(scene, tree_key, sample)
+                } else {
+                    tree_key // not used
+                },
+                tree_key,
+                u: decision(scene, Lanes2 { x: key[0], y: key[1] }, sample),
+            };
+            let samples = &rows.sample[..hits.len()];
+            light = Some(lights.sample(
+                simd,
+                scene,
+                choices,
+                surface.ray_origin,
+                surface.shading_normal,
+                samples,
+            ));
+        }
+        let directions = Directions {
+            to_light: light.as_ref().map(|light| normalize(light.to_light)),
+            u: decision(scene, Lanes2 { x: key[2], y: key[3] }, sample),
+            random,
+        };
+        let rows_of_materials = &mut materials.rows;
+        let scattered = match material_kind {
+            MaterialKind::Diffuse => {
+                let material = LaneMaterials {
+                    simd,
+                    rows: rows_of_materials,
+                };
+                Diffuse::new(&material).scatter(&surface, directions)
+            }
+            MaterialKind::Principled => {
+                let material = LaneMaterials {
+                    simd,
+                    rows: rows_of_materials,
+                };
+                Principled::new(scene, &material, &surface, &materials.energy).scatter(&surface, directions)
+            }
+            MaterialKind::Metal => Metal::new(simd, rows_of_materials, &surface).scatter(&surface, directions),
+        };
+
+        let mut contributions = Rows3::default();
+        let mut queued_mask = 0;
+        if let (Some(light), Some(reflected)) = (light, scattered.reflections) {
+            let mut contribution = throughput * reflected.value * light.radiance * (constant(1.0) / light.pdf);
+            contribution = contribution * select(power_heuristic(light.pdf, reflected.pdf), one, light.is_delta);
+            let max_component = largest(contribution);
+            queued_mask = (max_component.gt(zero) & max_component.lt(zero.splat(INFINITE_T))).to_bitmask();
+            contributions = store3(contribution);
+        }
+        let next = scattered.next_rays;
+        let mut continued = throughput * next.weight;
+        let mut survives = zero.le(zero); // true in all lanes
+        if has_roulette {
+            let first_depth = x.splat(s.rr_depth);
+            let in_roulette = (depth + 1).simd_ge(first_depth);
+            let chance = min(largest(continued) / f32x8::simd_from(simd, rows.eta2), one);
+            survives = !(in_roulette & roulette_random.ge(chance));
+            continued = Vector3::select(continued, continued * (constant(1.0) / chance), in_roulette);
+        }
+        let survives = (survives & largest(continued).gt(zero)).to_bitmask();
+
+        let (origins, normals) = (store3(surface.ray_origin), store3(surface.shading_normal));
+        let (directions, throughputs) = (store3(next.wi), store3(continued));
+        let pdfs: Row = next.pdf.into();
+        let has_light_tree = s.light_tree != 0;
+        let has_previous_normal = has_light_tree || s.environment_flags & ENVIRONMENT_MAP != 0;
+        for (lane, queued) in hits.iter().enumerate() {
+            let state = &mut self.paths[queued.path as usize];
+            let (exclude_front, exclude_back) = (rows.exclude_front[lane], rows.exclude_back[lane]);
+            let origin = get3(&origins, lane);
+            let bounces = rows.depth[lane] + 1;
+            if s.emitters != 0 {
+                let contribution = get3(&contributions, lane);
+                if queued_mask >> lane & 1 != 0 {
+                    self.shadow_rays.push(QueuedShadowRay {
+                        path: queued.path,
+                        ray: ShadowRay {
+                            origin,
+                            to_light: get3(&lights.to_light, lane),
+                            t_max: lights.t_max[lane],
+                            exclude_front,
+                            exclude_back,
+                            target_prim: lights.primitive[lane],
+                            contribution,
+                            bounces,
+                        },
+                    });
+                } else {
+                    add_radiance(scene, state, contribution, false, bounces);
+                }
+            }
+            state.path = Path {
+                ray: Ray {
+                    origin,
+                    direction: get3(&directions, lane),
+                },
+                differential: Differential::default(),
+                throughput: get3(&throughputs, lane),
+                depth: bounces,
+                branch: 0,
+                origin_prim: exclude_front,
+                inside_prim: exclude_back,
+            };
+            state.pdf = pdfs[lane];
+            state.skipped_distance = 0.0;
+            state.ended |= survives >> lane & 1 == 0;
+            if has_light_tree {
+                state.prev_position = origin;
+            }
+            if has_previous_normal {
+                state.prev_normal = get3(&normals, lane);
+            }
+        }
+    }
+}

@@ -1,0 +1,140 @@
+//! Light samples of several paths in SIMD lanes.
+
+use fearless_simd::prelude::*;
+use fearless_simd::{f32x8, mask32x8, u32x8};
+use glam::{UVec2, Vec2, Vec3};
+
+use super::super::emitter::{LightSample, sample_emitter, select_emitter};
+use super::super::lanes::{Lanes2, Real, Vector3};
+use super::super::light_choice::{EmitterSelection, light_tree_select};
+use super::super::light_sample::solid_angle_pdf;
+use super::super::math::dot;
+use super::rows::{F, LANES, Row, Rows3, V, get3, load3, set3, splat3, store3};
+use crate::records::{Light, Packed, RECTANGLE};
+
+/// One light sample per path.
+pub struct LightRows {
+    pub to_light: Rows3,
+    radiance: Rows3,
+    pdf: Row,
+    is_delta: Row,
+    pub t_max: Row,
+    pub primitive: [u32; LANES],
+}
+
+impl LightRows {
+    /// Creates the rows. `light` is the only light, if any: all of its samples have the same `t_max` and `primitive`.
+    pub fn new(light: Option<&Light>) -> LightRows {
+        LightRows {
+            to_light: Default::default(),
+            radiance: Default::default(),
+            pdf: Default::default(),
+            is_delta: Default::default(),
+            t_max: [light.map_or(0.0, |light| light.t_max); LANES],
+            primitive: [light.map_or(0, |light| light.primitive); LANES],
+        }
+    }
+
+    fn set(&mut self, lane: usize, light: LightSample) {
+        set3(&mut self.to_light, lane, light.to);
+        set3(&mut self.radiance, lane, light.radiance);
+        self.pdf[lane] = light.pdf;
+        self.is_delta[lane] = if light.is_delta { 1.0 } else { 0.0 };
+        self.t_max[lane] = light.t_max;
+        self.primitive[lane] = light.primitive;
+    }
+}
+
+/// Random numbers that select an emitter and a point on it, like those of the scalar `shade`.
+pub struct LightChoices<S: Simd> {
+    /// Bits that select an emitter.
+    pub emitter: Lanes2<u32x8<S>>,
+    /// Key of the choices in a light tree.
+    pub tree_key: Lanes2<u32x8<S>>,
+    /// Point on the unit square.
+    pub u: Lanes2<F<S>>,
+}
+
+/// Values of [`LightSample`] in lanes.
+pub struct LightSamples<S: Simd> {
+    pub to_light: V<S>,
+    pub radiance: V<S>,
+    pub pdf: F<S>,
+    pub is_delta: mask32x8<S>,
+}
+
+impl LightRows {
+    /// Samples a light for each of the first `count` surface points. `samples` contains the sample numbers of the paths.
+    #[inline(always)]
+    pub fn sample<S: Simd>(
+        &mut self,
+        simd: S,
+        scene: &Packed,
+        choices: LightChoices<S>,
+        points: V<S>,
+        normals: V<S>,
+        samples: &[u32],
+    ) -> LightSamples<S> {
+        let zero: F<S> = SimdBase::splat(simd, 0.0);
+        if let Some(light) = only_light(scene) {
+            let (to_light, radiance, pdf) = rectangle_samples(simd, light, points, choices.u);
+            self.to_light = store3(to_light);
+            return LightSamples {
+                to_light,
+                radiance,
+                pdf,
+                is_delta: zero.lt(zero), // false in all lanes
+            };
+        }
+        let (points, normals) = (store3(points), store3(normals));
+        let (bits_x, bits_y): ([u32; LANES], [u32; LANES]) = (choices.emitter.x.into(), choices.emitter.y.into());
+        let (key_x, key_y): ([u32; LANES], [u32; LANES]) = (choices.tree_key.x.into(), choices.tree_key.y.into());
+        let (u_x, u_y): (Row, Row) = (choices.u.x.into(), choices.u.y.into());
+        for (lane, &sample) in samples.iter().enumerate() {
+            let (p, normal) = (get3(&points, lane), get3(&normals, lane));
+            let mut selection = EmitterSelection {
+                emitter: select_emitter(scene, UVec2::new(bits_x[lane], bits_y[lane])),
+                density: 0.0,
+            };
+            if scene.specialization.light_tree != 0 {
+                let key = UVec2::new(key_x[lane], key_y[lane]);
+                selection = light_tree_select(scene, selection.emitter, p, normal, key, sample);
+            }
+            let u = Vec2::new(u_x[lane], u_y[lane]);
+            self.set(lane, sample_emitter(scene, selection, p, normal, u));
+        }
+        LightSamples {
+            to_light: load3(simd, &self.to_light),
+            radiance: load3(simd, &self.radiance),
+            pdf: f32x8::simd_from(simd, self.pdf),
+            is_delta: f32x8::simd_from(simd, self.is_delta).gt(zero),
+        }
+    }
+}
+
+/// Returns the only light of the scene, if it can be sampled in lanes.
+pub fn only_light(scene: &Packed) -> Option<&Light> {
+    let s = &scene.specialization;
+    let [emitter] = scene.lighting.emitters[..] else {
+        return None;
+    };
+    let is_plain = s.light_tree == 0 && s.emission_textures == 0 && s.alpha_surfaces == 0 && emitter.instance == 0;
+    let light = scene.lighting.lights.get(emitter.index as usize)?;
+    (is_plain && light.kind == RECTANGLE).then_some(light)
+}
+
+/// Returns the vectors to light samples, their radiance and their pdfs, like `sample_light` for rectangles.
+#[inline(always)]
+fn rectangle_samples<S: Simd>(simd: S, light: &Light, p: V<S>, u: Lanes2<F<S>>) -> (V<S>, V<S>, F<S>) {
+    let vector = |v| splat3(simd, v);
+    let (x, y) = (u.x * 2.0 - 1.0, u.y * 2.0 - 1.0);
+    let normal = vector(light.normal);
+    let to_light = (vector(light.center) - p * x.splat(light.finite)) + vector(light.u) * x + vector(light.v) * y;
+    let pdf = solid_angle_pdf(x.splat(light.density), to_light, normal);
+    let mut radiance = vector(light.color);
+    if light.sides == 1 {
+        let behind = dot(normal, to_light).ge(x.splat(0.0));
+        radiance = Vector3::select(radiance, vector(Vec3::ZERO), behind);
+    }
+    (to_light, radiance, pdf)
+}
