@@ -4,7 +4,7 @@ import { element, onFrame, onState, sendCommand } from "/link.js";
 import { numberField } from "/numbers.js";
 import { enable } from "/parts.js";
 
-const VIEWS = ["color", "normal", "depth", "uv", "primitive", "samples", "compare", "denoised"];
+const VIEWS = ["color", "normal", "depth", "uv", "primitive", "samples", "compare"];
 const radios = () => [...document.querySelectorAll("input[name=view]")];
 const MAX_EXPOSURE = 100; // maximum exposure in stops, positive or negative
 const EXPOSURE_FIELD = { kind: "number", range: [-MAX_EXPOSURE, MAX_EXPOSURE] };
