@@ -13,8 +13,8 @@ const MAX_COLOR: f32 = 1e15;
 /// Largest standard error of a background without noise, relative to its color.
 const MAX_BACKGROUND_ERROR: f32 = 0.01;
 
-/// What a pixel shows. At the edge of a surface in front of a background without noise, only the color of the surface is
-/// averaged, with pixels inside of the edge too.
+/// The coverage of a pixel by surfaces. At a silhouette in front of a background without noise, only the light of the
+/// surface is filtered, so that pixels at the silhouette are averaged with pixels inside of it.
 #[derive(Clone, Copy, PartialEq)]
 pub enum Coverage {
     /// The color cannot be averaged: it is not finite, or the pixel has no samples.

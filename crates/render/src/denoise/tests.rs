@@ -343,7 +343,7 @@ fn a_background_with_noise_is_averaged() {
 
 #[test]
 fn the_variance_of_the_samples_that_hit_a_surface_is_exact() {
-    // Of 6 samples, these 4 hit a surface.
+    // Four of six samples hit a surface, with these values.
     let hits = [1.0, 2.0, 3.0, 5.0_f32];
     let (sum, squares): (f32, f32) = (hits.iter().sum(), hits.iter().map(|value| value * value).sum());
     let variance = (squares - sum * sum / 6.0) / (6.0 * 5.0);

@@ -280,7 +280,7 @@ impl Batch<'_> {
             random,
         };
         let rows_of_materials = &mut materials.rows;
-        let scattered = match material_kind {
+        let result = match material_kind {
             MaterialKind::Diffuse => {
                 let material = LaneMaterials {
                     simd,
@@ -300,14 +300,14 @@ impl Batch<'_> {
 
         let mut contributions = Rows3::default();
         let mut queued_mask = 0;
-        if let (Some(light), Some(reflected)) = (light, scattered.reflections) {
+        if let (Some(light), Some(reflected)) = (light, result.reflections) {
             let mut contribution = throughput * reflected.value * light.radiance * (constant(1.0) / light.pdf);
             contribution = contribution * select(power_heuristic(light.pdf, reflected.pdf), one, light.is_delta);
             let max_component = largest(contribution);
             queued_mask = (max_component.gt(zero) & max_component.lt(zero.splat(INFINITE_T))).to_bitmask();
             contributions = store3(contribution);
         }
-        let next = scattered.next_rays;
+        let next = result.next_rays;
         let mut continued = throughput * next.weight;
         let mut survives = zero.le(zero); // true in all lanes
         if has_roulette {

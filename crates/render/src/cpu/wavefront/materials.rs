@@ -42,8 +42,8 @@ pub struct Directions<S: Simd> {
     pub random: F<S>,
 }
 
-/// Light scattered at the hits.
-pub struct Scattered<S: Simd> {
+/// Light result at the hits.
+pub struct ScatterResult<S: Simd> {
     /// Reflection of the light samples, like the scalar `reflection`.
     pub reflections: Option<Reflections<S>>,
     /// The next rays, like those of the scalar `sample_bsdf`.
@@ -64,8 +64,8 @@ impl<S: Simd> Diffuse<S> {
     }
 
     #[inline(always)]
-    pub fn scatter(&self, surface: &LaneSurfaces<S>, directions: Directions<S>) -> Scattered<S> {
-        Scattered {
+    pub fn scatter(&self, surface: &LaneSurfaces<S>, directions: Directions<S>) -> ScatterResult<S> {
+        ScatterResult {
             reflections: directions.to_light.map(|wi| self.reflections(surface, wi)),
             next_rays: self.next_rays(surface, directions.u),
         }
@@ -128,7 +128,7 @@ impl<S: Simd> Principled<S> {
     }
 
     #[inline(always)]
-    pub fn scatter(&self, surface: &LaneSurfaces<S>, directions: Directions<S>) -> Scattered<S> {
+    pub fn scatter(&self, surface: &LaneSurfaces<S>, directions: Directions<S>) -> ScatterResult<S> {
         let normal = surface.shading_normal;
         let direction = principled_direction(&self.mixture, self.wo, directions.u, directions.random, self.lobes);
         let to_light = directions.to_light.unwrap_or(normal);
@@ -142,7 +142,7 @@ impl<S: Simd> Principled<S> {
         let [reflected, value] = local;
         let sample = evaluated_sample(direction, value, pdfs[1]);
         let wi = normalize(vector_from_lobe(self.frame, normal, sample.wi));
-        Scattered {
+        ScatterResult {
             reflections: directions.to_light.map(|wi| Reflections {
                 value: surface.where_allowed(wi, reflected),
                 pdf: pdfs[0],
@@ -180,11 +180,11 @@ impl<'a, S: Simd> Metal<'a, S> {
     }
 
     #[inline(always)]
-    pub fn scatter(&self, surface: &LaneSurfaces<S>, directions: Directions<S>) -> Scattered<S> {
+    pub fn scatter(&self, surface: &LaneSurfaces<S>, directions: Directions<S>) -> ScatterResult<S> {
         let normal = surface.shading_normal;
         let sample = metal_sample(&self.material, self.wo, directions.u);
         let wi = normalize(vector_from_lobe(self.frame, normal, sample.wi));
-        Scattered {
+        ScatterResult {
             reflections: directions.to_light.map(|wi| {
                 let local = vector_to_lobe(self.frame, normal, wi);
                 Reflections {
