@@ -42,11 +42,15 @@ pub fn replace_unchanged(path: &Path, expected: &[u8], content: &[u8]) -> std::i
 ///
 /// The file keeps changing.
 pub fn wait_settled(path: &Path) -> Result<(), String> {
+    let changed = || fs::metadata(path).and_then(|data| data.modified()).ok();
+    wait_while_young(path, || changed().and_then(|changed| changed.elapsed().ok()))
+}
+
+/// Like [`wait_settled`], with the time since the last change of the file; `None` if it is unknown.
+fn wait_while_young(path: &Path, age: impl Fn() -> Option<Duration>) -> Result<(), String> {
     let start = Instant::now();
     loop {
-        let changed = fs::metadata(path).and_then(|data| data.modified()).ok();
-        let age = changed.and_then(|changed| changed.elapsed().ok());
-        match age.and_then(|age| MAX_SAVE_DURATION.checked_sub(age)) {
+        match age().and_then(|age| MAX_SAVE_DURATION.checked_sub(age)) {
             Some(remaining) if start.elapsed() < MAX_WAIT => sleep(remaining.max(Duration::from_millis(1))),
             Some(_) => {
                 return Err(format!(
@@ -108,7 +112,6 @@ pub fn with_camera(text: &str, origin: &str, camera: &CameraDescription) -> Resu
 
 #[cfg(test)]
 mod tests {
-    use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
     use std::time::SystemTime;
 
     use super::*;
@@ -204,20 +207,7 @@ mod tests {
             wait_settled(&file).unwrap();
             assert_eq!(start.elapsed() > MAX_SAVE_DURATION / 2, must_wait, "{age:?}");
         }
-        set_age(Duration::ZERO);
-        let is_done = AtomicBool::new(false);
-        let error = std::thread::scope(|scope| {
-            scope.spawn(|| {
-                while !is_done.load(Relaxed) {
-                    set_age(Duration::ZERO);
-                    sleep(Duration::from_millis(1));
-                }
-            });
-            // On a busy machine a single wait may succeed.
-            let error = (0..10).find_map(|_| wait_settled(&file).err());
-            is_done.store(true, Relaxed);
-            error.unwrap()
-        });
+        let error = wait_while_young(&file, || Some(Duration::ZERO)).unwrap_err();
         assert!(error.contains("s.toml: another program is writing"), "{error}");
     }
 
