@@ -354,6 +354,30 @@ fn device_names_are_valid_choices() {
     }
 }
 
+/// Layered materials need the largest stack frames, especially without optimization, as in `cargo test` of a program
+/// that uses the library.
+#[test]
+fn all_kinds_of_materials_fit_into_the_stack_of_a_thread() {
+    for material in [
+        "type = \"diffuse\"\ncolor = [0.8, 0.1, 0.1]",
+        "type = \"principled\"\nroughness = 0.3\nanisotropy = 0.4\nclearcoat = 1\nsheen_color = [0.2, 0.2, 0.2]",
+        "type = \"principled\"\nroughness = 0.3\ntransmission = 1",
+        "type = \"conductor\"\nmetal = \"gold\"\nroughness = 0.3",
+        "type = \"dielectric\"\nior = 1.5\nroughness = 0.3",
+    ] {
+        let text = FILE.replace("type = \"phong\"\ncolor = [0.8, 0.1, 0.1]", material);
+        let path = tempfile::Builder::new().suffix(".toml").tempfile().expect("a file");
+        std::fs::write(
+            &path,
+            text.replace("ambient = [0.1, 0.1, 0.1]", "integrator = \"path\""),
+        )
+        .expect("a scene");
+        let scene = Scene::load(path.path()).expect("a valid scene");
+        let picture = wgray::render(&scene, &cpu_options()).expect("an image");
+        assert!(floats(&picture, "R").iter().any(|value| *value > 0.0), "{material}");
+    }
+}
+
 #[cfg(not(feature = "gpu"))]
 #[test]
 fn without_the_feature_gpu_only_the_cpu_exists() {

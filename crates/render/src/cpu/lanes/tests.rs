@@ -285,6 +285,13 @@ fn bits(x: f32) -> u32 {
 
 #[test]
 fn lanes_are_bit_identical_to_scalar_results() {
+    // Without optimization, the frame of all inlined functions exceeds the stack of a test's thread.
+    let thread = std::thread::Builder::new().stack_size(64 << 20);
+    let result = thread.spawn(compare_lanes).expect("a thread").join();
+    result.unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+}
+
+fn compare_lanes() {
     let random = &mut Random(7);
     let mut differing = 0;
     for _ in 0..3000 {

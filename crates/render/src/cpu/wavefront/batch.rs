@@ -25,7 +25,7 @@ use super::QueuedShadowRay;
 use super::lights::{LightChoices, LightRows, only_light};
 use super::materials::{Diffuse, Directions, Metal, Principled};
 use super::rows::{F, LANES, Row, Rows3, get3, load3, set3, store3};
-use super::shade::{MaterialKind, QueuedHit, ShadingQueues, SurfaceKind};
+use super::shade::{IS_OPTIMIZED, MaterialKind, QueuedHit, ShadingQueues, SurfaceKind};
 use super::surfaces::{EvaluatedHits, FaceHits, FlatHits, LaneSurfaces};
 use crate::records::{DIFFUSE, ENVIRONMENT_MAP, INFINITE_T, INSTANCE, METAL, Material, NO_INDEX, Packed};
 
@@ -281,21 +281,23 @@ impl Batch<'_> {
         };
         let rows_of_materials = &mut materials.rows;
         let result = match material_kind {
-            MaterialKind::Diffuse => {
-                let material = LaneMaterials {
-                    simd,
-                    rows: rows_of_materials,
-                };
-                Diffuse::new(&material).scatter(&surface, directions)
-            }
-            MaterialKind::Principled => {
+            MaterialKind::Principled if IS_OPTIMIZED => {
                 let material = LaneMaterials {
                     simd,
                     rows: rows_of_materials,
                 };
                 Principled::new(scene, &material, &surface, &materials.energy).scatter(&surface, directions)
             }
-            MaterialKind::Metal => Metal::new(simd, rows_of_materials, &surface).scatter(&surface, directions),
+            MaterialKind::Metal if IS_OPTIMIZED => {
+                Metal::new(simd, rows_of_materials, &surface).scatter(&surface, directions)
+            }
+            _ => {
+                let material = LaneMaterials {
+                    simd,
+                    rows: rows_of_materials,
+                };
+                Diffuse::new(&material).scatter(&surface, directions)
+            }
         };
 
         let mut contributions = Rows3::default();

@@ -19,6 +19,10 @@ use crate::records::{
     PRINCIPLED, Packed,
 };
 
+/// True in builds with optimization. Otherwise, only diffuse surfaces are shaded in lanes, because the stack frame of the
+/// other kinds, whose functions are inlined, would be larger than the 2 MiB of a thread.
+pub const IS_OPTIMIZED: bool = !cfg!(debug_assertions);
+
 /// Hits to shade in lanes, for each kind of material and each kind of surface.
 #[derive(Default)]
 pub struct ShadingQueues([[Vec<QueuedHit>; SurfaceKind::ALL.len()]; MaterialKind::ALL.len()]);
@@ -219,8 +223,8 @@ fn lane_material(material: &Material) -> Option<(MaterialKind, u32)> {
     let is_transmissive = material.transmission > 0.0;
     match material.kind {
         DIFFUSE if !is_rough => Some((MaterialKind::Diffuse, FOR_ROUGHNESS)),
-        PRINCIPLED if !is_transmissive => Some((MaterialKind::Principled, FOR_TRANSMISSION)),
-        METAL if !is_polished(material) => Some((MaterialKind::Metal, FOR_ROUGHNESS | FOR_ANISOTROPY)),
+        PRINCIPLED if IS_OPTIMIZED && !is_transmissive => Some((MaterialKind::Principled, FOR_TRANSMISSION)),
+        METAL if IS_OPTIMIZED && !is_polished(material) => Some((MaterialKind::Metal, FOR_ROUGHNESS | FOR_ANISOTROPY)),
         _ => None,
     }
 }
