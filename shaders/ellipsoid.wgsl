@@ -1,4 +1,4 @@
-// The ellipsoid: the unit sphere of local space.
+// The ellipsoid: the unit sphere in local space.
 
 // Returns |l|^2 - 1 for a local position l = `from_anchor` - `q.middle`; negative inside. `from_anchor` is p - anchor
 // in local space. The square is expanded, and `q.level` is the precomputed |middle|^2 - 1. This avoids cancellation

@@ -21,7 +21,7 @@ fn store_layers(layers: Layers, index: u32, first_layer: u32) {
     film[start + 4u * pixels] = layers.normal;
 }
 
-// The noise estimates of a pixel, except the moments of the radiance.
+// Accumulators for the noise estimates of a pixel, except the moments of the radiance, which have their own list.
 struct Noise {
     half_sum: vec4f,       // like the pixel's sum, over samples of even index
     albedo_moments: vec4f, // rgb: squared deviations of the albedo

@@ -20,8 +20,8 @@ fn wrap_v(t: Texture) -> u32 {
     return t.wrap >> 2u;
 }
 
-// Transforms a footprint from surface to texture coordinates. Beyond a clamped edge, the footprint has no extent across
-// the edge, so that coarse levels do not mix in distant texels.
+// Transforms a footprint from surface to texture coordinates. Outside of [0, 1] on a clamped axis, the footprint has no
+// extent along the axis, so that coarse levels do not mix in distant texels.
 fn texture_footprint(t: Texture, f: Footprint) -> Footprint {
     let dx = vec2f(t.u.x * f.dx.x + t.u.y * f.dx.y, t.v.x * f.dx.x + t.v.y * f.dx.y);
     let dy = vec2f(t.u.x * f.dy.x + t.u.y * f.dy.y, t.v.x * f.dy.x + t.v.y * f.dy.y);

@@ -18,7 +18,8 @@ fn lens_sample(blades: u32, u: vec2f) -> vec2f {
     return polygon_sample(blades, u);
 }
 
-// Samples the regular polygon on the unit circle with a corner at (1, 0), by its triangles.
+// Samples the regular polygon inscribed in the unit circle with a corner at (1, 0): selects a triangle between the
+// center and a side, then a point of the triangle.
 fn polygon_sample(corners: u32, u: vec2f) -> vec2f {
     let scaled = u.x * f32(corners);
     let side = floor(scaled);

@@ -113,7 +113,8 @@ fn power_heuristic(pdf: f32, other_pdf: f32) -> f32 {
     return select(0.0, 1.0 / (1.0 + ratio * ratio), pdf > 0.0);
 }
 
-// Returns the upper 32 bits of the product of `bits` and `count`: an integer below `count`, uniform for uniform bits.
+// Returns the upper 32 bits of the product of `bits` and `count`: an integer below `count`, uniformly distributed if
+// `bits` is.
 fn uniform_below(bits: u32, count: u32) -> u32 {
     let low = (bits & 0xffffu) * (count & 0xffffu);
     let middle = (bits >> 16u) * (count & 0xffffu) + (low >> 16u);

@@ -1,4 +1,4 @@
-// The rectangle |x| <= 1, |y| <= 1, z = 0 of local space.
+// The rectangle |x| <= 1, |y| <= 1, z = 0 in local space.
 
 // Returns the t of the hit in (0, limit), else `limit`.
 fn intersect_rectangle(q: Primitive, ray: Ray, limit: f32) -> f32 {

@@ -123,9 +123,10 @@ fn facet_frame(surface: Surface, material: Material) -> Tangents {
     return frame_around(surface.shading_normal);
 }
 
-// Returns a microfacet material with the values for the viewer's direction: the relative index behind the surface, and
-// the energy that single scattering loses. `surface.du` and `surface.dv` are the axes of the frame.
-fn facets_of(surface: Surface, original: Material) -> Material {
+// Returns a microfacet material with fields for the viewer's direction: `ior` of rough glass is the index behind the
+// surface relative to the index on the viewer's side, `loss` is the energy that single scattering loses relative to the
+// single-scattering albedo. `surface.du` and `surface.dv` are the axes of the frame.
+fn material_for_view(surface: Surface, original: Material) -> Material {
     var material = original;
     let wo = vector_to_lobe(Tangents(surface.du, surface.dv), surface.shading_normal, surface.wo);
     if (MATERIALS & (1u << ROUGH_GLASS)) != 0u {

@@ -39,12 +39,16 @@ fn interval_hits(interval: vec2f, limit: f32) -> bool {
 
 // A bundle of rays with a common origin, whose direction components are in given ranges, as precomputed terms for box
 // tests. A test reports a hit if any ray of the bundle may hit the box.
+//
+// Multiplied by the offset from the origin to a box's lower or upper side, the near factors give the earliest t and the
+// far factors the latest t of the bundle. A near factor is 0 if a ray cannot enter by this side, a far factor if a ray
+// need not leave by this side. The latest t is unbounded if both far factors of an axis are 0.
 struct RayInterval {
     low_origin: vec3f,
     high_origin: vec3f,
-    near_low: vec3f,       // factor from the distance of a lower side to the earliest t
-    near_high: vec3f,      // factor from the distance of an upper side to the earliest t
-    far_low: vec3f,        // factor from the distance of a lower side to the latest t; 0 if unbounded
+    near_low: vec3f,
+    near_high: vec3f,
+    far_low: vec3f,
     far_high: vec3f,
 }
 

@@ -137,7 +137,7 @@ fn ewa_level_color(t: Texture, level: Level, uv: vec2f, dx: vec2f, dy: vec2f) ->
     let xx = m.x + max((4.0 * (q.x * q.x) - 1.0) / 3.0, min_increase);
     let yy = m.z + max((4.0 * (q.y * q.y) - 1.0) / 3.0, min_increase);
     let slope = m.y / yy;
-    let half_width2 = xx - m.y * slope; // of the row through the center
+    let half_width2 = xx - m.y * slope; // squared half-width of the ellipse in the row through its center
     let x = near_coordinate(uv.x, wrap_u(t)) * size.x - 0.5;
     let y = near_coordinate(uv.y, wrap_v(t)) * size.y - 0.5;
     let half_height = sqrt(yy);

@@ -1,5 +1,5 @@
-// The triangle x >= 0, y >= 0, x + y <= 1, z = 0 of local space: barycentric coordinates of the second and third
-// vertex.
+// The triangle x >= 0, y >= 0, x + y <= 1, z = 0 in local space: x and y are the barycentric coordinates of the second
+// and third vertex.
 
 // Returns the t of the hit in (0, limit), else `limit`.
 fn intersect_triangle(q: Primitive, ray: Ray, limit: f32) -> f32 {

@@ -54,8 +54,9 @@ impl Options {
         Err(Problem::of("crop", format!("{x0},{y0},{x1},{y1} {rule}")))
     }
 
-    /// Returns the layout of the film. It has layers for alpha, and for requested layers that are means over samples. It
-    /// has noise estimates if requested, or for requested statistics unless sampling is adaptive.
+    /// Returns the layout of the film. The film has layers if the image has alpha, is denoised, or includes an AOV that
+    /// is a mean over samples. It has noise estimates if the options ask for them, if the image is denoised, or if an
+    /// AOV needs sample statistics; films of adaptive sampling have these statistics anyway.
     pub(crate) fn film_layout(&self, scene: &Scene) -> FilmLayout {
         let integrator = scene.render.integrator;
         let aovs = self.layers(scene);

@@ -91,8 +91,8 @@ pub fn allowed<'a>(
         .find(|entry| entry.check == check && (name.contains(entry.adapter) || driver.contains(entry.adapter)))
 }
 
-/// Checks the fraction of differing results against the table entry. Without an entry, no result may differ. An entry
-/// whose deviation no longer occurs is an error.
+/// Checks the fraction of differing results against the entry of known differences. Without an entry, no result may
+/// differ. With an entry, some results must differ: otherwise the entry is obsolete, which is an error.
 pub fn judge(entry: Option<&KnownDifference>, check: &str, fraction: f64) -> Result<(), String> {
     match entry {
         None if fraction == 0.0 => Ok(()),

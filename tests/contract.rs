@@ -71,7 +71,7 @@ fn film_bits(backend: &mut dyn Backend) -> (Region, Vec<u32>) {
 
 /// Renders all samples: the pilot pass, then the further samples.
 fn complete_film(backend: &mut dyn Backend) -> Film {
-    let pilot = backend.samples_of_all().min(SAMPLES);
+    let pilot = backend.unskippable_samples().min(SAMPLES);
     backend.begin(full_region()).expect("a film");
     backend.render(full_region(), 0..pilot).expect("pilot samples");
     backend.render(full_region(), pilot..SAMPLES).expect("further samples");
@@ -177,7 +177,7 @@ const SENTENCES: &[Sentence] = &[
     ("any backend resumes a film", |packed, make| {
         let mut backend = make();
         let expected = bits(&complete_film(&mut *backend));
-        let pilot = backend.samples_of_all().min(SAMPLES);
+        let pilot = backend.unskippable_samples().min(SAMPLES);
         for sample in [1, pilot / 2, pilot, pilot + (SAMPLES - pilot) / 2] {
             let mut interrupted = Cpu::new(packed);
             interrupted.begin(full_region()).map_err(|e| e.to_string())?;
@@ -260,7 +260,7 @@ const SENTENCES: &[Sentence] = &[
     ("every partition of the work gives the same film", |_, make| {
         let mut backend = make();
         let expected = bits(&complete_film(&mut *backend));
-        let pilot = backend.samples_of_all().min(SAMPLES);
+        let pilot = backend.unskippable_samples().min(SAMPLES);
         let tiles = [region(0, 0, 20, 1), region(0, 1, 9, 12), region(9, 1, 20, 12)];
         backend.begin(full_region()).map_err(|e| e.to_string())?;
         for (start, end) in [(0, pilot), (pilot, SAMPLES)] {
@@ -370,7 +370,7 @@ const SENTENCES: &[Sentence] = &[
                 return Ok(());
             }
             let mut backend = make();
-            let pilot = backend.samples_of_all();
+            let pilot = backend.unskippable_samples();
             backend.begin(full_region()).map_err(|e| e.to_string())?;
             backend
                 .render(region(0, 0, 20, 11), 0..pilot)
@@ -545,8 +545,8 @@ impl Backend for DefectiveBackend<'_> {
         self.inner.largest_film()
     }
 
-    fn samples_of_all(&self) -> u32 {
-        self.inner.samples_of_all()
+    fn unskippable_samples(&self) -> u32 {
+        self.inner.unskippable_samples()
     }
 
     fn around(&self, region: Region) -> Region {

@@ -193,12 +193,18 @@ mod tutorials {
     fn with_dev_in_background(script: &str) -> String {
         let dev = "wgray dev scene.toml --out live.png";
         let in_background = format!("{dev} --listen 127.0.0.1:0 > dev.log 2>&1 &\ntrap \"kill $!\" EXIT");
-        let has_first = "until grep -q Finished dev.log && [ -e live.png ]; do sleep 0.1; done";
-        let has_second =
+        let wait_for_first_image = "until grep -q Finished dev.log && [ -e live.png ]; do sleep 0.1; done";
+        let wait_for_second_image =
             "until [ $(grep -c Finished dev.log) -ge 2 ] && ! cmp -s live.png before.png; do sleep 0.1; done";
         script
-            .replace(&format!("{dev}\n"), &format!("{in_background}\n{has_first}\n"))
-            .replace("wgray diff live.png", &format!("{has_second}\nwgray diff live.png"))
+            .replace(
+                &format!("{dev}\n"),
+                &format!("{in_background}\n{wait_for_first_image}\n"),
+            )
+            .replace(
+                "wgray diff live.png",
+                &format!("{wait_for_second_image}\nwgray diff live.png"),
+            )
     }
 
     /// Runs a tutorial in an empty folder beside the folder `wgray`, the repository. Returns whether it succeeds, and

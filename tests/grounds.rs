@@ -1,5 +1,6 @@
-//! Compares large and small spheres with the f64 oracle: no self-shadowing, and correct contact shadows. Radii are 1e-3
-//! to 1e4 scene sizes, near the origin and far away.
+//! Compares images of spheres and flat shapes with images of the f64 oracle: shapes must not shadow themselves, and
+//! must cast contact shadows. The scenes have sizes from 1e-3 to 1e3, at the origin and far away. Radii are from 1e-3
+//! to 1e4 times [`Setting::size`].
 
 use glam::DVec3;
 use wgray::scene::Description;

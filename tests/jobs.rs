@@ -222,7 +222,7 @@ fn at_the_time_limit_every_pixel_has_a_sample() {
 /// Returns the film of the first `samples` samples of all pixels.
 fn film_of_samples(packed: &Packed, samples: u32) -> Film {
     let (mut cpu, region) = (Cpu::new(packed), whole(packed));
-    let pilot = cpu.samples_of_all().min(samples);
+    let pilot = cpu.unskippable_samples().min(samples);
     cpu.begin(region).expect("a film");
     cpu.render(region, 0..pilot).expect("samples");
     cpu.render(region, pilot..samples).expect("samples");

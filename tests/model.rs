@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 pub struct Model {
     /// Base color of the large box.
     pub color: [f64; 3],
-    pub cameras: bool,
+    pub has_cameras: bool,
     pub animated: bool,
 }
 
@@ -18,7 +18,7 @@ impl Default for Model {
     fn default() -> Model {
         Model {
             color: [0.7, 0.3, 0.2],
-            cameras: false,
+            has_cameras: false,
             animated: true,
         }
     }
@@ -83,7 +83,7 @@ impl Model {
                 "samplers": [{ "input": 2, "output": 3 }],
             }]);
         }
-        if self.cameras {
+        if self.has_cameras {
             let side = 0.5_f64.sqrt();
             let camera_nodes = json!([
                 { "name": "front camera", "camera": 0, "translation": [0, 1, 6] },

@@ -75,8 +75,8 @@ fn a_point_light_over_a_plane_matches_the_closed_form() {
     for film in films(&scene) {
         let error = largest_error(&film, |x, y| point_light(x, y, 6));
         assert!(error < 2e-6, "{error}");
-        let wrong_power = largest_error(&film, |x, y| point_light(x, y, 5));
-        assert!(wrong_power > 0.01, "the wrong formula is accepted");
+        let error_with_wrong_power = largest_error(&film, |x, y| point_light(x, y, 5));
+        assert!(error_with_wrong_power > 0.01, "the wrong formula is accepted");
     }
 }
 

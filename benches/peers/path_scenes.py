@@ -210,7 +210,7 @@ def blob(rows=24, seed=1, radii=(1, 1, 1), center=(0, 0, 0)):
 
 
 def block(corners, height):
-    """Returns a prism on the floor over the polygon of the corners (x, z); y is up."""
+    """Returns a prism that stands on the floor; `corners` are the corners (x, z) of its base, and y is up."""
     signed_area = sum(a[0] * b[1] - b[0] * a[1] for a, b in zip(corners, corners[1:] + corners[:1]))
     corners = corners if signed_area < 0 else corners[::-1]  # counter-clockwise seen from above, with z pointing down the page
     vertices = [[x, y, z] for y in (0, height) for x, z in corners]

@@ -120,7 +120,7 @@ fn advance(before: PathState, pixel: vec2u) -> PathState {
                     let frame = facet_frame(surface, material);
                     surface.du = frame.u;
                     surface.dv = frame.v;
-                    material = facets_of(surface, material);
+                    material = material_for_view(surface, material);
                 }
             }
             if EMITTERS != 0u {

@@ -12,10 +12,11 @@ use wgray_render::records::Packed;
 
 use super::numbers::significant;
 
-/// Name of the metadata that marks an incomplete image, with a value such as `32 of 64 samples`.
+/// Key of the metadata entry of an incomplete image, with a value such as `32 of 64 samples`.
 const PARTIAL: &str = "partial";
 
-/// Name of the metadata of an image with a noise limit, with a value such as `64 of 4096 samples, 0.0187, median 0.0041`.
+/// Key of the metadata entry of an image rendered with a noise limit: samples, and 95th percentile and median of the
+/// noise, such as `64 of 4096 samples, 0.0187, median 0.0041`.
 const NOISE: &str = "noise";
 
 /// Returns true if an image file is complete and contains all samples.

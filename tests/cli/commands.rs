@@ -58,12 +58,12 @@ fn the_view_check_finds_a_mesh_away_from_the_origin() {
     let (start, rest) = super::SCENE.split_once("[[shapes]]").unwrap();
     let mesh = "[[shapes]]\ntype = 'mesh'\nmaterial = 'gray'\nfile = 'far.obj'\n";
     assert!(rest.contains("sphere"));
-    let camera_at_origin = format!("{start}{mesh}");
-    let camera_at_mesh = camera_at_origin.replace(
+    let scene_out_of_view = format!("{start}{mesh}");
+    let scene_in_view = scene_out_of_view.replace(
         "position = [0, -5, 1], look_at = [0, 0, 1]",
         "position = [100.3, -5, 1], look_at = [100.3, 0, 1]",
     );
-    for (scene, is_in_view) in [(camera_at_mesh, true), (camera_at_origin, false)] {
+    for (scene, is_in_view) in [(scene_in_view, true), (scene_out_of_view, false)] {
         folder.write("far.toml", &scene);
         let result = folder.run(&["check", "far.toml"]);
         assert_eq!(result.code, 0, "{}", result.stderr);

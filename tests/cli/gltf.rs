@@ -16,7 +16,7 @@ fn folder_with_model(model: &Model) -> TestFolder {
 
 fn model_with_cameras() -> Model {
     Model {
-        cameras: true,
+        has_cameras: true,
         ..Model::default()
     }
 }

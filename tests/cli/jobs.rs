@@ -250,10 +250,10 @@ fn checkpoints_of_other_jobs_are_rejected() {
     let run = |extra: &[&str]| folder.run(&[&base[..], extra].concat());
     assert_eq!(run(&["--checkpoint", "c"]).code, 0);
     let checkpoint = folder.read("c");
-    let assert_rejected = |extra: &[&str], rule: &str| {
+    let assert_rejected = |extra: &[&str], expected_reason: &str| {
         let result = run(extra);
         assert_eq!(result.code, 2, "{extra:?}: {}", result.stderr);
-        assert!(result.stderr.contains(rule), "{extra:?}: {}", result.stderr);
+        assert!(result.stderr.contains(expected_reason), "{extra:?}: {}", result.stderr);
         assert!(!result.stderr.contains("panicked"), "{}", result.stderr);
     };
     assert_rejected(
@@ -261,7 +261,7 @@ fn checkpoints_of_other_jobs_are_rejected() {
         "--checkpoint: c: already exists; pass --resume to continue it",
     );
     let resume = ["--checkpoint", "c", "--resume"];
-    for (option, value, rule) in [
+    for (option, value, expected_reason) in [
         ("--seed", "7", "its scene or an option"),
         ("--spp", "4", "its number of samples is 3, not 4"),
         ("--size", "11x6", "its size is 10 x 6, not 11 x 6"),
@@ -270,7 +270,7 @@ fn checkpoints_of_other_jobs_are_rejected() {
     ] {
         assert_rejected(
             &[&resume[..], &[option, value]].concat(),
-            &format!("--checkpoint: c: belongs to another job: {rule}"),
+            &format!("--checkpoint: c: belongs to another job: {expected_reason}"),
         );
     }
     assert_rejected(
@@ -281,7 +281,7 @@ fn checkpoints_of_other_jobs_are_rejected() {
     assert_rejected(&resume, "its scene or an option");
     folder.write("small.toml", &super::SCENE.replace("# ", "#  "));
     assert_eq!(run(&resume).code, 0, "a comment in the scene file changes the job");
-    for (bytes, rule) in [
+    for (bytes, expected_reason) in [
         (Vec::new(), "it is not a part or checkpoint that wgray wrote"),
         (
             b"width = 3\n".repeat(20),
@@ -290,7 +290,7 @@ fn checkpoints_of_other_jobs_are_rejected() {
         (checkpoint[..40].to_vec(), "its header is damaged or truncated"),
     ] {
         fs::write(folder.path("c"), &bytes).expect("a file");
-        assert_rejected(&resume, rule);
+        assert_rejected(&resume, expected_reason);
         assert_eq!(folder.read("c"), bytes, "the rejected file was changed");
     }
     fs::remove_file(folder.path("c")).expect("a file");

@@ -83,7 +83,7 @@ fn the_time_to_an_image_includes_the_time_to_compile() {
         if let Report::Reloaded { seconds, compiled } = report {
             assert!(
                 compiled.is_none_or(|compiled| compiled <= seconds),
-                "{compiled:?} of {seconds}"
+                "compile time {compiled:?}, total time {seconds}"
             );
             images += 1;
         }

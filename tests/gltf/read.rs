@@ -51,7 +51,7 @@ pub fn to_file(p: DVec3) -> DVec3 {
     DVec3::new(p.x, p.z, -p.y)
 }
 
-/// Loads [`SCENE`] with this glTF file; `keys` are additional keys of its shape.
+/// Loads [`SCENE`] with a shape that refers to this glTF file; `keys` are additional keys of the shape.
 pub fn load_scene(file: &Path, keys: &str) -> Scene {
     try_load_scene(file, keys).unwrap_or_else(|error| panic!("{error}"))
 }
@@ -66,7 +66,7 @@ pub fn try_load_scene(file: &Path, keys: &str) -> Result<Scene, String> {
     Scene::load(&path).map_err(|error| error.to_string())
 }
 
-/// Writes the file and loads [`SCENE`] with it.
+/// Writes the glTF file and loads [`SCENE`] with a shape that refers to the file.
 pub fn scene(builder: &Builder, name: &str) -> Scene {
     let folder = TestFolder::with_file("a", "");
     load_scene(&builder.write(folder.folder(), name, Packing::Binary), "")

@@ -119,7 +119,7 @@ const CASES: &[(&str, &str, &str)] = &[
     (
         "a.ply",
         "ply\nelement vertex -1\n",
-        "a.ply:2: element \"vertex\": \"-1\" must be a whole number that fits into memory",
+        "a.ply:2: element \"vertex\": count \"-1\" must be a non-negative whole number that fits into memory",
     ),
     (
         "a.ply",
@@ -278,7 +278,7 @@ fn counts_without_bytes_are_refused_at_once() {
             (vertex("99999999999", xyz) + face, "must be at most 1073741824"),
             (
                 vertex("99999999999999999999", xyz) + face,
-                "must be a whole number that fits into memory",
+                "must be a non-negative whole number that fits into memory",
             ),
             (vertex("1073741824", xyz) + face, "bytes or more; remaining bytes: "),
             (

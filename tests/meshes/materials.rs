@@ -163,7 +163,7 @@ fn strict_rejects_missing_materials() {
         "{notes:?}"
     );
     let message = load(true).unwrap_err().to_string();
-    assert!(message.contains("no material \"m\""), "{message}");
+    assert!(message.contains("undefined material \"m\""), "{message}");
 }
 
 #[test]

@@ -260,7 +260,7 @@ fn tangents_of_mirrored_texture_coordinates_are_not_averaged() {
             let prim = fetch_hit_primitive(&packed, hit(&packed, slot, b));
             let point = prim.primitive.anchor + prim.edge_1 * b.x + prim.edge_2 * b.y;
             let middle = prim.primitive.anchor + (prim.edge_1 + prim.edge_2) / 3.0;
-            // u is along x on the right, against x on the left; v is along y.
+            // u increases along +x where x > 0, and along -x where x < 0; v increases along +y.
             let tangent = Vec3::new(point.z, 0.0, -point.x).normalize() * middle.x.signum();
             let found = face_frame(&prim, b);
             assert!(found.u.angle_between(tangent) < 0.01, "{point}: {} {tangent}", found.u);

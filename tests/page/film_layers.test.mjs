@@ -50,7 +50,7 @@ test("film layers are views with the images and files of a render", async () => 
   await canvas(page).hover();
   await page.locator("#values", { hasText: /albedo [\d.]+ +[\d.]+ +[\d.]+.*bits.*shown/ }).waitFor();
   const layerCompileTime = await compileTime();
-  assert.notEqual(layerCompileTime, colorCompileTime, "the layers did not compile another kernel");
+  assert.notEqual(layerCompileTime, colorCompileTime, "no kernel was compiled for the layers");
   await page.keyboard.press("1");
   await page.waitForFunction(() => document.getElementById("panels").dataset.view === "color");
   await waitUntilSettled(page);

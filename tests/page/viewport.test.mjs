@@ -243,7 +243,7 @@ test("the image is compared with its earlier state, with a kept image and with f
   const firstImage = await shownImage(page, "first");
   assert.notDeepEqual(wipedImage, firstImage);
   await page.locator("#wipe").fill("0");
-  assertSameImage(await shownImage(page, "first"), oldImage, "a divider at 0 does not show only the second image");
+  assertSameImage(await shownImage(page, "first"), oldImage, "the divider at 0 does not leave only the second image");
   await page.getByLabel("Flicker", { exact: true }).first().check();
   await page.selectOption("#pace", "0");
   assertSameImage(await shownImage(page, "first"), firstImage);

@@ -11,7 +11,7 @@ use wgray_render::cpu::principled::{
     PrincipledLobes, principled_eval, principled_mixture, principled_pdf, principled_sample,
 };
 use wgray_render::cpu::rough_dielectric::{rough_dielectric_eval, rough_dielectric_pdf};
-use wgray_render::cpu::scattering::facets_of;
+use wgray_render::cpu::scattering::material_for_view;
 use wgray_render::cpu::sequence::sobol_sample;
 use wgray_render::cpu::surface::Surface;
 use wgray_render::cpu::thin::{thin_eval, thin_pdf};
@@ -66,7 +66,7 @@ fn evaluated_for(packed: &Packed, material: &Material, wo: Vec3, side: f32) -> M
         du: Vec3::X,
         dv: Vec3::Y,
     };
-    facets_of(packed, &surface, *material)
+    material_for_view(packed, &surface, *material)
 }
 
 fn mixture(packed: &Packed, material: &Material, wo: Vec3, side: f32) -> PrincipledLobes {

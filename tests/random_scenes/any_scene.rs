@@ -19,7 +19,7 @@ use wgray_render::records::Packed;
 use self::files::ENVIRONMENT_MAPS;
 pub use self::files::folder;
 use self::materials::*;
-pub use self::moved::moved;
+pub use self::moved::scale_and_translate;
 use self::shapes::*;
 use self::values::*;
 use crate::patterns;
@@ -298,7 +298,7 @@ fn description_with(
                     description.render.clamp = paths.clamp;
                     description.render.alpha = paths.alpha.then_some(true);
                 }
-                moved(&mut description, scale, DVec3::new(offset, -offset, offset));
+                scale_and_translate(&mut description, scale, DVec3::new(offset, -offset, offset));
                 description
             },
         )

@@ -151,7 +151,7 @@ fn random_scenes_are_within_tolerance_without_guaranteed_bits() {
         let description = strategy.new_tree(&mut runner).expect("a scene").current();
         placements.map(|(scale, offset)| {
             let mut description = description.clone();
-            any_scene::moved(&mut description, scale, offset);
+            any_scene::scale_and_translate(&mut description, scale, offset);
             description
         })
     });

@@ -5,7 +5,7 @@ use wgray::scene::{Pattern, PixelFilterDescription, PixelFilterKind};
 use wgray_render::cpu::pixel::filtered;
 use wgray_render::cpu::sequence::sobol_sample;
 use wgray_render::film::mean;
-use wgray_render::pack::filter::{height, table};
+use wgray_render::pack::filter::{kernel_value, table};
 use wgray_render::records::{FILTER_TABLE_SIZE, Packed};
 
 use super::cornell;
@@ -40,7 +40,7 @@ fn moment(kind: PixelFilterKind, power: i32) -> f64 {
     let filter = valid_filter(kind, 1.0);
     let position = |i: i32| (f64::from(i) + 0.5) / f64::from(steps);
     (0..steps)
-        .map(|i| 2.0 * height(filter, position(i)) * position(i).powi(power))
+        .map(|i| 2.0 * kernel_value(filter, position(i)) * position(i).powi(power))
         .sum::<f64>()
         / f64::from(steps)
 }
@@ -59,11 +59,11 @@ fn filters_have_the_expected_integrals() {
     let mitchell = valid_filter(PixelFilterKind::Mitchell, 2.0);
     for i in 0..10 {
         let sum: f64 = (-3..=3)
-            .map(|k| height(mitchell, f64::from(k) + f64::from(i) / 10.0))
+            .map(|k| kernel_value(mitchell, f64::from(k) + f64::from(i) / 10.0))
             .sum();
         assert!((sum - 1.0).abs() < 1e-12, "{sum}");
     }
-    assert!((height(mitchell, 0.0) - 8.0 / 9.0).abs() < 1e-12 && height(mitchell, 1.5) < 0.0);
+    assert!((kernel_value(mitchell, 0.0) - 8.0 / 9.0).abs() < 1e-12 && kernel_value(mitchell, 1.5) < 0.0);
 }
 
 /// Returns the weighted mean of |x|^power over equally probable, uniform bins.

@@ -480,8 +480,8 @@ impl Backend for GpuAndCpu<'_> {
         self.gpu.largest_film()
     }
 
-    fn samples_of_all(&self) -> u32 {
-        self.gpu.samples_of_all()
+    fn unskippable_samples(&self) -> u32 {
+        self.gpu.unskippable_samples()
     }
 
     fn around(&self, region: Region) -> Region {

@@ -79,7 +79,7 @@ impl DisplaySettings {
     /// Returns the false color of the Rec. 709 luminance; a luminance of zero gets the first color.
     fn false_color(&self, [r, g, b]: [f32; 3], [first, last]: [f32; 2]) -> [u8; 3] {
         let stops = (0.2126 * r + 0.7152 * g + 0.0722 * b).log2() + self.view.exposure as f32;
-        color(((stops - first) / (last - first) * 255.0 + 0.5) as u8) // saturates; NaN is 0
+        color(((stops - first) / (last - first) * 255.0 + 0.5) as u8) // `as` saturates and maps NaN to 0
     }
 }
 

@@ -30,8 +30,9 @@ use wgray_image::Region;
 /// - If no dispatch is pending, `poll` returns true and `wait` returns immediately.
 /// - Every partition of a render into tiles and sample ranges gives a film with the same bits, provided that every
 ///   pixel gets each sample once, in ascending order.
-/// - With adaptive sampling, all pixels get their first [`samples_of_all`](Backend::samples_of_all) samples before any
-///   pixel gets further samples. The dispatch that completes the pilot samples may add further samples to its tile.
+/// - With adaptive sampling, all pixels get their first [`unskippable_samples`](Backend::unskippable_samples) samples
+///   before any pixel gets further samples. The dispatch that completes the pilot samples may add further samples
+///   to its tile.
 /// - An empty tile or an empty range of samples changes nothing, regardless of its position.
 ///
 /// # First hits
@@ -79,15 +80,16 @@ pub trait Backend {
     /// available; [`job::first_hits`](crate::job::first_hits) splits a large region.
     fn first_hits(&mut self, region: Region) -> Result<Vec<FirstHit>, RenderError>;
 
-    /// Returns the maximum number of pixels of a region whose film fits, including the pixels that
-    /// [`around`](Backend::around) adds.
+    /// Returns the maximum number of pixels of a region whose film, with the pixels that [`around`](Backend::around)
+    /// adds, fits into the device's buffers.
     fn largest_film(&self) -> u64;
 
-    /// Returns the number of samples that every pixel gets: the pilot samples with adaptive sampling, else `u32::MAX`.
-    fn samples_of_all(&self) -> u32;
+    /// Returns the number of leading samples that no pixel skips: the pilot samples with adaptive sampling, else
+    /// `u32::MAX`.
+    fn unskippable_samples(&self) -> u32;
 
-    /// Returns the pixels that determine the sample counts of a region: the region, and with adaptive sampling also its
-    /// neighbors.
+    /// Returns the region that the film of `region` must cover: `region`, and with adaptive sampling also its
+    /// neighbors, which affect the sample counts of its pixels.
     fn around(&self, region: Region) -> Region;
 }
 
@@ -131,7 +133,7 @@ impl Rules {
         self.picture = Region::whole(width, height);
     }
 
-    pub fn samples_of_all(&self) -> u32 {
+    pub fn unskippable_samples(&self) -> u32 {
         match self.film_layout.adaptive {
             true => self.pilot_samples,
             false => u32::MAX,

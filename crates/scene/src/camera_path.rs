@@ -65,7 +65,9 @@ impl CameraPath {
             CameraDescription::Perspective(c) => {
                 c.fov = interpolate(&self.extent).unwrap_or(c.fov);
                 if let Some(aperture) = interpolate(&self.aperture) {
-                    (c.aperture, c.f_number) = (Some(aperture), None); // both keys set the lens diameter
+                    // `aperture` and `f_number` both define the lens diameter, so the interpolated aperture replaces
+                    // `f_number`.
+                    (c.aperture, c.f_number) = (Some(aperture), None);
                 }
                 c.focus_distance = interpolate(&self.focus_distance).or(c.focus_distance);
                 (&mut c.position, &mut c.look_at, &mut c.up)

@@ -22,9 +22,9 @@ const MAX_DECODER_BYTES: usize = 64 << 20;
 /// declare 16,384 x 16,384 texels. A decoder may use twice this limit in total.
 const DECODED_LIMIT: (u64, u64) = (256 << 20, 32);
 
-/// Limit in bytes on the texels that an EXR file does not store. The limit increases with the file size like
-/// [`DECODED_LIMIT`].
-const BLANK_LIMIT: u64 = 64 << 20;
+/// Memory limit in bytes for texels of an EXR display window outside of the stored data window, because a small file
+/// may declare a huge display window. The limit increases with the file size like [`DECODED_LIMIT`].
+const UNSTORED_TEXELS_LIMIT: u64 = 64 << 20;
 
 /// Format of an image file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -181,7 +181,7 @@ pub(super) fn decode(
     check_header(header, &fits)?;
     check_decoded_size(bytes, (width, height), color.bytes_per_pixel().into())?;
     if format == ImageFormat::OpenExr {
-        check_blank_size(bytes, (width, height), stored.get())?;
+        check_unstored_size(bytes, (width, height), stored.get())?;
     }
     Ok(DynamicImage::from_decoder(decoder)?)
 }
@@ -199,11 +199,11 @@ fn check_decoded_size(file: &[u8], (width, height): (u32, u32), bytes_per_texel:
     }
 }
 
-/// Rejects an EXR file with too many texels that are not stored.
-fn check_blank_size(file: &[u8], (width, height): (u32, u32), stored: u64) -> Result<(), DecodeError> {
-    let blank = (u64::from(width) * u64::from(height)).saturating_sub(stored);
-    let (bytes, length) = (blank * 3 * size_of::<f32>() as u64, file.len() as u64);
-    let limit = BLANK_LIMIT + length * DECODED_LIMIT.1;
+/// Rejects an EXR file that declares too many texels without storing them.
+fn check_unstored_size(file: &[u8], (width, height): (u32, u32), stored: u64) -> Result<(), DecodeError> {
+    let unstored = (u64::from(width) * u64::from(height)).saturating_sub(stored);
+    let (bytes, length) = (unstored * 3 * size_of::<f32>() as u64, file.len() as u64);
+    let limit = UNSTORED_TEXELS_LIMIT + length * DECODED_LIMIT.1;
     match bytes <= limit {
         true => Ok(()),
         false => Err(DecodeError::Large(format!(

@@ -13,7 +13,7 @@ use super::problem::Problem;
 /// An override of the value of a key: `KEY=VALUE`.
 ///
 /// `KEY` is a path from the top of the file, such as `render.seed`, `materials."dark red".color`, `shapes[2].radius` or
-/// `shapes.2.radius`; list indices start at 0. `VALUE` is TOML; text that is not TOML is a string.
+/// `shapes.2.radius`; list indices start at 0. `VALUE` is a TOML value; other text is taken as a string.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Define {
     pub(super) key: KeyPath,

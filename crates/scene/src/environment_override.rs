@@ -23,8 +23,8 @@ pub enum Background {
     Display(DVec3),
 }
 
-/// Replaces the environment. Keeps its visibility to the camera, and its background unless the new environment has a
-/// background.
+/// Replaces the environment. The new environment takes over `visible` of the old environment, and its `background`
+/// unless the new environment has a `background`.
 pub(super) fn replace_environment(description: &mut Description, environment: &EnvironmentDescription) {
     let before = description.environment.take();
     let (visible, background) = before.map_or((true, None), |before| (before.visible, before.background));

@@ -35,12 +35,12 @@ pub struct Plan<'a> {
     pub scene: Arc<Packed>,
     /// The region of the image: the crop, or the full image.
     pub image_region: Region,
-    /// The part to render, and its rows.
+    /// The part to render, and the region of its rows.
     pub tile: Option<(Tile, Region)>,
     pub options: Options,
-    /// Samples per pixel; with adaptive sampling or a noise limit the maximum.
+    /// Samples per pixel; with adaptive sampling or a noise limit, the maximum.
     pub samples: u32,
-    /// The limit of the noise.
+    /// The noise at which rendering stops.
     pub noise: Option<f64>,
     pub deadline: Option<Instant>,
     /// Write intermediate images.

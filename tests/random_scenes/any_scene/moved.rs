@@ -3,8 +3,8 @@
 use glam::DVec3;
 use wgray::scene::*;
 
-/// Scales and translates all objects of a scene.
-pub fn moved(description: &mut Description, scale: f64, offset: DVec3) {
+/// Scales the cameras, lights and shapes of a scene about the origin, then translates them by `offset`.
+pub fn scale_and_translate(description: &mut Description, scale: f64, offset: DVec3) {
     let move_point = |p: &mut DVec3| *p = *p * scale + offset;
     match &mut description.camera {
         CameraDescription::Perspective(c) => {

@@ -91,7 +91,7 @@ impl Painter {
         };
         self.state.notice = Some(Notice {
             number,
-            command: self.executed + 1,
+            command: self.executed_commands + 1,
             text,
             bad,
         });

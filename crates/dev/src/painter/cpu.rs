@@ -98,8 +98,7 @@ impl Painter {
         }
     }
 
-    /// Continues the CPU's image with a new kernel if the kernel computes the image of the CPU. Otherwise, returns
-    /// `gpu`.
+    /// Continues the CPU's image on `gpu` if its kernel computes the same image, bit by bit. Otherwise, returns `gpu`.
     pub(super) fn continue_on(
         &mut self,
         gpu: Gpu,

@@ -94,7 +94,7 @@ impl Painter {
         let Some(mut gpu) = self.continue_on(gpu, &shaders, &kernel_choice, &loaded) else {
             return;
         };
-        self.compiled = self.state.compile_seconds;
+        self.next_compile_seconds = self.state.compile_seconds;
         self.drop_interim();
         let (packed, limits) = (self.packed(&loaded), self.limits);
         let view = kernel_choice.supported_view(self.view);

@@ -61,7 +61,7 @@ pub struct Painter {
 
     /// The last valid scene.
     loaded: Option<Arc<Loaded>>,
-    /// The newest readable shaders.
+    /// The newest shaders whose files could be read.
     shaders: Option<Arc<Shaders>>,
     /// The last shaders that rendered a complete image.
     last_good: Option<Arc<Shaders>>,
@@ -109,7 +109,7 @@ pub struct Painter {
     /// The full size and the displayed size of an image that is too large to display, as last reported.
     reported_sizes: Option<([u32; 2], [u32; 2])>,
 
-    executed: u64,
+    executed_commands: u64,
     frames: u64,
     /// Number of changes of the image so far, for example of the scene, the camera or the view.
     revision: u64,
@@ -117,8 +117,8 @@ pub struct Painter {
     change: Option<(Instant, bool)>,
     /// Seconds from the last change to its first image.
     latency: Option<f64>,
-    /// Seconds spent on compiling the kernel of the next frame.
-    compiled: Option<f64>,
+    /// Seconds spent on compiling the kernel of the next frame, for the report about this frame.
+    next_compile_seconds: Option<f64>,
     /// The time when the first image after a save was shown; `None` once the image is finished.
     first_frame: Option<Instant>,
     last_frame: Instant,
@@ -229,12 +229,12 @@ impl Painter {
             comparison: Comparison::default(),
             events,
             reported_sizes: None,
-            executed: 0,
+            executed_commands: 0,
             frames: 0,
             revision: 0,
             change: None,
             latency: None,
-            compiled: None,
+            next_compile_seconds: None,
             first_frame: None,
             last_frame: Instant::now(),
             frame_cost: Duration::ZERO,
@@ -247,7 +247,7 @@ impl Painter {
             Event::BuildResult(built) => self.handle_build(*built),
             Event::Command(command) => {
                 self.execute(command);
-                self.executed += 1;
+                self.executed_commands += 1;
             }
             Event::Reference(reference) => self.set_reference(reference),
             Event::Measured(errors) => self.set_errors(errors),
@@ -256,7 +256,7 @@ impl Painter {
                 // has already finished.
                 if self.pending.is_none() {
                     self.change = self.change.map(|(_, saved)| (Instant::now(), saved));
-                    self.compiled = None;
+                    self.next_compile_seconds = None;
                 }
             }
             Event::Reading(reading) => self.state.reading = reading,
@@ -294,7 +294,7 @@ impl Painter {
             }
             Err(problem) => self.problems.files = Some(*problem),
         }
-        self.show_files(noticed_at, display_changed);
+        self.apply_changed_files(noticed_at, display_changed);
     }
 
     /// Sets the scene or its errors. Returns true if the display settings changed.
@@ -332,7 +332,8 @@ impl Painter {
         display_changed
     }
 
-    fn show_files(&mut self, noticed_at: Instant, display_changed: bool) {
+    /// Applies changed files: shows the changes of the display settings, and renders the other changes.
+    fn apply_changed_files(&mut self, noticed_at: Instant, display_changed: bool) {
         self.failures = 0;
         self.replace_unavailable_view();
         self.synchronize((noticed_at, true));

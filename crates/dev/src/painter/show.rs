@@ -119,7 +119,7 @@ impl Painter {
         if let Some((noticed_at, saved)) = change {
             self.first_frame = saved.then_some(self.last_frame);
             if saved {
-                let compiled = self.compiled.take();
+                let compiled = self.next_compile_seconds.take();
                 (self.report)(Report::Reloaded {
                     seconds: noticed_at.elapsed().as_secs_f64(),
                     compiled,
@@ -213,7 +213,7 @@ impl Painter {
         self.state.no_comparison = self.no_comparison();
         self.state.apart = self.errors();
         self.state.camera_moved = self.camera.is_some();
-        (self.state.executed, self.state.frame) = (self.executed, self.frames);
+        (self.state.executed, self.state.frame) = (self.executed_commands, self.frames);
         let is_pausing = self.paused && !self.running.as_ref().is_some_and(|running| running.canvas.is_new());
         let is_rendering = self.running.is_some() && !self.is_done() && !is_pausing;
         self.state.busy = self.restart_pending || self.pending.is_some() || is_rendering;

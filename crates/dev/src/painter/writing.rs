@@ -122,7 +122,7 @@ impl Painter {
         if let (Some(view), Some(loaded)) = (view, &self.loaded) {
             self.camera = (view != loaded.camera).then_some(view);
         }
-        self.show_files(Instant::now(), display_changed);
+        self.apply_changed_files(Instant::now(), display_changed);
         Ok(())
     }
 
@@ -191,7 +191,7 @@ impl Painter {
         self.state.undo_blocked = None;
         self.history.add(step, before, &new.text);
         let display_changed = self.adopt_written(new);
-        self.show_files(Instant::now(), display_changed);
+        self.apply_changed_files(Instant::now(), display_changed);
         Ok(())
     }
 

@@ -14,7 +14,7 @@ use super::wide::{SLOTS, costs};
 const MIN_PARALLEL_ITEMS: usize = 1 << 16;
 /// Items per task of a parallel loop.
 const CHUNK: usize = 1 << 14;
-/// Minimum number of items of a node whose halves are built in parallel.
+/// Minimum number of items of a node whose parts are built in parallel.
 const MIN_JOIN_ITEMS: usize = 1 << 11;
 /// Maximum number of items of a node that is split by a sweep along each axis.
 const MAX_SMALL_ITEMS: usize = 8;
@@ -71,14 +71,14 @@ impl BuildItem {
 pub struct Inner {
     pub low: Vec3,
     pub high: Vec3,
-    /// Number of items in the first half.
+    /// Number of items in the first part.
     pub first_size: u32,
     /// SAH cost in a wide BVH if the items may occupy up to 1, 2, .. 7 slots of the parent.
     pub costs: [f32; SLOTS - 1],
 }
 
 /// A binary BVH in depth-first order. A node of n items owns n - 1 consecutive inner nodes: itself, then the inner
-/// nodes of each half.
+/// nodes of each part.
 pub struct Binary {
     pub items: Vec<BuildItem>,
     pub inner: Vec<Inner>,
@@ -102,17 +102,17 @@ fn build(items: &mut [BuildItem], inner: &mut [Inner], levels: u32, max_leaf_siz
     let count = items.len();
     let bounds = Bounds::of(items);
     let first_size = split(items, &bounds, levels);
-    let halves = items.split_at_mut(first_size);
+    let parts = items.split_at_mut(first_size);
     let inner = below.split_at_mut(first_size - 1);
-    let mut build_first = || build(halves.0, inner.0, levels - 1, max_leaf_size);
-    let mut build_second = || build(halves.1, inner.1, levels - 1, max_leaf_size);
+    let mut build_first = || build(parts.0, inner.0, levels - 1, max_leaf_size);
+    let mut build_second = || build(parts.1, inner.1, levels - 1, max_leaf_size);
     if count >= MIN_JOIN_ITEMS {
         rayon::join(build_first, build_second);
     } else {
         build_first();
         build_second();
     }
-    let sides = [(&*halves.0, &*inner.0), (&*halves.1, &*inner.1)].map(|(items, inner)| costs_of(items, inner));
+    let sides = [(&*parts.0, &*inner.0), (&*parts.1, &*inner.1)].map(|(items, inner)| costs_of(items, inner));
     let Aabb { low, high } = bounds.aabb();
     *node = Inner {
         low,

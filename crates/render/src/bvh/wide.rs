@@ -22,7 +22,7 @@ pub fn leaf_cost(area: f32, count: usize) -> f32 {
 }
 
 /// Returns the costs of a binary node that occupies up to 1, 2, .. 7 slots of a wide parent, given the costs of its
-/// halves.
+/// parts.
 pub fn costs(area: f32, count: usize, max_leaf_size: usize, sides: &[[f32; SLOTS - 1]; 2]) -> [f32; SLOTS - 1] {
     let split_cost = |slots: usize| distribute(slots, |k| sides[0][k - 1], |k| sides[1][k - 1]).0;
     let mut costs = [0.0; SLOTS - 1];
@@ -79,7 +79,7 @@ impl<'a> Part<'a> {
         super::binary::area(low.extend(0.0), high.extend(0.0))
     }
 
-    fn halves(&self) -> [Part<'a>; 2] {
+    fn parts(&self) -> [Part<'a>; 2] {
         let first_size = self.inner[0].first_size as usize;
         let items = self.items.split_at(first_size);
         let inner = self.inner[1..].split_at(first_size - 1);
@@ -102,15 +102,15 @@ impl<'a> Part<'a> {
 
     /// Collects the parts that fill this number of slots of a wide node. This part must have at least two items.
     fn collect_children(&self, slots: usize, children: &mut Vec<Part<'a>>) {
-        let halves = self.halves();
-        let (_, first_slots) = distribute(slots, |k| halves[0].cost(k), |k| halves[1].cost(k));
-        for (half, mut slots) in halves.into_iter().zip([first_slots, slots - first_slots]) {
-            while slots > 1 && half.cost(slots) == half.cost(slots - 1) {
+        let parts = self.parts();
+        let (_, first_slots) = distribute(slots, |k| parts[0].cost(k), |k| parts[1].cost(k));
+        for (part, mut slots) in parts.into_iter().zip([first_slots, slots - first_slots]) {
+            while slots > 1 && part.cost(slots) == part.cost(slots - 1) {
                 slots -= 1;
             }
             match slots {
-                1 => children.push(half),
-                _ => half.collect_children(slots, children),
+                1 => children.push(part),
+                _ => part.collect_children(slots, children),
             }
         }
     }

@@ -137,8 +137,8 @@ impl<P: Deref<Target = Packed>> Backend for Cpu<P> {
         Ok(pixels.map(|pixel| pixel_first_hit(scene, pixel)).collect())
     }
 
-    fn samples_of_all(&self) -> u32 {
-        self.rules.samples_of_all()
+    fn unskippable_samples(&self) -> u32 {
+        self.rules.unskippable_samples()
     }
 
     fn around(&self, region: Region) -> Region {

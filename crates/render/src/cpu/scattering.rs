@@ -177,7 +177,7 @@ pub fn facet_frame(scene: &Packed, surface: Surface, material: &Material) -> Tan
     frame_around(surface.shading_normal)
 }
 
-pub fn facets_of(scene: &Packed, surface: &Surface, original: Material) -> Material {
+pub fn material_for_view(scene: &Packed, surface: &Surface, original: Material) -> Material {
     let mut material = original;
     let frame = Tangents {
         u: surface.du,

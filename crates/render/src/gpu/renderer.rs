@@ -641,8 +641,8 @@ impl Backend for Gpu {
         self.discard_film_on_error(result)
     }
 
-    fn samples_of_all(&self) -> u32 {
-        self.rules.samples_of_all()
+    fn unskippable_samples(&self) -> u32 {
+        self.rules.unskippable_samples()
     }
 
     fn around(&self, region: Region) -> Region {

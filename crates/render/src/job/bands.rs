@@ -445,7 +445,7 @@ impl<S: CheckpointStore> Bands<S> {
         if !self.store.small_pieces() {
             return;
         }
-        let min_rows = MIN_ROWS[usize::from(backend.samples_of_all() < self.samples)];
+        let min_rows = MIN_ROWS[usize::from(backend.unskippable_samples() < self.samples)];
         let samples_per_row = f64::from(region.width()) * f64::from(self.samples);
         let samples_per_piece = self.steps.speed().unwrap_or(0.0) * self.store.interval().as_secs_f64();
         let rows = ((samples_per_piece / samples_per_row) as u32).max(min_rows);

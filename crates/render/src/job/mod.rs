@@ -159,7 +159,7 @@ mod tests {
             u64::MAX
         }
 
-        fn samples_of_all(&self) -> u32 {
+        fn unskippable_samples(&self) -> u32 {
             u32::MAX
         }
 
@@ -231,7 +231,7 @@ mod tests {
             u64::MAX
         }
 
-        fn samples_of_all(&self) -> u32 {
+        fn unskippable_samples(&self) -> u32 {
             4
         }
 

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-/// Measured speed: work (samples over all pixels) per second.
+/// Measured speed: total samples of all pixels per second.
 #[derive(Clone, Debug)]
 pub(super) struct Pace {
     /// Target duration of a dispatch.

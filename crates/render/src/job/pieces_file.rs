@@ -1,7 +1,7 @@
 //! File format of checkpoints and parts: a header that identifies the job, then hashed pieces. Numbers are
 //! little-endian. Files are only appended to, so that complete pieces stay intact.
 //!
-//! | part | bytes |
+//! | structure | contents |
 //! | --- | --- |
 //! | file | [`MAGIC`], header, pieces |
 //! | header | length (u32), JSON of a [`Header`], BLAKE3 hash of both |

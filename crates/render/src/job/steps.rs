@@ -42,7 +42,7 @@ pub struct Steps {
     /// The region, and neighbors that need pilot samples.
     film: Region,
     samples: u32,
-    samples_of_all: u32,
+    unskippable_samples: u32,
     target: u32,
     reached: SampleProgress,
     dispatch: Option<Dispatch>,
@@ -71,7 +71,7 @@ impl Steps {
             region: Region::whole(0, 0),
             film: Region::whole(0, 0),
             samples: 0,
-            samples_of_all: 0,
+            unskippable_samples: 0,
             target: 0,
             reached: SampleProgress {
                 pass: 0..0,
@@ -86,7 +86,7 @@ impl Steps {
         self.region = region;
         self.samples = samples;
         self.target = samples;
-        self.samples_of_all = backend.samples_of_all().min(samples);
+        self.unskippable_samples = backend.unskippable_samples().min(samples);
         self.film = film_of(backend, region, samples);
         self.dispatch = None;
         self.pace.start_film();
@@ -188,7 +188,7 @@ impl Steps {
     fn end_dispatch(&mut self) -> Option<f64> {
         let dispatch = self.dispatch.take()?;
         let Dispatch { tile, samples, start } = dispatch;
-        let is_full = self.reached.pass.end <= self.samples_of_all;
+        let is_full = self.reached.pass.end <= self.unskippable_samples;
         self.pace.record(dispatch.work(), start.elapsed(), is_full);
         let region = self.region_of_pass();
         self.reached.next = match tile.x1 < region.x1 {
@@ -206,7 +206,7 @@ impl Steps {
     }
 
     fn region_of_pass(&self) -> Region {
-        if self.reached.pass.start < self.samples_of_all {
+        if self.reached.pass.start < self.unskippable_samples {
             self.film
         } else {
             self.region
@@ -241,8 +241,8 @@ impl Steps {
         };
         let pixels = f64::from(self.region.width()) * f64::from(rows);
         let count = (self.split.samples_per_dispatch).unwrap_or_else(|| (self.pace.work() / pixels).max(1.0) as u32);
-        let end = if first < self.samples_of_all {
-            self.samples_of_all
+        let end = if first < self.unskippable_samples {
+            self.unskippable_samples
         } else {
             self.samples
         };
@@ -255,7 +255,7 @@ impl Steps {
 
 /// Returns the pixels of the film of a region: with adaptive sampling, the region and its neighbors.
 pub(super) fn film_of(backend: &dyn Backend, region: Region, samples: u32) -> Region {
-    match backend.samples_of_all() < samples {
+    match backend.unskippable_samples() < samples {
         true => backend.around(region),
         false => region,
     }

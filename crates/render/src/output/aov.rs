@@ -185,7 +185,7 @@ impl Aov {
         self.row().name
     }
 
-    /// Returns the channels of an EXR layer.
+    /// Returns the channels of the AOV's layer in an EXR file.
     pub fn channels(self) -> &'static [Channel] {
         self.row().channels
     }

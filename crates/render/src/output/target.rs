@@ -124,8 +124,8 @@ pub fn files(path: &Path, format: Format, aovs: &[Aov]) -> Vec<PathBuf> {
     files
 }
 
-/// Writes the bands that `render` produces to all targets. The files are renamed into place when all of them are
-/// complete. After a failure, existing files are unchanged.
+/// Writes the bands that `render` produces to temporary files of all targets. When all files are complete, renames them
+/// into place. After a failure, existing files are unchanged.
 ///
 /// # Errors
 ///

@@ -15,7 +15,7 @@ const STEPS: usize = 1 << 14;
 /// Mitchell: B = C = 1/3, scaled to the radius ("Reconstruction Filters in Computer Graphics", SIGGRAPH 1988, eq. 8).
 /// Gaussian: standard deviation of radius / 3, shifted to 0 at the radius. Blackman-Harris: four-term window with side
 /// lobes at -92 dB (Harris, "On the Use of Windows for Harmonic Analysis", Proc. IEEE 66(1), 1978).
-pub fn height(filter: PixelFilter, distance: f64) -> f64 {
+pub fn kernel_value(filter: PixelFilter, distance: f64) -> f64 {
     let x = distance.abs() / filter.radius;
     if x > 1.0 {
         return 0.0;
@@ -80,7 +80,7 @@ struct Lobe {
 impl Lobe {
     fn new(filter: PixelFilter, start: f64, end: f64) -> Lobe {
         let step = (end - start) / STEPS as f64;
-        let value_at = |i: f64| height(filter, start + step * i);
+        let value_at = |i: f64| kernel_value(filter, start + step * i);
         let mut sum = 0.0;
         let mut sums = vec![sum];
         for i in 0..STEPS {
@@ -113,7 +113,7 @@ fn lobes(filter: PixelFilter) -> Vec<Lobe> {
     let (mut positive, mut negative) = (0.5 * filter.radius, 0.75 * filter.radius);
     for _ in 0..64 {
         let middle = 0.5 * (positive + negative);
-        match height(filter, middle) > 0.0 {
+        match kernel_value(filter, middle) > 0.0 {
             true => positive = middle,
             false => negative = middle,
         }

@@ -99,9 +99,9 @@ impl Cone {
 /// An emitter in the light tree.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TreeEmitter {
-    /// Lower corner of the box.
+    /// Lower corner of the bounding box.
     pub low: DVec3,
-    /// Upper corner of the box.
+    /// Upper corner of the bounding box.
     pub high: DVec3,
     /// Bounds of the directions of emission.
     pub cone: Cone,

@@ -11,9 +11,10 @@ use wgray_scene::{Geometry, Light, Reflection, Scene, Shadows};
 /// is rounded.
 const TOLERANCE: f64 = 1e-6;
 
-/// Returns a flag for each primitive outside of the BVH: true if the primitive can occlude a surface from a light. With
-/// more than [`MAX_LINEAR_PRIMITIVES`] primitives, flat primitives are not tested, because each test takes time
-/// proportional to the number of shapes.
+/// Returns a flag for each primitive outside of the BVH: true if the primitive can occlude a surface from a light. A
+/// flat primitive cannot if all shapes and lights are on one side of its plane. With more than
+/// [`MAX_LINEAR_PRIMITIVES`] primitives, this is not tested, because each test takes time proportional to the number
+/// of shapes.
 pub fn can_cast_shadow(scene: &Scene, primitives: &[Primitive]) -> Vec<bool> {
     let is_tested = primitives.len() <= MAX_LINEAR_PRIMITIVES && !has_environment_map(scene);
     let casts =

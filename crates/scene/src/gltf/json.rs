@@ -266,9 +266,9 @@ fn set_default(object: &mut Value, key: &str, value: Value) {
     }
 }
 
-/// Checks indices and enumerations.
+/// Checks indices, enumerations and required keys.
 fn check(root: &Root) -> Result<(), GltfFault> {
-    // The validation of the crate `gltf-json` assumes valid attributes, animation channels and cameras.
+    // Attributes, animation channels and cameras are checked first, because `root.validate` assumes valid values.
     for (i, mesh) in root.meshes.iter().enumerate() {
         for (k, primitive) in mesh.primitives.iter().enumerate() {
             for (name, accessor) in &primitive.attributes {

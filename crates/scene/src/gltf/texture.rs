@@ -13,7 +13,8 @@ use super::error::{GltfError, json_message};
 use crate::ktx2;
 use crate::{Encoding, ImageTextureDescription, TextureFilter, Wrap};
 
-/// Minimum magnitude of the scale of texture coordinates, and maximum magnitude of their scale and offset.
+/// Limits of texture transforms: a scale whose magnitude is below the first value is replaced by this value; scales and
+/// offsets whose magnitude exceeds the second value are rejected.
 const SCALE_LIMITS: (f64, f64) = (1e-6, 1e6);
 
 /// Maximum index of a texture coordinate set.

@@ -1,4 +1,4 @@
-//! Reads scene files of limited size.
+//! Reads scene files, up to a maximum size.
 
 use std::fs::File;
 use std::io::{self, Read as _};

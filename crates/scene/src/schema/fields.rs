@@ -40,7 +40,7 @@ pub struct Field {
     /// True if the value must be a square number.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub squares: bool,
-    /// Range of a slider around the value, or around the largest component of an emitter color.
+    /// A slider for the value, or for the largest component of an emitter color.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub slider: Option<Slider>,
     /// The allowed names, truncated if there are many.

@@ -17,8 +17,8 @@ use super::{At, Checked, Description, Environment, Integrator, Problem, between,
 const ELEVATION: f64 = 40.0;
 const TURBIDITY: f64 = 2.0;
 
-/// Returns the environment of `[environment]` or of the background; `None` if the environment neither emits light nor
-/// has a background.
+/// Returns the environment that `[environment]` describes, or else a constant environment with the radiance
+/// `render.background`. Returns `None` if the environment emits no light and its own `background` is missing or black.
 pub(super) fn environment(
     description: &Description,
     integrator: Integrator,

@@ -18,7 +18,8 @@ impl Textures<'_> {
         };
         needs_path(self.integrator)?;
         let color = self.color(emission)?;
-        // A replaced texture is constant, so its color would make the entire surface an emitter.
+        // An image that is damaged or not read is replaced by a constant color, with which the entire surface would
+        // emit. Such a material emits nothing.
         let is_replaced = matches!(color, Color::Texture(texture) if self.replaced.contains(&texture));
         Ok(if is_replaced { Color::BLACK } else { color })
     }

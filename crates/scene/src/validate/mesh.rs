@@ -288,13 +288,14 @@ fn missing_materials_note(mesh: &Mesh, file: &str, missing: &BTreeSet<&str>) -> 
             match unread {
                 Some((library, problem)) => {
                     let name = library.file.file_name().unwrap_or_default().to_string_lossy();
-                    format!("its MTL file {:?} cannot be read: {problem}", cut(&name))
+                    format!("the MTL file {:?} cannot be read: {problem}", cut(&name))
                 }
-                None => "not defined in its MTL files".to_owned(),
+                None => "missing from the MTL files of the mesh".to_owned(),
             }
         }
     };
-    format!("{file}: no material {names}: {reason}")
+    let noun = if missing.len() == 1 { "material" } else { "materials" };
+    format!("{file}: undefined {noun} {names}: {reason}")
 }
 
 /// Returns the names of a group: its own name, and the name of its material in the file.

@@ -124,7 +124,7 @@ fn a_valid_scene_has_the_values_of_its_file() {
     let (white, red) = (DVec3::splat(0.7), DVec3::X);
     let dark_red = phong(red * 0.3, red * 0.4, red * 0.5, 16.0);
     assert_eq!(scene.materials, [dark_red, phong(white, white, DVec3::ONE, 20.0)]);
-    let square = |z, u, v| Parallelogram {
+    let parallelogram_at = |z, u, v| Parallelogram {
         center: DVec3::new(0.0, 0.0, z),
         u,
         v,
@@ -132,7 +132,7 @@ fn a_valid_scene_has_the_values_of_its_file() {
     let lights = [
         Light::Rectangle {
             // The tangent is made orthogonal to the normal; the bitangent is -Z x X.
-            rectangle: square(9.0, DVec3::X, DVec3::NEG_Y * 2.0),
+            rectangle: parallelogram_at(9.0, DVec3::X, DVec3::NEG_Y * 2.0),
             color: DVec3::new(1.0, 0.5, 0.0),
             visible: true,
         },
@@ -147,7 +147,7 @@ fn a_valid_scene_has_the_values_of_its_file() {
     ];
     assert_eq!(scene.lights, lights);
     let geometries: Vec<_> = scene.shapes.iter().map(|shape| &shape.geometry).collect();
-    let rectangle = square(1.5, DVec3::Y * 3.0, DVec3::NEG_X);
+    let rectangle = parallelogram_at(1.5, DVec3::Y * 3.0, DVec3::NEG_X);
     assert_eq!(geometries[0], &Geometry::Rectangle(rectangle));
     let sphere = Geometry::Ellipsoid {
         center: DVec3::Z * 3.0,
@@ -470,8 +470,8 @@ fn disks_accept_all_radii_in_the_range_of_lengths() {
             assert!((disk.u.length() / radius - 1.0).abs() < 1e-12 && (disk.v.length() / radius - 1.0).abs() < 1e-12);
         }
     }
-    let rule = scene("1.1e9", "[0, 0, 1]").unwrap_err();
-    assert!(rule.contains("shapes[0].radius: 1.1e9 must be"), "{rule}");
+    let message = scene("1.1e9", "[0, 0, 1]").unwrap_err();
+    assert!(message.contains("shapes[0].radius: 1.1e9 must be"), "{message}");
 }
 
 #[test]

@@ -130,7 +130,7 @@ fn transform(scale: [f64; 2], rotate: f64, offset: [f64; 2]) -> Checked<[DVec3; 
     ])
 }
 
-/// The textures to which references of materials are resolved.
+/// The textures of a scene, in which the texture names of materials are looked up.
 pub(super) struct Textures<'a> {
     pub(super) names: Vec<&'a str>,
     pub(super) textures: &'a [Texture],

@@ -27,9 +27,9 @@ use crate::cpu::principled::{PrincipledLobes, principled_sample};
 use crate::cpu::ray::{Hit, Ray};
 use crate::cpu::rng::{hash4, unit_float};
 use crate::cpu::scattering::{
-    NO_LOBES, absorption_after, albedo, bounded, direction_allowed, facet_frame, facet_sample, facets_of, flipped,
-    has_facets, has_inside, is_delta, is_transmissive, lit_normal, local_wo, mixture_at, plain_reflection, reflection,
-    shaded_normal,
+    NO_LOBES, absorption_after, albedo, bounded, direction_allowed, facet_frame, facet_sample, flipped, has_facets,
+    has_inside, is_delta, is_transmissive, lit_normal, local_wo, material_for_view, mixture_at, plain_reflection,
+    reflection, shaded_normal,
 };
 use crate::cpu::sequence::sobol_bits;
 use crate::cpu::shadow_ray::ShadowRay;
@@ -213,7 +213,7 @@ pub fn shade(scene: &Packed, state: &mut PathState, hit: Hit, pixel: UVec2) -> O
             let frame = facet_frame(scene, surface, material);
             surface.du = frame.u;
             surface.dv = frame.v;
-            microfacets = facets_of(scene, &surface, *material);
+            microfacets = material_for_view(scene, &surface, *material);
             material = &microfacets;
         }
         if s.emitters != 0 {

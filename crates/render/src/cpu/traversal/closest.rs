@@ -88,16 +88,16 @@ pub fn leaves<S: Simd>(
     mut limit: f32,
     mut visit: impl FnMut(Range<usize>, f32) -> f32,
 ) {
-    // For each axis: 1 for a negative direction, origins for near and far sides, and reciprocal of the direction.
-    let mut is_negative = [0; 3];
+    // For each axis: near side (0: lower, 1: upper), origins for near and far sides, and reciprocal of the direction.
+    let mut near_side_index = [0; 3];
     let mut origins = [[0.0; 3]; 2];
     let mut inverse = [0.0; 3];
     for i in 0..3 {
         let k = line.axes[i];
         let negative = line.inverse[i] < 0.0;
-        is_negative[k] = usize::from(negative);
-        origins[is_negative[k]][k] = line.o_low[i];
-        origins[1 - is_negative[k]][k] = line.o_high[i];
+        near_side_index[k] = usize::from(negative);
+        origins[near_side_index[k]][k] = line.o_low[i];
+        origins[1 - near_side_index[k]][k] = line.o_high[i];
         inverse[k] = line.inverse[i];
     }
     // Distances and indices of nodes. The children of a node are sorted, with the nearest on top.
@@ -113,8 +113,8 @@ pub fn leaves<S: Simd>(
         let mut near = f32x8::splat(simd, f32::NEG_INFINITY);
         let mut far = f32x8::splat(simd, limit);
         for k in 0..3 {
-            near = near.max((side(simd, node, planes[is_negative[k]], k, scale[k]) - origins[0][k]) * inverse[k]);
-            far = far.min((side(simd, node, planes[1 - is_negative[k]], k, scale[k]) - origins[1][k]) * inverse[k]);
+            near = near.max((side(simd, node, planes[near_side_index[k]], k, scale[k]) - origins[0][k]) * inverse[k]);
+            far = far.min((side(simd, node, planes[1 - near_side_index[k]], k, scale[k]) - origins[1][k]) * inverse[k]);
         }
         let hits = (near.simd_le(far) & far.simd_ge(f32x8::splat(simd, 0.0))).to_bitmask() as u32;
         let mut leaves = hits & !u32::from(node.inner);

@@ -60,9 +60,9 @@ impl MeshStack {
         let mut near = f32x8::splat(simd, 0.0);
         let mut far = f32x8::splat(simd, limit);
         for k in 0..3 {
-            let negative = ray.is_negative[k];
-            let near_side = f32x8::simd_from(simd, node.planes[negative][k]);
-            let far_side = f32x8::simd_from(simd, node.planes[1 - negative][k]);
+            let near_index = ray.near_side_index[k];
+            let near_side = f32x8::simd_from(simd, node.planes[near_index][k]);
+            let far_side = f32x8::simd_from(simd, node.planes[1 - near_index][k]);
             near = near.max((near_side - ray.origins[0][k]) * ray.inverse[k]);
             far = far.min((far_side - ray.origins[1][k]) * ray.inverse[k]);
         }

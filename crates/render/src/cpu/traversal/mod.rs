@@ -1,8 +1,9 @@
 //! Closest-hit and occlusion queries over a BVH of triangles or other items.
 //!
-//! The results do not depend on the BVH: they equal those of testing every triangle with [`Line::triangle`]. A ray hits
-//! a triangle only where it hits the triangle's box. Every step of the box test is monotone, so that a ray that hits a
-//! box also hits every enclosing box. At equal distance, the smallest index wins.
+//! A [`Line`] is a ray prepared for box and triangle tests. The results do not depend on the BVH: they equal those of
+//! testing every triangle with [`Line::triangle`]. A ray hits a triangle only where it hits the triangle's box. Every
+//! step of the box test is monotone, so that a ray that hits a box also hits every enclosing box. At equal distance,
+//! the smallest index wins.
 //!
 //! Each function is compiled for several instruction sets (`fearless_simd`). All versions give the same bits, since no
 //! operation is contracted to a fused multiply-add.
@@ -59,9 +60,9 @@ pub fn remaining_t_max(start: f32, t: f32) -> f32 {
     (t - start) + t * 4.7683716e-7
 }
 
-/// Returns the closest hit nearer than `best`, except on the triangle with index `skip`; `best` if there is no such
-/// hit. The distance of a hit is `start` plus the distance from the ray's origin, clamped to at least 0. Hits at
-/// distance 0 do not count. At equal distance, the smallest index wins.
+/// Returns the closest hit nearer than `best`, except on the triangle with index `skip`; `best` if no such hit exists.
+/// `start` is the distance along the full ray at which `line` begins: a hit at distance t along `line` has the distance
+/// `start + max(t, 0)`. Hits at distance 0 do not count. At equal distance, the smallest index wins.
 pub fn closest(level: Level, mesh: &Mesh, line: &Line, start: f32, skip: u32, best: Nearest) -> Nearest {
     dispatch!(level, simd => closest::closest(simd, mesh, line, start, skip, best))
 }

@@ -11,27 +11,28 @@ use crate::bvh::Node;
 /// A ray with precomputed values for tests against boxes.
 #[derive(Clone, Copy, Debug)]
 pub struct BoxRay {
-    /// For each axis, 1 if the direction is negative, else 0.
-    pub(super) is_negative: [usize; 3],
+    /// For each axis, the side of boxes that the ray enters: 0 for the lower side, 1 for the upper side.
+    pub(super) near_side_index: [usize; 3],
     /// Origins for tests of near and far sides.
     pub(super) origins: [[f32; 3]; 2],
     pub(super) inverse: [f32; 3],
 }
 
 impl BoxRay {
-    /// Creates a ray from the origins for tests of lower and upper sides, and the reciprocals of the direction.
+    /// Creates a ray from the origins for tests of lower and upper sides, and the reciprocals of the direction's
+    /// components.
     #[inline(always)]
     pub fn new(low_origin: [f32; 3], high_origin: [f32; 3], inverse: [f32; 3]) -> BoxRay {
-        let mut is_negative = [0; 3];
+        let mut near_side_index = [0; 3];
         let mut origins = [low_origin, high_origin];
         for k in 0..3 {
             if inverse[k] < 0.0 {
-                is_negative[k] = 1;
+                near_side_index[k] = 1;
                 (origins[0][k], origins[1][k]) = (high_origin[k], low_origin[k]);
             }
         }
         BoxRay {
-            is_negative,
+            near_side_index,
             origins,
             inverse,
         }
@@ -40,7 +41,7 @@ impl BoxRay {
     /// Returns the octant of the direction: bit k is set if component k is negative.
     #[inline(always)]
     pub fn octant(&self) -> usize {
-        let [x, y, z] = self.is_negative;
+        let [x, y, z] = self.near_side_index;
         x | y << 1 | z << 2
     }
 
@@ -107,7 +108,7 @@ impl Stack {
         let mut near = f32x8::splat(simd, f32::NEG_INFINITY);
         let mut far = f32x8::splat(simd, limit);
         for k in 0..3 {
-            let [near_side, far_side] = [planes[ray.is_negative[k]], planes[1 - ray.is_negative[k]]];
+            let [near_side, far_side] = [planes[ray.near_side_index[k]], planes[1 - ray.near_side_index[k]]];
             near = near.max((side(simd, node, near_side, k, scale[k]) - ray.origins[0][k]) * ray.inverse[k]);
             far = far.min((side(simd, node, far_side, k, scale[k]) - ray.origins[1][k]) * ray.inverse[k]);
         }

@@ -16,7 +16,7 @@ use super::super::path::{Path, usable_normal};
 use super::super::principled::bounded_color;
 use super::super::ray::{Hit, Ray};
 use super::super::rng::{hash4, unit_float};
-use super::super::scattering::{bounded, facet_frame, facets_of, local_wo, shaded_normal};
+use super::super::scattering::{bounded, facet_frame, local_wo, material_for_view, shaded_normal};
 use super::super::shadow_ray::ShadowRay;
 use super::super::surface::{Surface, largest};
 use super::super::texture::evaluate_material;
@@ -26,7 +26,7 @@ use super::lights::{LightChoices, LightRows, only_light};
 use super::materials::{Diffuse, Directions, Metal, Principled};
 use super::rows::{F, LANES, Row, Rows3, get3, load3, set3, store3};
 use super::shade::{IS_OPTIMIZED, MaterialKind, QueuedHit, ShadingQueues, SurfaceKind};
-use super::surfaces::{EvaluatedHits, FaceHits, FlatHits, LaneSurfaces};
+use super::surfaces::{FaceHits, FlatHits, LaneSurfaces, ScalarHits};
 use crate::records::{DIFFUSE, ENVIRONMENT_MAP, INFINITE_T, INSTANCE, METAL, Material, NO_INDEX, Packed};
 
 /// The paths of a batch, and the queue of their shadow rays.
@@ -84,7 +84,7 @@ fn evaluate(scene: &Packed, path: &Path, hit: Hit) -> Evaluated {
         let frame = facet_frame(scene, surface, &material);
         (surface.du, surface.dv) = (frame.u, frame.v);
         if material.kind == METAL {
-            material = facets_of(scene, &surface, material);
+            material = material_for_view(scene, &surface, material);
             material.energy = NO_INDEX; // the loss is known
         } else {
             energy = principled_energy(scene, &material, local_wo(&surface), surface.side);
@@ -148,7 +148,7 @@ impl Batch<'_> {
     pub fn shade_queues<S: Simd>(&mut self, simd: S, queues: &ShadingQueues) {
         let scene = self.scene;
         let epsilon = scene.environment.shadow_epsilon;
-        let (mut flat, mut faces, mut evaluated) = (FlatHits::new(), FaceHits::new(), EvaluatedHits::default());
+        let (mut flat, mut faces, mut evaluated) = (FlatHits::new(), FaceHits::new(), ScalarHits::default());
         let mut lights = LightRows::new(only_light(scene));
         let mut materials = HitMaterials {
             rows: MaterialRows::default(),

@@ -164,7 +164,7 @@ pub struct Metal<'a, S: Simd> {
 }
 
 impl<'a, S: Simd> Metal<'a, S> {
-    /// Returns the materials, like the scalar `facets_of`. The shading normals of the surfaces are usable.
+    /// Returns the materials, like the scalar `material_for_view`. The shading normals of the surfaces are usable.
     #[inline(always)]
     pub fn new(simd: S, rows: &'a mut MaterialRows, surface: &LaneSurfaces<S>) -> Self {
         let normal = surface.shading_normal;

@@ -317,7 +317,7 @@ impl FaceHits {
 
 /// Hits whose surfaces are evaluated one by one: hits on solids, and on materials with textures or vertex colors.
 #[derive(Default)]
-pub struct EvaluatedHits {
+pub struct ScalarHits {
     position: Rows3,
     normal: Rows3,
     smooth_normal: Rows3,
@@ -334,7 +334,7 @@ pub struct EvaluatedHits {
     face_y: Rows3,
 }
 
-impl EvaluatedHits {
+impl ScalarHits {
     #[inline(always)]
     pub fn set(&mut self, lane: usize, surface: &Surface, prim: &HitPrimitive, coat_normal: Vec3) {
         self.side[lane] = surface.side;

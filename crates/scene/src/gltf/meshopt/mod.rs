@@ -96,7 +96,10 @@ pub(super) fn parse_compression(
         },
     };
     if !rule.is_empty() {
-        return fault("byteStride", &stride, rule);
+        return Err(GltfFault::key(
+            format!("{key}.byteStride"),
+            format!("{rule}, not {stride}"),
+        ));
     }
     if mode != Mode::Attributes && filter != Filter::None {
         return fault("filter", &"a filter", "requires the mode ATTRIBUTES");

@@ -126,8 +126,8 @@ pub(super) fn header(words: &mut Tokens, defects: &mut Defects) -> Result<Header
                     .ok()
                     .and_then(|count| count.parse().ok())
                     .ok_or_else(|| {
-                        let rule = "must be a whole number that fits into memory";
-                        words.fault(format!("element {name:?}: {} {rule}", quoted(count)))
+                        let rule = "must be a non-negative whole number that fits into memory";
+                        words.fault(format!("element {name:?}: count {} {rule}", quoted(count)))
                     })?;
                 elements.push(Element {
                     name,

@@ -236,19 +236,22 @@ fn a_map_needs_texture_coordinates() {
 #[test]
 fn undefined_materials_are_replaced_by_a_default() {
     let folder = TestFolder::new("newmtl red\n");
-    let note = |details: &str| format!("in/a.obj: no material {details}; a gray material is used instead");
+    let note = |details: &str| format!("in/a.obj: undefined {details}; a gray material is used instead");
     let notes = |keys: &str| folder.scene(&format!("{MESH}{keys}")).unwrap().notes;
     let scene = folder.scene(MESH).unwrap();
-    assert_eq!(scene.notes, [note("\"blue\": not defined in its MTL files")]);
+    assert_eq!(
+        scene.notes,
+        [note("material \"blue\": missing from the MTL files of the mesh")]
+    );
     assert_eq!(names(&scene, 0), ["red", "red", "default"]);
     let gray = Color::Plain(DVec3::splat(0.8));
     assert_eq!(phong(material_named(&scene, "default")).1, gray);
     fs::remove_file(folder.path("in/a.mtl")).unwrap();
-    let start = "in/a.obj: no material \"blue\", \"red\": its MTL file \"a.mtl\" cannot be read: ";
+    let start = "in/a.obj: undefined materials \"blue\", \"red\": the MTL file \"a.mtl\" cannot be read: ";
     let found = notes("");
     assert!(found.len() == 1 && found[0].message.starts_with(start), "{found:?}");
     folder.write("in/a.obj", &OBJ.replace("mtllib a.mtl\n", ""));
-    let expected = note("\"blue\": the file names no MTL file");
+    let expected = note("material \"blue\": the file names no MTL file");
     assert_eq!(notes("materials = { red = 'own' }"), [expected]);
     // A group without a material causes no warning.
     folder.write("in/a.obj", &OBJ.replace("mtllib a.mtl\n", "").replace("usemtl ", "g "));
@@ -257,8 +260,8 @@ fn undefined_materials_are_replaced_by_a_default() {
         format!("{text}usemtl m{i}\nf 1/1 2/1 {}/1\n", i % 6 + 4)
     });
     folder.write("in/a.obj", &many);
-    let details =
-        "\"blue\", \"m0\", \"m1\", \"m10\", \"m11\", \"m12\", \"m13\", \"m14\" and 14 more: the file names no MTL file";
+    let details = "materials \"blue\", \"m0\", \"m1\", \"m10\", \"m11\", \"m12\", \"m13\", \"m14\" and 14 more: \
+                   the file names no MTL file";
     let found = notes("");
     assert!(found.iter().any(|found| *found == note(details)), "{found:?}");
 }
