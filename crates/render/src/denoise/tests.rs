@@ -234,6 +234,31 @@ fn a_single_sample_is_denoised_by_features() {
     assert!(after < before / 20.0, "{before} before, {after} after");
 }
 
+/// Stratified samples have less noise than independent ones: of 16 times as many samples, the variance is 1/32, not 1/16.
+#[test]
+fn the_variance_of_many_samples_is_that_of_stratified_samples() {
+    let subject = Subject {
+        width: 1,
+        height: 1,
+        amplitude: 0.2,
+    };
+    let variance_of = |samples: u32| {
+        let mut film = subject.film(|_, _| DVec3::splat(0.5), WHITE);
+        let scale = (samples / SAMPLES) as f32;
+        for values in [&mut film.sums, &mut film.half_sums]
+            .into_iter()
+            .chain(&mut film.layers)
+        {
+            values[0] *= scale;
+        }
+        film.moments[0] = Vec3::splat((samples - 1) as f32).extend(samples as f32);
+        Guides::of(&film).plane(crate::records::GUIDE_COLOR_VARIANCE as usize)[0]
+    };
+    let [few, some, many] = [4, 16, 256].map(variance_of);
+    assert!((few / some - 4.0).abs() < 1e-3, "{few} {some}");
+    assert!((some / many - 32.0).abs() < 1e-3, "{some} {many}");
+}
+
 /// Returns the film of a noisy surface to the right of the line x = 10.3 + 0.2 y, with 16 samples per pixel, in front of
 /// `background`. Also returns the mean of each pixel with a surface without noise.
 fn film_of_an_edge(background: impl Fn(&mut u64) -> f64) -> (Film, Vec<DVec3>) {
