@@ -1,7 +1,7 @@
 // Mappings from the unit square to points and directions.
 
 // Samples the unit disk uniformly: Shirley and Chiu, "A Low Distortion Map between Disk and Square", Journal of
-// Graphics Tools 2(3), 1997. Sine and cosine of angles up to pi / 4 are Taylor series, within 3e-8.
+// Graphics Tools 2(3), 1997. Sine and cosine of angles up to pi / 4 are Taylor series, with an error below 3e-8.
 fn disk_sample(u: vec2f) -> vec2f {
     let a = 2.0 * u.x - 1.0;
     let b = 2.0 * u.y - 1.0;

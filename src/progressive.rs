@@ -82,7 +82,7 @@ impl<'s> ProgressiveRender<'s> {
             largest_film,
             NoCheckpoint,
         );
-        // `snapshot` returns no errors, so the memory for its film is checked here.
+        // `snapshot` cannot return an error, so an allocation here tests that the memory for its film exists.
         drop(empty(setup.layout.region, film_layout)?);
         Ok(ProgressiveRender {
             open,

@@ -23,8 +23,8 @@ use wgray_scene::Scene;
 ///
 /// With [`Device::Auto`](crate::Device::Auto), the CPU renders if no adapter exists, if the CPU is faster than the
 /// adapter for this scene, or if the scene or image does not fit into the adapter's memory. With any device, the CPU
-/// renders if the driver truncates long loops and a single sample exceeds the limit. A lost device is re-opened a few
-/// times, and the render resumes from its finished samples; if re-opening fails,
+/// renders if the driver truncates long loops and a single sample exceeds the limit. After a device is lost, a
+/// few attempts are made to re-open it. Then the render resumes from its finished samples; if re-opening fails,
 /// [`Device::Auto`](crate::Device::Auto) resumes on the CPU. `tracing` warnings report the reason, and
 /// [`Picture::device`] returns the device that rendered last.
 ///

@@ -153,8 +153,8 @@ fn windows_wider_than_the_image_are_clipped_and_renormalized() {
 
 #[test]
 fn tiles_and_chunks_do_not_change_the_metrics() {
-    // The image is larger than a tile of 256 x 256 pixels and a chunk of 65,536 pixels. The contributions of distant
-    // pixels add up.
+    // The image is larger than a tile of 256 x 256 pixels and a chunk of 65,536 pixels. Pixels with
+    // errors are too far apart to influence each other, so their errors add up.
     let noise = |x: u32, y: u32, c: u32| ((x * 7919 + y * 104_729 + c * 1_299_709) % 251) as f32;
     let b = picture(600, 300, BYTES, move |x, y, c| (noise(x, y, c) / 2.0).floor());
     let with_errors_at = |pixels: &'static [(u32, u32)]| {

@@ -31,7 +31,7 @@ fn module_imports_have_no_cycles() {
 
 #[test]
 fn cycles_are_detected() {
-    let found = |texts: &[(&str, &str)]| {
+    let cycles_in = |texts: &[(&str, &str)]| {
         let file = |(name, text): &(&str, &str)| {
             let module = if *name == "lib" { Vec::new() } else { strings(&[name]) };
             (module, syn::parse_file(text).unwrap())
@@ -39,16 +39,16 @@ fn cycles_are_detected() {
         cycles(&imports(&texts.iter().map(file).collect::<Vec<_>>(), &[]))
     };
     let no_cycles: Vec<Vec<String>> = Vec::new();
-    assert_eq!(found(&[("a", "use crate::b::B;"), ("b", "pub struct B;")]), no_cycles);
+    assert_eq!(cycles_in(&[("a", "use crate::b::B;"), ("b", "pub struct B;")]), no_cycles);
     let cycle = [strings(&["a", "b"])];
     assert_eq!(
-        found(&[("a", "use crate::b::B;"), ("b", "fn f() { super::a::g() }")]),
+        cycles_in(&[("a", "use crate::b::B;"), ("b", "fn f() { super::a::g() }")]),
         cycle
     );
     // A cycle through names that the root module exports.
     let root = ("lib", "mod a; mod b; pub use b::B; pub use a::*;");
     assert_eq!(
-        found(&[
+        cycles_in(&[
             root,
             ("a", "use super::{B}; pub struct A;"),
             ("b", "type T = crate::A;")
@@ -61,10 +61,10 @@ fn cycles_are_detected() {
         ("b", "use crate::c;"),
         ("c", "use crate::a;"),
     ];
-    assert_eq!(found(&third), [strings(&["a", "b", "c"])]);
+    assert_eq!(cycles_in(&third), [strings(&["a", "b", "c"])]);
     // Test modules do not count.
     assert_eq!(
-        found(&[
+        cycles_in(&[
             ("a", "use crate::b::B;"),
             ("b", "#[cfg(test)] mod tests { use crate::a; }")
         ]),

@@ -169,7 +169,7 @@ def check(args, name, path, bound):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--scenes", help="names, separated by commas, or course: the three JSON scenes; default: all")
+    parser.add_argument("--scenes", help="names, separated by commas; 'course' stands for the three JSON scenes; default: all")
     parser.add_argument("--wgray", default=str(install.ROOT / "target/release/wgray"),
                         help="the program, or none: Mitsuba instead")
     parser.add_argument("--device", default="cpu")

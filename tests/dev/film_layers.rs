@@ -20,7 +20,7 @@ const LAYERS: [(View, Layer); 5] = [
     (View::ShadingNormal, Layer::Normal),
 ];
 
-/// Returns the scene for the path integrator, with an environment.
+/// Returns the scene for the path integrator, lit also by a background.
 fn path_scene() -> String {
     SCENE.replace(
         "[render]",

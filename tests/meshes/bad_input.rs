@@ -37,32 +37,32 @@ const CASES: &[(&str, &str, &str)] = &[
     (
         "a.obj",
         "v 1 2 3\nf 1 1 2\n",
-        "a.obj:2: vertex 2 of the face does not exist; defined so far: 1",
+        "a.obj:2: the face refers to vertex 2, which does not exist; defined so far: 1",
     ),
     (
         "a.obj",
         "v 1 2 3\nf 1 1 -2\n",
-        "a.obj:2: vertex -2 of the face does not exist; defined so far: 1",
+        "a.obj:2: the face refers to vertex -2, which does not exist; defined so far: 1",
     ),
     (
         "a.obj",
         "v 1 2 3\nf 0 1 1\n",
-        "a.obj:2: vertex 0 of the face does not exist; indices count from 1, or from -1 backwards",
+        "a.obj:2: the face refers to vertex 0; indices count from 1, or from -1 backwards",
     ),
     (
         "a.obj",
         "v 1 2 3\nf 1/1 1 1\n",
-        "a.obj:2: texture coordinate 1 of the face does not exist; defined so far: 0",
+        "a.obj:2: the face refers to texture coordinate 1, which does not exist; defined so far: 0",
     ),
     (
         "a.obj",
         "v 1 2 3\nf 1//4294967297 1 1\n",
-        "a.obj:2: normal 4294967297 of the face does not exist; defined so far: 0",
+        "a.obj:2: the face refers to normal 4294967297, which does not exist; defined so far: 0",
     ),
     (
         "a.obj",
         "v 1 2 3\nf 1 1 99999999999999999999999999999999999999\n",
-        "a.obj:2: vertex 999999999999999999999999999999 of the face does not exist; defined so far: 1",
+        "a.obj:2: the face refers to vertex 999999999999999999999999999999, which does not exist; defined so far: 1",
     ),
     (
         "a.obj",

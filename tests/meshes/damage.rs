@@ -30,7 +30,7 @@ fn damaged_lines_of_obj_files_are_replaced() {
         ),
         (
             "f 1 2 3\nf 1 2 9\n",
-            "line 6: vertex 9 of the face does not exist; defined so far: 4; the face was removed",
+            "line 6: the face refers to vertex 9, which does not exist; defined so far: 4; the face was removed",
         ),
         (
             "f 1 2 3\nf 1 2 x\n",
@@ -38,12 +38,12 @@ fn damaged_lines_of_obj_files_are_replaced() {
         ),
         (
             "f 1/1 2/2 3/3\n",
-            "line 5: texture coordinate 1 of the face does not exist; defined so far: 0; \
+            "line 5: the face refers to texture coordinate 1, which does not exist; defined so far: 0; \
              the texture coordinates (0, 0) are used instead (similar problems: 2)",
         ),
         (
             "f 1//1 2//2 3//3\n",
-            "line 5: normal 1 of the face does not exist; defined so far: 0; the normal of the triangles is used instead (similar problems: 2)",
+            "line 5: the face refers to normal 1, which does not exist; defined so far: 0; the normal of the triangles is used instead (similar problems: 2)",
         ),
         (
             "vt 0 nan\nf 1/1 2/1 3/1\n",

@@ -163,7 +163,7 @@ fn unsupported_files_are_rejected_with_a_hint() {
     );
     fs::write(&path, "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n").unwrap();
     let expected = format!(
-        "{}:4: vertex 9 of the face does not exist; defined so far: 3",
+        "{}:4: the face refers to vertex 9, which does not exist; defined so far: 3",
         path.display()
     );
     assert_eq!(load(&path).unwrap_err(), expected);

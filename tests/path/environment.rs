@@ -151,7 +151,7 @@ fn irradiance_matches_a_sum_over_all_directions() {
             for mode in both() {
                 let found = DVec3::from_array(mean(&render(&with_map(image, rotation, (256, 1), GROUND), mode)));
                 if expected == DVec3::ZERO {
-                    assert_eq!(found, expected, "a texel below the ground lights the ground");
+                    assert_eq!(found, expected, "a texel below the horizon lights the ground");
                     continue;
                 }
                 let ratio = found / expected;

@@ -341,7 +341,7 @@ fn invalid_values_are_rejected() {
         ("[textures.t]\ntype = 'image'".into(), "3: textures.t.file is missing"),
         (
             "[textures.t]\ntype = 'image'\nfile = 'good.exr'\nencoding = 'srgb'".into(),
-            "5: textures.t.file: \"good.exr\" must not be \"srgb\": files of type EXR are linear",
+            "5: textures.t.file: the encoding of \"good.exr\" must not be \"srgb\": EXR files are linear",
         ),
         (
             "[textures.t]\ntype = 'noise'".into(),

@@ -1,10 +1,10 @@
-//! Escaping of untrusted text for terminals: control characters and direction marks are printed as escapes such as
-//! `\u{1b}`.
+//! Escaping of untrusted text for terminals: control characters, direction marks and line separators are printed as
+//! escapes such as `\u{1b}`.
 
 use std::borrow::Cow;
 use std::fmt::Write as _;
 
-/// Returns true for control characters and direction marks (Unicode UAX 9).
+/// Returns true for control characters, direction marks (Unicode UAX 9) and line separators.
 fn is_control_or_mark(c: char) -> bool {
     let marks = ['\u{61c}', '\u{200e}', '\u{200f}', '\u{2028}', '\u{2029}'];
     c.is_control()

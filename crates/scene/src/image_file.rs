@@ -93,7 +93,7 @@ impl Assets {
         let is_float = matches!(format, Format::Image(ImageFormat::OpenExr | ImageFormat::Hdr));
         if is_float && encoding == Some(Encoding::Srgb) {
             return Err(Problem::new(format!(
-                "{file:?} must not be \"srgb\": files of type {} are linear",
+                "the encoding of {file:?} must not be \"srgb\": {} files are linear",
                 format.name()
             )));
         }

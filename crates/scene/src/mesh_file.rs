@@ -12,7 +12,7 @@ use crate::mesh::{Mesh, MeshError, Normals};
 #[derive(PartialEq, Eq, Hash)]
 struct Key {
     /// The [`FileSystem::id`] of the file system.
-    source: u64,
+    file_system: u64,
     path: PathBuf,
     length: u64,
     modified: SystemTime,
@@ -64,7 +64,7 @@ fn cached_mesh(file_system: &FileSystem, key: &Key) -> Option<Arc<Mesh>> {
 fn key(file_system: &FileSystem, path: &Path, normals: Option<Normals>) -> Option<Key> {
     let (length, modified) = file_system.stamp(path)?;
     Some(Key {
-        source: file_system.id(),
+        file_system: file_system.id(),
         path: path.to_owned(),
         length,
         modified,

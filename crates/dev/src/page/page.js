@@ -65,11 +65,11 @@ onFrame((header, images) => {
   Object.assign(element("panels").dataset, { revision, samples, done, view: viewName(header.view), sent: header.sent.join("x") });
 });
 
-// For scripts that control the page: returns whether the image is final and shows all commands of this page and at
-// least `commands` commands of all viewers.
-window.isSettled = (commands) => {
+// For scripts that control the page: returns whether the image is final and includes the effects of all commands of this
+// page. At least `minExecuted` commands of all viewers together must have been executed.
+window.isSettled = (minExecuted) => {
   const state = lastState();
-  return isUpToDate() && state.executed >= commands && picture.isSettled() && !state.busy && state.frame > 0 && shownFrame >= state.frame;
+  return isUpToDate() && state.executed >= minExecuted && picture.isSettled() && !state.busy && state.frame > 0 && shownFrame >= state.frame;
 };
 
 onState((state) => {

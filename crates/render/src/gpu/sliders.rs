@@ -291,7 +291,7 @@ mod tests {
     fn overrides_that_compilation_needs_are_not_sliders() {
         let free = "override free: f32 = 0.5; // 0..1\nfn half_of(x: f32) -> f32 { return x * free; }\n";
         assert_eq!(sliders_of(free).len(), 1);
-        for bound in [
+        for excluded in [
             "override size: u32 = 3u;\nvar<workgroup> group_bins: array<f32, size>;\n",
             "override size: u32 = 3u;\nvar<workgroup> group_bins: array<f32, size * 2u>;\n",
             "override half_gain: f32 = 0.5;\noverride full_gain: f32 = half_gain * 2.0;\n",
@@ -299,11 +299,11 @@ mod tests {
             "@id(7) override numbered: f32 = 0.5;\n",
             "const constant: f32 = 0.5; // slider 0..1\n",
         ] {
-            let names: Vec<String> = sliders_of(&(free.to_string() + bound))
+            let names: Vec<String> = sliders_of(&(free.to_string() + excluded))
                 .into_iter()
                 .map(|slider| slider.name)
                 .collect();
-            assert_eq!(names, ["free"], "{bound}");
+            assert_eq!(names, ["free"], "{excluded}");
         }
         assert_eq!(sliders_of("override broken: f32 = missing;\n"), []);
     }

@@ -54,7 +54,7 @@ pub struct MeshDescription {
     /// Material of all groups that `materials` does not name. If absent, the file's own, else gray.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub material: Option<String>,
-    /// Names of materials, by the names of groups or materials of the file.
+    /// Material for each group or material of the file. Both are names.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub materials: BTreeMap<String, String>,
     /// Translation, applied last.
@@ -102,7 +102,7 @@ pub struct InstanceDescription {
     /// Material of all groups that `materials` does not name. If absent, the file's own, else gray.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub material: Option<String>,
-    /// Names of materials, by the names of groups or materials of the file.
+    /// Material for each group or material of the file. Both are names.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub materials: BTreeMap<String, String>,
     /// Translation, applied last.

@@ -26,7 +26,7 @@ const MAX_IMAGES_BYTES: u64 = 4 << 30;
 /// An open file. JSON indices (except in raw extension data) and enumerations are valid, and all numbers are finite.
 /// The node hierarchy and other values are not validated yet.
 pub(super) struct Document {
-    /// JSON without data URIs of buffers.
+    /// The JSON, from which the data URIs of buffers have been removed.
     pub json: Root,
     pub path: PathBuf,
     pub notes: Vec<String>,

@@ -322,12 +322,12 @@ fn index(text: &[u8], count: usize, kind: &str) -> Option<Result<u32, String>> {
         (true, false) => Ok((n - 1) as u32),
         (true, true) => Ok((count - n) as u32),
         (false, _) if n == 0 => Err(format!(
-            "{kind} 0 of the face does not exist; indices count from 1, or from -1 backwards"
+            "the face refers to {kind} 0; indices count from 1, or from -1 backwards"
         )),
         (false, _) => {
             let number = String::from_utf8_lossy(&text[..text.len().min(30)]);
             Err(format!(
-                "{kind} {number} of the face does not exist; defined so far: {count}"
+                "the face refers to {kind} {number}, which does not exist; defined so far: {count}"
             ))
         }
     })

@@ -54,7 +54,7 @@ macro_rules! material_fields {
             /// 1 with an anisotropic albedo table, else 0.
             has_aniso_table: [f32; 8],
             /// 1 with multiple-scattering compensation that depends on the directions, else 0.
-            has_energy: [f32; 8],
+            has_energy_table: [f32; 8],
         }
 
         impl MaterialRows {
@@ -69,7 +69,7 @@ macro_rules! material_fields {
                 })*
                 self.is_thin[lane] = if material.is_thin() { 1.0 } else { 0.0 };
                 self.has_aniso_table[lane] = if material.has_aniso_table() { 1.0 } else { 0.0 };
-                self.has_energy[lane] = if material.energy != NO_INDEX { 1.0 } else { 0.0 };
+                self.has_energy_table[lane] = if material.energy != NO_INDEX { 1.0 } else { 0.0 };
             }
 
             /// Sets the color of a diffuse material. Its other parameters have no effect.
@@ -80,12 +80,12 @@ macro_rules! material_fields {
                 self.diffuse[2][lane] = color.z;
             }
 
-            /// Sets the losses of the materials with compensation.
+            /// Sets the loss in the lanes whose material has an energy table. The other lanes keep theirs.
             #[inline(always)]
             pub fn set_loss<S: Simd>(&mut self, loss: f32x8<S>) {
-                let has_energy = f32x8::simd_from(loss.simd, self.has_energy);
+                let has_energy_table = f32x8::simd_from(loss.simd, self.has_energy_table);
                 let before = f32x8::simd_from(loss.simd, self.loss);
-                self.loss = select(before, loss, has_energy.gt(Real::splat(loss, 0.0))).into();
+                self.loss = select(before, loss, has_energy_table.gt(Real::splat(loss, 0.0))).into();
             }
         }
 
