@@ -253,13 +253,13 @@ impl OpenScene {
     }
 
     /// Closes the lost device.
-    fn release(&mut self, lost: &str, message: &str) {
+    fn release(&mut self, lost_device: &str, message: &str) {
         let scene = Arc::clone(self.engine.scene());
         let engine = std::mem::replace(&mut self.engine, Engine::cpu(scene));
         let _ = catch_panic(|| drop(engine)); // wgpu may panic; the device is lost anyway
         #[cfg(feature = "gpu")]
-        self.context.devices.remove(lost);
-        self.lost = Some((lost.to_string(), message.to_string()));
+        self.context.devices.remove(lost_device);
+        self.lost = Some((lost_device.to_string(), message.to_string()));
     }
 
     fn use_engine(&mut self, engine: Engine, info: DeviceInfo) {

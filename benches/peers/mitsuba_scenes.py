@@ -200,7 +200,7 @@ def quaternion(rotation):
 def mesh_file(s):
     kind = os.path.splitext(s.file)[1]
     if kind not in (".ply", ".obj"):
-        raise ValueError(f"{s.file}: other renderers support only PLY and OBJ files")
+        raise ValueError(f"{s.file}: the comparison supports only PLY and OBJ files")
     # The benchmark files have no normals. Without normals, wgray's default is flat shading, Mitsuba's is smooth.
     return {"type": kind[1:], "filename": s.file, "face_normals": s.normals in (None, "flat")}
 

@@ -64,12 +64,13 @@ fn info_counts_shapes_memory_and_samples() {
     let shapes = &tube["shapes"];
     assert!(
         shapes["triangles"].as_u64() > shapes["mesh_triangles"].as_u64(),
-        "a mesh has two instances: {shapes}"
+        "the second instance of the mesh is not counted: {shapes}"
     );
     assert_eq!(
         shapes["triangles"], shapes["instanced_triangles"],
-        "only meshes have triangles: {shapes}"
+        "triangles outside of meshes are counted: {shapes}"
     );
+    // The former names of two keys.
     assert_eq!(shapes["instanced_triangles"], shapes["placed_mesh_triangles"]);
     assert_eq!(tube["picture"]["max_samples"], tube["picture"]["most_samples"]);
     assert!(tube["picture"]["max_samples"].as_u64() > Some(0));

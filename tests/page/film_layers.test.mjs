@@ -59,7 +59,7 @@ test("film layers are views with the images and files of a render", async () => 
   assert.deepEqual(page.errors, []);
 });
 
-test("a layer that a scene lacks is disabled with the reason until the scene has it", async () => {
+test("a layer that the scene does not provide is disabled, and its tooltip gives the reason", async () => {
   await studio.start();
   const page = await open(browser, studio);
   const group = page.locator("#layers optgroup:has([value=direct])");

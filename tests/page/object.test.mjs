@@ -48,7 +48,7 @@ test("a click shows the object, and its controls write to the scene file", async
   const lines = page.locator("#object-groups > details").first().locator("pre");
   const lineNumber = SCENE.split("\n").indexOf("[[shapes]]") + 1;
   assert.match(await lines.innerText(), new RegExp(`^ *${lineNumber}  \\[\\[shapes\\]\\]\\n`));
-  // After a key has changed the value, the box, the file and the displayed lines contain the new value.
+  // After a key press has changed the value, the box, the file and the displayed lines contain the new value.
   await box(page, "shapes[0].radius").focus();
   await page.keyboard.press("ArrowLeft");
   await page.locator("#undo-write", { hasText: "shapes[0].radius" }).waitFor();

@@ -41,7 +41,7 @@ use wgray_scene::CameraDescription;
 
 /// Minimum time between frames while an image is refined. At most a tenth of the time is spent on making frames.
 const FRAME_INTERVAL: Duration = Duration::from_millis(100);
-/// Maximum number of successive attempts to open a device without rendering an image.
+/// Maximum number of successive attempts to open a device that end before an image is rendered.
 const MAX_ATTEMPTS: u32 = 3;
 const DEFAULT_GAIN: f32 = 256.0;
 

@@ -17,9 +17,9 @@ const MAX_STEPS: usize = 256;
 
 #[derive(Default)]
 pub struct CameraHistory {
-    /// Cameras before each step, oldest first.
+    /// Cameras before each step of the history, oldest first.
     back: Vec<CameraDescription>,
-    /// Cameras that a step forward restores, the next one last.
+    /// Cameras that redo restores, the next one last.
     forward: Vec<CameraDescription>,
     /// True if the next move belongs to the current step.
     in_step: bool,

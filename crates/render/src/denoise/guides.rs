@@ -26,12 +26,12 @@ const DEPTH_TOLERANCE: f32 = 0.003;
 /// Variances of features are multiplied by this factor, because estimates from a few samples are too low as often as too
 /// high.
 const FEATURE_VARIANCE_SCALE: f32 = 2.0;
-/// Variance of features from which on a pixel contains an edge.
+/// Variance of features above which a pixel is assumed to contain an edge.
 const EDGE_VARIANCE: f32 = 1e-4;
 /// Minimum of a pixel's variance, relative to the mean variance of the 3 x 3 pixels around it.
 const MIN_RELATIVE_VARIANCE: f32 = 0.25;
-/// Radius of the mean of squared half differences.
-const HALF_RADIUS: usize = 4;
+/// Radius of the square of pixels over which the squared differences of the two halves of the samples are averaged.
+const HALF_VARIANCE_RADIUS: usize = 4;
 /// Depth of pixels that are not averaged with any other pixel.
 const EXCLUDED_DEPTH: f32 = 1e15;
 
@@ -224,7 +224,7 @@ fn limit_variances(film: &Film, coverages: &[Coverage], guides: &mut [[f32; PLAN
         .collect();
     let (local, limits) = (
         box_means(&variances, width, 1),
-        box_means(&half_variances, width, HALF_RADIUS),
+        box_means(&half_variances, width, HALF_VARIANCE_RADIUS),
     );
     for (guides, (local, limit)) in guides.iter_mut().zip(local.into_iter().zip(limits)) {
         let mut variance = guides[COLOR_VARIANCE].max(MIN_RELATIVE_VARIANCE * local);

@@ -16,6 +16,8 @@ const MAX_ROULETTE_BOUNCES: u32 = 100;
 
 /// Estimated number of surfaces that a ray passes through because of their alpha before a hit.
 const ALPHA_SKIPS: f64 = 4.0;
+/// Estimated number of surfaces invisible to the camera that a camera ray passes through.
+const CAMERA_SKIPS: f64 = 2.0;
 
 /// Estimated iterations of a texture lookup.
 const LOOKUP_ITERATIONS: f64 = 8.0;
@@ -48,8 +50,8 @@ fn iterations_of_sample(packed: &Packed, baked: bool) -> f64 {
         TRAVERSAL_ITERATIONS
     };
     let per_hit = per_hit + per_traversal;
-    // Camera rays skip camera-invisible surfaces.
-    let per_start = 1.0 + f64::from(features.camera_invisible) * (1.0 + per_hit) * 2.0;
+    // A camera ray searches again behind a surface that is invisible to the camera.
+    let per_start = 1.0 + f64::from(features.camera_invisible) * (1.0 + per_hit) * CAMERA_SKIPS;
     if packed.integrator.follows_paths() {
         // Each bounce has a BSDF ray, a shadow ray and texture lookups.
         let per_shadow_ray = if baked { per_traversal } else { casters + per_traversal };

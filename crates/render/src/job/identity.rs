@@ -10,7 +10,7 @@ use wgray_image::Region;
 /// Maximum width and height of an image in pixels, and maximum number of samples per pixel. Scenes have equal limits.
 const MAX_COUNT: u32 = 65_536;
 
-/// Everything that determines the bits of a film. The device is not part, because it does not affect the bits.
+/// Everything that determines the bits of a film. The device is not included, because it does not affect the bits.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Identity {

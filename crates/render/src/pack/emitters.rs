@@ -21,7 +21,7 @@ pub struct PackedEmitters {
     /// Lights, emitters and light tree.
     pub lighting: Lighting,
     /// Probability of sampling the environment map.
-    pub environment: f64,
+    pub environment_probability: f64,
     /// [`Instance::leaves`](super::Instance::leaves) per instance; empty without a light tree.
     pub instance_leaves: Vec<u32>,
 }
@@ -140,7 +140,7 @@ pub fn emitters(
             _ => materials[primitives[light.primitive as usize].0.material as usize].density,
         };
     }
-    packed.environment = environment_integral.map_or(0.0, |_| powers[environment] / total);
+    packed.environment_probability = environment_integral.map_or(0.0, |_| powers[environment] / total);
     packed.lighting.emitters = (table(&powers).into_iter().zip(references))
         .map(|((threshold, alias_index), (instance, index))| Emitter {
             threshold,
@@ -298,7 +298,7 @@ fn with_tree(
         let light = &mut packed.lighting.lights[*index as usize];
         light.density = (power / total) as f32;
         if light.kind == ENVIRONMENT {
-            packed.environment = power / total;
+            packed.environment_probability = power / total;
         }
     }
     let weights: Vec<f64> = [tree_power]

@@ -118,7 +118,7 @@ pub fn pack_with(scene: &Scene, shading: &PackedShading) -> Packed {
     .specialization();
     let samples = scene.render.pixel_samples.count;
     let adaptive = scene.render.adaptive;
-    let environment = environment(scene, environment_map, packed_emitters.environment);
+    let environment = environment(scene, environment_map, packed_emitters.environment_probability);
     let primitives = order.into_primitives();
     Packed {
         origin,

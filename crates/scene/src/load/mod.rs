@@ -239,8 +239,8 @@ impl<'a> PendingScene<'a> {
             assets: Assets::default(),
             description: change.description,
         };
-        // Values outside of the parts come from `before`, which contains the overrides, unless their text is parsed
-        // again.
+        // The overrides have been applied to `before`. Values outside of the changed part lack them only if they were
+        // parsed again.
         if change.parsed_rest {
             pending = pending.with_overrides()?;
         }

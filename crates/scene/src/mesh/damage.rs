@@ -15,7 +15,7 @@ pub(super) const EXTRA_VALUES: &str = "the extra values were ignored";
 #[derive(Default)]
 pub(super) struct Defects(Vec<Defect>);
 
-/// Faults with equal remedies.
+/// Faults with the same remedy, counted together.
 struct Defect {
     remedy: &'static str,
     first: MeshFault,

@@ -18,7 +18,7 @@ use crate::records::{INFINITE_T, NO_INDEX, Packed, with_primitive_kind};
 pub struct RayRows {
     origin: Rows3,
     direction: Rows3,
-    /// Primitives outside of meshes that the rays cannot hit again, as in [`Path`].
+    /// For each ray, the primitive outside of meshes that it starts on and cannot hit again, as in [`Path`].
     origin_prim: [u32; LANES],
     /// Solids that the rays start on and pass through, as in [`Path`].
     inside_prim: [u32; LANES],

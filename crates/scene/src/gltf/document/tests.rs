@@ -53,8 +53,8 @@ fn small() -> (Value, Vec<u8>) {
     (json, binary)
 }
 
-/// Reads all data, with an index beyond the end of each list. Returns the number of values that were read. Failures
-/// must not panic.
+/// Reads all data, with an index beyond the end of each list. Returns the number of values that were read. A
+/// read that fails must return an error, not panic.
 fn count_reads(document: &Document) -> usize {
     let mut count = 0;
     for i in 0..document.json.accessors.len() + 1 {
