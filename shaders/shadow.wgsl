@@ -10,7 +10,7 @@ struct SampleBlock {
     key: vec2u,
 }
 
-// Returns the mask of samples that the primitive occludes from p. `kind` is a compile-time constant. With
+// Returns the mask of samples that the primitive occludes from p. Callers pass a constant for `kind`, so that code for other kinds is removed. With
 // `from_inside`, p is on a solid seen from inside (`solid_levels`).
 fn occlusion_mask(kind: u32, q: Primitive, p: vec3f, from_inside: bool, light: Light, block: SampleBlock) -> u32 {
     let from_anchor = vector_to_local(q, p - q.anchor);

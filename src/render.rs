@@ -259,7 +259,7 @@ pub(crate) fn empty(region: Region, film_layout: FilmLayout) -> Result<Film, Ren
     Ok(Film::of(region, film_layout))
 }
 
-/// Returns true if any of these layers is derived from the first hits.
+/// Returns true if any of `aovs` is derived from the first hits.
 pub fn needs_first_hits(scene: &Packed, aovs: &[Aov]) -> bool {
     let mut sources = aovs.iter().map(|aov| aov.source(scene.integrator));
     sources.any(|source| source == AovSource::FirstHit)

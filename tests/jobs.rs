@@ -235,7 +235,7 @@ fn last_pass(bands: &mut Bands<impl CheckpointStore>) -> Film {
         films.push(band.film);
         Ok(())
     };
-    bands.last_pass(&mut output).expect("a pass");
+    bands.output_last_pass(&mut output).expect("a pass");
     let mut films = films.into_iter();
     let mut joined = films.next().expect("a band");
     for film in films {

@@ -39,7 +39,10 @@ fn cycles_are_detected() {
         cycles(&imports(&texts.iter().map(file).collect::<Vec<_>>(), &[]))
     };
     let no_cycles: Vec<Vec<String>> = Vec::new();
-    assert_eq!(cycles_in(&[("a", "use crate::b::B;"), ("b", "pub struct B;")]), no_cycles);
+    assert_eq!(
+        cycles_in(&[("a", "use crate::b::B;"), ("b", "pub struct B;")]),
+        no_cycles
+    );
     let cycle = [strings(&["a", "b"])];
     assert_eq!(
         cycles_in(&[("a", "use crate::b::B;"), ("b", "fn f() { super::a::g() }")]),

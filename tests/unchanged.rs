@@ -85,11 +85,11 @@ fn images_have_the_recorded_checksums() {
         fs::write(&path, &found).expect("the checksum file");
     }
     let recorded = fs::read_to_string(&path).expect("the checksum file");
-    let films: BTreeSet<&str> = recorded.lines().filter_map(|line| line.split(' ').next()).collect();
+    let film_checksums: BTreeSet<&str> = recorded.lines().filter_map(|line| line.split(' ').next()).collect();
     assert_eq!(
-        films.len(),
+        film_checksums.len(),
         recorded.lines().count(),
-        "two scenes have the same checksum"
+        "two scenes have the same film checksum"
     );
     let changed: Vec<&str> = found
         .lines()

@@ -32,7 +32,7 @@ def register():
             return type(self).__name__
 
     class Conductor(Rough):
-        """A one-sided metal. The reflectance is `color`, times that of the complex indices `eta` + i `k` if given."""
+        """A one-sided metal. The reflectance is `color`, times the Fresnel reflectance for the complex index `eta` + i `k` if given."""
 
         def __init__(self, props):
             mi.BSDF.__init__(self, props)

@@ -180,7 +180,7 @@ def main():
     parser.add_argument("--course-spp", type=int, default=512)
     parser.add_argument("--course-batches", type=int, default=48)
     parser.add_argument("--seed", type=int, default=1, help="first seed of wgray; Mitsuba's seeds start at 1001")
-    parser.add_argument("--wrong", type=float, default=1, help="factor on wgray's images, which must be detected")
+    parser.add_argument("--wrong", type=float, default=1, help="factor by which wgray's images are multiplied; unless it is 1, all scenes must fail")
     parser.add_argument("--control", type=float, default=1.02, help="the factor that the test of each scene must detect")
     parser.add_argument("--own-facets", action="store_true",
                         help="use Mitsuba's own rough BSDFs, with the separable masking-shadowing function")

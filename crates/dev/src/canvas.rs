@@ -150,7 +150,7 @@ impl Canvas {
         Ok(same_kernel)
     }
 
-    /// Sets the slider values, given as bits. The caller must restart the image.
+    /// Sets the slider values, given as bit patterns, and discards the film. The caller must start the image again.
     pub fn set_sliders(&mut self, values: &[u32]) -> Result<(), RenderError> {
         self.engine.set_sliders(values)
     }

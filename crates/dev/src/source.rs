@@ -102,7 +102,7 @@ pub struct KernelChoice {
     pub integrator: Integrator,
     /// True if sampling is adaptive.
     pub adaptive: bool,
-    /// True if the CPU renders the scene instead of a kernel.
+    /// True if the CPU, not a kernel, renders the scene.
     pub on_cpu: bool,
 }
 

@@ -12,11 +12,11 @@ use crate::color::{linear_to_srgb, srgb_to_linear};
 /// Transform from linear light to display values. [`ViewTransform::name`] is the name in files.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Deserialize, Serialize, JsonSchema)]
 pub enum ViewTransform {
-    /// Clamps to 0 ... 1, then gamma 1/2.2.
+    /// Clamps to 0 ... 1, then applies gamma 1/2.2.
     #[default]
     #[serde(rename = "gamma22")]
     Gamma22,
-    /// Clamps to 0 ... 1, then the sRGB curve.
+    /// Clamps to 0 ... 1, then applies the sRGB curve.
     #[serde(rename = "srgb")]
     Srgb,
     /// AgX without a look: desaturates bright colors gradually, like film.

@@ -18,7 +18,7 @@ pub(super) const MAX_COUNT: u32 = 65_536;
 pub(super) const MIN_ADAPTIVE_SAMPLES: u32 = 2;
 /// Maximum number of bounces of a path.
 pub(super) const MAX_DEPTH: u32 = 1024;
-/// Maximum contributions of a sample.
+/// Values of `clamp`, the maximum contribution of a sample.
 pub(super) const CLAMPS: (f64, f64) = (1e-6, 1e6);
 /// Offsets of ray origins above a surface, relative to the largest coordinate of the surface point.
 pub(super) const SHADOW_EPSILONS: (f64, f64) = (0.0, 0.1);

@@ -22,9 +22,10 @@ const WAVELENGTHS: DVec3 = DVec3::new(0.68, 0.55, 0.44);
 const SOLAR_IRRADIANCE: f64 = 4.0;
 /// Angular radius of the sun.
 const SUN_RADIUS: f64 = 0.2666 * PI / 180.0;
-/// Single-scattering albedo of haze, and the asymmetry parameter g of its Henyey-Greenstein phase function.
+/// Single-scattering albedo of haze.
 const HAZE_ALBEDO: f64 = 0.9;
-const HAZE_FORWARD: f64 = 0.75;
+/// Asymmetry parameter g of the Henyey-Greenstein phase function of haze.
+const HAZE_ASYMMETRY: f64 = 0.75;
 /// Fractions of the scattered light that reach the ground: for molecules, and for haze, which scatters forwards.
 const MOLECULES_DOWN: f64 = 0.5;
 const HAZE_DOWN: f64 = 0.8;
@@ -161,7 +162,7 @@ impl Air {
     /// of t times the sun's air mass; the scattered light then passes the remaining depth times the ray's air mass.
     fn scattered_once(&self, row: &Row, direction: DVec3) -> DVec3 {
         let cosine = direction.dot(self.sun);
-        let g = HAZE_FORWARD;
+        let g = HAZE_ASYMMETRY;
         let molecule_phase = 3.0 / (16.0 * PI) * (1.0 + cosine * cosine);
         let spread = 1.0 + g * g - 2.0 * g * cosine;
         let haze_phase = (1.0 - g * g) / (4.0 * PI * spread * spread.sqrt());

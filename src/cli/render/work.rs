@@ -365,10 +365,10 @@ fn save_pass(
         if !targets.is_empty() {
             image::save(targets, layout, &options, &mut |sink| {
                 if !plan.denoises() {
-                    return bands.last_pass(&mut |band| write_band(plan, renderer, band, &mut totals, sink));
+                    return bands.output_last_pass(&mut |band| write_band(plan, renderer, band, &mut totals, sink));
                 }
                 let parts = denoise::collect(layout.region, plan.scene.film_layout(), &mut |sink| {
-                    bands.last_pass(&mut |band| write_band(plan, renderer, band, &mut totals, sink))
+                    bands.output_last_pass(&mut |band| write_band(plan, renderer, band, &mut totals, sink))
                 })?;
                 write_denoised(renderer, parts, sink)
             })?;

@@ -30,7 +30,7 @@ pub struct Flip {
     pub map: Option<Map>,
 }
 
-/// An error map in 8 bits: 255 is 1. Each value is the maximum over a square of pixels.
+/// An error map with 8 bits per value: 255 represents an error of 1. Each value is the maximum over a square of pixels.
 #[derive(Clone, Debug)]
 pub struct Map {
     /// Side of a square in pixels.

@@ -48,7 +48,7 @@ pub struct Bands<S> {
     pass_end: Option<u32>,
     /// Target duration of a pass.
     pass_duration: Duration,
-    /// True to keep the films of the last complete pass ([`Bands::last_pass`]).
+    /// True to keep the films of the last complete pass ([`Bands::output_last_pass`]).
     keeps_last_pass: bool,
     steps: Steps,
     /// Samples over all pixels of the finished bands.
@@ -313,7 +313,7 @@ impl<S: CheckpointStore> Bands<S> {
 
     /// Renders another pass over all bands, adding one or more samples per pixel. Returns the number of samples of
     /// every pixel; `None` if all samples are complete or the time is up, after which [`Bands::render_next`] returns
-    /// the bands. After an error the pass can be continued, and [`Bands::last_pass`] returns the previous pass.
+    /// the bands. After an error the pass can be continued, and [`Bands::output_last_pass`] returns the previous pass.
     ///
     /// # Errors
     ///
@@ -353,12 +353,12 @@ impl<S: CheckpointStore> Bands<S> {
         self.bands.iter().map(samples).min().unwrap_or(self.samples)
     }
 
-    /// Passes copies of all bands, as of the last complete pass, to `output`, from top to bottom.
+    /// Calls `output` with a copy of each band, from top to bottom, in its state after the last complete pass.
     ///
     /// # Errors
     ///
     /// Errors of `output`, and of a store that cannot load a piece.
-    pub fn last_pass(
+    pub fn output_last_pass(
         &mut self,
         output: &mut dyn FnMut(FinishedBand) -> Result<(), RenderError>,
     ) -> Result<(), RenderError> {

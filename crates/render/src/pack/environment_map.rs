@@ -292,8 +292,8 @@ fn bin_normal(bin: u32) -> DVec3 {
     DVec3::new(folded(x, y), folded(y, x), z).normalize()
 }
 
-/// Returns the mean clamped cosine for cosines uniform in m - r to m + r. The result is larger if few cosines are
-/// positive, so that light just above the horizon is sampled often enough.
+/// Returns the mean clamped cosine for cosines uniform in m - r to m + r. If few cosines are positive, the result
+/// exceeds the mean, so that light just above the horizon is sampled often enough.
 fn mean_cosine(m: f64, r: f64) -> f64 {
     if m >= r {
         m

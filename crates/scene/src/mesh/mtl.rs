@@ -135,7 +135,7 @@ fn set(material: &mut MtlMaterial, keyword: &[u8], words: &mut Tokens) -> Result
         "norm" => material.normal_map = map(material, words, keyword),
         "map_Pm" => material.metallic_map = map(material, words, keyword),
         "map_Pr" => material.roughness_map = map(material, words, keyword),
-        _ => ignore(material, (*keyword).to_owned(), line),
+        _ => record_ignored(material, (*keyword).to_owned(), line),
     }
     material.lines.insert((*keyword).to_owned(), line);
     Ok(())
@@ -145,7 +145,7 @@ fn map(material: &mut MtlMaterial, words: &mut Tokens, keyword: &str) -> Option<
     let line = words.line();
     let (file, options) = map_file(&words.name());
     for option in options {
-        ignore(
+        record_ignored(
             material,
             format!("option {} of {keyword}", quoted(option.as_bytes())),
             line,
@@ -154,8 +154,8 @@ fn map(material: &mut MtlMaterial, words: &mut Tokens, keyword: &str) -> Option<
     Some(file).filter(|file| !file.is_empty())
 }
 
-/// Records a statement without effect, up to a limit.
-fn ignore(material: &mut MtlMaterial, statement: String, line: usize) {
+/// Records a statement that has no effect. At most [`MAX_IGNORED`] are recorded.
+fn record_ignored(material: &mut MtlMaterial, statement: String, line: usize) {
     if material.others.len() < MAX_IGNORED && !material.others.contains(&statement) {
         material.lines.insert(statement.clone(), line);
         material.others.push(statement);

@@ -13,13 +13,13 @@ use crate::bvh::Node;
 pub struct BoxRay {
     /// For each axis, the side of boxes that the ray enters: 0 for the lower side, 1 for the upper side.
     pub(super) near_side_index: [usize; 3],
-    /// Origins for tests of near and far sides.
+    /// The ray's origin, shifted to pad the boxes: for tests of near sides, and of far sides.
     pub(super) origins: [[f32; 3]; 2],
     pub(super) inverse: [f32; 3],
 }
 
 impl BoxRay {
-    /// Creates a ray from the origins for tests of lower and upper sides, and the reciprocals of the direction's
+    /// Creates a ray from its origin, shifted to pad the boxes for tests of lower and of upper sides, and the reciprocals of the direction's
     /// components.
     #[inline(always)]
     pub fn new(low_origin: [f32; 3], high_origin: [f32; 3], inverse: [f32; 3]) -> BoxRay {

@@ -27,7 +27,7 @@ pub fn closest_hits(
     scratch: &mut Scratch,
     meshes: &BatchMeshes,
 ) {
-    if meshes.are_missing(scene) {
+    if meshes.are_not_converted(scene) {
         hits.clear();
         hits.extend(active.iter().map(|i| {
             let path = &paths[*i as usize].path;

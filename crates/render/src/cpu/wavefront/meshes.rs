@@ -35,7 +35,7 @@ impl BatchMeshes {
     }
 
     /// Returns true if the meshes were not converted because the scene has too many triangles.
-    pub fn are_missing(&self, scene: &Packed) -> bool {
+    pub fn are_not_converted(&self, scene: &Packed) -> bool {
         self.meshes.len() < scene.bvh.meshes.len()
     }
 

@@ -27,8 +27,9 @@ pub fn occluded_rays(
     meshes: &BatchMeshes,
 ) {
     occluded.clear();
-    // A shadow ray may continue through surfaces with alpha, so it is traced alone.
-    if scene.specialization.alpha_surfaces != 0 || meshes.are_missing(scene) {
+    // Rays are traced one by one if they may continue through surfaces with alpha, or if the meshes are too large to be
+    // converted for lanes.
+    if scene.specialization.alpha_surfaces != 0 || meshes.are_not_converted(scene) {
         occluded.extend(rays.iter().map(|QueuedShadowRay { path, ray }| {
             let i = *path as usize;
             is_shadow_ray_occluded(scene, ray, pixels[i], paths[i].sample)

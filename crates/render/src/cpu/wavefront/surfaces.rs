@@ -32,12 +32,13 @@ pub struct LaneSurfaces<S: Simd> {
     /// [`None`] if tangents follow from the shading normal.
     pub tangents: Option<Tangents<V<S>>>,
     /// [`None`] if no hit is on a mesh.
-    pub face: Option<LaneFaces<S>>,
+    pub triangle: Option<LaneTriangles<S>>,
 }
 
-/// The maps from points to coordinates x and y in triangles, as in [`Primitive`](crate::records::Primitive).
+/// `anchor`, `x` and `y` of triangles ([`Primitive`](crate::records::Primitive)). They map a point p to barycentric coordinates:
+/// `dot(x, p - anchor)` and `dot(y, p - anchor)`.
 #[derive(Clone, Copy)]
-pub struct LaneFaces<S: Simd> {
+pub struct LaneTriangles<S: Simd> {
     anchor: V<S>,
     x: V<S>,
     y: V<S>,
@@ -75,14 +76,14 @@ impl<S: Simd> LaneSurfaces<S> {
         let zero = wi.x.splat(0.0);
         let lit = dot(self.shading_normal, wi).gt(zero) & dot(self.smooth_normal, wi).gt(zero);
         // Without a mesh, the smooth normal is the geometric normal, so light from below is not in `lit`.
-        let Some(face) = &self.face else {
+        let Some(triangle) = &self.triangle else {
             return lit;
         };
         let fall = -dot(self.normal, wi);
         let height = dot(self.normal, self.terminator_offset);
         let crossing = self.position + self.terminator_offset + wi * (height / max(fall, fall.splat(1e-30)));
-        let from_anchor = crossing - face.anchor;
-        let (x, y) = (dot(face.x, from_anchor), dot(face.y, from_anchor));
+        let from_anchor = crossing - triangle.anchor;
+        let (x, y) = (dot(triangle.x, from_anchor), dot(triangle.y, from_anchor));
         lit & (fall.le(zero) | x.lt(zero) | y.lt(zero) | (x + y).gt(zero.splat(1.0)))
     }
 }
@@ -142,7 +143,7 @@ impl FlatHits {
             wo: -direction,
             side,
             tangents: None,
-            face: None,
+            triangle: None,
         }
     }
 }
@@ -267,7 +268,7 @@ impl FaceHits {
         let determinant = select(min_positive, area, Real::abs(area).gt(min_positive));
         let instance_anchor = load3(simd, &i.anchor);
         let anchor = instance_anchor + from_mesh(u, v, w, v0);
-        let face = LaneFaces {
+        let triangle = LaneTriangles {
             anchor,
             x: cross(edge_2, z) / determinant,
             y: cross(z, edge_1) / determinant,
@@ -310,7 +311,7 @@ impl FaceHits {
             wo: -d,
             side,
             tangents: None,
-            face: Some(face),
+            triangle: Some(triangle),
         }
     }
 }
@@ -374,7 +375,7 @@ impl ScalarHits {
                 u: load3(simd, &self.du),
                 v: load3(simd, &self.dv),
             }),
-            face: Some(LaneFaces {
+            triangle: Some(LaneTriangles {
                 anchor: load3(simd, &self.face_anchor),
                 x: load3(simd, &self.face_x),
                 y: load3(simd, &self.face_y),

@@ -283,7 +283,10 @@ fn invalid_meshes_are_reported_with_line_key_value_and_rule() {
 fn errors_in_mesh_files_name_the_mesh_file() {
     let folder = folder();
     for (file, expected) in [
-        ("broken.obj", "broken.obj:2: the face refers to vertex 2, which does not exist"),
+        (
+            "broken.obj",
+            "broken.obj:2: the face refers to vertex 2, which does not exist",
+        ),
         ("far.obj", "\"far.obj\" reaches to "),
         ("small.obj", ""),
     ] {
