@@ -387,7 +387,7 @@ fn paths_do_not_depend_on_the_limit_of_triangles() {
     let expected = scalar(&packed, &samples);
     for (limit, are_not_converted) in [(triangles, false), (triangles - 1, true)] {
         let meshes = BatchMeshes::with_limit(&packed, limit);
-        assert_eq!(meshes.are_not_converted(&packed), are_missing);
+        assert_eq!(meshes.are_not_converted(&packed), are_not_converted);
         assert_eq!(
             count_differing(&wavefront_with(meshes, &packed, &samples, 256).0, &expected),
             0
