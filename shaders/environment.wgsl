@@ -9,6 +9,13 @@ struct EnvironmentEval {
     pdf: f32,              // of `sample_environment`, per solid angle, including the emitter selection
 }
 
+// A sampled cell, and the position in it from 0 to 1.
+struct EnvironmentPoint {
+    column: u32,
+    row: u32,
+    position: vec2f,
+}
+
 // An interval of a cumulative distribution.
 struct Interval {
     index: u32,
@@ -55,6 +62,11 @@ fn interval_width(distribution: u32, index: u32) -> f32 {
 fn environment_eval(direction: vec3f, normal: vec3f) -> EnvironmentEval {
     let d = vec3f(dot(environment.x, direction), dot(environment.y, direction), dot(environment.z, direction));
     let cell = cell_towards(d, environment.width, environment.height);
+    return environment_at(cell, normal);
+}
+
+// Returns the radiance and the pdf at a point of a cell.
+fn environment_at(cell: EnvironmentCell, normal: vec3f) -> EnvironmentEval {
     let next_column = column_after(cell.column, environment.width);
     let a = environment_texel(cell.row, cell.column);
     let b = environment_texel(cell.row, next_column);
@@ -72,17 +84,16 @@ fn environment_eval(direction: vec3f, normal: vec3f) -> EnvironmentEval {
     return EnvironmentEval(upper + (lower - upper) * cell.y, (sum.x + sum.y + sum.z) * inverse * probability);
 }
 
-// Returns the MIS-weighted radiance of a ray that leaves the scene. `pdf` is the pdf of the ray's direction, `normal`
-// the normal of the surface where the ray starts.
-fn environment_mis(direction: vec3f, pdf: f32, normal: vec3f) -> vec3f {
-    let eval = environment_eval(direction, normal);
+// Returns the MIS-weighted radiance of a ray that leaves the scene. `pdf` is the pdf of the ray's direction, and `eval` is
+// evaluated for the normal of the surface where the ray starts.
+fn environment_mis(eval: EnvironmentEval, pdf: f32) -> vec3f {
     return eval.radiance * select(1.0, power_heuristic(pdf, eval.pdf), pdf > 0.0);
 }
 
-// Samples the map for a surface normal, or 0 if light may arrive from both sides. Inverts the distributions of rows and
-// blocks, then selects a cell by Walker's alias method; the position in the block selects the entry of the alias table.
-// Radiance and pdf are evaluated as for BSDF samples, so that the pdfs agree.
-fn sample_environment(light: Light, normal: vec3f, u: vec2f) -> LightSample {
+// Samples a point of the map for a surface normal, or 0 if light may arrive from both sides. Inverts the distributions of
+// rows and blocks, then selects a cell by Walker's alias method; the position in the block selects the entry of the
+// alias table.
+fn environment_point(normal: vec3f, u: vec2f) -> EnvironmentPoint {
     let bits = hash4(vec4u(bitcast<u32>(u.x), bitcast<u32>(u.y), 0u, 0u));
     let rows = block_distributions(normal);
     let row = interval_at(rows, u.y, unit_float(bits.y));
@@ -102,7 +113,13 @@ fn sample_environment(light: Light, normal: vec3f, u: vec2f) -> LightSample {
     let own_cell = ((row.index << row_shift) + cell.y) * 65536u + (column.index << column_shift) + cell.x;
     let selected_cell = select(texel_word(entry + 1u), own_cell, bits.z < texel_word(entry));
     let position = vec2f(x - f32(cell.x), y - f32(cell.y));
-    let d = direction_in_cell(selected_cell & 65535u, selected_cell >> 16u, position, width, height);
+    return EnvironmentPoint(selected_cell & 65535u, selected_cell >> 16u, position);
+}
+
+// Samples a direction to the map. Radiance and pdf are evaluated as for BSDF samples, so that the pdfs agree.
+fn sample_environment(light: Light, normal: vec3f, u: vec2f) -> LightSample {
+    let point = environment_point(normal, u);
+    let d = direction_in_cell(point.column, point.row, point.position, environment.width, environment.height);
     let direction = normalize(environment.x * d.x + environment.y * d.y + environment.z * d.z);
     let eval = environment_eval(direction, normal);
     return LightSample(direction, eval.radiance, eval.pdf, false, light.t_max, NO_INDEX);

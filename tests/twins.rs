@@ -84,6 +84,11 @@ const ONE_SIDED: &[(&str, &str, &str)] = &[
     ),
     (
         "integrators/path.wgsl",
+        "leave_scene",
+        "only in Rust: the part of `shade` for a ray that hits nothing, also called by the wavefront",
+    ),
+    (
+        "integrators/path.wgsl",
         "add_direct_light",
         "in Rust, `sample_direct_light` returns the shadow ray, which is traced after `shade`",
     ),

@@ -43,7 +43,7 @@ fn advance(before: PathState, pixel: vec2u) -> PathState {
     var environment_light = environment.radiance;
     if (ENVIRONMENT_FLAGS & ENVIRONMENT_MAP) != 0u {
         if !is_hit {
-            environment_light = environment_mis(path.ray.direction, state.pdf, state.prev_normal);
+            environment_light = environment_mis(environment_eval(path.ray.direction, state.prev_normal), state.pdf);
         }
     }
     if (ENVIRONMENT_FLAGS & BACKGROUND) != 0u {

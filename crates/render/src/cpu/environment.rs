@@ -3,7 +3,7 @@
 use glam::{UVec2, UVec4, Vec2, Vec3};
 
 use super::emitter::LightSample;
-use super::equirect::{cell_towards, column_after, direction_in_cell, normal_bin};
+use super::equirect::{EnvironmentCell, cell_towards, column_after, direction_in_cell, normal_bin};
 use super::light_sample::power_heuristic;
 use super::math::{dot, min, normalize};
 use super::rng::{hash4, unit_float};
@@ -20,6 +20,13 @@ pub struct Interval {
     pub index: u32,
     pub width: f32,
     pub position: f32,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EnvironmentPoint {
+    pub column: u32,
+    pub row: u32,
+    pub position: Vec2,
 }
 
 pub fn environment_texel(scene: &Packed, row: u32, column: u32) -> Vec3 {
@@ -72,6 +79,11 @@ pub fn environment_eval(scene: &Packed, direction: Vec3, normal: Vec3) -> Enviro
         dot(environment.z, direction),
     );
     let cell = cell_towards(d, environment.width, environment.height);
+    environment_at(scene, cell, normal)
+}
+
+pub fn environment_at(scene: &Packed, cell: EnvironmentCell, normal: Vec3) -> EnvironmentEval {
+    let environment = &scene.environment;
     let next_column = column_after(cell.column, environment.width);
     let a = environment_texel(scene, cell.row, cell.column);
     let b = environment_texel(scene, cell.row, next_column);
@@ -92,13 +104,12 @@ pub fn environment_eval(scene: &Packed, direction: Vec3, normal: Vec3) -> Enviro
     }
 }
 
-pub fn environment_mis(scene: &Packed, direction: Vec3, pdf: f32, normal: Vec3) -> Vec3 {
-    let eval = environment_eval(scene, direction, normal);
+pub fn environment_mis(eval: EnvironmentEval, pdf: f32) -> Vec3 {
     let weight = if pdf > 0.0 { power_heuristic(pdf, eval.pdf) } else { 1.0 };
     eval.radiance * weight
 }
 
-pub fn sample_environment(scene: &Packed, light: &Light, normal: Vec3, u: Vec2) -> LightSample {
+pub fn environment_point(scene: &Packed, normal: Vec3, u: Vec2) -> EnvironmentPoint {
     let bits = hash4(UVec4::new(u.x.to_bits(), u.y.to_bits(), 0, 0));
     let rows = block_distributions(scene, normal);
     let row = interval_at(scene, rows, u.y, unit_float(bits.y));
@@ -125,8 +136,23 @@ pub fn sample_environment(scene: &Packed, light: &Light, normal: Vec3, u: Vec2) 
     } else {
         scene.textures.texels[entry + 1]
     };
-    let position = Vec2::new(x - cell.x as f32, y - cell.y as f32);
-    let d = direction_in_cell(selected_cell & 65_535, selected_cell >> 16, position, width, height);
+    EnvironmentPoint {
+        column: selected_cell & 65_535,
+        row: selected_cell >> 16,
+        position: Vec2::new(x - cell.x as f32, y - cell.y as f32),
+    }
+}
+
+pub fn sample_environment(scene: &Packed, light: &Light, normal: Vec3, u: Vec2) -> LightSample {
+    let environment = &scene.environment;
+    let point = environment_point(scene, normal, u);
+    let d = direction_in_cell(
+        point.column,
+        point.row,
+        point.position,
+        environment.width,
+        environment.height,
+    );
     let direction = normalize(environment.x * d.x + environment.y * d.y + environment.z * d.z);
     let eval = environment_eval(scene, direction, normal);
     LightSample {

@@ -1,37 +1,39 @@
 //! Twin of `shaders/equirect.wgsl`.
 
-use glam::{Vec2, Vec3};
+use glam::Vec3;
 
+use super::lanes::{Real, Vector2, Vector3, Word, constant, select};
 use super::math::{atan2, floor, max, min, sine};
 use crate::records::NORMAL_BINS;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct EnvironmentCell {
-    pub column: u32,
-    pub row: u32,
-    pub x: f32,
-    pub y: f32,
+pub struct EnvironmentCell<F: Real = f32> {
+    pub column: F::Word,
+    pub row: F::Word,
+    pub x: F,
+    pub y: F,
 }
 
-pub fn cell_towards(d: Vec3, width: u32, height: u32) -> EnvironmentCell {
-    let u = (0.5 - atan2(d.y, d.x) * 0.159_154_94) * width as f32 - 0.5;
-    let v = atan2((d.x * d.x + d.y * d.y).sqrt(), d.z) * std::f32::consts::FRAC_1_PI * height as f32 + 0.5;
+#[inline(always)]
+pub fn cell_towards<V: Vector3>(d: V, width: u32, height: u32) -> EnvironmentCell<V::Real> {
+    let (x, y, z) = (d.x(), d.y(), d.z());
+    let zero = x.splat(0.0);
+    let u = (constant(0.5) - atan2(y, x) * 0.159_154_94) * width as f32 - 0.5;
+    let v = atan2((x * x + y * y).sqrt(), z) * std::f32::consts::FRAC_1_PI * height as f32 + 0.5;
     let column = floor(u);
-    let row = min(floor(v), height as f32);
+    let row = min(floor(v), x.splat(height as f32));
     let fraction = v - row;
-    let is_first = row == 0.0;
-    let is_last = row == height as f32;
-    let y = if is_first {
-        2.0 * fraction - 1.0
-    } else if is_last {
-        2.0 * fraction
-    } else {
-        fraction
-    };
-    let clamped_y = min(max(y, 0.0), 1.0);
+    let is_first = row.eq(zero);
+    let is_last = row.eq(x.splat(height as f32));
+    let y = select(
+        select(fraction, constant(2.0) * fraction, is_last),
+        constant(2.0) * fraction - 1.0,
+        is_first,
+    );
+    let clamped_y = min(max(y, zero), x.splat(1.0));
     EnvironmentCell {
-        column: if column >= 0.0 { column } else { width as f32 - 1.0 } as u32,
-        row: row as u32,
+        column: select(x.splat(width as f32 - 1.0), column, column.ge(zero)).to_word(),
+        row: row.to_word(),
         x: u - column,
         y: clamped_y,
     }
@@ -41,10 +43,12 @@ pub fn column_after(column: u32, width: u32) -> u32 {
     if column + 1 == width { 0 } else { column + 1 }
 }
 
-pub fn cap_above(row: u32, height: u32) -> f32 {
-    let from_pole = max(row as f32 - 0.5, 0.0) / height as f32;
-    let s = sine(0.5 * min(from_pole, 1.0));
-    2.0 * s * s
+#[inline(always)]
+pub fn cap_above<W: Word>(row: W, height: u32) -> W::Real {
+    let row = row.to_real();
+    let from_pole = max(row - 0.5, row.splat(0.0)) / row.splat(height as f32);
+    let s = sine(constant(0.5) * min(from_pole, row.splat(1.0)));
+    constant(2.0) * s * s
 }
 
 pub fn normal_bin(normal: Vec3) -> u32 {
@@ -60,17 +64,25 @@ pub fn normal_bin(normal: Vec3) -> u32 {
     if sum > 0.0 { bin } else { NORMAL_BINS * NORMAL_BINS }
 }
 
-pub fn direction_in_cell(column: u32, row: u32, u: Vec2, width: u32, height: u32) -> Vec3 {
-    let turn = 1.0 - 2.0 * ((column as f32 + 0.5 + u.x) / width as f32);
-    let is_lower_half = row > height / 2;
-    let from_pole = if is_lower_half { height - row } else { row };
+#[inline(always)]
+pub fn direction_in_cell<W: Word>(
+    column: W,
+    row: W,
+    u: <W::Real as Real>::Vec2,
+    width: u32,
+    height: u32,
+) -> <W::Real as Real>::Vec3 {
+    let zero = u.x().splat(0.0);
+    let turn = constant(1.0) - constant(2.0) * ((column.to_real() + 0.5 + u.x()) / zero.splat(width as f32));
+    let is_lower_half = row.to_real().gt(zero.splat((height / 2) as f32));
+    let from_pole = W::select(row, row.splat(height).wrapping_sub(row), is_lower_half);
     let inner = cap_above(from_pole, height);
-    let cap = inner + (cap_above(from_pole + 1, height) - inner) * u.y;
-    let radius = max(cap * (2.0 - cap), 0.0).sqrt();
-    let z = 1.0 - cap;
-    Vec3::new(
+    let cap = inner + (cap_above(from_pole.wrapping_add(row.splat(1)), height) - inner) * u.y();
+    let radius = max(cap * (constant(2.0) - cap), zero).sqrt();
+    let z = constant(1.0) - cap;
+    Vector3::new(
         radius * sine(turn + 0.5),
         radius * sine(turn),
-        if is_lower_half { -z } else { z },
+        select(z, -z, is_lower_half),
     )
 }

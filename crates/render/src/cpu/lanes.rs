@@ -30,6 +30,7 @@ pub trait Real:
 {
     /// The result of a comparison: a `bool`, or one in each lane.
     type Mask: Condition;
+    type Word: Word<Real = Self>;
     type Vec2: Vector2<Real = Self>;
     type Vec3: Vector3<Real = Self>;
     type Vec4: Vector4<Real = Self>;
@@ -51,6 +52,10 @@ pub trait Real:
     fn select(if_false: Self, if_true: Self, mask: Self::Mask) -> Self;
     /// Calls `function` for the number of each lane.
     fn map(self, function: impl FnMut(f32) -> f32) -> Self;
+    /// Rounds toward 0. The absolute value must be less than 2³¹. The result is never -0.
+    fn truncate(self) -> Self;
+    /// Returns the integer part of a number from 0 to less than 2³¹.
+    fn to_word(self) -> Self::Word;
 
     #[inline(always)]
     fn gt(self, other: Self) -> Self::Mask {
@@ -112,17 +117,19 @@ pub trait Word:
     + Shl<u32, Output = Self>
     + Shr<u32, Output = Self>
 {
-    type Real: Real;
+    type Real: Real<Word = Self>;
     type UVec2: WordVector2<Word = Self>;
     type UVec4: WordVector4<Word = Self>;
 
     /// Returns `value` in all lanes. The value of `self` is not used.
     fn splat(self, value: u32) -> Self;
     fn wrapping_add(self, other: Self) -> Self;
+    fn wrapping_sub(self, other: Self) -> Self;
     fn wrapping_mul(self, other: Self) -> Self;
     fn reverse_bits(self) -> Self;
     /// Returns the nearest floating-point number. Values must be less than 2³¹.
     fn to_real(self) -> Self::Real;
+    fn select(if_false: Self, if_true: Self, mask: <Self::Real as Real>::Mask) -> Self;
 }
 
 /// A vector of two floating-point numbers.
@@ -216,6 +223,7 @@ pub trait WordVector4: Copy {
 
 impl Real for f32 {
     type Mask = bool;
+    type Word = u32;
     type Vec2 = Vec2;
     type Vec3 = Vec3;
     type Vec4 = Vec4;
@@ -259,6 +267,16 @@ impl Real for f32 {
     fn map(self, mut function: impl FnMut(f32) -> f32) -> f32 {
         function(self)
     }
+
+    #[inline(always)]
+    fn truncate(self) -> f32 {
+        self as i32 as f32
+    }
+
+    #[inline(always)]
+    fn to_word(self) -> u32 {
+        self as u32
+    }
 }
 
 impl Condition for bool {
@@ -284,6 +302,11 @@ impl Word for u32 {
     }
 
     #[inline(always)]
+    fn wrapping_sub(self, other: u32) -> u32 {
+        u32::wrapping_sub(self, other)
+    }
+
+    #[inline(always)]
     fn wrapping_mul(self, other: u32) -> u32 {
         u32::wrapping_mul(self, other)
     }
@@ -296,6 +319,11 @@ impl Word for u32 {
     #[inline(always)]
     fn to_real(self) -> f32 {
         self as f32
+    }
+
+    #[inline(always)]
+    fn select(if_false: u32, if_true: u32, mask: bool) -> u32 {
+        if mask { if_true } else { if_false }
     }
 }
 
@@ -406,6 +434,7 @@ impl WordVector4 for UVec4 {
 
 impl<S: Simd> Real for f32x8<S> {
     type Mask = mask32x8<S>;
+    type Word = u32x8<S>;
     type Vec2 = Lanes2<Self>;
     type Vec3 = Lanes3<Self>;
     type Vec4 = [Self; 4];
@@ -450,6 +479,16 @@ impl<S: Simd> Real for f32x8<S> {
         let lanes: [f32; 8] = self.into();
         Self::simd_from(self.simd, lanes.map(function))
     }
+
+    #[inline(always)]
+    fn truncate(self) -> Self {
+        Self::float_from(i32x8::truncate_from(self))
+    }
+
+    #[inline(always)]
+    fn to_word(self) -> u32x8<S> {
+        u32x8::truncate_from(self)
+    }
 }
 
 impl<S: Simd> Condition for mask32x8<S> {
@@ -475,6 +514,11 @@ impl<S: Simd> Word for u32x8<S> {
     }
 
     #[inline(always)]
+    fn wrapping_sub(self, other: Self) -> Self {
+        self - other
+    }
+
+    #[inline(always)]
     fn wrapping_mul(self, other: Self) -> Self {
         self * other
     }
@@ -491,6 +535,11 @@ impl<S: Simd> Word for u32x8<S> {
     #[inline(always)]
     fn to_real(self) -> f32x8<S> {
         f32x8::float_from(self.bitcast::<i32x8<S>>())
+    }
+
+    #[inline(always)]
+    fn select(if_false: Self, if_true: Self, mask: mask32x8<S>) -> Self {
+        mask.select(if_true, if_false)
     }
 }
 

@@ -45,14 +45,11 @@ pub fn positive_zero(x: f32) -> f32 {
     f32::from_bits(if bits == 0x8000_0000 { 0 } else { bits })
 }
 
-pub fn floor(x: f32) -> f32 {
-    let small = x.abs() < 8_388_608.0;
-    let integer = if small { x } else { 0.0 } as i32 as f32;
-    if small {
-        if integer > x { integer - 1.0 } else { integer }
-    } else {
-        x
-    }
+#[inline(always)]
+pub fn floor<F: Real>(x: F) -> F {
+    let small = x.abs().lt(x.splat(8_388_608.0));
+    let integer = select(x.splat(0.0), x, small).truncate();
+    select(x, select(integer, integer - 1.0, integer.gt(x)), small)
 }
 
 pub fn power_whole(x: f32, n: u32, bits: u32) -> f32 {
@@ -97,33 +94,32 @@ pub fn exp2(x: f32) -> f32 {
     }
 }
 
-pub fn atan2(y: f32, x: f32) -> f32 {
+#[inline(always)]
+pub fn atan2<F: Real>(y: F, x: F) -> F {
+    let c = constant;
+    let zero = x.splat(0.0);
     let large = max(x.abs(), y.abs());
     let small = min(x.abs(), y.abs());
-    let steep = small > 0.414_213_57 * large;
-    let t = if steep { small - large } else { small } / if steep { small + large } else { large };
+    let steep = small.gt(c(0.414_213_57) * large);
+    let t = select(small, small - large, steep) / select(large, small + large, steep);
     let t2 = t * t;
-    let high = 0.111_111_11 - t2 * (0.090_909_09 - t2 * (0.076_923_08 - t2 * (0.066_666_67 - t2 * 0.058_823_53)));
-    let series = 1.0 - t2 * (0.333_333_34 - t2 * (0.2 - t2 * (0.142_857_15 - t2 * high)));
-    let octant = if steep { FRAC_PI_4 } else { 0.0 } + t * series;
-    let quadrant = if y.abs() > x.abs() { FRAC_PI_2 - octant } else { octant };
-    let half = if x < 0.0 { PI - quadrant } else { quadrant };
-    if large > 0.0 {
-        if y < 0.0 { -half } else { half }
-    } else {
-        0.0
-    }
+    let high =
+        c(0.111_111_11) - t2 * (c(0.090_909_09) - t2 * (c(0.076_923_08) - t2 * (c(0.066_666_67) - t2 * 0.058_823_53)));
+    let series = c(1.0) - t2 * (c(0.333_333_34) - t2 * (c(0.2) - t2 * (c(0.142_857_15) - t2 * high)));
+    let octant = select(zero, x.splat(FRAC_PI_4), steep) + t * series;
+    let quadrant = select(octant, c(FRAC_PI_2) - octant, y.abs().gt(x.abs()));
+    let half = select(quadrant, c(PI) - quadrant, x.lt(zero));
+    select(zero, select(half, -half, y.lt(zero)), large.gt(zero))
 }
 
-pub fn sine(x: f32) -> f32 {
+#[inline(always)]
+pub fn sine<F: Real>(x: F) -> F {
+    let c = constant;
     let integer = floor(x + 0.5);
     let r = x - integer;
     let r2 = r * r;
-    let tail = 0.599_264_5 - r2 * (0.082_145_89 - r2 * 0.007_370_431);
-    let series = r * (PI - r2 * (5.167_712_7 - r2 * (2.550_164 - r2 * tail)));
-    if integer - 2.0 * floor(0.5 * integer) > 0.0 {
-        -series
-    } else {
-        series
-    }
+    let tail = c(0.599_264_5) - r2 * (c(0.082_145_89) - r2 * 0.007_370_431);
+    let series = r * (c(PI) - r2 * (c(5.167_712_7) - r2 * (c(2.550_164) - r2 * tail)));
+    let is_odd = (integer - c(2.0) * floor(c(0.5) * integer)).gt(x.splat(0.0));
+    select(series, -series, is_odd)
 }

@@ -8,7 +8,7 @@ use crate::cpu::dielectric::{dielectric_sample, transmittance};
 use crate::cpu::differential::{Differential, HitDifferential};
 use crate::cpu::diffuse::diffuse_sample;
 use crate::cpu::emitter::{emitter_pdf, sample_emitter, select_emitter};
-use crate::cpu::environment::environment_mis;
+use crate::cpu::environment::{environment_eval, environment_mis};
 use crate::cpu::geometry::{
     closest_hit, fetch_hit_primitive, hit_differential, is_occluded, material_of, skip_camera_invisible, surface_of,
 };
@@ -112,20 +112,15 @@ pub fn shade(scene: &Packed, state: &mut PathState, hit: Hit, pixel: UVec2) -> O
     let s = &scene.specialization;
     let path = state.path;
     if hit.primitive == NO_INDEX {
-        state.ended = true;
-        let is_environment_visible =
-            ((s.alpha == 0) & (s.environment_flags & ENVIRONMENT_INVISIBLE == 0)) | (path.depth > 0);
         let environment_light = if s.environment_flags & ENVIRONMENT_MAP != 0 {
-            environment_mis(scene, path.ray.direction, state.pdf, state.prev_normal)
+            environment_mis(
+                environment_eval(scene, path.ray.direction, state.prev_normal),
+                state.pdf,
+            )
         } else {
             scene.environment.radiance
         };
-        let environment_light = match s.environment_flags & BACKGROUND != 0 && path.depth == 0 {
-            true => scene.environment.background,
-            false => environment_light,
-        };
-        let contribution = path.throughput * environment_light;
-        add_radiance(scene, state, contribution, is_environment_visible, path.depth);
+        leave_scene(scene, state, environment_light);
         return None;
     }
     let prim = fetch_hit_primitive(scene, hit);
@@ -258,6 +253,21 @@ pub fn shade(scene: &Packed, state: &mut PathState, hit: Hit, pixel: UVec2) -> O
     let has_throughput = largest(state.path.throughput) > 0.0;
     state.ended |= !has_throughput;
     shadow_ray
+}
+
+/// Ends a path whose ray hits nothing, and adds the light of the environment.
+#[inline(always)]
+pub fn leave_scene(scene: &Packed, state: &mut PathState, environment_light: Vec3) {
+    let s = &scene.specialization;
+    let depth = state.path.depth;
+    state.ended = true;
+    let is_environment_visible = ((s.alpha == 0) & (s.environment_flags & ENVIRONMENT_INVISIBLE == 0)) | (depth > 0);
+    let environment_light = match s.environment_flags & BACKGROUND != 0 && depth == 0 {
+        true => scene.environment.background,
+        false => environment_light,
+    };
+    let contribution = state.path.throughput * environment_light;
+    add_radiance(scene, state, contribution, is_environment_visible, depth);
 }
 
 /// Returns true if the geometry occludes a shadow ray.

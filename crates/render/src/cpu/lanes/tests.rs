@@ -5,12 +5,13 @@ use glam::{UVec2, UVec4, Vec2, Vec3};
 
 use super::*;
 use crate::cpu::diffuse::{angles_at, diffuse_pdf, diffuse_sample};
+use crate::cpu::equirect::{cap_above, cell_towards, direction_in_cell};
 use crate::cpu::ggx::{ggx_albedo, ggx_albedo_along, ggx_d, ggx_g1, ggx_g2, ggx_length, ggx_pdf, ggx_sample};
 use crate::cpu::light_sample::{power_heuristic, solid_angle_pdf};
 use crate::cpu::lobe::{
     facet_alpha, facet_eval, facet_loss, facet_pdf, facet_weight, half_vector, vector_from_lobe, vector_to_lobe,
 };
-use crate::cpu::math::{cross, dot, max, min, normalize, power};
+use crate::cpu::math::{atan2, cross, dot, floor, max, min, normalize, power, sine};
 use crate::cpu::mesh::{flipped_to, lift};
 use crate::cpu::metal::{conductor_fresnel, metal_eval, metal_fresnel, metal_pdf, metal_sample};
 use crate::cpu::path::usable_normal;
@@ -63,6 +64,9 @@ where
         ("angles_at wo", angles.wo),
         ("angles_at between", angles.between),
         ("diffuse_pdf", diffuse_pdf(angles)),
+        ("floor", floor(n[8])),
+        ("atan2", atan2(n[0], n[1])),
+        ("sine", sine(n[2])),
     ];
     reals.extend(scalars);
     for (name, v) in [("disk_sample", disk_sample(u)), ("triangle_sample", triangle_sample(u))] {
@@ -86,6 +90,18 @@ where
     append_facet_results(a.numbers, u, |name, results| {
         reals.extend(results.iter().map(|&x| (name, x)))
     });
+    let (width, height) = (37, 18);
+    let cell = cell_towards(unit, width, height);
+    reals.extend([("cell_towards x", cell.x), ("cell_towards y", cell.y)]);
+    words.extend([("cell_towards column", cell.column), ("cell_towards row", cell.row)]);
+    let row = k & 15;
+    reals.push(("cap_above", cap_above(row, height)));
+    let v = direction_in_cell(j & 31, row, u, width, height);
+    reals.extend([
+        ("direction_in_cell", v.x()),
+        ("direction_in_cell", v.y()),
+        ("direction_in_cell", v.z()),
+    ]);
     let sobol: W::UVec2 = sobol_bits(i, WordVector2::new(j, k));
     words.extend([
         ("sobol_bits", sobol.x()),

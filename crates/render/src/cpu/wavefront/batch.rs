@@ -22,6 +22,7 @@ use super::super::surface::{Surface, largest};
 use super::super::texture::evaluate_material;
 use super::super::vertices::with_vertex_colors;
 use super::QueuedShadowRay;
+use super::environment::leave_to_environment;
 use super::lights::{LightChoices, LightRows, only_light};
 use super::materials::{Diffuse, Directions, Metal, Principled};
 use super::rows::{F, LANES, Row, Rows3, get3, load3, set3, store3};
@@ -143,10 +144,11 @@ impl HitMaterials {
 }
 
 impl Batch<'_> {
-    /// Shades all queued hits. Only one loop contains the code for all kinds, so that it is compiled only once.
+    /// Ends the paths that hit nothing, and shades all queued hits. Only one loop contains the code for all kinds, so that it is compiled only once.
     #[inline(always)]
     pub fn shade_queues<S: Simd>(&mut self, simd: S, queues: &ShadingQueues) {
         let scene = self.scene;
+        leave_to_environment(simd, scene, self.paths, queues.missed());
         let epsilon = scene.environment.shadow_epsilon;
         let (mut flat, mut faces, mut evaluated) = (FlatHits::new(), FaceHits::new(), ScalarHits::default());
         let mut lights = LightRows::new(only_light(scene));

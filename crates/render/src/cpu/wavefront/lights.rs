@@ -9,8 +9,10 @@ use super::super::lanes::{Lanes2, Real, Vector3};
 use super::super::light_choice::{EmitterSelection, light_tree_select};
 use super::super::light_sample::solid_angle_pdf;
 use super::super::math::dot;
+use super::environment::environment_samples;
 use super::rows::{F, LANES, Row, Rows3, V, get3, load3, set3, splat3, store3};
-use crate::records::{Light, Packed, RECTANGLE};
+use super::shade::IS_OPTIMIZED;
+use crate::records::{ENVIRONMENT, Light, NO_INDEX, Packed, RECTANGLE};
 
 /// One light sample per path.
 pub struct LightRows {
@@ -86,6 +88,18 @@ impl LightRows {
                 is_delta: zero.lt(zero), // false in all lanes
             };
         }
+        if let Some(light) = only_environment(scene) {
+            let (to_light, evals) = environment_samples(simd, scene, &store3(normals), choices.u, samples.len());
+            self.to_light = store3(to_light);
+            self.t_max = [light.t_max; LANES];
+            self.primitive = [NO_INDEX; LANES];
+            return LightSamples {
+                to_light,
+                radiance: load3(simd, &evals.radiance),
+                pdf: f32x8::simd_from(simd, evals.pdf),
+                is_delta: zero.lt(zero), // false in all lanes
+            };
+        }
         let (points, normals) = (store3(points), store3(normals));
         let (bits_x, bits_y): ([u32; LANES], [u32; LANES]) = (choices.emitter.x.into(), choices.emitter.y.into());
         let (key_x, key_y): ([u32; LANES], [u32; LANES]) = (choices.tree_key.x.into(), choices.tree_key.y.into());
@@ -121,6 +135,16 @@ pub fn only_light(scene: &Packed) -> Option<&Light> {
     let is_plain = s.light_tree == 0 && s.emission_textures == 0 && s.alpha_surfaces == 0 && emitter.instance == 0;
     let light = scene.lighting.lights.get(emitter.index as usize)?;
     (is_plain && light.kind == RECTANGLE).then_some(light)
+}
+
+/// Returns the environment map, if it is the only emitter of the scene.
+fn only_environment(scene: &Packed) -> Option<&Light> {
+    let [emitter] = scene.lighting.emitters[..] else {
+        return None;
+    };
+    let light = scene.lighting.lights.get(emitter.index as usize)?;
+    let is_plain = IS_OPTIMIZED && scene.specialization.light_tree == 0 && emitter.instance == 0;
+    (is_plain && light.kind == ENVIRONMENT).then_some(light)
 }
 
 /// Returns the vectors to light samples, their radiance and their pdfs, like `sample_light` for rectangles.

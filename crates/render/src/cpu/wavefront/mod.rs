@@ -6,6 +6,7 @@
 mod batch;
 mod begin;
 mod closest_hits;
+mod environment;
 mod items;
 mod lights;
 mod linear;

@@ -15,17 +15,22 @@ use super::super::samples::LEVEL;
 use super::QueuedShadowRay;
 use super::batch::Batch;
 use crate::records::{
-    DIFFUSE, FOR_ANISOTROPY, FOR_ROUGHNESS, FOR_TRANSMISSION, METAL, Material, NO_COLORS, NO_SHADOW, OPAQUE,
-    PRINCIPLED, Packed,
+    DIFFUSE, ENVIRONMENT_MAP, FOR_ANISOTROPY, FOR_ROUGHNESS, FOR_TRANSMISSION, METAL, Material, NO_COLORS, NO_INDEX,
+    NO_SHADOW, OPAQUE, PRINCIPLED, Packed,
 };
 
 /// True in builds with optimization. Otherwise, only diffuse surfaces are shaded in lanes, because the stack frame of the
 /// other kinds, whose functions are inlined, would be larger than the 2 MiB of a thread.
 pub const IS_OPTIMIZED: bool = !cfg!(debug_assertions);
 
-/// Hits to shade in lanes, for each kind of material and each kind of surface.
+/// Paths to continue or to end in lanes.
 #[derive(Default)]
-pub struct ShadingQueues([[Vec<QueuedHit>; SurfaceKind::ALL.len()]; MaterialKind::ALL.len()]);
+pub struct ShadingQueues {
+    /// Hits to shade, for each kind of material and each kind of surface.
+    hits: [[Vec<QueuedHit>; SurfaceKind::ALL.len()]; MaterialKind::ALL.len()],
+    /// Paths whose rays hit nothing but the environment map.
+    missed: Vec<u32>,
+}
 
 /// A material whose hits are shaded in lanes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -98,9 +103,15 @@ pub fn shade_hits(
     queues: &mut ShadingQueues,
 ) -> LaneHits {
     shadow_rays.clear();
-    queues.0.as_flattened_mut().iter_mut().for_each(Vec::clear);
+    queues.hits.as_flattened_mut().iter_mut().for_each(Vec::clear);
+    queues.missed.clear();
     let has_lanes = has_lane_instructions();
+    let has_environment_map = IS_OPTIMIZED && scene.specialization.environment_flags & ENVIRONMENT_MAP != 0;
     for (&path, &hit) in active.iter().zip(hits) {
+        if has_lanes && has_environment_map && hit.primitive == NO_INDEX {
+            queues.missed.push(path);
+            continue;
+        }
         let state = &mut paths[path as usize];
         let found = if has_lanes { lane_queue(scene, state, hit) } else { None };
         if let Some((material_kind, surface_kind, material)) = found {
@@ -108,16 +119,16 @@ pub fn shade_hits(
                 state.ended = true;
                 continue;
             }
-            let queue = &mut queues.0[material_kind as usize][surface_kind as usize];
+            let queue = &mut queues.hits[material_kind as usize][surface_kind as usize];
             queue.push(QueuedHit { path, material, hit });
         } else if let Some(ray) = shade(scene, state, hit, pixels[path as usize]) {
             shadow_rays.push(QueuedShadowRay { path, ray });
         }
     }
     let lane_hits = LaneHits {
-        counts: queues.0.each_ref().map(|queues| queues.each_ref().map(Vec::len)),
+        counts: queues.hits.each_ref().map(|queues| queues.each_ref().map(Vec::len)),
     };
-    if lane_hits != LaneHits::default() {
+    if lane_hits != LaneHits::default() || !queues.missed.is_empty() {
         let batch = Batch {
             scene,
             paths,
@@ -163,10 +174,14 @@ fn shade_in_lanes(mut batch: Batch, queues: &ShadingQueues) {
 }
 
 impl ShadingQueues {
+    pub fn missed(&self) -> &[u32] {
+        &self.missed
+    }
+
     /// Returns the queues that contain hits, with their kinds.
     pub fn filled(&self) -> impl Iterator<Item = (MaterialKind, SurfaceKind, &[QueuedHit])> {
         let of_material = |material: MaterialKind| {
-            SurfaceKind::ALL.map(|surface| (material, surface, &self.0[material as usize][surface as usize][..]))
+            SurfaceKind::ALL.map(|surface| (material, surface, &self.hits[material as usize][surface as usize][..]))
         };
         let all = MaterialKind::ALL.into_iter().flat_map(of_material);
         all.filter(|(_, _, hits)| !hits.is_empty())
