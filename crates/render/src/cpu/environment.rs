@@ -16,17 +16,17 @@ pub struct EnvironmentEval {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Interval {
-    pub index: u32,
-    pub width: f32,
-    pub position: f32,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EnvironmentPoint {
     pub column: u32,
     pub row: u32,
     pub position: Vec2,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Interval {
+    pub index: u32,
+    pub width: f32,
+    pub position: f32,
 }
 
 pub fn environment_texel(scene: &Packed, row: u32, column: u32) -> Vec3 {
