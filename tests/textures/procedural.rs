@@ -60,7 +60,7 @@ fn clip_to_strip(polygon: &[DVec2], axis: DVec2, low: f64, high: f64) -> Vec<DVe
     clip(&clip(polygon, axis, high), -axis, -low)
 }
 
-/// Returns the exact mean over the parallelogram, cell by cell.
+/// Returns the exact mean of the pattern over the parallelogram, summed cell by cell.
 fn exact_mean(kind: u32, width: f64, f: Footprint) -> f64 {
     let (uv, a, b) = (f.uv.as_dvec2(), f.dx.as_dvec2() / 2.0, f.dy.as_dvec2() / 2.0);
     let parallelogram = [uv - a - b, uv + a - b, uv + a + b, uv - a + b];

@@ -212,7 +212,7 @@ fn kernel(table: &mut Table, info: &Info) {
     table.row("", &format!("unused: {}", features(&kernel.leaves_out)));
 }
 
-/// Lists at most `MAX_LISTED` names, with indices if options accept indices.
+/// Lists at most `MAX_LISTED` names. If `indexed`, options of the command line accept indices, which are listed too.
 fn list<'a>(names: impl ExactSizeIterator<Item = Option<&'a str>>, indexed: bool) -> String {
     let more = names.len().saturating_sub(MAX_LISTED);
     let item = |(i, name): (usize, Option<&str>)| match (name, indexed) {

@@ -175,7 +175,8 @@ impl Aov {
         })
     }
 
-    /// Returns true if a PNG has the variable in a separate file. The denoised color is in the PNG itself.
+    /// Returns true if PNG output stores this variable in a file of its own. The denoised color replaces the color of the
+    /// main file.
     pub fn has_file(self) -> bool {
         self != Aov::Denoised
     }

@@ -330,7 +330,7 @@ fn write_distribution(weights: &[f64], words: &mut Vec<u32>) {
     }
 }
 
-/// Returns the weights of cells: mean of the corners times the solid angle.
+/// Returns the weights of cells: the mean of the values at the corners times the solid angle.
 fn weights(texels: &[u32], width: usize, height: usize) -> Vec<f64> {
     let value = |i: usize| {
         let rgb = &texels[3 * i..3 * i + 3];

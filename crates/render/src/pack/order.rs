@@ -1,10 +1,10 @@
 //! Order of primitives: first those outside of the BVH, by kind and by whether they can cast a shadow.
 
-use super::shadow_casters::{can_cast_shadow, may_cast_shadow};
+use super::shadow_casters::{material_casts_shadow, shadow_caster_flags};
 use super::{MAX_LINEAR_PRIMITIVES, PLANE, Primitive};
 use wgray_scene::Scene;
 
-/// Primitives in order. The flag is true if a primitive can cast a shadow.
+/// Primitives in order. The flag is false if a primitive is known to cast no shadow.
 pub struct SortedPrimitives {
     all: Vec<(Primitive, bool)>,
     /// Number of primitives outside of the BVH.
@@ -17,13 +17,13 @@ impl SortedPrimitives {
         let bounded = primitives.iter().filter(|primitive| primitive.kind != PLANE).count();
         let is_in_bvh = |primitive: &Primitive| bounded > MAX_LINEAR_PRIMITIVES && primitive.kind != PLANE;
         let (in_bvh, linear): (Vec<Primitive>, Vec<Primitive>) = primitives.into_iter().partition(is_in_bvh);
-        let casts = can_cast_shadow(scene, &linear);
+        let casts = shadow_caster_flags(scene, &linear);
         let mut all: Vec<(Primitive, bool)> = linear.into_iter().zip(casts).collect();
         let linear_count = all.len();
         all.extend(
             in_bvh
                 .into_iter()
-                .map(|primitive| (primitive, may_cast_shadow(scene, &primitive))),
+                .map(|primitive| (primitive, material_casts_shadow(scene, &primitive))),
         );
         all[..linear_count].sort_by_key(|(primitive, casts)| (primitive.kind, !casts));
         all[linear_count..].sort_by_key(|(primitive, casts)| (primitive.kind, !casts));

@@ -15,15 +15,15 @@ const TOLERANCE: f64 = 1e-6;
 /// flat primitive cannot if all shapes and lights are on one side of its plane. With more than
 /// [`MAX_LINEAR_PRIMITIVES`] primitives, this is not tested, because each test takes time proportional to the number
 /// of shapes.
-pub fn can_cast_shadow(scene: &Scene, primitives: &[Primitive]) -> Vec<bool> {
+pub fn shadow_caster_flags(scene: &Scene, primitives: &[Primitive]) -> Vec<bool> {
     let is_tested = primitives.len() <= MAX_LINEAR_PRIMITIVES && !has_environment_map(scene);
     let casts =
-        |p: &Primitive| may_cast_shadow(scene, p) && (!is_tested || is_solid(p.kind) || has_both_sides(scene, p));
+        |p: &Primitive| material_casts_shadow(scene, p) && (!is_tested || is_solid(p.kind) || has_both_sides(scene, p));
     primitives.iter().map(casts).collect()
 }
 
 /// Returns true if a primitive's material casts shadows.
-pub fn may_cast_shadow(scene: &Scene, primitive: &Primitive) -> bool {
+pub fn material_casts_shadow(scene: &Scene, primitive: &Primitive) -> bool {
     match scene.shapes.get(primitive.shape as usize) {
         Some(shape) => casts_shadow(scene, shape.material),
         // The primitive of an area light. With `path`, it occludes light from behind.
@@ -94,7 +94,7 @@ mod tests {
              materials.m = {{ type = 'phong', color = [1, 1, 1] }}\n{shapes}"
         );
         let scene = Description::parse(&text, "s.toml").unwrap().validate().unwrap();
-        can_cast_shadow(&scene, &pack_shapes(&scene))
+        shadow_caster_flags(&scene, &pack_shapes(&scene))
     }
 
     const FLOOR: &str = "[[shapes]]\ntype = 'plane'\nmaterial = 'm'\npoint = [1, 2, 3]\nnormal = [0.6, 0, 0.8]\n";

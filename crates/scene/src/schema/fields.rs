@@ -264,7 +264,7 @@ impl FieldList<'_> {
     fn add_list(&mut self, schema: &Json, path: &mut Vec<Segment>, context: &FieldContext) {
         let Some(items) = schema.get("items") else { return };
         if let Some("number" | "integer") = items.get("type").and_then(Json::as_str) {
-            let is_color = label_and_range(schema).0.starts_with(COLOR_LABEL);
+            let is_color = label_and_range(schema).0.starts_with(COLOR_LABEL_PREFIX);
             let kind = if is_color { Kind::Color } else { Kind::Vector };
             return self.add_field(kind, schema, path, context);
         }
@@ -454,8 +454,8 @@ fn choose<'a>(branches: &[&'a Json], context: &FieldContext) -> Option<&'a Json>
     branches.iter().find(|branch| has_type(branch, types)).copied()
 }
 
-/// Start of the label of a color kind.
-const COLOR_LABEL: &str = "linear red";
+/// Prefix of the labels of colors in the schema.
+const COLOR_LABEL_PREFIX: &str = "linear red";
 
 /// Splits the title of a schema into a label and a range.
 fn label_and_range(schema: &Json) -> (&str, &str) {
