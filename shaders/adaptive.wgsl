@@ -70,8 +70,9 @@ fn pilot_finish(pilot: vec4f, sum: vec4f, moments: vec4f) -> vec4f {
 }
 
 // Returns the sample count that the neighbors' pilot statistics require, from `pilot_samples` samples each. Doubles the
-// count until the mean squared error is small enough, as long as the variance is reliable. The effective sample size of
-// the variance, y^2 / z, is 1 if a single sample deviates, and the full count if half of the samples deviate.
+// count until the mean squared error is small enough, as long as the variance is reliable. y^2 / z is the effective
+// number of samples behind the variance: about 1 if one outlier causes nearly all of it, and the full count if all
+// deviations from the mean are equally large.
 fn samples_wanted(pilot_sum: vec4f, pilot_samples: u32, squared_error: f32, max_samples: u32) -> u32 {
     if !(pilot_sum.w > 0.0) | !(squared_error > 0.0) {
         return max_samples;
@@ -80,7 +81,7 @@ fn samples_wanted(pilot_sum: vec4f, pilot_samples: u32, squared_error: f32, max_
     var count = pilot_samples;
     while count < max_samples {
         let is_enough = variance <= squared_error * f32(count);
-        let is_reliable = pilot_sum.y * pilot_sum.y >= pilot_sum.z * (EFFECTIVE_SAMPLES_PER_DOUBLING * (f32(2u * count / pilot_samples) - 1.0));
+        let is_reliable = pilot_sum.y * pilot_sum.y >= pilot_sum.z * (EFFECTIVE_SAMPLES_PER_MULTIPLE * (f32(2u * count / pilot_samples) - 1.0));
         if is_enough | !is_reliable {
             break;
         }

@@ -1,6 +1,6 @@
-// Camera samples of a pixel, and the interface of integrators: `begin_path` starts a path, and `advance` traces one
-// surface at a time until it has `ended`; then `path_value` and `path_layers` return its contribution. Lanes in
-// lockstep thus begin their next samples without waiting for the longest path.
+// Camera samples of a pixel, and the interface of integrators: `begin_path` starts a path, and each call of `advance`
+// extends it to the next surface. Once `PathState::ended` is true, `path_value` and `path_layers` return the path's
+// contribution. Lanes in lockstep thus begin their next samples without waiting for the longest path.
 
 struct CameraSample {
     ray: Ray,

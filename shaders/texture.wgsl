@@ -180,11 +180,11 @@ fn with_principled(before: Material, color: vec3f, lookup: Lookup) -> Material {
     if (LOBES & LOBE_ANISOTROPY) != 0u {
         m.rotation += select(0.0, direction_turn(color), (purposes & FOR_DIRECTION) != 0u);
     }
-    m.specular_weight = select(m.specular_weight, channel_of(color, lookup, WEIGHT_CHANNEL), (purposes & FOR_WEIGHT) != 0u);
+    m.specular_weight = select(m.specular_weight, channel_of(color, lookup, SPECULAR_WEIGHT_CHANNEL), (purposes & FOR_SPECULAR_WEIGHT) != 0u);
     m.transmission = select(m.transmission, channel_of(color, lookup, TRANSMISSION_CHANNEL), (purposes & FOR_TRANSMISSION) != 0u);
-    m.clearcoat = select(m.clearcoat, channel_of(color, lookup, COAT_CHANNEL), (purposes & FOR_COAT) != 0u);
-    let coat_roughness = channel_of(color, lookup, COAT_ROUGHNESS_CHANNEL);
-    m.clearcoat_roughness = select(m.clearcoat_roughness, coat_roughness, (purposes & FOR_COAT_ROUGHNESS) != 0u);
+    m.clearcoat = select(m.clearcoat, channel_of(color, lookup, CLEARCOAT_CHANNEL), (purposes & FOR_CLEARCOAT) != 0u);
+    let coat_roughness = channel_of(color, lookup, CLEARCOAT_ROUGHNESS_CHANNEL);
+    m.clearcoat_roughness = select(m.clearcoat_roughness, coat_roughness, (purposes & FOR_CLEARCOAT_ROUGHNESS) != 0u);
     let sheen_roughness = channel_of(color, lookup, SHEEN_ROUGHNESS_CHANNEL);
     m.sheen_roughness = select(m.sheen_roughness, sheen_roughness, (purposes & FOR_SHEEN_ROUGHNESS) != 0u);
     m.opacity = select(m.opacity, channel_of(color, lookup, OPACITY_CHANNEL), (purposes & FOR_OPACITY) != 0u);
@@ -220,7 +220,7 @@ fn evaluate_material(prim: HitPrimitive, hit: Hit, material: Material, surface: 
             if (MATERIALS & (1u << PRINCIPLED)) != 0u {
                 shading.material = with_principled(shading.material, color, lookup);
                 if (LOBES & LOBE_COAT) != 0u {
-                    if (purposes & FOR_COAT_NORMAL) != 0u {
+                    if (purposes & FOR_CLEARCOAT_NORMAL) != 0u {
                         shading.coat_normal = mapped_normal(surface, t, color);
                     }
                 }

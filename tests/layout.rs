@@ -106,8 +106,8 @@ fn constants_match_in_wgsl_and_rust() {
     };
     assert_eq!(value("INFINITE_T"), f32::MAX.to_bits());
     assert_eq!(
-        value("EFFECTIVE_SAMPLES_PER_DOUBLING"),
-        wgray_render::records::EFFECTIVE_SAMPLES_PER_DOUBLING.to_bits()
+        value("EFFECTIVE_SAMPLES_PER_MULTIPLE"),
+        wgray_render::records::EFFECTIVE_SAMPLES_PER_MULTIPLE.to_bits()
     );
     assert_eq!(value("NO_INDEX"), u32::MAX);
     assert_eq!(value("PLANE"), wgray_render::records::PLANE);

@@ -1,4 +1,4 @@
-//! Compares every shared function on GPU and CPU, bit by bit, for thousands of inputs.
+//! Compares every shared function on GPU and CPU, bit for bit, for thousands of inputs.
 
 use glam::{UVec2, UVec3, UVec4, Vec2, Vec3, Vec4};
 use wgray_render::cpu::adaptive::{

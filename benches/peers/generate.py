@@ -265,7 +265,7 @@ class Scenes:
         return bool(mesh) and bool(MESHES[mesh]) and not (self.folder / "meshes" / f"{mesh}.ply").exists()
 
     def write(self, name):
-        """Writes a scene and its mesh if they do not exist or the text of the scene has changed."""
+        """Writes a scene and its mesh, unless both exist and the text of the scene is unchanged."""
         make, mesh = self.definition(name)
         (self.folder / "meshes").mkdir(parents=True, exist_ok=True)
         path = self.folder / f"{name}.toml"

@@ -251,6 +251,11 @@ fn unknown_gltf_selections_list_the_available_ones() {
         2,
         "cannot be used with",
     );
+}
+
+#[test]
+fn gltf_files_without_triangles_and_invalid_ones_are_rejected() {
+    let folder = folder_with_model(&model_with_cameras());
     let empty = r#"{ "asset": { "version": "2.0" }, "scenes": [{ "nodes": [0] }], "nodes": [{}] }"#;
     fs::write(folder.path("empty.gltf"), empty).unwrap();
     assert_rejected(&folder, &["render", "empty.gltf"], 3, "has no triangles");

@@ -412,7 +412,7 @@ fn a_new_comment_in_a_shader_causes_no_compilation_and_later_errors_have_the_cor
     let (revision, before) = (session.revision(), session.state());
     files.write(KERNEL, &format!("// one\n// two\n{}", files.read(KERNEL)));
     session.wait("the saved comment", |session| {
-        (session.state().scenes > before.scenes).then_some(())
+        (session.state().scene_revision > before.scene_revision).then_some(())
     });
     std::thread::sleep(IDLE_TIME);
     let after = session.state();

@@ -56,12 +56,12 @@ fn a_new_value_is_written_and_shown() {
     set(&session, "render.pixel_samples.pattern", json!("random"), None);
     session.wait_for_rendered_image(&files);
     // The file watcher reports edits of other programs, but not what the session writes.
-    let scenes = session.state().scenes;
+    let revision = session.state().scene_revision;
     std::thread::sleep(IDLE_TIME);
-    assert_eq!(session.state().scenes, scenes);
+    assert_eq!(session.state().scene_revision, revision);
     files.edit("scene.toml", "fov = 40", "fov = 44");
     session.wait("the edited scene", |session| {
-        (session.state().scenes > scenes).then_some(())
+        (session.state().scene_revision > revision).then_some(())
     });
     session.wait_for_rendered_image(&files);
 }

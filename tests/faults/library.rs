@@ -1,5 +1,5 @@
-//! The library on a driver that loses its device. Environment variables select the driver, so the library renders in a
-//! child process.
+//! The library with a Vulkan driver that loses its device. The library renders in a child process, because environment
+//! variables select the driver.
 
 use std::ops::ControlFlow;
 use std::process::Command;

@@ -14,7 +14,7 @@ fn damaged_lines_of_obj_files_are_replaced() {
         ),
         (
             "v 0 inf 0\nv 0 0 1e10\nf 1 2 3\nf 1 2 5\nf 5 1 3 2 4\n",
-            "line 5: y: inf must be from -1e9 to 1e9; faces with this vertex were removed (similar problems: 1)",
+            "line 5: y: inf must be from -1e9 to 1e9; faces with this vertex were removed (and 1 similar problem)",
         ),
         (
             "v 3.1+e2 0 0\nf 1 2 3\nf 3 2 5\n",
@@ -26,7 +26,7 @@ fn damaged_lines_of_obj_files_are_replaced() {
         ),
         (
             "f 1 2 3\nf 1 2\nf 3\n",
-            "line 6: a face must have at least 3 corners, not 2; the face was removed (similar problems: 1)",
+            "line 6: a face must have at least 3 corners, not 2; the face was removed (and 1 similar problem)",
         ),
         (
             "f 1 2 3\nf 1 2 9\n",
@@ -39,11 +39,11 @@ fn damaged_lines_of_obj_files_are_replaced() {
         (
             "f 1/1 2/2 3/3\n",
             "line 5: the face refers to texture coordinate 1, which does not exist; defined so far: 0; \
-             the texture coordinates (0, 0) are used instead (similar problems: 2)",
+             the texture coordinates (0, 0) are used instead (and 2 similar problems)",
         ),
         (
             "f 1//1 2//2 3//3\n",
-            "line 5: the face refers to normal 1, which does not exist; defined so far: 0; the normal of the triangles is used instead (similar problems: 2)",
+            "line 5: the face refers to normal 1, which does not exist; defined so far: 0; the normal of the triangles is used instead (and 2 similar problems)",
         ),
         (
             "vt 0 nan\nf 1/1 2/1 3/1\n",
@@ -55,7 +55,7 @@ fn damaged_lines_of_obj_files_are_replaced() {
         ),
         (
             "v 0 0 0 0.5 nan 0\nv 0 0 0 red 0 0\nf 1 2 3\n",
-            "line 5: the color of the vertex must be three finite numbers; white is used instead (similar problems: 1)",
+            "line 5: the color of the vertex must be three finite numbers; white is used instead (and 1 similar problem)",
         ),
     ] {
         let mesh = load("a.obj", format!("{SQUARE}{lines}"), None).unwrap();
@@ -131,7 +131,7 @@ fn vertex_colors_that_are_not_finite_are_white() {
     let text = format!("{header}0 0 0 0.5 0.25 0\n1 0 0 nan 0 0\n1 1 0 0 1e39 0\n3 0 1 2\n");
     let mesh = load("a.ply", text, None).unwrap();
     let note = "line 14: vertex 1: color: the values must be finite as 32-bit floats; \
-                white is used instead (similar problems: 1)";
+                white is used instead (and 1 similar problem)";
     assert_eq!(mesh.notes, [note]);
     assert_eq!(mesh.colors[0].to_array(), [0.5, 0.25, 0.0, 1.0]);
     assert_eq!(mesh.colors[1..], [glam::Vec4::ONE; 2]);
@@ -145,7 +145,7 @@ fn ply_lines_may_have_more_values_than_declared() {
     assert_eq!(
         mesh.notes,
         [
-            "line 10: the line has more values than the header declares; the extra values were ignored (similar problems: 3)"
+            "line 10: the line has more values than the header declares; the extra values were ignored (and 3 similar problems)"
         ]
     );
     // A row may span several lines, and a line may contain several rows.

@@ -1,4 +1,4 @@
-//! Textures, mirrors and glass: GPU and CPU agree, bit by bit on software Vulkan.
+//! Textures, mirrors and glass: GPU and CPU agree, bit for bit on software Vulkan.
 
 use std::collections::BTreeSet;
 use std::path::Path;

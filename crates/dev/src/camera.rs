@@ -568,7 +568,11 @@ mod tests {
         let path = "position = [0, -4, 1]\nlook_at = [0, 0, 1]\nfov = 45\npath.keys = [{ frame = 1, fov = 40 }]";
         let result = merged(&orbited, &file, &camera(path)).unwrap();
         assert_eq!(pose(&result).position, pose(&orbited).position);
-        assert_eq!(result.path(), camera(path).path(), "the path of the file is lost");
+        assert_eq!(
+            result.path(),
+            camera(path).path(),
+            "the camera path of the file is lost"
+        );
         let with_new_position = camera("position = [0, -5, 1]\nlook_at = [0, 0, 1]\nfov = 45");
         assert_eq!(
             merged(&orbited, &file, &with_new_position),

@@ -386,9 +386,10 @@ fn cover(range: &mut Option<Range<usize>>, node: Node) {
     }
 }
 
+/// Extends a range to contain a span.
 fn widen(range: &mut Option<Range<usize>>, span: Range<usize>) {
     if span.is_empty() {
-        return; // the document's own table has no header
+        return; // the root table has no header
     }
     *range = Some(match range.take() {
         Some(old) => old.start.min(span.start)..old.end.max(span.end),

@@ -169,7 +169,7 @@ pub struct State {
     /// True if the camera differs from the camera in the file.
     pub camera_moved: bool,
     /// Number of valid scenes read so far.
-    pub scenes: u64,
+    pub scene_revision: u64,
     /// The last change of the scene file, which can be undone: `camera`, `materials.red.color`.
     pub undo: Option<String>,
     /// The reason if nothing can be undone because another program changed the file.

@@ -8,7 +8,7 @@ const VALUE_KEYS = /^(Arrow|Page|Home$|End$)/; // keys that change a control's v
 const SEARCH_DELAY = 250; // milliseconds after the last key before matching names are requested
 
 let request = null; // the request for the shown object: a pixel, or a name and a material
-let scenes = null; // the number of valid scenes when `request` was sent
+let requestedRevision = null; // the revision of the scene when `request` was sent
 let shown = null; // the last answer about the object
 let groups = new Map(); // the tables that are shown, by name
 let gesture = Math.floor(Math.random() * 2 ** 40); // the current gesture's number; its changes form one undo step
@@ -22,13 +22,13 @@ let waiting = new Map(); // later changes: the newest per value and gesture
 export function select(pixel) {
   request = { at: pixel };
   element("object").open = true;
-  scenes = lastState()?.scenes;
+  requestedRevision = lastState()?.scene_revision;
   sendQuery({ object: pixel });
 }
 
 function inspect(name, material) {
   request = { name, material };
-  scenes = lastState()?.scenes;
+  requestedRevision = lastState()?.scene_revision;
   sendQuery({ inspect: request });
 }
 
@@ -57,15 +57,15 @@ export function setUpObject() {
     }));
   }
   onLink(() => {
-    scenes = null;
+    requestedRevision = null;
     [sending, waiting] = [null, new Map()];
   });
   onState((state) => {
     showUndo(state);
     showNote();
     settle(state);
-    if (state.scenes !== scenes) {
-      scenes = state.scenes;
+    if (state.scene_revision !== requestedRevision) {
+      requestedRevision = state.scene_revision;
       repeatRequest();
     }
   });

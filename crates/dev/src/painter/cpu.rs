@@ -98,7 +98,7 @@ impl Painter {
         }
     }
 
-    /// Continues the CPU's image on `gpu` if its kernel computes the same image, bit by bit. Otherwise, returns `gpu`.
+    /// Continues the CPU's image on `gpu` if its kernel computes the same image, bit for bit. Otherwise, returns `gpu`.
     pub(super) fn continue_on(
         &mut self,
         gpu: Gpu,

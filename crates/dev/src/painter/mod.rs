@@ -325,7 +325,7 @@ impl Painter {
                     (.., view) => view,
                 };
                 self.loaded = Some(loaded);
-                self.state.scenes += 1;
+                self.state.scene_revision += 1;
             }
             Err(problems) => self.problems.scene = problems,
         }

@@ -4,7 +4,7 @@ use glam::{Vec3, Vec4, Vec4Swizzles};
 
 use super::math::{max, min, power};
 use crate::film;
-use crate::records::EFFECTIVE_SAMPLES_PER_DOUBLING;
+use crate::records::EFFECTIVE_SAMPLES_PER_MULTIPLE;
 
 pub fn moments_with(moments: Vec4, sum: Vec4, sample: Vec4) -> Vec4 {
     moments + squared_deviation(sum, sample).extend(1.0)
@@ -79,7 +79,7 @@ pub fn samples_wanted(pilot_sum: Vec4, pilot_samples: u32, squared_error: f32, m
     while count < max_samples {
         let is_enough = variance <= squared_error * count as f32;
         let is_reliable = pilot_sum.y * pilot_sum.y
-            >= pilot_sum.z * (EFFECTIVE_SAMPLES_PER_DOUBLING * ((2 * count / pilot_samples) as f32 - 1.0));
+            >= pilot_sum.z * (EFFECTIVE_SAMPLES_PER_MULTIPLE * ((2 * count / pilot_samples) as f32 - 1.0));
         if is_enough | !is_reliable {
             break;
         }

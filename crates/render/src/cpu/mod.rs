@@ -1,5 +1,5 @@
-//! The CPU path: twins of the WGSL functions, with the same names, arguments and order of operations, run on several
-//! threads. It is the reference for tests of the GPU path.
+//! The CPU backend: twins of the WGSL functions, with the same names, arguments and order of operations, run on several
+//! threads. It is the reference for tests of the GPU backend.
 //!
 //! The WGSL files document the functions.
 #![allow(missing_docs, reason = "documented in the WGSL files")]

@@ -17,11 +17,12 @@ use super::vertices::footprint_in_set;
 
 use super::texel::{gaussian_weight, level_size, near_coordinate, unpacked_color, wrapped_index};
 use crate::records::{
-    ANISOTROPY_CHANNEL, COAT_CHANNEL, COAT_ROUGHNESS_CHANNEL, EWA, FLOAT, FOR_AMBIENT, FOR_ANISOTROPY, FOR_COAT,
-    FOR_COAT_NORMAL, FOR_COAT_ROUGHNESS, FOR_DIFFUSE, FOR_DIRECTION, FOR_EMISSION, FOR_METALLIC, FOR_NORMAL,
-    FOR_OPACITY, FOR_ROUGHNESS, FOR_SHEEN, FOR_SHEEN_ROUGHNESS, FOR_SPECULAR, FOR_TINT, FOR_TRANSMISSION, FOR_WEIGHT,
-    LINES, Lookup, METALLIC_CHANNEL, Material, NEAREST, OPACITY_CHANNEL, PRINCIPLED, Packed, ROUGHNESS_CHANNEL,
-    SHEEN_ROUGHNESS_CHANNEL, TRANSMISSION_CHANNEL, TRILINEAR, Texture, WEIGHT_CHANNEL,
+    ANISOTROPY_CHANNEL, CLEARCOAT_CHANNEL, CLEARCOAT_ROUGHNESS_CHANNEL, EWA, FLOAT, FOR_AMBIENT, FOR_ANISOTROPY,
+    FOR_CLEARCOAT, FOR_CLEARCOAT_NORMAL, FOR_CLEARCOAT_ROUGHNESS, FOR_DIFFUSE, FOR_DIRECTION, FOR_EMISSION,
+    FOR_METALLIC, FOR_NORMAL, FOR_OPACITY, FOR_ROUGHNESS, FOR_SHEEN, FOR_SHEEN_ROUGHNESS, FOR_SPECULAR,
+    FOR_SPECULAR_WEIGHT, FOR_TINT, FOR_TRANSMISSION, LINES, Lookup, METALLIC_CHANNEL, Material, NEAREST,
+    OPACITY_CHANNEL, PRINCIPLED, Packed, ROUGHNESS_CHANNEL, SHEEN_ROUGHNESS_CHANNEL, SPECULAR_WEIGHT_CHANNEL,
+    TRANSMISSION_CHANNEL, TRILINEAR, Texture,
 };
 
 pub fn texture_color(scene: &Packed, t: &Texture, surface: Footprint) -> Vec3 {
@@ -197,10 +198,14 @@ pub fn with_principled(before: Material, color: Vec3, lookup: &Lookup) -> Materi
     for (parameter, purpose, slot) in [
         (&mut m.metallic, FOR_METALLIC, METALLIC_CHANNEL),
         (&mut m.anisotropy, FOR_ANISOTROPY, ANISOTROPY_CHANNEL),
-        (&mut m.specular_weight, FOR_WEIGHT, WEIGHT_CHANNEL),
+        (&mut m.specular_weight, FOR_SPECULAR_WEIGHT, SPECULAR_WEIGHT_CHANNEL),
         (&mut m.transmission, FOR_TRANSMISSION, TRANSMISSION_CHANNEL),
-        (&mut m.clearcoat, FOR_COAT, COAT_CHANNEL),
-        (&mut m.clearcoat_roughness, FOR_COAT_ROUGHNESS, COAT_ROUGHNESS_CHANNEL),
+        (&mut m.clearcoat, FOR_CLEARCOAT, CLEARCOAT_CHANNEL),
+        (
+            &mut m.clearcoat_roughness,
+            FOR_CLEARCOAT_ROUGHNESS,
+            CLEARCOAT_ROUGHNESS_CHANNEL,
+        ),
         (&mut m.sheen_roughness, FOR_SHEEN_ROUGHNESS, SHEEN_ROUGHNESS_CHANNEL),
         (&mut m.opacity, FOR_OPACITY, OPACITY_CHANNEL),
     ] {
@@ -263,7 +268,7 @@ pub fn evaluate_material(
             }
             if shading.material.kind == PRINCIPLED {
                 shading.material = with_principled(shading.material, color, lookup);
-                if purposes & FOR_COAT_NORMAL != 0 {
+                if purposes & FOR_CLEARCOAT_NORMAL != 0 {
                     shading.coat_normal = mapped_normal(surface, t, color);
                 }
             }

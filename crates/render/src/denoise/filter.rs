@@ -1,4 +1,4 @@
-//! The CPU path of `shaders/kernels/denoise.wgsl`: the same sums in the same order, eight pixels at a time. Distances of
+//! The CPU backend of `shaders/kernels/denoise.wgsl`: the same sums in the same order, eight pixels at a time. Distances of
 //! pixels are computed once per tile and offset, and summed over patches row by row.
 
 use fearless_simd::prelude::*;

@@ -237,7 +237,7 @@ impl Gpu {
         }
     }
 
-    /// Denoises a finished film with noise estimates. Software Vulkan uses the CPU path, which is faster and has the
+    /// Denoises a finished film with noise estimates. Software Vulkan uses the CPU backend, which is faster and has the
     /// same bits.
     ///
     /// # Errors

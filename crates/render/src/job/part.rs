@@ -1,4 +1,4 @@
-//! Parts of an image that separate processes render: files of finished pieces, with first hits if layers need them.
+//! Parts of an image, each rendered by its own process: files of finished pieces, with first hits if layers need them.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;

@@ -110,7 +110,7 @@ impl Appearances {
     }
 
     pub fn has_normal_maps(&self) -> bool {
-        self.any_material_has_lookup(FOR_NORMAL | FOR_COAT_NORMAL)
+        self.any_material_has_lookup(FOR_NORMAL | FOR_CLEARCOAT_NORMAL)
     }
 
     /// Returns true if any lookup has any of the purposes.
@@ -246,7 +246,7 @@ impl Appearances {
             && let Some(map) = principled.clearcoat_normal_map
         {
             let texture = self.texture(scene, map.texture, Some(map.strength));
-            lookups.add(texture, uv_set(map.texture), FOR_COAT_NORMAL, None);
+            lookups.add(texture, uv_set(map.texture), FOR_CLEARCOAT_NORMAL, None);
         }
         record.lookups = UVec2::new(self.lookups.len() as u32, lookups.0.len() as u32);
         self.lookups.extend(lookups.0);
@@ -439,14 +439,14 @@ fn principled(
         ),
         metallic: resolve_scalar(&p.metallic, FOR_METALLIC, METALLIC_CHANNEL, resolve),
         transmission: resolve_scalar(&p.transmission, FOR_TRANSMISSION, TRANSMISSION_CHANNEL, resolve),
-        clearcoat: resolve_scalar(&p.clearcoat, FOR_COAT, COAT_CHANNEL, resolve),
+        clearcoat: resolve_scalar(&p.clearcoat, FOR_CLEARCOAT, CLEARCOAT_CHANNEL, resolve),
         clearcoat_roughness: resolve_scalar(
             &p.clearcoat_roughness,
-            FOR_COAT_ROUGHNESS,
-            COAT_ROUGHNESS_CHANNEL,
+            FOR_CLEARCOAT_ROUGHNESS,
+            CLEARCOAT_ROUGHNESS_CHANNEL,
             resolve,
         ),
-        specular_weight: resolve_scalar(&p.specular, FOR_WEIGHT, WEIGHT_CHANNEL, resolve),
+        specular_weight: resolve_scalar(&p.specular, FOR_SPECULAR_WEIGHT, SPECULAR_WEIGHT_CHANNEL, resolve),
         opacity: match has_alpha {
             true => resolve_scalar(&p.alpha, FOR_OPACITY, OPACITY_CHANNEL, resolve),
             false => 1.0,

@@ -11,10 +11,9 @@ use wgray_scene::{Geometry, Light, Reflection, Scene, Shadows};
 /// is rounded.
 const TOLERANCE: f64 = 1e-6;
 
-/// Returns a flag for each primitive outside of the BVH: true if the primitive can occlude a surface from a light. A
-/// flat primitive cannot if all shapes and lights are on one side of its plane. With more than
-/// [`MAX_LINEAR_PRIMITIVES`] primitives, this is not tested, because each test takes time proportional to the number
-/// of shapes.
+/// Returns a flag for each primitive outside of the BVH: false if it cannot occlude any light. This holds for a flat
+/// primitive if all shapes and lights are on one side of its plane, and for glass without shadows. With more than
+/// [`MAX_LINEAR_PRIMITIVES`] primitives or an environment map, the planes are not tested.
 pub fn shadow_caster_flags(scene: &Scene, primitives: &[Primitive]) -> Vec<bool> {
     let is_tested = primitives.len() <= MAX_LINEAR_PRIMITIVES && !has_environment_map(scene);
     let casts =

@@ -160,19 +160,19 @@ constants! {
     /// Flag in [`Lookup::purposes`]: the lookup sets [`Material::sheen`].
     pub const FOR_SHEEN: u32 = 0x80;
     /// Flag in [`Lookup::purposes`]: the lookup sets the clear coat's normal.
-    pub const FOR_COAT_NORMAL: u32 = 0x100;
+    pub const FOR_CLEARCOAT_NORMAL: u32 = 0x100;
     /// Flag in [`Lookup::purposes`]: the lookup sets [`Material::metallic`].
     pub const FOR_METALLIC: u32 = 0x200;
     /// Flag in [`Lookup::purposes`]: the lookup sets [`Material::anisotropy`].
     pub const FOR_ANISOTROPY: u32 = 0x400;
     /// Flag in [`Lookup::purposes`]: the lookup sets [`Material::specular_weight`].
-    pub const FOR_WEIGHT: u32 = 0x800;
+    pub const FOR_SPECULAR_WEIGHT: u32 = 0x800;
     /// Flag in [`Lookup::purposes`]: the lookup sets [`Material::transmission`].
     pub const FOR_TRANSMISSION: u32 = 0x1000;
     /// Flag in [`Lookup::purposes`]: the lookup sets [`Material::clearcoat`].
-    pub const FOR_COAT: u32 = 0x2000;
+    pub const FOR_CLEARCOAT: u32 = 0x2000;
     /// Flag in [`Lookup::purposes`]: the lookup sets [`Material::clearcoat_roughness`].
-    pub const FOR_COAT_ROUGHNESS: u32 = 0x4000;
+    pub const FOR_CLEARCOAT_ROUGHNESS: u32 = 0x4000;
     /// Flag in [`Lookup::purposes`]: the lookup sets [`Material::sheen_roughness`].
     pub const FOR_SHEEN_ROUGHNESS: u32 = 0x8000;
     /// Flag in [`Lookup::purposes`]: the lookup sets [`Material::opacity`].
@@ -186,13 +186,13 @@ constants! {
     /// Index of a pair of bits in [`Lookup::channels`]: channel of [`Material::anisotropy`].
     pub const ANISOTROPY_CHANNEL: u32 = 2;
     /// Index of a pair of bits in [`Lookup::channels`]: channel of [`Material::specular_weight`].
-    pub const WEIGHT_CHANNEL: u32 = 3;
+    pub const SPECULAR_WEIGHT_CHANNEL: u32 = 3;
     /// Index of a pair of bits in [`Lookup::channels`]: channel of [`Material::transmission`].
     pub const TRANSMISSION_CHANNEL: u32 = 4;
     /// Index of a pair of bits in [`Lookup::channels`]: channel of [`Material::clearcoat`].
-    pub const COAT_CHANNEL: u32 = 5;
+    pub const CLEARCOAT_CHANNEL: u32 = 5;
     /// Index of a pair of bits in [`Lookup::channels`]: channel of [`Material::clearcoat_roughness`].
-    pub const COAT_ROUGHNESS_CHANNEL: u32 = 6;
+    pub const CLEARCOAT_ROUGHNESS_CHANNEL: u32 = 6;
     /// Index of a pair of bits in [`Lookup::channels`]: channel of [`Material::sheen_roughness`].
     pub const SHEEN_ROUGHNESS_CHANNEL: u32 = 7;
     /// Index of a pair of bits in [`Lookup::channels`]: channel of [`Material::opacity`].
@@ -224,7 +224,7 @@ constants! {
     pub const SAMPLE_BLOCK: u32 = 32;
 
     /// Minimum effective sample size of the variance estimate for each multiple of the pilot samples after the first.
-    pub const EFFECTIVE_SAMPLES_PER_DOUBLING: f32 = 2.0;
+    pub const EFFECTIVE_SAMPLES_PER_MULTIPLE: f32 = 2.0;
 
     /// Radius of the denoiser's window in pixels: a pixel is averaged with the pixels of a square of 2 * radius + 1.
     pub const DENOISE_RADIUS: u32 = 7;

@@ -80,7 +80,8 @@ records! {
 
     /// A primitive: a world-space point p is (x, y, z) (p - anchor) - middle in object space.
     pub struct Primitive {
-        /// Solids: a surface point towards the origin, for precision. Others: the origin of object space.
+        /// Solids: the surface point that faces the world origin, so that coordinates near the world origin are precise.
+        /// Others: the origin of object space. In world space.
         pub anchor: Vec3,
         /// Material index.
         pub material: u32,

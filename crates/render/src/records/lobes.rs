@@ -3,7 +3,7 @@
 #[cfg(doc)]
 use super::PRINCIPLED;
 use super::record::constants;
-use super::{FOR_ANISOTROPY, FOR_COAT, FOR_METALLIC, FOR_SHEEN, FOR_TRANSMISSION, FOR_WEIGHT, Material};
+use super::{FOR_ANISOTROPY, FOR_CLEARCOAT, FOR_METALLIC, FOR_SHEEN, FOR_SPECULAR_WEIGHT, FOR_TRANSMISSION, Material};
 use glam::Vec3;
 
 /// A lobe of `principled` materials.
@@ -42,7 +42,7 @@ pub static LOBES: [Lobe; 5] = [
     Lobe {
         bit: LOBE_SPECULAR,
         name: "specular lobe",
-        purposes: FOR_METALLIC | FOR_WEIGHT,
+        purposes: FOR_METALLIC | FOR_SPECULAR_WEIGHT,
         is_in: |m| m.metallic > 0.0 || m.specular_weight > 0.0,
     },
     Lobe {
@@ -54,7 +54,7 @@ pub static LOBES: [Lobe; 5] = [
     Lobe {
         bit: LOBE_COAT,
         name: "clearcoat",
-        purposes: FOR_COAT,
+        purposes: FOR_CLEARCOAT,
         is_in: |m| m.clearcoat > 0.0,
     },
     Lobe {

@@ -56,7 +56,8 @@ impl Defect {
         };
         let more = match self.count {
             1 => String::new(),
-            count => format!(" (similar problems: {})", count - 1),
+            2 => " (and 1 similar problem)".to_owned(),
+            count => format!(" (and {} similar problems)", count - 1),
         };
         Note {
             line,

@@ -56,16 +56,16 @@ impl Adjacency {
 
     /// Finds non-manifold edges, inconsistent winding and duplicate triangles. If `group_of` is empty, all triangles
     /// are in one group.
-    pub fn edges(&self, triangles: &[[u32; 3]], group_of: &[u32]) -> Edges {
+    pub fn find_irregularities(&self, triangles: &[[u32; 3]], group_of: &[u32]) -> Irregularities {
         (0..self.point_count())
             .into_par_iter()
             .with_min_len(1024)
             .fold(
-                || (Edges::default(), Vec::new()),
-                |(mut edges, mut other_ends), point| {
+                || (Irregularities::default(), Vec::new()),
+                |(mut irregularities, mut other_ends), point| {
                     let (mut non_manifold, mut inconsistent) =
                         self.irregular_edges(triangles, point, &[], &mut other_ends);
-                    // Edges are counted without duplicate triangles, which would make edges irregular.
+                    // Counted without duplicate triangles, which would make their edges irregular.
                     if non_manifold + inconsistent > 0 {
                         let duplicates = self.duplicates(triangles, group_of, point);
                         if !duplicates.is_empty() {
@@ -73,18 +73,18 @@ impl Adjacency {
                                 self.irregular_edges(triangles, point, &duplicates, &mut other_ends);
                             let lowest_point =
                                 |triangle: &u32| self.points_of(triangles, *triangle).iter().min().copied();
-                            edges
+                            irregularities
                                 .duplicates
                                 .extend(duplicates.iter().filter(|t| lowest_point(t) == Some(point as u32)));
                         }
                     }
-                    edges.non_manifold += non_manifold;
-                    edges.inconsistent += inconsistent;
-                    (edges, other_ends)
+                    irregularities.non_manifold += non_manifold;
+                    irregularities.inconsistent += inconsistent;
+                    (irregularities, other_ends)
                 },
             )
-            .map(|(edges, _)| edges)
-            .reduce(Edges::default, |mut a, b| {
+            .map(|(irregularities, _)| irregularities)
+            .reduce(Irregularities::default, |mut a, b| {
                 a.non_manifold += b.non_manifold;
                 a.inconsistent += b.inconsistent;
                 a.duplicates.extend(b.duplicates);
@@ -155,7 +155,7 @@ impl Adjacency {
 
 /// Irregular edges and duplicate triangles.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub(super) struct Edges {
+pub(super) struct Irregularities {
     /// Number of edges with more than two triangles.
     pub non_manifold: usize,
     /// Number of edges that both of their triangles traverse in the same direction: the winding is inconsistent.
@@ -213,13 +213,20 @@ mod tests {
         assert_eq!(adjacency.triangles_at(0), [0, 1]);
         assert_eq!(adjacency.triangles_at(1), [0]);
         assert_eq!(adjacency.triangles_at(3), [1]);
-        assert_eq!(adjacency.edges(&triangles, &[]), Edges::default());
+        assert_eq!(
+            adjacency.find_irregularities(&triangles, &[]),
+            Irregularities::default()
+        );
     }
 
     fn irregularities(triangles: &[[u32; 3]], groups: &[u32]) -> (usize, usize, Vec<u32>) {
-        let mut edges = Adjacency::of(&square(), triangles).edges(triangles, groups);
-        edges.duplicates.sort_unstable();
-        (edges.non_manifold, edges.inconsistent, edges.duplicates)
+        let mut irregularities = Adjacency::of(&square(), triangles).find_irregularities(triangles, groups);
+        irregularities.duplicates.sort_unstable();
+        (
+            irregularities.non_manifold,
+            irregularities.inconsistent,
+            irregularities.duplicates,
+        )
     }
 
     #[test]
