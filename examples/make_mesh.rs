@@ -114,7 +114,7 @@ pub struct Triangles {
 }
 
 impl Triangles {
-    /// Returns the bytes of a file with this name, whose extension selects the format.
+    /// Encodes the mesh as a file; the extension of `file` selects the format.
     pub fn to_bytes(&self, file: &str) -> Result<Vec<u8>, Box<dyn Error>> {
         match Path::new(file).extension().and_then(|extension| extension.to_str()) {
             Some("obj") => Ok(self.to_obj()),

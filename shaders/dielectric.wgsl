@@ -24,7 +24,7 @@ fn refracts_inwards(surface: Surface, material: Material, normal: vec3f) -> bool
 struct DielectricSample {
     path: Path,
     is_transmitted: bool,
-    eta: f32,              // ratio of the indices in front of and behind the surface if transmitted, else 1
+    eta: f32,              // if transmitted, the refractive index on the viewer's side divided by the one behind the surface; else 1
 }
 
 // Samples reflection or refraction. Radiance scales with the squared index: Veach, "Robust Monte Carlo Methods for

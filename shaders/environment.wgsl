@@ -57,8 +57,8 @@ fn interval_width(distribution: u32, index: u32) -> f32 {
     return environment_float(distribution + index + 1u) - environment_float(distribution + index);
 }
 
-// Returns the bilinear radiance, and the pdf for a surface normal: the block's probability times the ratio of the
-// cell's mean radiance to the block's integral.
+// Returns the bilinearly interpolated radiance, and the pdf for a surface normal: the probability of sampling the map,
+// times that of the block, times the cell's mean radiance divided by the block's integrated radiance.
 fn environment_eval(direction: vec3f, normal: vec3f) -> EnvironmentEval {
     let d = vec3f(dot(environment.x, direction), dot(environment.y, direction), dot(environment.z, direction));
     let cell = cell_towards(d, environment.width, environment.height);

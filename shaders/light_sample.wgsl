@@ -1,6 +1,7 @@
 // Samples of emitters as seen from a point, and their pdfs.
 
-// Converts the pdf `density` from area to solid angle at `to_light`, for a unit normal.
+// Converts the pdf `density` from area to solid angle. `to_light` is the vector to the point on the light, and `normal`
+// the unit normal there.
 fn solid_angle_pdf(density: f32, to_light: vec3f, normal: vec3f) -> f32 {
     let d2 = dot(to_light, to_light);
     return density * d2 * sqrt(d2) / abs(dot(normal, to_light));

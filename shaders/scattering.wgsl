@@ -150,7 +150,7 @@ fn material_for_view(surface: Surface, original: Material) -> Material {
     return material;
 }
 
-// Evaluates a microfacet material in its frame.
+// Evaluates a microfacet material. `wo` and `wi` are in the frame of the shading normal.
 fn facet_reflection(material: Material, wo: vec3f, wi: vec3f) -> Reflection {
     var result = Reflection(vec3f(0.0), 0.0);
     if (MATERIALS & (1u << METAL)) != 0u {

@@ -1,6 +1,6 @@
 // Specular reflection and refraction.
 
-// Reflects the direction d, which points to the surface, at the normal n.
+// Reflects the direction d, which points towards the surface, about the normal n.
 fn reflected_direction(d: vec3f, n: vec3f) -> vec3f {
     return d - n * (2.0 * dot(d, n));
 }

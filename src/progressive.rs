@@ -194,7 +194,9 @@ impl<'s> ProgressiveRender<'s> {
     pub fn add_samples(&mut self, count: u32) -> Result<(), Error> {
         let total = u64::from(self.bands.requested_samples()) + u64::from(count);
         let rule = match total {
-            _ if self.film_layout.adaptive => "cannot be added with adaptive sampling; lower its error".to_owned(),
+            _ if self.film_layout.adaptive => {
+                "cannot be added with adaptive sampling; lower render.adaptive.error instead".to_owned()
+            }
             total if total > u64::from(MAX_SAMPLES) => format!("{total} in total must be at most {MAX_SAMPLES}"),
             _ => {
                 self.bands.add_samples(count);

@@ -59,7 +59,7 @@ fn directions_match_the_mapping() {
         ((0.1, 0.0), Vec3::Z),
         ((0.5, 1.0), Vec3::NEG_Z),
         ((0.5, 0.25), Vec3::new(0.0, 0.5_f32.sqrt(), 0.5_f32.sqrt())),
-        ((0.5, -0.25), Vec3::new(0.0, -(0.5_f32.sqrt()), 0.5_f32.sqrt())), // filter support beyond the pole
+        ((0.5, -0.25), Vec3::new(0.0, -(0.5_f32.sqrt()), 0.5_f32.sqrt())), // beyond the pole, within the support of the pixel filter
         ((1.25, 0.5), Vec3::NEG_X),                                        // filter support beyond the seam
     ] {
         let ray = panorama_ray(&packed.camera, Vec2::new(point.0 * w, point.1 * h));

@@ -32,7 +32,7 @@ const SHADERS_WITHOUT_TWIN: &[(&str, &str)] = &[
     ),
     (
         "buffers.wgsl",
-        "scene access of kernels; in baked kernels, the same functions return constants",
+        "scene access of kernels; baked kernels have generated functions with the scene as constants instead",
     ),
     (
         "meshes.wgsl",

@@ -191,8 +191,9 @@ def main():
     for name, minimum in (("size", BLOCK), ("batches", 4), ("course_size", BLOCK), ("course_batches", 4), ("spp", 1), ("course_spp", 1)):
         if getattr(args, name) < minimum:
             parser.error(f"--{name.replace('_', '-')}: {getattr(args, name)} must be at least {minimum}")
-    if not 0 <= args.seed <= 1000 - max(args.batches, args.course_batches) + 1:
-        parser.error(f"--seed: {args.seed} is too large: the seeds from 1001 are reserved for Mitsuba")
+    max_seed = 1001 - max(args.batches, args.course_batches)
+    if not 0 <= args.seed <= max_seed:
+        parser.error(f"--seed: {args.seed} must be from 0 to {max_seed}: each batch takes the next seed, and Mitsuba's seeds start at 1001")
 
     mi.set_variant(args.variant)
     mi.set_log_level(mi.LogLevel.Error)

@@ -339,7 +339,7 @@ fn invalid_cameras_are_rejected_before_the_first_frame() {
 fn a_failed_frame_ends_the_run_and_finished_frames_remain() {
     let folder = TestFolder::new();
     write_moving_scene(&folder, "linear");
-    // The check before the render accepts /dev/full, which is not a regular file; writing the second frame then fails.
+    // /dev/full is a device, so the check before the render accepts it; writing the statistics of the second frame then fails.
     #[cfg(target_os = "linux")]
     {
         std::os::unix::fs::symlink("/dev/full", folder.path("s.2.json")).unwrap();

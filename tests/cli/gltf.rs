@@ -472,7 +472,7 @@ fn info_lists_the_names_that_options_accept() {
 #[test]
 fn a_conversion_overwrites_a_file_only_with_force() {
     let folder = folder_with_model(&Model::default());
-    folder.write("mine.toml", "# a scene of many hours\n");
+    folder.write("mine.toml", "# a scene that took many hours to write\n");
     let convert = ["convert", "box.glb", "-o", "mine.toml"];
     assert_rejected(
         &folder,
@@ -480,7 +480,7 @@ fn a_conversion_overwrites_a_file_only_with_force() {
         2,
         "--output: mine.toml: already exists; pass --force to overwrite it",
     );
-    assert_eq!(folder.read("mine.toml"), b"# a scene of many hours\n");
+    assert_eq!(folder.read("mine.toml"), b"# a scene that took many hours to write\n");
     folder.run_quietly(&[&convert[..], &["--force"]].concat());
     assert!(folder.read("mine.toml").starts_with(b"# box.glb, as a scene. "));
     assert_rejected(&folder, &convert, 2, "already exists");

@@ -1,5 +1,5 @@
 //! Rendering on the CPU in the development mode, for scenes with a BVH: without a GPU while the shaders are unedited,
-//! and on any device while a kernel is compiled. The CPU computes the bits of the kernel.
+//! and on any device while a kernel is compiled. The CPU computes the same bits as the kernel.
 
 use std::time::Instant;
 

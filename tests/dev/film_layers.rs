@@ -212,7 +212,7 @@ fn missing_layers_are_rejected_until_an_edit_adds_them() {
     assert_eq!(session.state().missing_views.len(), 4);
 }
 
-/// Returns the denoised image of a scene, computed from the definition of the view.
+/// Returns the image that the view "denoised" must show: all samples rendered by the CPU backend, then denoised.
 fn denoised_image(files: &Files) -> Vec<[f32; 3]> {
     let packed = files.packed().with_layers().with_noise();
     let mut cpu = Cpu::new(&packed);

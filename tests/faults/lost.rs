@@ -23,7 +23,7 @@ fn assert_reopened(result: &RunResult, reopened: usize, other_lines: &[&str]) {
     assert_eq!(lines.len(), reopened + other_lines.len(), "{}", result.stderr);
     for line in &lines[..reopened] {
         assert!(line.starts_with("warning: llvmpipe"), "{line}");
-        assert!(line.contains(": the device was lost: the driver ended it"), "{line}");
+        assert!(line.contains(": the device was lost: the driver removed it"), "{line}");
         assert!(line.ends_with("; re-opening it"), "{line}");
     }
     for (line, start) in lines[reopened..].iter().zip(other_lines) {

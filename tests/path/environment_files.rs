@@ -105,7 +105,7 @@ fn errors_are_reported_with_their_location() {
         ),
         (
             "file = 'huge.hdr'",
-            "5: environment.file: \"huge.hdr\" (16384 x 8192 texels) needs 2561.7 MiB and the previous textures 0.0 MiB; the \
+            "5: environment.file: \"huge.hdr\" (16384 x 8192 texels) needs 2561.7 MiB, in addition to 0.0 MiB for the previous textures; the \
              limit is 1024.0 MiB"
                 .to_owned(),
         ),

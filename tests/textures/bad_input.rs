@@ -114,7 +114,7 @@ fn invalid_images_are_rejected() {
         ),
         (
             "large.png",
-            "(16384 x 16384 texels) needs 1365.3 MiB and the previous textures 0.0 MiB; the limit is 1024.0 MiB",
+            "(16384 x 16384 texels) needs 1365.3 MiB, in addition to 0.0 MiB for the previous textures; the limit is 1024.0 MiB",
         ),
         ("/etc/hostname", "lies outside of "),
         ("../", "lies outside of "),
@@ -257,7 +257,7 @@ fn gray_palette_and_alpha_images_are_decoded() {
     for name in ["gray", "gray_alpha", "rgba", "palette"] {
         assert_eq!(texels(name), texels("rgb"), "{name}");
     }
-    // 16-bit channels become floats of the same value.
+    // 16-bit sRGB channels are decoded to linear floats, without rounding to 8 bits.
     let gray_16_bit = |x: u32| image::Luma([257 * (60 * x) as u16]);
     image::ImageBuffer::from_fn(4, 4, |x, _| gray_16_bit(x))
         .save(path("deep.png"))

@@ -1,4 +1,4 @@
-//! Damaged images are replaced with a warning, or rejected with `strict`.
+//! Damaged images cause a warning and are replaced or repaired; with `strict`, they are rejected.
 
 use std::path::Path;
 

@@ -388,7 +388,7 @@ fn ewa_over_the_pyramid_nearly_equals_ewa_over_the_finest_level() {
                 let limit = 1.4 * finest + if stripes { 0.05 } else { 0.0005 };
                 assert!(
                     ewa <= limit,
-                    "{name} {width} x {anisotropy}: {ewa} {finest} {trilinear}"
+                    "{name}, width {width}, anisotropy {anisotropy}: error {ewa} (finest level {finest}, trilinear {trilinear})"
                 );
                 max_ratio = max_ratio.max(if stripes { 0.0 } else { ewa / finest });
                 cases += u32::from(!stripes);
@@ -424,7 +424,7 @@ fn the_cost_of_ewa_is_bounded_for_narrow_images() {
             if size > 1.0 {
                 assert!(
                     (f64::from(found) - mean).abs() < 0.2,
-                    "{width} x {height}: {found} {mean}"
+                    "{width} x {height}: found {found}, expected about {mean}"
                 );
             }
         }

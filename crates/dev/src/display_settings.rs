@@ -1,4 +1,4 @@
-//! Display settings: view transform and exposure (from the scene or chosen on the page), false colors, and marks.
+//! Display settings: view transform and exposure (from the scene or chosen on the page), false colors, and marks on invalid pixels.
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};

@@ -12,7 +12,7 @@ use wgray_render::output::Aov;
 /// A film layer, as written by `wgray render --aov`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FilmLayer {
-    /// The layer.
+    /// The kind of the layer.
     pub aov: Aov,
     /// Three values per pixel. The variance is 0 if there are fewer than two samples.
     pub values: Pixels,

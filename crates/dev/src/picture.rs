@@ -39,7 +39,7 @@ pub enum View {
     Albedo,
     /// The radiance after exactly one reflection.
     Direct,
-    /// The radiance after two or more reflections.
+    /// Radiance scattered more than once.
     Indirect,
     /// The radiance without reflections.
     Emission,

@@ -1,4 +1,4 @@
-//! Rejection of input paths that may block forever or never end.
+//! Rejects input files that may block forever when opened, or that never end.
 
 use std::fs::{self, FileType};
 use std::io;

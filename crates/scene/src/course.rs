@@ -144,7 +144,7 @@ pub fn invalid(text: &str, origin: &str, problems: Problems, defines: &Defines) 
 
 enum ReadFault {
     Text(serde_json::Error, KeyPath),
-    /// Invalid types or keys.
+    /// Valid JSON with invalid types or keys, or an invalid override.
     Values(Problems),
     Large,
 }

@@ -23,7 +23,7 @@ impl Scene {
         let is_dark = self.render.integrator.follows_paths() && self.render.max_depth == 0;
         if is_dark && !self.shapes.is_empty() && self.has_light() && !self.has_emission() {
             warnings.push(
-                "render.max_depth is 0, so only emission is shown, and no surface has any; 1 adds direct light"
+                "render.max_depth is 0, so only emitters are visible, and no shape emits light; 1 adds direct light"
                     .to_owned(),
             );
         }

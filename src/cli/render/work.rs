@@ -114,7 +114,7 @@ pub fn write(
         Files::Part(file) => write_part(plan, &layout, file, &mut render_to),
     });
     match written {
-        Err(RenderError::Cancelled) if !totals.partial.is_empty() => {} // these files have been written
+        Err(RenderError::Cancelled) if !totals.partial.is_empty() => {} // `save_pass` has written the partial images
         written => written?,
     }
     drop(watcher);

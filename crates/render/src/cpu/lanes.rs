@@ -107,7 +107,7 @@ macro_rules! constant_operators {
 
 constant_operators! { Add add; Sub sub; Mul mul; Div div; }
 
-/// An unsigned 32-bit integer. Sums and products wrap, as in WGSL.
+/// An unsigned 32-bit integer, or one in each lane. Sums and products wrap, as in WGSL.
 pub trait Word:
     Copy
     + BitAnd<Output = Self>

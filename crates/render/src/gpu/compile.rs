@@ -103,7 +103,7 @@ impl ValidKernel {
         let mut module = specialized.into_owned();
         prune(&mut module);
         let info = validate(&module).map_err(|error| ShaderError::at_stage("specialization", &error))?;
-        // naga need not bound loops, because each loop of the kernels counts to a bound.
+        // naga need not bound loops, because every loop of the kernels ends.
         let options = spv::Options {
             lang_version: (1, 3),
             force_loop_bounding: false,

@@ -47,7 +47,7 @@ impl DeviceFault {
             (wgpu::DeviceLostReason::Destroyed, _) => DeviceFault::Lost("the program released the device".to_string()),
             (_, NO_MEMORY) => DeviceFault::Memory,
             (_, LOST) => DeviceFault::Lost(
-                "the driver ended it, for example after a reset or a dispatch that took too long".to_string(),
+                "the driver removed it, for example after a reset or a dispatch that took too long".to_string(),
             ),
             (_, other) => DeviceFault::Lost(other.to_string()),
         }

@@ -24,7 +24,7 @@ const OP_EXECUTION_MODE: u16 = 16;
 
 /// Extension of the float controls before SPIR-V 1.4.
 const FLOAT_CONTROLS: &[u8] = b"SPV_KHR_float_controls";
-/// Bits of the controlled floats.
+/// Width in bits of the float type to which the controls apply.
 const WIDTH: u32 = 32;
 
 /// Returns a module's instructions: the opcode, and all words. The first word encodes opcode and length.

@@ -1,4 +1,4 @@
-//! EXR files with one channel of any name, decoded as gray, because the crate `image` requires R, G and B. Files that
+//! Decodes EXR files with one channel of any name as gray. The crate `image` requires R, G and B. Files that
 //! have neither R, G and B nor exactly one channel are rejected here.
 
 use std::io::Cursor;

@@ -40,7 +40,7 @@ pub(super) struct Document {
 enum ImageFault {
     /// The image is missing or unreadable.
     Missing(String),
-    /// The image violates a rule.
+    /// The image or the reference to it is invalid, or the image is too large.
     Invalid(GltfFault),
 }
 

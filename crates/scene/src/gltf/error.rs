@@ -194,7 +194,7 @@ pub(super) fn json_message(message: &dyn std::fmt::Display) -> String {
         "map" => "an object".to_owned(),
         "sequence" => "a list".to_owned(),
         "null" | "unit value" => "null".to_owned(),
-        count if prefix == "invalid length " => format!("a list of {count}"),
+        count if prefix == "invalid length " => format!("a list of {count} values"),
         _ => match (found.strip_prefix("string "), found.split_once('`')) {
             // `serde_json` has quoted the text.
             (Some(text), _) if text.chars().count() <= 60 => text.to_owned(),
@@ -214,7 +214,7 @@ pub(super) fn json_message(message: &dyn std::fmt::Display) -> String {
         "a map" | "map" => "an object".to_owned(),
         _ if expected.starts_with("struct ") => "an object".to_owned(),
         _ if expected.starts_with("an array of length ") || expected.starts_with("a tuple of size ") => {
-            format!("a list of {digits}")
+            format!("a list of {digits} values")
         }
         other => other.to_owned(),
     };

@@ -1,4 +1,4 @@
-//! Tangents of glTF meshes: MikkTSpace (section 3.7.2.1), and correction for texture transforms.
+//! Tangents of glTF meshes (glTF 2.0, section 3.7.2.1): generated with MikkTSpace, and corrected for texture transforms.
 
 use std::ops::Range;
 

@@ -20,7 +20,7 @@ struct ImportedImage {
     length: u64,
     /// Number of decoded copies: up to one each of sRGB colors, linear data and alpha.
     copies: u64,
-    /// True if the image has mip levels.
+    /// True if a texture with this image needs mip levels.
     has_levels: bool,
 }
 

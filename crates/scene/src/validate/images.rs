@@ -136,6 +136,6 @@ fn size_error(file: &str, (width, height): (u32, u32), bytes: u64, other_bytes: 
     let mib = |bytes: u64| format!("{:.1} MiB", bytes as f64 / f64::from(1 << 20));
     let (bytes, other_bytes, limit) = (mib(bytes), mib(other_bytes), mib(TEXEL_MEMORY));
     format!(
-        "{file:?} ({width} x {height} texels) needs {bytes} and the previous textures {other_bytes}; the limit is {limit}"
+        "{file:?} ({width} x {height} texels) needs {bytes}, in addition to {other_bytes} for the previous textures; the limit is {limit}"
     )
 }

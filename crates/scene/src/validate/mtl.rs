@@ -274,7 +274,7 @@ impl<'a> SceneMaterials<'a> {
         }
     }
 
-    /// Returns the index of the texture of a map.
+    /// Returns the index of the texture for an MTL map such as `map_Kd`; adds the texture on first use.
     fn map_texture(&mut self, path: &Path, part: Part, has_uvs: bool) -> Checked<usize> {
         if !has_uvs {
             return Err(Problem::new("the mesh has no texture coordinates"));
