@@ -193,13 +193,13 @@ fn ambiguous_frame_names_are_rejected() {
     for (frames, message) in [
         (
             "",
-            "must be whole numbers from 0 to 999999999, such as 5, 1-10, 1-10:2 or 1-3,7",
+            "frames are whole numbers from 0 to 999999999, such as 5, 1-10, 1-10:2 or 1-3,7",
         ),
-        ("-3", "must be whole numbers"),
-        ("-3--1", "must be whole numbers"),
+        ("-3", "frames are whole numbers"),
+        ("-3--1", "frames are whole numbers"),
         ("2-1", "2-1 must be in ascending order, 1-2"),
         ("1-2:0", "1-2:0 needs a step of at least 1"),
-        ("1-4000000000", "4000000000: must be whole numbers from 0 to 999999999"),
+        ("1-4000000000", "4000000000: frames are whole numbers from 0 to 999999999"),
         ("0-999999999", "must be at most 100000 frames"),
     ] {
         assert_rejected(&folder, &["moving.toml", "--frames", frames, "-o", "#.png"], 2, message);

@@ -262,8 +262,8 @@ mod tests {
             ("length", json!(-1), "expected a non-negative integer, found -1"),
             ("length", json!(1.5), "expected a non-negative integer, found 1.5"),
             ("length", json!({}), "expected a non-negative integer, found an object"),
-            ("position", json!([1, 2]), "expected a list of 3, found a list of 2"),
-            ("position", json!({}), "expected a list of 3, found an object"),
+            ("position", json!([1, 2]), "expected a list of 3 values, found a list of 2 values"),
+            ("position", json!({}), "expected a list of 3 values, found an object"),
             ("list", json!(null), "expected a list, found null"),
             (
                 "list",
@@ -279,7 +279,7 @@ mod tests {
         }
         for (value, expected) in [
             (json!([1, 2, 3]), "expected a string, found 1"),
-            (json!([]), "expected an object, found a list of 0"),
+            (json!([]), "expected an object, found a list of 0 values"),
             (json!("x"), "expected an object, found \"x\""),
             (json!({}), "\"name\" is required"),
         ] {
