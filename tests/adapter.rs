@@ -2,6 +2,7 @@
 
 use std::io::Write as _;
 use std::sync::OnceLock;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use wgray_render::gpu::{AdapterChoice, Device, choose};
 
@@ -10,13 +11,49 @@ const ADAPTER: &str = "WGRAY_TEST_ADAPTER";
 /// Environment variable that, if 1, restricts the tests to those that need no adapter.
 const WITHOUT_GPU: &str = "WGRAY_TEST_WITHOUT_GPU";
 
-/// Returns the adapter under test, or `None` if `WGRAY_TEST_WITHOUT_GPU` is 1. Panics if no adapter is found.
-pub fn device() -> Option<&'static Device> {
-    static DEVICE: OnceLock<Option<Device>> = OnceLock::new();
-    DEVICE.get_or_init(open).as_ref()
+/// Number of devices that the test threads share, because lavapipe compiles the kernels of a device one after another.
+const DEVICE_COUNT: usize = 4;
+
+/// Number of threads that use each device.
+static USERS: [AtomicUsize; DEVICE_COUNT] = [const { AtomicUsize::new(0) }; DEVICE_COUNT];
+
+/// The index of the device that a thread uses until it ends.
+struct DeviceIndex(usize);
+
+impl DeviceIndex {
+    /// Selects a device with the fewest users.
+    fn select() -> DeviceIndex {
+        let users = |index: &usize| USERS[*index].load(Ordering::Relaxed);
+        let index = (0..DEVICE_COUNT).min_by_key(users).expect("a device");
+        USERS[index].fetch_add(1, Ordering::Relaxed);
+        DeviceIndex(index)
+    }
 }
 
-fn open() -> Option<Device> {
+impl Drop for DeviceIndex {
+    fn drop(&mut self) {
+        USERS[self.0].fetch_sub(1, Ordering::Relaxed);
+    }
+}
+
+/// Returns a device of the adapter under test, always the same one in a thread, or `None` if `WGRAY_TEST_WITHOUT_GPU`
+/// is 1. Panics if no adapter is found.
+pub fn device() -> Option<&'static Device> {
+    static DEVICES: [OnceLock<Option<Device>>; DEVICE_COUNT] = [const { OnceLock::new() }; DEVICE_COUNT];
+    thread_local! {
+        static INDEX: DeviceIndex = DeviceIndex::select();
+    }
+    let index = INDEX.with(|index| index.0);
+    DEVICES[index].get_or_init(|| open(index)).as_ref()
+}
+
+/// Opens the device with an index. The first one is printed.
+fn open(index: usize) -> Option<Device> {
+    let print_line = |line: &str| {
+        if index == 0 {
+            print_line(line);
+        }
+    };
     if std::env::var_os(WITHOUT_GPU).is_some_and(|value| value == "1") {
         print_line("adapter: none, because WGRAY_TEST_WITHOUT_GPU is 1; GPU and CPU are not compared");
         return None;

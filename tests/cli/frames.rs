@@ -199,7 +199,10 @@ fn ambiguous_frame_names_are_rejected() {
         ("-3--1", "frames are whole numbers"),
         ("2-1", "2-1 must be in ascending order, 1-2"),
         ("1-2:0", "1-2:0 needs a step of at least 1"),
-        ("1-4000000000", "4000000000: frames are whole numbers from 0 to 999999999"),
+        (
+            "1-4000000000",
+            "4000000000: frames are whole numbers from 0 to 999999999",
+        ),
         ("0-999999999", "must be at most 100000 frames"),
     ] {
         assert_rejected(&folder, &["moving.toml", "--frames", frames, "-o", "#.png"], 2, message);

@@ -262,7 +262,11 @@ mod tests {
             ("length", json!(-1), "expected a non-negative integer, found -1"),
             ("length", json!(1.5), "expected a non-negative integer, found 1.5"),
             ("length", json!({}), "expected a non-negative integer, found an object"),
-            ("position", json!([1, 2]), "expected a list of 3 values, found a list of 2 values"),
+            (
+                "position",
+                json!([1, 2]),
+                "expected a list of 3 values, found a list of 2 values",
+            ),
             ("position", json!({}), "expected a list of 3 values, found an object"),
             ("list", json!(null), "expected a list, found null"),
             (
