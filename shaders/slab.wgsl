@@ -17,7 +17,7 @@ fn slabs(origin: vec3f, direction: vec3f, pad: f32) -> Slabs {
     return Slabs(origin + pad, origin - pad, inverse);
 }
 
-// Returns 1 / x, finite: |x| is at least 2^-100.
+// Returns 1 / x, with |x| clamped to at least 2^-100, so that the result is finite.
 fn inverse_of(x: f32) -> f32 {
     let smallest = select(7.888609e-31, -7.888609e-31, x < 0.0);
     return 1.0 / select(smallest, x, abs(x) >= 7.888609e-31);

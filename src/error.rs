@@ -15,7 +15,7 @@ pub enum Error {
     /// An invalid description that was created in code.
     #[error(transparent)]
     Description(#[from] Problem),
-    /// A render option that does not apply to the scene or the device.
+    /// A render option that is invalid, or that the scene or the device does not support.
     #[error("{0}")]
     Option(Problem),
     /// An image that could not be rendered or written.

@@ -40,7 +40,7 @@ pub struct Session {
     context: Context,
     scene: Arc<Scene>,
     state: SceneState,
-    /// A preparation that was cancelled, and continues in the background.
+    /// The preparation of a cancelled render, which continues in the background; the next render uses its result.
     cancelled: Option<Receiver<(SceneState, Result<ImageSetup, Error>)>>,
 }
 

@@ -67,7 +67,7 @@ fn p_value(chi_square: f64, degrees_of_freedom: f64) -> f64 {
     upper_tail(z)
 }
 
-/// Returns the p-value of a normal deviate: Abramowitz and Stegun, 26.2.17.
+/// Returns the one-sided p-value of a standard normal deviate: Abramowitz and Stegun, 26.2.17.
 fn upper_tail(z: f64) -> f64 {
     if z < 0.0 {
         return 1.0 - upper_tail(-z);

@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """Compares one light in a room with a thousand lights of the same total power; prints a Markdown table.
 
-The columns are the time, the error, and the time to reach the error of one light, per kind of light and device.
+Each row is for a kind of light, a device and a number of lights. The columns are the mean of the images, the render
+time, the error, the time to reach the same error as with one light, and the ratio of that time to the time with one light.
 
 Run it as `target/peers/venv/bin/python benches/peers/lamps.py --wgray target/release/wgray`.
 

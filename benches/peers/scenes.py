@@ -34,7 +34,8 @@ def unit(a):
 class Material:
     """A material. Each colour is a list of three numbers or a Checker.
 
-    `kind` is the material type of the scene format, except that "mirror" is "conductor" and "glass" is "dielectric".
+    `kind` is the material type of the scene format, except that "mirror" becomes "conductor" and "glass" becomes "dielectric"; without specular
+    reflection, "principled" becomes "dielectric" if it transmits, else "diffuse".
     """
     kind: str = "phong"
     ambient: list | None = None

@@ -21,7 +21,7 @@ pub struct PictureOptions {
     #[arg(long, value_name = "STOPS", value_parser = parse_exposure, allow_negative_numbers = true)]
     pub exposure: Option<f64>,
 
-    /// Use gamma22, srgb, agx or khronos-pbr-neutral; not for EXR
+    /// Set the view transform: gamma22, srgb, agx or khronos-pbr-neutral; not for EXR
     #[arg(long, value_name = "NAME", value_parser = name_parser(ViewTransform::ALL, ViewTransform::name), hide_possible_values = true)]
     pub view_transform: Option<ViewTransform>,
 

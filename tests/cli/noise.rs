@@ -100,7 +100,7 @@ fn the_image_does_not_depend_on_device_threads_or_interruptions() {
             found == count && folder.read("other.exr") == folder.read("cpu.exr"),
             "{options:?}"
         );
-        std::fs::remove_file(folder.path("other.exr")).expect("a file"); // a preview keeps better files
+        std::fs::remove_file(folder.path("other.exr")).expect("a file"); // with --preview, the next render would not replace a file with more samples
     }
     // The time limit is a bound; a checkpoint continues.
     let checkpoint = ["--device", "cpu", "--checkpoint", "c", "--resume", "-o", "resumed.exr"];

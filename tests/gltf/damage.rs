@@ -108,7 +108,7 @@ fn triangles_with_invalid_positions_are_skipped() {
             let scene = load(&file, false).unwrap();
             let context = format!("{invalid_vertex} {value}: {:?}", scene.notes);
             assert_eq!(triangle_count(&scene), valid_triangles + 2, "{context}");
-            let rule = "a vertex with a coordinate that is not finite or beyond 1e9";
+            let rule = "a vertex with a coordinate that is beyond 1e9 or not finite";
             let message = match valid_triangles {
                 0 => format!("meshes[0].primitives[0].attributes.POSITION: 2 triangles have {rule}"),
                 1 => format!("meshes[0].primitives[0].attributes.POSITION: 1 triangle has {rule}"),

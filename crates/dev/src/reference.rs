@@ -10,7 +10,7 @@ use wgray_image::color::srgb_to_linear;
 use wgray_image::compare::{self, Channel, Kind, PIXELS_PER_DEGREE, Picture, Plane};
 use wgray_scene::{ViewSettings, ViewTransform};
 
-/// Maximum number of pixels of a viewer's file, a little more than 7680 x 4320.
+/// Maximum number of pixels of an uploaded image, a little more than 7680 x 4320.
 const MAX_PIXELS: u64 = 1 << 25;
 
 /// A reference image.

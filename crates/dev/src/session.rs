@@ -1,4 +1,4 @@
-//! A session: watches the files of a scene, and renders them on its own thread.
+//! A session: watches the files of a scene, and renders the scene on its own thread.
 
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicUsize, Ordering};

@@ -77,7 +77,7 @@ impl Pending {
         })
     }
 
-    /// Returns the name for messages.
+    /// Returns the name of the output, as in messages.
     pub fn name(&self) -> &str {
         &self.name
     }

@@ -1,4 +1,4 @@
-//! Applies the overrides of a scene file to its tables.
+//! Applies overrides (`KEY=VALUE`, see `define.rs`) to the tables of a scene file.
 
 use toml::{Table, Value};
 

@@ -54,7 +54,7 @@ pub struct Scene {
     pub files: Vec<PathBuf>,
     /// Warnings, such as `rock.ply: 1 of 12 triangles is a duplicate and was removed`.
     pub notes: Vec<Note>,
-    /// Imported glTF files, kept alive by the scene.
+    /// Imported glTF files, kept alive so that later loads of the files can reuse them.
     pub imported: Vec<Arc<Imported>>,
 }
 

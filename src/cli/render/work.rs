@@ -230,7 +230,7 @@ fn render_passes(
     layout: &Layout,
 ) -> Result<(), RenderError> {
     loop {
-        // Not only after a pass: a checkpoint may have the samples of a decision.
+        // Also before the first pass: a resumed checkpoint may have a sample count at which the noise decides.
         let decision = bands.uniform_samples().filter(|samples| noise::is_decision(*samples));
         if let (Some(limit), Some(samples)) = (plan.noise, decision) {
             let noise = measured_noise(plan, bands)?;

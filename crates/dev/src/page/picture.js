@@ -286,7 +286,7 @@ export class Picture {
   #drag(panel, tool, dx, dy) {
     const view = this.#view(panel);
     const { pending } = this.motion;
-    // A drag across the shorter side of the panel orbits by half a turn.
+    // A drag as long as the shorter side of the panel orbits by half a turn.
     const angle = Math.PI / Math.min(panel.canvas.clientWidth, panel.canvas.clientHeight); // per CSS pixel
     if (tool === "hand") {
       const [x, y] = this.scale === null ? [this.header.width / 2, this.header.height / 2] : this.middle;

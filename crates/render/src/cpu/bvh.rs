@@ -70,7 +70,7 @@ fn closest_of_item(
     }
 }
 
-/// Returns the closer hit of `before` and the hit of a ray with an item that is a primitive. `near` is the distance to
+/// Intersects a ray with an item that is a primitive, and returns this hit or `before`, whichever is closer. `near` is the distance to
 /// the item's box.
 pub fn closest_of_primitive(
     scene: &Packed,

@@ -33,7 +33,7 @@ pub struct SceneBuffers {
     pub groups: [wgpu::BindGroup; 2],
     /// Memory in bytes.
     pub bytes: u64,
-    /// The uploaded texels.
+    /// The uploaded texels, and the buffers that contain them.
     texels: (Weak<Vec<u32>>, Vec<wgpu::Buffer>),
 }
 

@@ -200,7 +200,7 @@ impl<S: CheckpointStore> Bands<S> {
         Ok(bands)
     }
 
-    /// Adds samples per pixel to a render in passes, which may be complete.
+    /// Adds samples per pixel to a render in passes, even if its previous samples are complete.
     pub fn add_samples(&mut self, count: u32) {
         self.total_samples *= f64::from(self.samples + count) / f64::from(self.samples);
         self.samples += count;

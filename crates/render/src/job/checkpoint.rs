@@ -196,7 +196,7 @@ impl<'a> Checkpoint<'a> {
         }
     }
 
-    /// Returns the name in messages.
+    /// Returns the path of the checkpoint as in messages.
     pub fn name(&self) -> &Path {
         &self.name
     }

@@ -157,7 +157,7 @@ fn approximately_packed(color: DVec3) -> Option<u32> {
 struct PackedBytes {
     /// Exponent for each value of the largest byte.
     exponents: [u32; 256],
-    /// Mantissas of all bytes, for each exponent.
+    /// For each exponent, the mantissa of every byte value.
     mantissas: Vec<[u32; 256]>,
 }
 

@@ -30,8 +30,8 @@ impl PackedShading {
         }
     }
 
-    /// Packs materials, textures and environment map. An environment map that equals the map of `previous`, packed for
-    /// another scene, is not packed again. All texels are shared with `previous` if they are equal.
+    /// Packs materials, textures and environment map. `previous` is the packed shading of `previous_scene`. Its
+    /// environment map is reused if both scenes have the same map, and all its texels are shared if they are equal.
     pub fn of_changed(scene: &Scene, (previous_scene, previous): (&Scene, &PackedShading)) -> PackedShading {
         if environment_image(scene) != environment_image(previous_scene) {
             return PackedShading::of(scene);

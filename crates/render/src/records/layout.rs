@@ -280,7 +280,7 @@ records! {
         pub z: Vec4,
         /// Radii of the spheres.
         pub radius: Vec4,
-        /// Axes of the cones around normals, unit length: x.
+        /// Unit axes of the cones that contain the normals: x.
         pub axis_x: Vec4,
         /// Axes: y.
         pub axis_y: Vec4,

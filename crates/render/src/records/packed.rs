@@ -19,7 +19,7 @@ pub struct Packed {
     pub camera: Camera,
     /// The integrator.
     pub integrator: Integrator,
-    /// Values that apply to the whole scene.
+    /// Values that apply to the whole scene, and the environment map.
     pub environment: Environment,
     /// Primitives, including lights' rectangles. Primitives outside of the BVH come first, sorted by kind, then by
     /// whether they can cast a shadow.

@@ -206,7 +206,7 @@ impl<'a> Meshes<'a> {
                 1 => "1 triangle has".to_owned(),
                 _ => format!("{count} triangles have"),
             };
-            let rule = "that is not finite or beyond 1e9";
+            let rule = "that is beyond 1e9 or not finite";
             Damage {
                 what: format!("{location}.attributes.POSITION: {triangles} a vertex with a coordinate {rule}"),
                 stand_in: if count == 1 {

@@ -1,4 +1,4 @@
-//! Incremental parsing after a small change of a scene file, such as a change of one of 100,000 shapes.
+//! Incremental parsing after a small change to a scene file, such as an edit of one shape out of 100,000.
 
 use std::borrow::Cow;
 use std::path::Path;

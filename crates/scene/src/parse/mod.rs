@@ -153,7 +153,7 @@ fn with_section(problem: Problem) -> Problem {
     let [Segment::Key(key)] = problem.key.0.as_slice() else {
         return problem;
     };
-    // Replaces names of options, and names that other renderers use.
+    // Translates names of command-line options, and names in other renderers, to keys of scene files.
     let name = match key.as_str() {
         "spp" | "samples" => "pixel_samples",
         "bounces" | "depth" => "max_depth",

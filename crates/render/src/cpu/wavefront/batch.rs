@@ -116,7 +116,7 @@ impl HitMaterials {
         let material = &scene.materials[index as usize];
         let is_bounded = (s.lookups != 0) | (s.vertex_colors != 0);
         if material.kind == DIFFUSE {
-            self.index_of_lane[lane] = NO_INDEX; // only the color is set
+            self.index_of_lane[lane] = NO_INDEX; // the rest of the lane's material is left as it was
             let color = material.diffuse;
             self.rows
                 .set_diffuse(lane, if is_bounded { bounded_color(color) } else { color });

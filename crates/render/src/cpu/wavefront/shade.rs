@@ -52,8 +52,8 @@ pub enum SurfaceKind {
     Flat,
     /// A triangle of a mesh.
     Face,
-    /// A solid, or a surface with emission, a texture, vertex colors or anisotropy. Its surface and material are evaluated one by
-    /// one.
+    /// A solid; a surface with emission, a texture or vertex colors; with anisotropy in the scene, any surface that is
+    /// not diffuse. The scalar functions evaluate surface and material of each hit, which is then shaded in lanes.
     Evaluated,
 }
 
