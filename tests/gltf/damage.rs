@@ -158,8 +158,8 @@ fn a_node_may_have_any_scale() {
     assert_eq!(
         scene.notes,
         [
-            "meshes[0].primitives[0].attributes.POSITION: 2 triangles have a vertex with a coordinate that is not finite or \
-             beyond 1e9; they are skipped"
+            "meshes[0].primitives[0].attributes.POSITION: 2 triangles have a vertex with a coordinate that is beyond 1e9 or \
+             not finite; they are skipped"
         ]
     );
 }
