@@ -114,7 +114,7 @@ fn light_and_bsdf_sampling_agree() {
         };
         for material in materials {
             let text = format!("materials.m = {{ {material} }}\n{camera}{shape}");
-            let packed = scene(1024, 2, &text);
+            let packed = scene(4096, 2, &text);
             assert_eq!(
                 packed.specialization.light_tree != 0,
                 i == many_lights_index,

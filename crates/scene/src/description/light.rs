@@ -40,7 +40,8 @@ pub struct RectangleLightDescription {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Vector>")]
     pub tangent: Option<DVec3>,
-    /// Radiance under `"path"`; under `"phong"`, the light color of Phong's formula at any distance.
+    /// Radiance under `"path"`; under `"phong"`, the light color of Phong's formula, which does
+    /// not decrease with distance.
     #[schemars(with = "Rgb")]
     pub color: DVec3,
     /// Visible to the camera.
@@ -79,7 +80,8 @@ pub struct PointLightDescription {
     /// Position.
     #[schemars(with = "Point")]
     pub position: DVec3,
-    /// Radiant intensity under `"path"`; under `"phong"`, the light color of Phong's formula at any distance.
+    /// Radiant intensity under `"path"`; under `"phong"`, the light color of Phong's formula, which does
+    /// not decrease with distance.
     #[schemars(with = "Rgb")]
     pub color: DVec3,
 }

@@ -138,7 +138,7 @@ fn paths_without_bounces_show_only_emission() {
         panic!("{:?}", scene(0, ""))
     };
     assert!(
-        warning.starts_with("render.max_depth is 0, so only emission is shown"),
+        warning.starts_with("render.max_depth is 0, so only emitters are visible"),
         "{warning}"
     );
     assert_eq!(scene(1, ""), [""; 0]);
