@@ -2,7 +2,7 @@
 //
 // The map is divided into at most 32 x 32 blocks of cells. A block is selected in proportion to its irradiance on the
 // surface, from cumulative distributions for 290 bins of normals. A cell of the block is selected in proportion to its
-// radiance. Thus pdfs are exact, and a pixel's samples stay stratified over blocks.
+// mean radiance times its solid angle. Thus pdfs are exact, and a pixel's samples stay stratified over blocks.
 
 struct EnvironmentEval {
     radiance: vec3f,
