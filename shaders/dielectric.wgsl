@@ -11,8 +11,9 @@ fn eta_of(surface: Surface, material: Material) -> f32 {
     return select(material.ior, 1.0 / material.ior, surface.side > 0.0);
 }
 
-// Returns true if the refracted ray is on the other side of the surface, or if there is total internal reflection. Mapped and
-// interpolated normals can bend the refracted ray back to the viewer's side, although the path would count as inside.
+// Returns true if the refracted ray is on the other side of the surface, or if there is total internal reflection.
+// Mapped and interpolated normals can bend the refracted ray back to the viewer's side, although the path would count
+// as inside.
 fn refracts_inwards(surface: Surface, material: Material, normal: vec3f) -> bool {
     let eta = eta_of(surface, material);
     let cosine_i = max(dot(surface.wo, normal), 1e-6);

@@ -84,14 +84,14 @@ fn environment_at(cell: EnvironmentCell, normal: vec3f) -> EnvironmentEval {
     return EnvironmentEval(upper + (lower - upper) * cell.y, (sum.x + sum.y + sum.z) * inverse * probability);
 }
 
-// Returns the MIS-weighted radiance of a ray that leaves the scene. `pdf` is the pdf of the ray's direction, and `eval` is
-// evaluated for the normal of the surface where the ray starts.
+// Returns the MIS-weighted radiance of a ray that leaves the scene. `pdf` is the pdf of the ray's direction, and `eval`
+// is evaluated for the normal of the surface where the ray starts.
 fn environment_mis(eval: EnvironmentEval, pdf: f32) -> vec3f {
     return eval.radiance * select(1.0, power_heuristic(pdf, eval.pdf), pdf > 0.0);
 }
 
-// Samples a point of the map for a surface normal, or 0 if light may arrive from both sides. Inverts the distributions of
-// rows and blocks, then selects a cell by Walker's alias method; the position in the block selects the entry of the
+// Samples a point of the map for a surface normal, or 0 if light may arrive from both sides. Inverts the distributions
+// of rows and blocks, then selects a cell by Walker's alias method; the position in the block selects the entry of the
 // alias table.
 fn environment_point(normal: vec3f, u: vec2f) -> EnvironmentPoint {
     let bits = hash4(vec4u(bitcast<u32>(u.x), bitcast<u32>(u.y), 0u, 0u));

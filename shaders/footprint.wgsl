@@ -39,8 +39,8 @@ struct Ellipse {
     minor: f32,
 }
 
-// Returns the ellipse with the conjugate semi-diameters dx and dy. The minor semi-axis is enlarged to at least 1 / `anisotropy`
-// of the major semi-axis. The eigenvalues of J J^T for J = (dx, dy) are the squared semi-axes.
+// Returns the ellipse with the conjugate semi-diameters dx and dy. The minor semi-axis is enlarged to at least 1 /
+// `anisotropy` of the major semi-axis. The eigenvalues of J J^T for J = (dx, dy) are the squared semi-axes.
 fn footprint_ellipse(dx: vec2f, dy: vec2f, anisotropy: f32) -> Ellipse {
     let p = dx.x * dx.x + dy.x * dy.x;
     let q = dx.x * dx.y + dy.x * dy.y;

@@ -20,7 +20,7 @@ fn ellipsoid_cap(level: f32) -> f32 {
     return select(2.0, sine2 / (1.0 + sqrt(max(1.0 - sine2, 0.0))), level > 0.0);
 }
 
-// Samples a vector from p to an ellipsoid, uniform over the local directions to the unit sphere of local space.
+// Samples a vector from p to an ellipsoid, uniform over the local directions to the unit sphere in local space.
 fn ellipsoid_sample(q: Primitive, p: vec3f, u: vec2f) -> vec3f {
     let from_anchor = vector_to_local(q, p - q.anchor);
     let o = from_anchor - q.middle;

@@ -170,8 +170,8 @@ fn face_terminator_offset(face: HitPrimitive, b: vec2f, side: f32) -> vec3f {
     return lift_0 * (1.0 - b.x - b.y) + lift_1 * b.x + lift_2 * b.y;
 }
 
-// Returns the offset that lifts a point onto a vertex's tangent plane; 0 for a point above the plane. `from_vertex` is the
-// vector from the vertex to the point. A vertex normal more than 37 degrees off the triangle normal `up` implies no
+// Returns the offset that lifts a point onto a vertex's tangent plane; 0 for a point above the plane. `from_vertex` is
+// the vector from the vertex to the point. A vertex normal more than 37 degrees off the triangle normal `up` implies no
 // smooth surface, as at the corner of a cube: with an offset, objects on the cube would lose their contact shadows.
 fn lift(n: vec3f, from_vertex: vec3f, up: vec3f) -> vec3f {
     return n * select(0.0, max(-dot(n, from_vertex), 0.0), dot(n, up) > 0.8);

@@ -1,4 +1,4 @@
-// The infinite plane z = 0 of local space.
+// The infinite plane z = 0 in local space.
 
 // Returns the t of the hit in (0, limit), else `limit`.
 fn intersect_plane(q: Primitive, ray: Ray, limit: f32) -> f32 {

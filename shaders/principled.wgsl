@@ -81,8 +81,8 @@ fn principled_mixture(material: Material, wo: vec3f, outside: bool, coat_normal:
         // Turquin, "Practical multiple scattering compensation for microfacet models", 2019.
         compensation = max(1.0 / max(albedo_factors.x + albedo_factors.y, 1e-3) - lower_bound, 0.0);
         let inner_f0 = bounded_color(material.specular * (ratio * ratio)) * material.specular_weight;
-        // With the refractive index of air, f0 and thus f90 are 0: Lagarde and de Rousiers, "Moving Frostbite to Physically Based
-        // Rendering", SIGGRAPH 2014 course, section 3.
+        // With the refractive index of air, f0 and thus f90 are 0: Lagarde and de Rousiers, "Moving Frostbite to
+        // Physically Based Rendering", SIGGRAPH 2014 course, section 3.
         let inner_f90 = material.specular_weight * min(50.0 * (ratio * ratio), 1.0);
         let inner_gain = vec3f(1.0) + inner_f0 * compensation;
         let metal_gain = (vec3f(1.0) + base * compensation) * (material.metallic * layer_throughput);

@@ -184,5 +184,6 @@ const MAX_HARMONICS: f32 = 8.0;
 const MAX_PERIODS: f32 = 32.0;
 // Minimum width of a footprint, relative to its length or to a period, whichever is shorter.
 const MIN_WIDTH: f32 = 0.001;
-// Maximum extent of a footprint along an axis, in periods; beyond it, the pulse along that axis is replaced by its mean.
+// Maximum extent of a footprint along an axis, in periods; beyond it, the pulse along that axis is replaced by its
+// mean.
 const MAX_EXTENT: f32 = 4096.0;

@@ -10,8 +10,8 @@ struct SampleBlock {
     key: vec2u,
 }
 
-// Returns the mask of samples that the primitive occludes from p. Callers pass a constant for `kind`, so that code for other kinds is removed. With
-// `from_inside`, p is on a solid seen from inside (`solid_levels`).
+// Returns the mask of samples that the primitive occludes from p. Callers pass a constant for `kind`, so that code for
+// other kinds is removed. With `from_inside`, p is on a solid seen from inside (`solid_levels`).
 fn occlusion_mask(kind: u32, q: Primitive, p: vec3f, from_inside: bool, light: Light, block: SampleBlock) -> u32 {
     let from_anchor = vector_to_local(q, p - q.anchor);
     let o = from_anchor - q.middle;

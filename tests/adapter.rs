@@ -47,7 +47,7 @@ pub fn device() -> Option<&'static Device> {
     DEVICES[index].get_or_init(|| open(index)).as_ref()
 }
 
-/// Opens the device with an index. The first one is printed.
+/// Opens the adapter under test as the device `index`. Prints the adapter once, if `index` is 0.
 fn open(index: usize) -> Option<Device> {
     let print_line = |line: &str| {
         if index == 0 {

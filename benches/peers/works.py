@@ -54,11 +54,11 @@ def build(title, scene):
 
 
 SMALL = {
-    "cornell400": Workload("assignment scene, 400x400", CORNELL, 400),
-    "cornell800": Workload("assignment scene, 800x800", CORNELL, 800),
+    "cornell400": Workload("scenes/cornell.toml, 400x400", CORNELL, 400),
+    "cornell800": Workload("scenes/cornell.toml, 800x800", CORNELL, 800),
     "ellipsoids": Workload("20 ellipsoids, 3 lights, 400x400", ELLIPSOIDS, 400, lights=3),
-    "cold": Workload("assignment scene, 400x400, whole process, caches empty", CORNELL, 400, "cold", repeats=1),
-    "cached": Workload("assignment scene, 400x400, whole process, caches warm", CORNELL, 400, "cached", repeats=1),
+    "cold": Workload("scenes/cornell.toml, 400x400, whole process, caches empty", CORNELL, 400, "cold", repeats=1),
+    "cached": Workload("scenes/cornell.toml, 400x400, whole process, caches warm", CORNELL, 400, "cached", repeats=1),
 }
 LARGE = {
     "rock70k": large("rock of 69,312 triangles", "rock70k", ALL),
@@ -74,9 +74,9 @@ LARGE = {
     "terrain10m": large("terrain of 9,999,392 triangles", "terrain10m"),
 }
 PATH = {
-    "path": path("paths in the assignment scene", CORNELL_PATH, 400),
+    "path": path("paths in scenes/cornell-path.toml", CORNELL_PATH, 400),
     "path-rock70k": path("paths around a rock of 69,312 triangles", "path-rock70k", 400),
-    "path-cold": path("paths in the assignment scene, whole process, caches empty", CORNELL_PATH, 400, "cold"),
+    "path-cold": path("paths in scenes/cornell-path.toml, whole process, caches empty", CORNELL_PATH, 400, "cold"),
 }
 MATERIALS = {name: dataclasses.replace(workload, renderers=WITHOUT_CYCLES) for name, workload in {  # cycles_scenes.py does not support these scenes
     "spheres": path("a rough metal and a rough glass sphere under a map", "path-spheres", 400),

@@ -65,7 +65,7 @@ fn range(text: &str) -> Result<impl Iterator<Item = u32>, String> {
 fn number(text: &str) -> Result<u32, String> {
     let is_number = !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
     let number = text.parse().ok().filter(|number| is_number && *number <= MAX_NUMBER);
-    let rule = format!("frames are whole numbers from 0 to {MAX_NUMBER}, such as 5, 1-10, 1-10:2 or 1-3,7");
+    let rule = format!("frames and steps are whole numbers from 0 to {MAX_NUMBER}, such as 5, 1-10, 1-10:2 or 1-3,7");
     number.ok_or_else(|| match text {
         "" => rule,
         text => format!("{text}: {rule}"),
@@ -173,20 +173,23 @@ mod tests {
     #[test]
     fn invalid_ranges_are_rejected() {
         for (text, message) in [
-            ("", "frames are whole numbers from 0 to 999999999"),
-            ("1,,2", "frames are whole numbers"),
-            ("-5", "frames are whole numbers"),
-            ("-5-5", "frames are whole numbers"),
-            ("1-", "frames are whole numbers"),
-            ("1-2-3", "2-3: frames are whole numbers"),
-            ("+1", "+1: frames are whole numbers"),
-            ("1.5", "1.5: frames are whole numbers"),
-            ("a", "a: frames are whole numbers"),
-            ("1000000000", "1000000000: frames are whole numbers"),
-            ("99999999999999999999", "99999999999999999999: frames are whole numbers"),
-            ("1-10:", "frames are whole numbers"),
-            ("1-10:2:3", "2:3: frames are whole numbers"),
-            ("1-10:-1", "-1: frames are whole numbers"),
+            ("", "frames and steps are whole numbers from 0 to 999999999"),
+            ("1,,2", "frames and steps are whole numbers"),
+            ("-5", "frames and steps are whole numbers"),
+            ("-5-5", "frames and steps are whole numbers"),
+            ("1-", "frames and steps are whole numbers"),
+            ("1-2-3", "2-3: frames and steps are whole numbers"),
+            ("+1", "+1: frames and steps are whole numbers"),
+            ("1.5", "1.5: frames and steps are whole numbers"),
+            ("a", "a: frames and steps are whole numbers"),
+            ("1000000000", "1000000000: frames and steps are whole numbers"),
+            (
+                "99999999999999999999",
+                "99999999999999999999: frames and steps are whole numbers",
+            ),
+            ("1-10:", "frames and steps are whole numbers"),
+            ("1-10:2:3", "2:3: frames and steps are whole numbers"),
+            ("1-10:-1", "-1: frames and steps are whole numbers"),
             ("1-10:0", "1-10:0 needs a step of at least 1"),
             ("5:2", "5:2 needs a range before the step"),
             ("10-1", "10-1 must be in ascending order, 1-10"),

@@ -193,15 +193,15 @@ fn ambiguous_frame_names_are_rejected() {
     for (frames, message) in [
         (
             "",
-            "frames are whole numbers from 0 to 999999999, such as 5, 1-10, 1-10:2 or 1-3,7",
+            "frames and steps are whole numbers from 0 to 999999999, such as 5, 1-10, 1-10:2 or 1-3,7",
         ),
-        ("-3", "frames are whole numbers"),
-        ("-3--1", "frames are whole numbers"),
+        ("-3", "frames and steps are whole numbers"),
+        ("-3--1", "frames and steps are whole numbers"),
         ("2-1", "2-1 must be in ascending order, 1-2"),
         ("1-2:0", "1-2:0 needs a step of at least 1"),
         (
             "1-4000000000",
-            "4000000000: frames are whole numbers from 0 to 999999999",
+            "4000000000: frames and steps are whole numbers from 0 to 999999999",
         ),
         ("0-999999999", "must be at most 100000 frames"),
     ] {
@@ -342,7 +342,8 @@ fn invalid_cameras_are_rejected_before_the_first_frame() {
 fn a_failed_frame_ends_the_run_and_finished_frames_remain() {
     let folder = TestFolder::new();
     write_moving_scene(&folder, "linear");
-    // /dev/full is a device, so the check before the render accepts it; writing the statistics of the second frame then fails.
+    // /dev/full is a device, so the check before the render accepts it; writing the statistics of the second frame then
+    // fails.
     #[cfg(target_os = "linux")]
     {
         std::os::unix::fs::symlink("/dev/full", folder.path("s.2.json")).unwrap();

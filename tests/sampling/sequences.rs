@@ -167,8 +167,8 @@ fn aligned_runs_of_halton_points_have_one_point_in_each_interval() {
     for key in keys(20) {
         for digits in 1..=5u32 {
             let count = 3u32.pow(digits);
-            // `shuffled_index` maps an aligned run of 256 indices to an aligned run, in another order. The test uses the first
-            // 3^digits indices of that run.
+            // `shuffled_index` maps an aligned run of 256 indices to an aligned run, in another order. The test uses
+            // the first 3^digits indices of that run.
             let mut run: Vec<u32> = (512..768).map(|i| shuffled_index(i, key.x ^ key.y)).collect();
             run.sort_unstable();
             let mut intervals: Vec<u32> = (run[..count as usize].iter())

@@ -176,7 +176,7 @@ fn the_total_size_of_images_is_limited() {
     let small_texture = texture("a", "a.png", "nearest");
     assert_eq!(
         error(&(small_texture.clone() + &texture("b", "huge.png", "nearest"))),
-        "10: textures.b.file: \"huge.png\" (16384 x 16384 texels) needs 1024.0 MiB and the previous textures 1.0 MiB; \
+        "10: textures.b.file: \"huge.png\" (16384 x 16384 texels) needs 1024.0 MiB, in addition to 1.0 MiB for the previous textures; \
          the limit is 1024.0 MiB"
     );
     // The size is within the limit, so the image is decoded, which detects the truncation.

@@ -8,7 +8,7 @@ import { test } from "node:test";
 const readFile = (name) => readFileSync(new URL(name, import.meta.url));
 const module = new WebAssembly.Module(readFileSync(process.env.WGRAY_WASM));
 
-// The module needs only the clock: the crate web-time imports it through wasm-bindgen, which adds some helpers. On web pages, `wasm-bindgen` generates these
+// The module imports only the clock (of the crate web-time, through wasm-bindgen) and helpers of wasm-bindgen. On web pages, `wasm-bindgen` generates these
 // imports. Integer handles represent JavaScript objects. Handles from 128 to `statics_end` are never dropped; here, all
 // of these handles represent `performance`.
 const intrinsics = [

@@ -70,8 +70,8 @@ impl BadPixels {
     }
 }
 
-/// Returns the kind of each invalid pixel. `allow_negative` accepts negative values, which pixel filters with negative lobes
-/// produce.
+/// Returns the kind of each invalid pixel. `allow_negative` accepts negative values, which pixel filters with negative
+/// lobes produce.
 pub fn faults<T: Sync, const N: usize>(
     pixels: &[T],
     allow_negative: bool,

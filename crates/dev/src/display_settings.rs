@@ -1,4 +1,5 @@
-//! Display settings: view transform and exposure (from the scene or chosen on the page), false colors, and marks on invalid pixels.
+//! Display settings: view transform and exposure (from the scene or chosen on the page), false colors, and marks on
+//! invalid pixels.
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};

@@ -235,8 +235,8 @@ pub struct Notice {
 }
 
 pub enum Event {
-    /// The files of the scene and the shaders were read, at the start or after a change. Contains the new state, the time
-    /// when the start or the change was noticed, and the number of writes by this session up to that time.
+    /// The files of the scene and the shaders were read, at the start or after a change. Contains the new state, the
+    /// time when the start or the change was noticed, and the number of writes by this session up to that time.
     Files(Box<Snapshot>, Instant, u64),
     /// Changed files of the scene are being read, or turned out to be unchanged.
     Reading(bool),

@@ -86,9 +86,11 @@ pub struct Film {
     pub layers: [Vec<Vec4>; Layer::ALL.len()],
     /// Like `sums`, over the samples with even index. Empty without noise estimates.
     pub half_sums: Vec<Vec4>,
-    /// rgb: summed squared deviations of the albedo from its mean. Empty unless the film has noise estimates and layers.
+    /// rgb: summed squared deviations of the albedo from its mean. Empty unless the film has noise estimates and
+    /// layers.
     pub albedo_moments: Vec<Vec4>,
-    /// xyz: summed squared deviations of the normal from its mean; w: of the depth. Empty unless the film has noise estimates and layers.
+    /// xyz: summed squared deviations of the normal from its mean; w: of the depth. Empty unless the film has noise
+    /// estimates and layers.
     pub normal_moments: Vec<Vec4>,
     /// Denoised colors of a finished film in linear RGB, which are not accumulated and not one of the [`Film::lists`].
     /// Empty unless the film has been denoised.

@@ -124,9 +124,9 @@ pub struct UpAxis {
 }
 
 impl UpAxis {
-    /// Returns the rotation, in scene space, that turns this axis to +z; `None` if it already is +z there. `to_scene` maps
-    /// directions of the file to the scene. An axis that is -z in the scene is turned about y, the axis from front to back,
-    /// so that the front stays in front.
+    /// Returns the rotation, in scene space, that turns this axis to +z; `None` if it already is +z there. `to_scene`
+    /// maps directions of the file to the scene. An axis that is -z in the scene is turned about y, the axis from front
+    /// to back, so that the front stays in front.
     pub(super) fn rotation(self, to_scene: impl Fn(DVec3) -> DVec3) -> Option<(Rotation, DMat3)> {
         let sign = if self.is_negative { -1.0 } else { 1.0 };
         let up = to_scene(DVec3::AXES[self.axis] * sign);

@@ -5,7 +5,8 @@ use std::cell::Cell;
 use super::key_path::cut;
 use super::key_path::list;
 
-/// Maximum length in bytes of a compared name. Longer names are skipped, because comparison time is proportional to the product of both lengths.
+/// Maximum length in bytes of a compared name. Longer names are skipped, because comparison time is proportional to the
+/// product of both lengths.
 const MAX_LEN: usize = 64;
 
 /// Minimum length in bytes of an abbreviation.

@@ -74,7 +74,8 @@ pub struct Difference {
     pub different: u64,
     /// The first pixel counted in `different`, in row-major order.
     pub first: Option<PixelCoord>,
-    /// Pixels with a value that differs by more than the threshold, or with a value that is not finite and not bit-identical.
+    /// Pixels with a value that differs by more than the threshold, or with a value that is not finite and not
+    /// bit-identical.
     pub beyond: u64,
     /// The largest difference; `None` if all differences are 0.
     pub largest: Option<LargestDifference>,

@@ -70,8 +70,8 @@ fn closest_of_item(
     }
 }
 
-/// Intersects a ray with an item that is a primitive, and returns this hit or `before`, whichever is closer. `near` is the distance to
-/// the item's box.
+/// Intersects a ray with an item that is a primitive, and returns this hit or `before`, whichever is closer. `near` is
+/// the distance to the item's box.
 pub fn closest_of_primitive(
     scene: &Packed,
     before: Hit,

@@ -82,7 +82,8 @@ pub fn colors_of(film: &Film, i: usize, fraction: f32) -> (Vec3, Vec3) {
 /// of the value, which is 0 for samples that hit nothing; `mean` is the mean over the hits.
 ///
 /// With the fraction f of n samples that hit a surface, the sum of squared deviations from the mean over all samples is
-/// n (n - 1) `variance`. The squared deviations between hits and misses add n f (1 - f) `mean`² to those within the hits.
+/// n (n - 1) `variance`. The squared deviations between hits and misses add n f (1 - f) `mean`² to those within the
+/// hits.
 pub fn surface_variance(mean: Vec3, variance: Vec3, samples: f32, fraction: f32) -> Vec3 {
     if fraction == 1.0 {
         return variance;

@@ -1,5 +1,5 @@
-//! The CPU backend of `shaders/kernels/denoise.wgsl`: the same sums in the same order, eight pixels at a time. Distances of
-//! pixels are computed once per tile and offset, and summed over patches row by row.
+//! The CPU version of `shaders/kernels/denoise.wgsl`: the same sums in the same order, eight pixels at a time.
+//! Distances of pixels are computed once per tile and offset, and summed over patches row by row.
 
 use fearless_simd::prelude::*;
 use fearless_simd::{dispatch, f32x8};

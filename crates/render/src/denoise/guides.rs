@@ -193,8 +193,9 @@ fn guides_of(film: &Film, i: usize, coverage: Coverage) -> [f32; PLANES] {
     guides
 }
 
-/// Returns the factor of a variance that was estimated as if samples were independent. The variance of stratified samples
-/// falls faster: by n^-1 to n^-1.5, depending on the scene. The mean of the exponents is assumed, from 16 samples on.
+/// Returns the factor of a variance that was estimated as if samples were independent. The variance of stratified
+/// samples falls faster: as n^-1 to n^-1.5, depending on the scene. The mean of the exponents is assumed, from 16
+/// samples on.
 fn stratification(samples: f32) -> f32 {
     (16.0 / samples).min(1.0).sqrt().sqrt()
 }

@@ -234,7 +234,8 @@ fn a_single_sample_is_denoised_by_features() {
     assert!(after < before / 20.0, "{before} before, {after} after");
 }
 
-/// Stratified samples have less noise than independent ones: of 16 times as many samples, the variance is 1/32, not 1/16.
+/// Stratified samples have less noise than independent ones: with 16 times as many samples, the variance is 1/32 as
+/// large, not 1/16.
 #[test]
 fn the_variance_of_many_samples_is_that_of_stratified_samples() {
     let subject = Subject {

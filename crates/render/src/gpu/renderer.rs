@@ -237,8 +237,8 @@ impl Gpu {
         }
     }
 
-    /// Denoises a finished film with noise estimates. Software Vulkan uses the CPU backend, which is faster and has the
-    /// same bits.
+    /// Denoises a finished film with noise estimates. On software Vulkan, the CPU denoises, which is faster and gives
+    /// the same bits.
     ///
     /// # Errors
     ///

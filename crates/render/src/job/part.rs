@@ -206,7 +206,8 @@ pub struct Parts {
     pub identity: Identity,
     /// The header; all its fields except the tile are equal in all parts.
     pub header: PartHeader,
-    /// Path of each part, and the key of the hashes of its pieces. Each read opens its file again, because the number of open files is limited.
+    /// Path of each part, and the key of the hashes of its pieces. Each read opens its file again, because the number
+    /// of open files is limited.
     files: Vec<(PathBuf, Key)>,
     /// Each piece's file and entry, by first row.
     pieces: BTreeMap<u32, (usize, Entry)>,

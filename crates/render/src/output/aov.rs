@@ -175,8 +175,8 @@ impl Aov {
         })
     }
 
-    /// Returns true if PNG output stores this variable in a file of its own. The denoised color replaces the color of the
-    /// main file.
+    /// Returns true if PNG output stores this variable in a file of its own. The denoised color replaces the color of
+    /// the main file.
     pub fn has_file(self) -> bool {
         self != Aov::Denoised
     }

@@ -14,8 +14,8 @@ use crate::cpu::specular::{fresnel, refracted_cosine};
 /// because few microfacets tilt enough for total internal reflection, and a grid would miss these microfacets.
 const NORMAL_SAMPLES: (u32, u32) = (4096, 1024);
 
-/// Returns the tables of both sides of the surface, outside first. Rows: sqrt(alpha), 0 to 1; columns: cosine, 0 to 1. If `alpha` is
-/// constant, only the adjacent rows are computed, and the entries of other rows are 1.
+/// Returns the tables of both sides of the surface, outside first. Rows: sqrt(alpha), 0 to 1; columns: cosine, 0 to 1.
+/// If `alpha` is constant, only the adjacent rows are computed, and the entries of other rows are 1.
 pub fn energy_table(ior: f32, alpha: Option<f32>) -> Vec<f32> {
     let last = (ENERGY_SIZE - 1) as f32;
     let is_needed = |row: u32| alpha.is_none_or(|alpha| (row as f32 - alpha.sqrt() * last).abs() < 1.0);

@@ -12,8 +12,9 @@ use wgray_scene::{Geometry, Light, Reflection, Scene, Shadows};
 const TOLERANCE: f64 = 1e-6;
 
 /// Returns a flag for each primitive outside of the BVH: false if it cannot occlude any light. This holds for a flat
-/// primitive if all shapes and lights are on one side of its plane, and for glass without shadows. With more than
-/// [`MAX_LINEAR_PRIMITIVES`] primitives or an environment map, the planes are not tested.
+/// primitive if all shapes and lights are on one side of its plane, for glass without shadows, and, with `phong`, for
+/// the rectangle of an area light. With more than [`MAX_LINEAR_PRIMITIVES`] primitives or an environment map, the
+/// planes are not tested.
 pub fn shadow_caster_flags(scene: &Scene, primitives: &[Primitive]) -> Vec<bool> {
     let is_tested = primitives.len() <= MAX_LINEAR_PRIMITIVES && !has_environment_map(scene);
     let casts =

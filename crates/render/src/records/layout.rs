@@ -80,8 +80,8 @@ records! {
 
     /// A primitive: a world-space point p is (x, y, z) (p - anchor) - middle in object space.
     pub struct Primitive {
-        /// Solids: the surface point that faces the world origin, so that coordinates near the world origin are precise.
-        /// Others: the origin of object space. In world space.
+        /// In world space. Solids: the surface point that faces the world origin, so that coordinates near it are
+        /// precise. Others: the origin of object space.
         pub anchor: Vec3,
         /// Material index.
         pub material: u32,

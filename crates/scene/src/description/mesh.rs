@@ -54,7 +54,8 @@ pub struct MeshDescription {
     /// Material of all groups that `materials` does not name. If absent, the file's own, else gray.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub material: Option<String>,
-    /// Materials for parts of the mesh: each key is the name of a group or material in the file, each value the name of a material of the scene.
+    /// Materials for parts of the mesh: each key is the name of a group or material in the file, each value the name of
+    /// a material of the scene.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub materials: BTreeMap<String, String>,
     /// Translation, applied last.
@@ -102,7 +103,8 @@ pub struct InstanceDescription {
     /// Material of all groups that `materials` does not name. If absent, the file's own, else gray.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub material: Option<String>,
-    /// Materials for parts of the mesh: each key is the name of a group or material in the file, each value the name of a material of the scene.
+    /// Materials for parts of the mesh: each key is the name of a group or material in the file, each value the name of
+    /// a material of the scene.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub materials: BTreeMap<String, String>,
     /// Translation, applied last.

@@ -194,6 +194,7 @@ pub(super) fn json_message(message: &dyn std::fmt::Display) -> String {
         "map" => "an object".to_owned(),
         "sequence" => "a list".to_owned(),
         "null" | "unit value" => "null".to_owned(),
+        "1" if prefix == "invalid length " => "a list of 1 value".to_owned(),
         count if prefix == "invalid length " => format!("a list of {count} values"),
         _ => match (found.strip_prefix("string "), found.split_once('`')) {
             // `serde_json` has quoted the text.
@@ -266,6 +267,11 @@ mod tests {
                 "position",
                 json!([1, 2]),
                 "expected a list of 3 values, found a list of 2 values",
+            ),
+            (
+                "position",
+                json!([1]),
+                "expected a list of 3 values, found a list of 1 value",
             ),
             ("position", json!({}), "expected a list of 3 values, found an object"),
             ("list", json!(null), "expected a list, found null"),

@@ -1,4 +1,5 @@
-//! Tangents of glTF meshes (glTF 2.0, section 3.7.2.1): generated with MikkTSpace, and corrected for texture transforms.
+//! Tangents of glTF meshes (glTF 2.0, section 3.7.2.1): generated with MikkTSpace, and corrected for texture
+//! transforms.
 
 use std::ops::Range;
 

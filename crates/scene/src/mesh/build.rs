@@ -68,8 +68,8 @@ pub(super) fn build_mesh(mut raw: RawMesh, normals: Option<Normals>) -> Result<M
         ));
     }
 
-    // For a million triangles, the adjacency and the irregularities are computed in 0.05 s, a third of the loading time of a
-    // binary PLY file.
+    // For a million triangles, the adjacency and the irregularities are computed in 0.05 s, a third of the loading time
+    // of a binary PLY file.
     let mut adjacency = Adjacency::of(&mesh.positions, &mesh.triangles);
     let irregularities = adjacency.find_irregularities(&mesh.triangles, &mesh.group_of);
     if !irregularities.duplicates.is_empty() {

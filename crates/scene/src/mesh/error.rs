@@ -3,8 +3,8 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// An error of a mesh file. Messages begin with the location: `bunny.obj:17: the face refers to vertex 9, which does not exist;
-/// defined so far: 8`.
+/// An error of a mesh file. Messages begin with the location: `bunny.obj:17: the face refers to vertex 9, which does
+/// not exist; defined so far: 8`.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum MeshError {

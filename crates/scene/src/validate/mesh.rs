@@ -20,8 +20,8 @@ use super::mtl::SceneMaterials;
 use super::{At, Checked, Collector, MIN_SINE, Problem, between, check, list, number, point, show, unit};
 use crate::mesh::{Group, Mesh, MeshError, Normals};
 
-/// Maximum total number of groups of all shapes. The packed scene has a word for each group of each instance; the limit keeps
-/// its size below 64 MiB and the indices of the words within 32 bits.
+/// Maximum total number of groups of all shapes. The packed scene has a word for each group of each instance; the limit
+/// keeps its size below 64 MiB and the indices of the words within 32 bits.
 const MAX_GROUPS: usize = 1 << 24;
 
 /// The materials and files that shapes refer to.

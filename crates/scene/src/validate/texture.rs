@@ -192,7 +192,8 @@ impl Textures<'_> {
         })
     }
 
-    /// Validates a color that light is multiplied by, such as a reflectance: energy conservation limits its channels to 0 ... 1.
+    /// Validates a color that light is multiplied by, such as a reflectance: energy conservation limits its channels to
+    /// 0 ... 1.
     pub(super) fn tint(&self, description: &ColorDescription) -> Checked<Color> {
         if let ColorDescription::Plain(tint) = description {
             for x in tint.to_array() {

@@ -1,5 +1,5 @@
-//! The stack of a ray in a batch: nodes and leaves of a mesh. For closest hits, they are approximately in order of distance, with
-//! the nearest on top.
+//! The stack of a ray in a batch: nodes and leaves of a mesh. For closest hits, they are approximately in order of
+//! distance, with the nearest on top.
 
 use fearless_simd::prelude::*;
 use fearless_simd::{f32x8, u8x32, u32x8};

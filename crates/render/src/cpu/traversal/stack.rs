@@ -19,8 +19,8 @@ pub struct BoxRay {
 }
 
 impl BoxRay {
-    /// Creates a ray from its origin, shifted to pad the boxes for tests of lower and of upper sides, and the reciprocals of the direction's
-    /// components.
+    /// Creates a ray from its origin, shifted to pad the boxes for tests of lower and of upper sides, and the
+    /// reciprocals of the direction's components.
     #[inline(always)]
     pub fn new(low_origin: [f32; 3], high_origin: [f32; 3], inverse: [f32; 3]) -> BoxRay {
         let mut near_side_index = [0; 3];

@@ -144,7 +144,8 @@ impl HitMaterials {
 }
 
 impl Batch<'_> {
-    /// Ends the paths that hit nothing, and shades all queued hits. Only one loop contains the code for all kinds, so that it is compiled only once.
+    /// Ends the paths that hit nothing, and shades all queued hits. Only one loop contains the code for all kinds, so
+    /// that it is compiled only once.
     #[inline(always)]
     pub fn shade_queues<S: Simd>(&mut self, simd: S, queues: &ShadingQueues) {
         let scene = self.scene;

@@ -35,8 +35,8 @@ pub struct LaneSurfaces<S: Simd> {
     pub triangle: Option<LaneTriangles<S>>,
 }
 
-/// `anchor`, `x` and `y` of triangles ([`Primitive`](crate::records::Primitive)). They map a point p to barycentric coordinates:
-/// `dot(x, p - anchor)` and `dot(y, p - anchor)`.
+/// `anchor`, `x` and `y` of triangles ([`Primitive`](crate::records::Primitive)). They map a point p to barycentric
+/// coordinates: `dot(x, p - anchor)` and `dot(y, p - anchor)`.
 #[derive(Clone, Copy)]
 pub struct LaneTriangles<S: Simd> {
     anchor: V<S>,
@@ -316,7 +316,7 @@ impl FaceHits {
     }
 }
 
-/// Hits whose surfaces are evaluated one by one: hits on solids, and on materials with textures or vertex colors.
+/// Hits of the kind [`SurfaceKind::Evaluated`](super::shade::SurfaceKind::Evaluated).
 #[derive(Default)]
 pub struct ScalarHits {
     position: Rows3,
