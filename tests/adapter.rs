@@ -12,6 +12,9 @@ const ADAPTER: &str = "WGRAY_TEST_ADAPTER";
 const WITHOUT_GPU: &str = "WGRAY_TEST_WITHOUT_GPU";
 
 /// Number of devices that the test threads share, because lavapipe compiles the kernels of a device one after another.
+///
+/// An adapter that [`ADAPTER`] selects has one device: SwiftShader compiles one kernel at a time in each process, and
+/// compiles it again for every device.
 const DEVICE_COUNT: usize = 4;
 
 /// Number of threads that use each device.
@@ -23,8 +26,13 @@ struct DeviceIndex(usize);
 impl DeviceIndex {
     /// Selects a device with the fewest users.
     fn select() -> DeviceIndex {
+        let device_count = if std::env::var_os(ADAPTER).is_some() {
+            1
+        } else {
+            DEVICE_COUNT
+        };
         let users = |index: &usize| USERS[*index].load(Ordering::Relaxed);
-        let index = (0..DEVICE_COUNT).min_by_key(users).expect("a device");
+        let index = (0..device_count).min_by_key(users).expect("a device");
         USERS[index].fetch_add(1, Ordering::Relaxed);
         DeviceIndex(index)
     }

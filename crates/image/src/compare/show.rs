@@ -57,7 +57,7 @@ enum Source<'a> {
     Numbers(Vec<([&'a Plane; 2], f64, f64)>),
 }
 
-/// Returns the factor by which an error image subsamples images of this size; 1 if neither side exceeds [`MAX_SIDE`]
+/// Returns the factor by which an error image subsamples images of this size; 1 if neither side exceeds 4,096
 /// pixels.
 pub fn step(picture: &Picture) -> usize {
     (picture.width.max(picture.height) as usize).div_ceil(MAX_SIDE)
