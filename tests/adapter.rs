@@ -107,8 +107,8 @@ pub const KNOWN_DIFFERENCES: &[KnownDifference] = &[
     swiftshader("grid_sample", ROUNDED_TWICE, 0.0014),
     swiftshader("rotated_grid_sample", ROUNDED_TWICE, 0.0014),
     swiftshader("jittered_sample", ROUNDED_TWICE, 0.0065),
-    swiftshader("sample_square", ROUNDED_TWICE, 0.0008),
-    swiftshader("filter_offset", ROUNDED_TWICE, 0.0115),
+    swiftshader("sample_square", ROUNDED_TWICE, 0.0009),
+    swiftshader("filter_offset", ROUNDED_TWICE, 0.012),
 ];
 
 /// The driver rounds twice when it converts these integers to floats. Indices in scenes are below 2^31, so
