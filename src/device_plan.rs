@@ -6,10 +6,10 @@ use wgray_render::records::Packed;
 
 use crate::context::Context;
 use crate::device::{Device, DeviceInfo};
+use crate::device_cost::{Workload, faster_on_cpu};
 use crate::error::RenderError;
 #[cfg(feature = "gpu")]
 use crate::open::choice_of;
-use crate::open::faster_on_cpu;
 #[cfg(not(feature = "gpu"))]
 use crate::open::gpu_missing;
 
@@ -23,7 +23,7 @@ pub struct DevicePlan {
     pub adapter: Option<(gpu::GpuInfo, gpu::KernelPlan)>,
 }
 
-/// Returns the device that a render would use. If this device cannot be opened or has too little memory, a render falls
+/// Returns the device that a render of the full image would use. If this device cannot be opened or has too little memory, a render falls
 /// back to the next device or to the CPU.
 ///
 /// # Errors
@@ -42,7 +42,7 @@ pub fn plan_device(scene: &Packed, device: &Device) -> Result<DevicePlan, Render
             return Ok(on_cpu("this build has no GPU support (feature \"gpu\")".to_owned()));
         }
         Device::Auto => {
-            if let Some(reason) = faster_on_cpu(&Context::new(), scene) {
+            if let Some(reason) = faster_on_cpu(&Context::new(), scene, Workload::image(scene)) {
                 return Ok(on_cpu(reason));
             }
         }
@@ -59,7 +59,7 @@ fn preferred(scene: &Packed, device: &Device) -> Result<DevicePlan, RenderError>
     let info = gpu::preferred(&choice_of(device))?;
     let reason = match (device, info.is_software()) {
         (Device::Named(_), _) => "requested",
-        (_, true) => "no hardware GPU found, and software Vulkan is faster than the CPU for a scene without a BVH",
+        (_, true) => "no hardware GPU found, and software Vulkan is faster than the CPU for this scene",
         _ => "the first hardware GPU",
     };
     let reason = match device {

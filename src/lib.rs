@@ -113,6 +113,7 @@ mod cancel;
 pub mod cli;
 mod context;
 mod device;
+mod device_cost;
 #[cfg(feature = "cli")]
 mod device_plan;
 pub mod error;

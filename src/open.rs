@@ -82,24 +82,6 @@ impl Engine {
     }
 }
 
-/// Returns the reason if the CPU is faster than any adapter for this scene; `docs/performance.md` has the measurements.
-#[cfg(feature = "gpu")]
-pub(crate) fn faster_on_cpu(context: &Context, scene: &Packed) -> Option<String> {
-    if scene.specialization.tlas_kinds == 0 {
-        return None;
-    }
-    let adapter = context.devices.best()?;
-    adapter.is_software().then(|| {
-        let name = &adapter.name;
-        format!("no GPU found, and the CPU traverses the BVH faster than {name}; use --device gpu to override")
-    })
-}
-
-#[cfg(not(feature = "gpu"))]
-pub(crate) fn faster_on_cpu(_: &Context, _: &Packed) -> Option<String> {
-    None
-}
-
 #[cfg(feature = "gpu")]
 pub(crate) fn choice_of(device: &Device) -> gpu::AdapterChoice {
     match device {

@@ -43,7 +43,7 @@ pub fn render(scene: &Scene, options: &Options) -> Result<Picture, Error> {
 fn open(scene: &Scene, options: &Options) -> Result<OpenScene, Error> {
     options.region(scene).map_err(Error::Option)?;
     let packed = Arc::new(options.pack(scene));
-    OpenScene::new(&Context::new(), packed, options, &mut warnings())
+    OpenScene::new(&Context::new(), packed, options, 1, &mut warnings())
 }
 
 pub(crate) fn render_with(renderer: Renderer, scene: &Scene, options: &Options) -> Result<Picture, Error> {

@@ -13,8 +13,9 @@ use wgray_render::records::Packed;
 
 use crate::context::Context;
 use crate::device::{Device, DeviceInfo};
+use crate::device_cost::{Workload, faster_on_cpu};
 use crate::error::{Error, RenderError};
-use crate::open::{AcceptAdapter, Engine, faster_on_cpu, open_adapter};
+use crate::open::{AcceptAdapter, Engine, open_adapter};
 use crate::options::Options;
 
 /// Prefix of messages that explain why the CPU is used.
@@ -86,7 +87,7 @@ pub struct Renderer<'a> {
 }
 
 impl OpenScene {
-    /// Opens a device for a scene. With [`Device::Auto`] the CPU renders if no adapter exists, if the scene is too
+    /// Opens a device for `images` images of a scene. With [`Device::Auto`] the CPU renders if no adapter exists, if it is faster, if the scene is too
     /// large for the adapter, or if the adapter is lost permanently; `on_fault` reports the reason.
     ///
     /// # Errors
@@ -97,10 +98,14 @@ impl OpenScene {
         context: &Context,
         scene: Arc<Packed>,
         options: &Options,
+        images: u32,
         on_fault: &mut FaultHandler,
     ) -> Result<OpenScene, Error> {
         let cpu_reason = match options.device {
-            Device::Auto => faster_on_cpu(context, &scene).map(|reason| format!("{ON_CPU}{reason}")),
+            Device::Auto => {
+                let workload = Workload::new(&scene, options, images);
+                faster_on_cpu(context, &scene, workload).map(|reason| format!("{ON_CPU}{reason}"))
+            }
             _ => None,
         };
         let mut open = OpenScene {
@@ -148,6 +153,13 @@ impl OpenScene {
         (&self.device, self.exact_rounding) == requested
             && self.lost.is_none()
             && self.engine.scene().film_layout() == film_layout
+    }
+
+    /// Returns false if [`Device::Auto`] selected the CPU for less work, and an adapter is faster for these images.
+    pub fn is_fast_enough(&self, options: &Options, images: u32) -> bool {
+        let scene = self.engine.scene();
+        let workload = Workload::new(scene, options, images);
+        self.cpu_reason.is_none() || faster_on_cpu(&self.context, scene, workload).is_some()
     }
 
     /// Closes the scene and returns it. The device stays open in the context.

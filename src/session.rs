@@ -19,6 +19,9 @@ use crate::render::{ImageSetup, Progressive, render_progressive_with, render_wit
 use crate::renderer::{FaultHandler, OpenScene, Renderer, warnings};
 use crate::task::{Task, spawn_thread};
 
+/// Number of images for which a session selects its device.
+const IMAGES: u32 = 16;
+
 /// A scene to be rendered several times. The first render packs the scene (BVHs, textures, tables of the environment)
 /// and opens the device; later renders reuse both. Every image has the bits of [`render`](crate::render()).
 ///
@@ -39,6 +42,8 @@ use crate::task::{Task, spawn_thread};
 pub struct Session {
     context: Context,
     scene: Arc<Scene>,
+    /// Number of images that the device is selected for.
+    images: u32,
     state: SceneState,
     /// The preparation of a cancelled render, which continues in the background; the next render uses its result.
     cancelled: Option<Receiver<(SceneState, Result<ImageSetup, Error>)>>,
@@ -50,9 +55,17 @@ impl Session {
         Session {
             context: context.clone(),
             scene: scene.into(),
+            images: IMAGES,
             state: SceneState::default(),
             cancelled: None,
         }
+    }
+
+    /// Selects the device for `images` images.
+    #[cfg(feature = "cli")]
+    pub(crate) fn with_images(mut self, images: usize) -> Session {
+        self.images = u32::try_from(images).unwrap_or(u32::MAX);
+        self
     }
 
     /// Returns the scene, with the current camera.
@@ -151,6 +164,7 @@ impl Session {
         let mut worker = Session {
             context: self.context.clone(),
             scene: Arc::clone(&self.scene),
+            images: self.images,
             state: std::mem::take(&mut self.state),
             cancelled: self.cancelled.take(),
         };
@@ -183,9 +197,9 @@ impl Session {
             return Err(RenderError::Cancelled.into());
         }
         let (context, scene, options) = (self.context.clone(), Arc::clone(&self.scene), options.clone());
-        let mut state = std::mem::take(&mut self.state);
+        let (mut state, images) = (std::mem::take(&mut self.state), self.images);
         let prepare = move || {
-            let setup = state.prepare(&context, &scene, &options);
+            let setup = state.prepare(&context, &scene, &options, images);
             (state, setup)
         };
         let is_pool_thread = rayon::current_thread_index().is_some();
@@ -245,7 +259,8 @@ impl Session {
         if let Some(cancelled) = self.cancelled.take() {
             self.receive(cancelled, &CancelToken::new())?.ok();
         }
-        self.state.renderer(&self.context, &self.scene, options, on_fault)
+        self.state
+            .renderer(&self.context, &self.scene, options, self.images, on_fault)
     }
 
     /// Returns the scene, packed for these options.
@@ -298,8 +313,14 @@ impl SceneState {
         }
     }
 
-    fn prepare(&mut self, context: &Context, scene: &Scene, options: &Options) -> Result<ImageSetup, Error> {
-        let mut renderer = self.renderer(context, scene, options, warnings())?;
+    fn prepare(
+        &mut self,
+        context: &Context,
+        scene: &Scene,
+        options: &Options,
+        images: u32,
+    ) -> Result<ImageSetup, Error> {
+        let mut renderer = self.renderer(context, scene, options, images, warnings())?;
         ImageSetup::new(scene, &mut renderer, options)
     }
 
@@ -308,15 +329,16 @@ impl SceneState {
         context: &Context,
         scene: &Scene,
         options: &Options,
+        images: u32,
         mut on_fault: FaultHandler<'a>,
     ) -> Result<Renderer<'a>, Error> {
         let film_layout = options.film_layout(scene);
         let open = match self.open.take() {
-            Some(open) if open.suits(options, film_layout) => open,
+            Some(open) if open.suits(options, film_layout) && open.is_fast_enough(options, images) => open,
             other => {
                 self.open = other;
                 let packed = self.packed(scene, options);
-                OpenScene::new(context, packed, options, &mut on_fault)?
+                OpenScene::new(context, packed, options, images, &mut on_fault)?
             }
         };
         self.packed = None;

@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 
 use wgray::error::RenderError;
-use wgray::{Aov, Device, Error, Options, Overrides, Scene};
+use wgray::{Aov, Device, Error, Options, Overrides, Region, Scene};
 
 use crate::{adapter, sources};
 
@@ -41,12 +41,44 @@ fn every_device_choice_gives_the_same_image_and_reports_the_device() {
         }
     }
     let first = wgray::adapters()[0].name.clone();
-    for choice in [Device::Auto, Device::Gpu, Device::Named("1".to_string())] {
+    // Software Vulkan takes longer to compile the kernel than the CPU to render this image.
+    let automatic = if device.info.is_software() { "cpu" } else { &first };
+    let first_adapter = Device::Named("1".to_string());
+    for (choice, expected) in [
+        (Device::Auto, automatic),
+        (Device::Gpu, &first),
+        (first_adapter, &first),
+    ] {
         let picture = wgray::render(&scene, &options_for(choice)).unwrap();
-        assert_eq!(picture.device().name, first);
+        assert_eq!(picture.device().name, expected);
     }
     let error = wgray::render(&scene, &options_for(Device::from("abacus"))).unwrap_err();
     assert!(matches!(error, Error::Render(RenderError::NoDevice(_))), "{error:?}");
+}
+
+/// On software Vulkan, the CPU renders a crop of one pixel, and the adapter the full image and later crops.
+#[test]
+fn a_session_selects_the_device_again_for_more_work() {
+    let Some(device) = adapter::device() else { return };
+    let overrides = Overrides {
+        size: Some((200, 200)),
+        ..Overrides::default()
+    };
+    let scene = Scene::load_with(sources::path("scenes/cornell.toml"), &overrides).expect("a valid scene");
+    let mut session = wgray::Session::new(&wgray::Context::new(), scene);
+    let crop = Options {
+        crop: Some(Region::whole(1, 1)),
+        ..Options::default()
+    };
+    let mut render = |options: &Options| session.render(options).expect("an image");
+    let [first, full, last] = [&crop, &Options::default(), &crop].map(&mut render);
+    if device.info.is_software() {
+        assert_eq!(first.device().name, "cpu");
+        assert_ne!(full.device().name, "cpu");
+    }
+    assert_eq!(last.device(), full.device());
+    assert!(!adapter::bit_exact(device) || first.pixels() == last.pixels());
+    assert_eq!(last.pixels().colors.first(), full.pixels().colors.first());
 }
 
 #[test]

@@ -119,20 +119,10 @@ fn info_selects_the_same_device_as_a_render() {
     let folder = TestFolder::new();
     let cornell = project_scene("cornell.toml");
     for scene in ["small.toml", &cornell, &project_scene("twisted-tube.toml")] {
-        let planned = info(&folder, &[scene]);
-        let result = folder.run(&[
-            "render",
-            scene,
-            "--spp",
-            "1",
-            "--size",
-            "8x6",
-            "-o",
-            "a.png",
-            "--stats",
-            "stats.json",
-            "-q",
-        ]);
+        let workload = [scene, "--spp", "1", "--size", "8x6"];
+        let planned = info(&folder, &workload);
+        let outputs = ["-o", "a.png", "--stats", "stats.json", "-q"];
+        let result = folder.run(&[&["render"][..], &workload, &outputs].concat());
         assert_eq!(result.code, 0, "{}", result.stderr);
         let stats: Value = serde_json::from_slice(&folder.read("stats.json")).unwrap();
         assert_eq!(planned["device"]["name"], stats["device"], "{scene}");
@@ -141,6 +131,8 @@ fn info_selects_the_same_device_as_a_render() {
             "{planned}"
         );
     }
+    let large = info(&folder, &[&cornell]);
+    assert_ne!(large["device"]["name"], "cpu", "{large}");
     let on_gpu = info(&folder, &["small.toml", "--device", "gpu"]);
     assert!(on_gpu["memory"]["scene_on_device"].as_u64() > Some(500), "{on_gpu}");
     assert_eq!(on_gpu["kernel"]["entry"], "render");

@@ -152,6 +152,9 @@ impl TestFolder {
             .args(arguments)
             .envs(driver.environment(&self.path("log")))
             .envs(faults.iter().copied());
+        if arguments.contains(&"auto") {
+            command.env("FAULTS_GPU", "1"); // on software Vulkan, `auto` selects the CPU for small images
+        }
         command
     }
 

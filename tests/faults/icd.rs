@@ -7,6 +7,7 @@
 //! | --- | --- |
 //! | `FAULTS_DRIVER` | path of the library of the driver to forward to |
 //! | `FAULTS_ITSELF` | path of this library, which stays loaded to keep its counters |
+//! | `FAULTS_GPU` | if set, the driver's device is a discrete GPU, so that `--device auto` selects it for any scene |
 //! | `FAULTS_LOG` | path of a file to which a line per event is appended |
 //! | `FAULTS_LOSE` | numbers of submits that lose the device, such as `2,7`; `every:N`: the N-th submit of each device |
 //! | `FAULTS_LOSE_IN` | function that first returns `VK_ERROR_DEVICE_LOST`: `submit`, `status` (fence, semaphore), `wait` |
@@ -128,6 +129,9 @@ macro_rules! replacements {
 
 replacements! {
     b"vkGetDeviceProcAddr" => GET_DEVICE_PROC_ADDR, get_device_proc_addr: fn(Handle, *const c_char) -> Function;
+    b"vkGetPhysicalDeviceProperties" => PROPERTIES, get_properties: fn(Handle, *mut Properties) -> ();
+    b"vkGetPhysicalDeviceProperties2" b"vkGetPhysicalDeviceProperties2KHR" =>
+        PROPERTIES_2, get_properties_2: fn(Handle, *mut Properties2) -> ();
     b"vkCreateDevice" => CREATE_DEVICE, create_device: fn(Handle, Handle, Handle, *mut Handle) -> Code;
     b"vkAllocateMemory" => ALLOCATE_MEMORY, allocate_memory: fn(Handle, *const Allocation, Handle, Handle) -> Code;
     b"vkQueueSubmit" => QUEUE_SUBMIT, queue_submit: fn(Handle, u32, Handle, u64) -> Code;
@@ -148,6 +152,45 @@ struct Allocation {
     next: *const c_void,
     size: u64,
     memory_type: u32,
+}
+
+/// The start of `VkPhysicalDeviceProperties`.
+#[repr(C)]
+struct Properties {
+    api_version: u32,
+    driver_version: u32,
+    vendor: u32,
+    device: u32,
+    device_type: u32,
+}
+
+/// The start of `VkPhysicalDeviceProperties2`.
+#[repr(C)]
+struct Properties2 {
+    kind: i32,
+    next: *mut c_void,
+    properties: Properties,
+}
+
+fn set_device_type(properties: &mut Properties) {
+    const DISCRETE_GPU: u32 = 2;
+    if std::env::var_os("FAULTS_GPU").is_some() {
+        properties.device_type = DISCRETE_GPU;
+    }
+}
+
+unsafe extern "system" fn get_properties(physical: Handle, properties: *mut Properties) {
+    unsafe {
+        real::get_properties()(physical, properties);
+        set_device_type(&mut *properties);
+    }
+}
+
+unsafe extern "system" fn get_properties_2(physical: Handle, properties: *mut Properties2) {
+    unsafe {
+        real::get_properties_2()(physical, properties);
+        set_device_type(&mut (*properties).properties);
+    }
 }
 
 unsafe extern "system" fn get_device_proc_addr(device: Handle, name: *const c_char) -> Function {

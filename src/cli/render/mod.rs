@@ -103,7 +103,7 @@ impl<'a> Job<'a> {
         Ok(Job {
             args,
             log,
-            session: Session::new(&crate::Context::new(), scene),
+            session: Session::new(&crate::Context::new(), scene).with_images(frames.len()),
             fps,
             frames,
         })
