@@ -3,8 +3,8 @@
 /// The requested device. Without the feature `gpu` only the CPU is available.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum Device {
-    /// A hardware GPU, if available. Otherwise the faster of software Vulkan and the CPU, as predicted for the scene and
-    /// the number of samples. A session assumes 16 images.
+    /// A hardware GPU, if available. Otherwise software Vulkan or the CPU, whichever is predicted to render the image in
+    /// less time.
     #[default]
     Auto,
     /// The CPU, without any driver.

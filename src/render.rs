@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use crate::context::Context;
 use crate::device::DeviceInfo;
+use crate::device_cost::Workload;
 use crate::error::{Error, RenderError};
 use crate::image::{Aov, AovSource, Layout};
 use crate::options::Options;
@@ -43,7 +44,8 @@ pub fn render(scene: &Scene, options: &Options) -> Result<Picture, Error> {
 fn open(scene: &Scene, options: &Options) -> Result<OpenScene, Error> {
     options.region(scene).map_err(Error::Option)?;
     let packed = Arc::new(options.pack(scene));
-    OpenScene::new(&Context::new(), packed, options, 1, &mut warnings())
+    let workload = Workload::new(&packed, options, 1);
+    OpenScene::new(&Context::new(), packed, options, workload, &mut warnings())
 }
 
 pub(crate) fn render_with(renderer: Renderer, scene: &Scene, options: &Options) -> Result<Picture, Error> {

@@ -13,13 +13,10 @@ use wgray_render::records::Packed;
 
 use crate::context::Context;
 use crate::device::{Device, DeviceInfo};
-use crate::device_cost::{Workload, faster_on_cpu};
+use crate::device_cost::{Selection, Workload, select_without_gpu};
 use crate::error::{Error, RenderError};
 use crate::open::{AcceptAdapter, Engine, open_adapter};
 use crate::options::Options;
-
-/// Prefix of messages that explain why the CPU is used.
-const ON_CPU: &str = "rendering on the CPU: ";
 
 /// The recovery from a fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -67,8 +64,8 @@ pub struct OpenScene {
     exact_rounding: bool,
     engine: Engine,
     info: DeviceInfo,
-    /// Why [`Device::Auto`] selected the CPU although an adapter exists.
-    cpu_reason: Option<String>,
+    /// The selection of [`Device::Auto`] between the CPU and software Vulkan.
+    selection: Option<Selection>,
     /// Maximum size of a film in pixels. The bands depend on it, so a replacement device must support this size.
     largest_film: u64,
     /// The lost device and the error message, while no device is open.
@@ -87,8 +84,9 @@ pub struct Renderer<'a> {
 }
 
 impl OpenScene {
-    /// Opens a device for `images` images of a scene. With [`Device::Auto`] the CPU renders if no adapter exists, if it is faster, if the scene is too
-    /// large for the adapter, or if the adapter is lost permanently; `on_fault` reports the reason.
+    /// Opens a device for a scene. With [`Device::Auto`] the CPU renders if no adapter exists, if the CPU is faster for
+    /// this workload, if the scene is too large for the adapter, or if the adapter is lost permanently; `on_fault`
+    /// reports the reason.
     ///
     /// # Errors
     ///
@@ -98,14 +96,11 @@ impl OpenScene {
         context: &Context,
         scene: Arc<Packed>,
         options: &Options,
-        images: u32,
+        workload: Workload,
         on_fault: &mut FaultHandler,
     ) -> Result<OpenScene, Error> {
-        let cpu_reason = match options.device {
-            Device::Auto => {
-                let workload = Workload::new(&scene, options, images);
-                faster_on_cpu(context, &scene, workload).map(|reason| format!("{ON_CPU}{reason}"))
-            }
+        let selection = match options.device {
+            Device::Auto => select_without_gpu(context, &scene, workload),
             _ => None,
         };
         let mut open = OpenScene {
@@ -114,7 +109,7 @@ impl OpenScene {
             exact_rounding: options.exact_rounding,
             engine: Engine::cpu(scene),
             info: DeviceInfo::cpu(),
-            cpu_reason,
+            selection,
             largest_film: 0,
             lost: None,
             losses: 0,
@@ -123,7 +118,7 @@ impl OpenScene {
         };
         let on_cpu = match &options.device {
             Device::Cpu => true,
-            Device::Auto => !cfg!(feature = "gpu") || open.cpu_reason.is_some(),
+            Device::Auto => !cfg!(feature = "gpu") || open.cpu_reason().is_some(),
             _ => false,
         };
         if !on_cpu {
@@ -137,8 +132,8 @@ impl OpenScene {
             }
         }
         open.largest_film = open.engine.backend().largest_film();
-        let reason = match (&open.cpu_reason, &options.device) {
-            (Some(reason), _) => reason.strip_prefix(ON_CPU).unwrap_or(reason),
+        let reason = match (&open.selection, &options.device) {
+            (Some(selection), _) => &selection.reason,
             (None, Device::Auto) if open.info == DeviceInfo::cpu() => "no adapter can render the scene",
             (None, Device::Auto) => "it is the best device",
             (None, _) => "it was requested",
@@ -156,10 +151,15 @@ impl OpenScene {
     }
 
     /// Returns false if [`Device::Auto`] selected the CPU for less work, and an adapter is faster for these images.
-    pub fn is_fast_enough(&self, options: &Options, images: u32) -> bool {
-        let scene = self.engine.scene();
-        let workload = Workload::new(scene, options, images);
-        self.cpu_reason.is_none() || faster_on_cpu(&self.context, scene, workload).is_some()
+    pub fn is_fast_enough(&self, workload: Workload) -> bool {
+        let select = || select_without_gpu(&self.context, self.engine.scene(), workload);
+        self.cpu_reason().is_none() || select().is_none_or(|selection| selection.is_cpu)
+    }
+
+    /// Returns the reason why [`Device::Auto`] selected the CPU although an adapter exists.
+    fn cpu_reason(&self) -> Option<&str> {
+        let selection = self.selection.as_ref().filter(|selection| selection.is_cpu);
+        selection.map(|selection| &*selection.reason)
     }
 
     /// Closes the scene and returns it. The device stays open in the context.
@@ -232,7 +232,7 @@ impl OpenScene {
             let accept = |name: &str, is_software: bool| match &self.device {
                 _ if name == lost => true,
                 Device::Gpu => is_last,
-                Device::Auto => is_last && !is_software, // the CPU is faster
+                Device::Auto => is_last && !is_software, // the CPU is about as fast as software Vulkan
                 Device::Named(_) | Device::Cpu => false,
             };
             match self.open_adapter(Some(&accept)) {
@@ -307,10 +307,10 @@ impl<'a> Renderer<'a> {
         Renderer { open, on_fault }
     }
 
-    /// Returns the reason why [`Device::Auto`] chose the CPU although an adapter exists.
+    /// Returns the reason why [`Device::Auto`] selected the CPU although an adapter exists.
     #[cfg(feature = "cli")]
     pub fn cpu_reason(&self) -> Option<&str> {
-        self.open.cpu_reason.as_deref()
+        self.open.cpu_reason()
     }
 
     pub fn info(&self) -> &DeviceInfo {

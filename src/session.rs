@@ -11,6 +11,7 @@ use wgray_scene::{Camera, Scene};
 
 use crate::cancel::CancelToken;
 use crate::context::Context;
+use crate::device_cost::Workload;
 use crate::error::{Error, RenderError};
 use crate::options::{Options, set_film_layout};
 use crate::picture::Picture;
@@ -19,11 +20,13 @@ use crate::render::{ImageSetup, Progressive, render_progressive_with, render_wit
 use crate::renderer::{FaultHandler, OpenScene, Renderer, warnings};
 use crate::task::{Task, spawn_thread};
 
-/// Number of images for which a session selects its device.
-const IMAGES: u32 = 16;
+/// Number of images for which [`Device::Auto`](crate::Device::Auto) selects the device of a session.
+const IMAGES: usize = 16;
 
 /// A scene to be rendered several times. The first render packs the scene (BVHs, textures, tables of the environment)
 /// and opens the device; later renders reuse both. Every image has the bits of [`render`](crate::render()).
+///
+/// [`Device::Auto`](crate::Device::Auto) selects a device for 16 images of the scene.
 ///
 /// ```
 /// # fn main() -> Result<(), wgray::Error> {
@@ -42,8 +45,8 @@ const IMAGES: u32 = 16;
 pub struct Session {
     context: Context,
     scene: Arc<Scene>,
-    /// Number of images that the device is selected for.
-    images: u32,
+    /// The work that the device is selected for, if it is known.
+    workload: Option<Workload>,
     state: SceneState,
     /// The preparation of a cancelled render, which continues in the background; the next render uses its result.
     cancelled: Option<Receiver<(SceneState, Result<ImageSetup, Error>)>>,
@@ -55,17 +58,16 @@ impl Session {
         Session {
             context: context.clone(),
             scene: scene.into(),
-            images: IMAGES,
+            workload: None,
             state: SceneState::default(),
             cancelled: None,
         }
     }
 
-    /// Selects the device for `images` images.
+    /// Sets the work that [`Device::Auto`](crate::Device::Auto) selects a device for.
     #[cfg(feature = "cli")]
-    pub(crate) fn with_images(mut self, images: usize) -> Session {
-        self.images = u32::try_from(images).unwrap_or(u32::MAX);
-        self
+    pub(crate) fn expect(&mut self, workload: Workload) {
+        self.workload = Some(workload);
     }
 
     /// Returns the scene, with the current camera.
@@ -164,7 +166,7 @@ impl Session {
         let mut worker = Session {
             context: self.context.clone(),
             scene: Arc::clone(&self.scene),
-            images: self.images,
+            workload: self.workload,
             state: std::mem::take(&mut self.state),
             cancelled: self.cancelled.take(),
         };
@@ -197,9 +199,9 @@ impl Session {
             return Err(RenderError::Cancelled.into());
         }
         let (context, scene, options) = (self.context.clone(), Arc::clone(&self.scene), options.clone());
-        let (mut state, images) = (std::mem::take(&mut self.state), self.images);
+        let (mut state, workload) = (std::mem::take(&mut self.state), self.workload);
         let prepare = move || {
-            let setup = state.prepare(&context, &scene, &options, images);
+            let setup = state.prepare(&context, &scene, &options, workload);
             (state, setup)
         };
         let is_pool_thread = rayon::current_thread_index().is_some();
@@ -260,7 +262,7 @@ impl Session {
             self.receive(cancelled, &CancelToken::new())?.ok();
         }
         self.state
-            .renderer(&self.context, &self.scene, options, self.images, on_fault)
+            .renderer(&self.context, &self.scene, options, self.workload, on_fault)
     }
 
     /// Returns the scene, packed for these options.
@@ -318,9 +320,9 @@ impl SceneState {
         context: &Context,
         scene: &Scene,
         options: &Options,
-        images: u32,
+        workload: Option<Workload>,
     ) -> Result<ImageSetup, Error> {
-        let mut renderer = self.renderer(context, scene, options, images, warnings())?;
+        let mut renderer = self.renderer(context, scene, options, workload, warnings())?;
         ImageSetup::new(scene, &mut renderer, options)
     }
 
@@ -329,16 +331,18 @@ impl SceneState {
         context: &Context,
         scene: &Scene,
         options: &Options,
-        images: u32,
+        workload: Option<Workload>,
         mut on_fault: FaultHandler<'a>,
     ) -> Result<Renderer<'a>, Error> {
         let film_layout = options.film_layout(scene);
+        let workload_of = |packed: &Packed| workload.unwrap_or_else(|| Workload::new(packed, options, IMAGES));
         let open = match self.open.take() {
-            Some(open) if open.suits(options, film_layout) && open.is_fast_enough(options, images) => open,
+            Some(open) if open.suits(options, film_layout) && open.is_fast_enough(workload_of(open.scene())) => open,
             other => {
                 self.open = other;
                 let packed = self.packed(scene, options);
-                OpenScene::new(context, packed, options, images, &mut on_fault)?
+                let workload = workload_of(&packed);
+                OpenScene::new(context, packed, options, workload, &mut on_fault)?
             }
         };
         self.packed = None;

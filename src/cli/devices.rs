@@ -15,8 +15,13 @@ fn list(out: &mut impl Write) -> io::Result<()> {
     let adapters = gpu::adapters();
     list_adapters(out, &adapters)?;
     list_cpu(out)?;
-    let chosen = adapters.first().map_or("cpu", |info| &info.name);
-    writeln!(out, "auto selects: {chosen}")?;
+    match adapters.first() {
+        Some(info) if info.is_lavapipe() => {
+            writeln!(out, "auto selects: {}, or cpu if predicted to be faster", info.name)?;
+        }
+        Some(info) if !info.is_software() => writeln!(out, "auto selects: {}", info.name)?,
+        _ => writeln!(out, "auto selects: cpu")?,
+    }
     if adapters.is_empty() {
         writeln!(out, "{}", wgray_render::error::HOW_TO_GET_VULKAN)?;
     }

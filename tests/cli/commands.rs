@@ -11,6 +11,13 @@ fn devices_are_listed() {
         assert!(result.stdout.contains(word), "{word} is missing in {}", result.stdout);
     }
     assert!(!result.stdout.contains("auto selects: cpu"));
+    if result.stdout.contains("auto selects: llvmpipe") {
+        assert!(
+            result.stdout.ends_with(", or cpu if predicted to be faster\n"),
+            "{}",
+            result.stdout
+        );
+    }
     let without_driver = folder.run_with(&["devices"], &NO_DRIVER);
     assert_eq!(without_driver.code, 0);
     assert!(

@@ -131,8 +131,13 @@ fn info_selects_the_same_device_as_a_render() {
             "{planned}"
         );
     }
-    let large = info(&folder, &[&cornell]);
+    let large = info(&folder, &[&cornell, "--spp", "65536"]);
     assert_ne!(large["device"]["name"], "cpu", "{large}");
+    let reason = large["device"]["why"].as_str().unwrap();
+    assert!(
+        !reason.contains("no GPU") || reason.contains(" the CPU is predicted to take "),
+        "{reason}"
+    );
     let on_gpu = info(&folder, &["small.toml", "--device", "gpu"]);
     assert!(on_gpu["memory"]["scene_on_device"].as_u64() > Some(500), "{on_gpu}");
     assert_eq!(on_gpu["kernel"]["entry"], "render");

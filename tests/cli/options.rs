@@ -131,7 +131,7 @@ fn devices_are_selected_by_kind_and_by_part_of_a_name() {
 #[test]
 fn exact_rounding_does_not_change_images_of_software_vulkan_and_the_cpu() {
     let folder = TestFolder::new();
-    for device in ["auto", "cpu"] {
+    for device in ["gpu", "cpu"] {
         let arguments = ["render", "small.toml", "--device", device, "-o"];
         folder.run_quietly(&[&arguments[..], &["default.exr"]].concat());
         folder.run_quietly(&[&arguments[..], &["exact.exr", "--exact-rounding"]].concat());
@@ -143,7 +143,7 @@ fn exact_rounding_does_not_change_images_of_software_vulkan_and_the_cpu() {
 fn any_number_of_threads_gives_the_same_image() {
     let folder = TestFolder::new();
     folder.run_quietly(&["render", "small.toml", "--reproducible", "-o", "all.exr"]);
-    for (device, threads) in [("auto", "1"), ("cpu", "1"), ("cpu", "3")] {
+    for (device, threads) in [("gpu", "1"), ("cpu", "1"), ("cpu", "3")] {
         folder.run_quietly(&[
             "render",
             "small.toml",

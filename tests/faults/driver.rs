@@ -150,11 +150,11 @@ impl TestFolder {
             .current_dir(self.folder())
             .args(["render", "scene.toml", "-o", "out.exr", "--aov", "normal"])
             .args(arguments)
-            .envs(driver.environment(&self.path("log")))
-            .envs(faults.iter().copied());
+            .envs(driver.environment(&self.path("log")));
         if arguments.contains(&"auto") {
             command.env("FAULTS_GPU", "1"); // on software Vulkan, `auto` selects the CPU for small images
         }
+        command.envs(faults.iter().copied());
         command
     }
 

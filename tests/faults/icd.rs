@@ -7,7 +7,7 @@
 //! | --- | --- |
 //! | `FAULTS_DRIVER` | path of the library of the driver to forward to |
 //! | `FAULTS_ITSELF` | path of this library, which stays loaded to keep its counters |
-//! | `FAULTS_GPU` | if set, the driver's device is a discrete GPU, so that `--device auto` selects it for any scene |
+//! | `FAULTS_GPU` | if 1, the driver's device is a discrete GPU, so that `--device auto` selects it for any scene |
 //! | `FAULTS_LOG` | path of a file to which a line per event is appended |
 //! | `FAULTS_LOSE` | numbers of submits that lose the device, such as `2,7`; `every:N`: the N-th submit of each device |
 //! | `FAULTS_LOSE_IN` | function that first returns `VK_ERROR_DEVICE_LOST`: `submit`, `status` (fence, semaphore), `wait` |
@@ -174,7 +174,7 @@ struct Properties2 {
 
 fn set_device_type(properties: &mut Properties) {
     const DISCRETE_GPU: u32 = 2;
-    if std::env::var_os("FAULTS_GPU").is_some() {
+    if std::env::var_os("FAULTS_GPU").is_some_and(|value| value == "1") {
         properties.device_type = DISCRETE_GPU;
     }
 }

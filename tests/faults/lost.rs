@@ -166,6 +166,13 @@ fn a_permanent_device_loss_is_an_error_or_falls_back_to_the_cpu() {
     let result = folder.run_on(driver, &["--device", "auto", "--quiet"], &faults);
     assert_eq!((result.code, result.stderr.as_str()), (0, ""));
     assert!(result.picture == Some(expected.clone()));
+    // On software Vulkan, `auto` selects the adapter for enough samples.
+    let many_samples = ["--spp", "8192", "--threads", "1"];
+    let expected_of_many = folder.render_expected(driver, &many_samples);
+    let software = [&faults[..], &[("FAULTS_GPU", "0")]].concat();
+    let result = folder.run_on(driver, &[&AUTO[..], &many_samples].concat(), &software);
+    assert_reopened(&result, 1, &["warning: rendering on the CPU: llvmpipe"]);
+    assert!(result.code == 0 && result.picture == Some(expected_of_many));
     // The program waits for a device that cannot be re-opened at first.
     let faults = [("FAULTS_LOSE", "2"), ("FAULTS_REFUSE", "2")];
     let result = folder.run_on(driver, &GPU, &faults);

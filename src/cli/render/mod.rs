@@ -39,7 +39,7 @@ pub fn run(args: Args, start: Instant) -> anyhow::Result<ExitCode> {
     info!(seconds = start.elapsed().as_secs_f64(), "scene read");
     let (mut start, mut skipped) = (start, 0);
     let count = job.frames.len();
-    for (frame, outputs) in std::mem::take(&mut job.frames) {
+    for (i, (frame, outputs)) in std::mem::take(&mut job.frames).into_iter().enumerate() {
         let exists = args.skip_existing && outputs.exist();
         if exists && outputs.part().is_none() {
             skipped += 1;
@@ -47,6 +47,7 @@ pub fn run(args: Args, start: Instant) -> anyhow::Result<ExitCode> {
         }
         job.select_frame(frame)?;
         let plan = Plan::resolve(&args, &mut job.session, &job.log, frame, start)?;
+        job.session.expect(plan.workload(count - i));
         outputs.check_size(plan.region())?;
         if let Some(part) = outputs.part().filter(|_| exists) {
             if plan.is_done(part) {
@@ -103,7 +104,7 @@ impl<'a> Job<'a> {
         Ok(Job {
             args,
             log,
-            session: Session::new(&crate::Context::new(), scene).with_images(frames.len()),
+            session: Session::new(&crate::Context::new(), scene),
             fps,
             frames,
         })

@@ -26,6 +26,7 @@ use crate::cli::picture_options::PictureOptions;
 use crate::cli::progress::{self, Mode};
 use crate::cli::signal::Stop;
 use crate::cli::{Interrupted, Usage, cli_error, option_error};
+use crate::device_cost::Workload;
 
 /// Maximum samples per pixel with a noise limit, unless `--spp` is given.
 const MAX_NOISE_SAMPLES: u32 = 4096;
@@ -43,6 +44,7 @@ pub struct Plan<'a> {
     /// The noise at which rendering stops.
     pub noise: Option<f64>,
     pub deadline: Option<Instant>,
+    time_limit: Option<Duration>,
     /// Write intermediate images.
     pub preview: bool,
     pub checkpoint: Option<PathBuf>,
@@ -100,6 +102,7 @@ impl<'a> Plan<'a> {
             },
             noise: args.noise,
             deadline: args.time_limit.and_then(|limit| start.checked_add(limit)),
+            time_limit: args.time_limit,
             preview: args.preview,
             checkpoint: args.checkpoint(frame)?,
             checkpoint_interval: args.checkpoint_interval,
@@ -129,6 +132,21 @@ impl<'a> Plan<'a> {
             middle_depth,
             max_samples: self.samples,
             view: self.view,
+        }
+    }
+
+    /// Returns the workload of this image and of the images that follow.
+    pub fn workload(&self, images: usize) -> Workload {
+        let workload = Workload::new(&self.scene, &self.options, images);
+        Workload {
+            pixels: self.region().pixels(),
+            samples: if self.noise.is_some() {
+                self.samples
+            } else {
+                workload.samples
+            },
+            time_limit: self.time_limit,
+            ..workload
         }
     }
 
@@ -204,7 +222,7 @@ impl<'a> Plan<'a> {
         });
         let renderer = renderer.map_err(cli_error)?;
         if let Some(reason) = renderer.cpu_reason() {
-            info!("{reason}");
+            info!("rendering on the CPU: {reason}");
         }
         Ok(renderer)
     }

@@ -47,6 +47,11 @@ impl GpuInfo {
     pub fn is_software(&self) -> bool {
         self.kind == SOFTWARE
     }
+
+    /// Returns true for Mesa's software driver.
+    pub fn is_lavapipe(&self) -> bool {
+        is_lavapipe(&self.name)
+    }
 }
 
 const SOFTWARE: &str = "software";

@@ -96,10 +96,7 @@ pub(super) fn parse_compression(
         },
     };
     if !rule.is_empty() {
-        return Err(GltfFault::key(
-            format!("{key}.byteStride"),
-            format!("{rule}, not {stride}"),
-        ));
+        return fault("byteStride", &stride, rule);
     }
     if mode != Mode::Attributes && filter != Filter::None {
         return fault("filter", &"a filter", "requires the mode ATTRIBUTES");
