@@ -46,7 +46,11 @@ impl DeviceInfo {
         let threads = rayon::current_num_threads();
         DeviceInfo {
             name: "cpu".to_owned(),
-            driver: format!("wgray {}, {threads} threads", env!("CARGO_PKG_VERSION")),
+            driver: format!(
+                "wgray {}, {threads} thread{}",
+                env!("CARGO_PKG_VERSION"),
+                if threads == 1 { "" } else { "s" }
+            ),
             interface: "cpu".to_owned(),
         }
     }

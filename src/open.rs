@@ -31,6 +31,10 @@ impl Engine {
         Engine::Cpu(Box::new(Cpu::new(scene)))
     }
 
+    pub(crate) fn is_cpu(&self) -> bool {
+        matches!(self, Engine::Cpu(_))
+    }
+
     pub(crate) fn backend(&mut self) -> &mut dyn Backend {
         match self {
             Engine::Cpu(cpu) => &mut **cpu,

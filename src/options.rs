@@ -14,7 +14,8 @@ use crate::device::Device;
 pub struct Options {
     /// The device that renders.
     pub device: Device,
-    /// The region to render; `None` renders the full image. The pixels are identical to those of the full image.
+    /// The region to render; `None` renders the full image. The pixels are identical to those of the full
+    /// image; denoised pixels differ near the edges of the region.
     pub crop: Option<Region>,
     /// The layers to render in addition to the radiance. Duplicates are ignored.
     pub aovs: Vec<Aov>,

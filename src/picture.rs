@@ -195,10 +195,15 @@ impl Picture {
     ///
     /// # Errors
     ///
-    /// The image does not have the layer, or the writer fails.
+    /// The image does not have the layer, the layer is [`Aov::Denoised`], which is the image of a PNG, or the writer
+    /// fails.
     pub fn write_layer_to(&self, layer: Aov, writer: impl Write + Seek, options: &SaveOptions) -> Result<(), Error> {
         if !self.layout.aovs.contains(&layer) {
             let rule = format!("the image does not have the layer {}", layer.name());
+            return Err(RenderError::Output(io::Error::new(io::ErrorKind::InvalidInput, rule)).into());
+        }
+        if !layer.has_file() {
+            let rule = format!("the layer {} is the image of a PNG: use write_to", layer.name());
             return Err(RenderError::Output(io::Error::new(io::ErrorKind::InvalidInput, rule)).into());
         }
         self.write_content(writer, (Format::Png, Some(layer)), options)

@@ -153,22 +153,25 @@ impl<'s> ProgressiveRender<'s> {
         if !rule.is_empty() {
             return Err(Error::Option(Problem::of("noise", format!("{limit} {rule}"))));
         }
+        let mut status = Status::Running;
         loop {
             let is_decision = self.bands.uniform_samples().is_some_and(is_decision);
             if is_decision && self.noise().is_some_and(|noise| noise.percentile_95 < limit) {
                 return Ok(Status::Converged);
             }
-            match self.step(cancel)? {
-                Status::Running => {}
-                status => return Ok(status),
+            if status != Status::Running {
+                return Ok(status);
             }
+            status = self.step(cancel)?;
         }
     }
 
-    /// Returns the noise of the image so far; `None` unless [`Options::noise`](crate::Options::noise) is set.
+    /// Returns the noise of the image so far, infinite for pixels with fewer than two samples; `None` unless
+    /// [`Options::noise`](crate::Options::noise) is set.
     pub fn noise(&self) -> Option<Noise> {
         let mut meter = NoiseMeter::new(self.setup.layout.view.exposure);
         self.bands.films(&mut |film| meter.add(&film));
+        meter.complete(self.setup.layout.region.pixels());
         self.film_layout.noise.then(|| meter.noise())
     }
 
@@ -219,7 +222,8 @@ impl<'s> ProgressiveRender<'s> {
         }
     }
 
-    /// Like [`ProgressiveRender::snapshot`], but reuses the memory of an earlier snapshot of this render.
+    /// Like [`ProgressiveRender::snapshot`], but reuses the memory of another image of the same size with the same
+    /// layers.
     pub fn snapshot_into(&self, picture: &mut Picture) {
         let layout = &self.setup.layout;
         if picture.film.region != layout.region || picture.film.film_layout() != self.film_layout {
@@ -229,6 +233,7 @@ impl<'s> ProgressiveRender<'s> {
         for list in picture.film.lists_mut() {
             list.fill(Default::default());
         }
+        picture.film.denoised.clear();
         self.copy_to(&mut picture.film);
         picture.hits.clone_from(&self.setup.hits);
         picture.layout.clone_from(layout);

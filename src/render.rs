@@ -13,14 +13,15 @@ use crate::picture::Picture;
 use crate::renderer::{OpenScene, Renderer, warnings};
 use wgray_image::Region;
 use wgray_render::backend::Backend;
-use wgray_render::denoise::denoise;
+use wgray_render::denoise::{self, denoise};
 use wgray_render::film::{Film, FilmLayout};
 use wgray_render::job::{self, Bands, Flow, NoCheckpoint, Order, WorkSplit};
 use wgray_render::records::{FirstHit, Packed};
 use wgray_scene::Scene;
 
 /// Renders a scene. The image takes 16 bytes of memory per pixel, 80 more if it has alpha or layers that are averaged
-/// over samples, and 32 or 64 more with noise estimates, without or with such layers.
+/// over samples, 32 or 64 more with noise estimates, without or with such layers, and 64 more with layers of first hits,
+/// such as depth. The denoiser temporarily takes 144 more.
 ///
 /// With [`Device::Auto`](crate::Device::Auto), the CPU renders if no adapter exists, if the CPU is faster than the
 /// adapter for this scene, or if the scene or image does not fit into the adapter's memory. With any device, the CPU
@@ -125,6 +126,7 @@ pub(crate) fn render_progressive_with(
         renderer.work(|backend, device| {
             let mut report_progress = |backend: &mut dyn Backend, band: Region, fraction: f64| {
                 let mut progress = Progressive {
+                    copy_failed: false,
                     fraction,
                     backend,
                     device,
@@ -136,7 +138,9 @@ pub(crate) fn render_progressive_with(
                 match watch(&mut progress) {
                     Ok(flow) => Ok(flow.is_continue().into()),
                     // Failures while the image is copied are handled like failures of the render.
-                    Err(Error::Render(error @ (RenderError::Lost { .. } | RenderError::OutOfMemory { .. }))) => {
+                    Err(Error::Render(error @ (RenderError::Lost { .. } | RenderError::OutOfMemory { .. })))
+                        if progress.copy_failed =>
+                    {
                         Err(error)
                     }
                     Err(error) => {
@@ -167,6 +171,8 @@ pub(crate) fn render_progressive_with(
 
 /// An image that is being rendered.
 pub struct Progressive<'a> {
+    /// True after the image could not be copied from the device.
+    copy_failed: bool,
     fraction: f64,
     backend: &'a mut dyn Backend,
     device: &'a DeviceInfo,
@@ -188,7 +194,8 @@ impl Progressive<'_> {
     ///
     /// The device is lost, or its driver reports an error.
     pub fn picture(&mut self) -> Result<Picture, Error> {
-        self.full_film.copy_rows(&self.backend.film()?.part(self.band));
+        let film = self.backend.film().inspect_err(|_| self.copy_failed = true)?;
+        self.full_film.copy_rows(&film.part(self.band));
         let mut film = self.full_film.clone();
         if self.layout.aovs.contains(&Aov::Denoised) {
             film.denoised = denoise(&film);
@@ -219,7 +226,10 @@ impl ImageSetup {
     pub(crate) fn new(scene: &Scene, renderer: &mut Renderer, options: &Options) -> Result<ImageSetup, Error> {
         let packed = &Arc::clone(renderer.scene());
         let region = options.region(scene).map_err(Error::Option)?;
-        let hits = match needs_first_hits(packed, &options.aovs) {
+        let needs_hits = needs_first_hits(packed, &options.aovs);
+        let denoises = options.aovs.contains(&Aov::Denoised);
+        check_image_memory(region, packed.film_layout(), needs_hits, denoises)?;
+        let hits = match needs_hits {
             true => renderer.work(|backend, _| job::first_hits(backend, region))?,
             false => Vec::new(),
         };
@@ -253,6 +263,21 @@ impl<'a> RenderSetup<'a> {
             device: self.renderer.info().clone(),
         })
     }
+}
+
+/// Tests that an image fits into the memory: its film, first hits and the memory of the denoiser.
+fn check_image_memory(
+    region: Region,
+    film_layout: FilmLayout,
+    has_hits: bool,
+    denoises: bool,
+) -> Result<(), RenderError> {
+    let hit_bytes = if has_hits { size_of::<FirstHit>() as u64 } else { 0 };
+    let film_bytes = match denoises {
+        true => denoise::memory(region, film_layout),
+        false => region.pixels().saturating_mul(film_layout.bytes() as u64),
+    };
+    job::check_memory(film_bytes.saturating_add(region.pixels().saturating_mul(hit_bytes)))
 }
 
 /// Returns a film without samples, if it fits into the memory.

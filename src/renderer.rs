@@ -68,7 +68,7 @@ pub struct OpenScene {
     selection: Option<Selection>,
     /// Maximum size of a film in pixels. The bands depend on it, so a replacement device must support this size.
     largest_film: u64,
-    /// The lost device and the error message, while no device is open.
+    /// The lost device and the message of the loss, while no device is open.
     lost: Option<(String, String)>,
     /// Losses without progress in between.
     losses: usize,
@@ -251,16 +251,13 @@ impl OpenScene {
             Some(reason) => format!("{message}; it could not be opened again: {reason}"),
             None => format!("{message}, repeatedly"),
         };
-        let error = lost_error(message.clone());
+        let error = lost_error(message);
         match self.device {
             Device::Auto => {
                 self.fall_back_to_cpu(&error, on_fault);
                 Ok(())
             }
-            _ => {
-                self.lost = Some((lost, message));
-                Err(error)
-            }
+            _ => Err(error),
         }
     }
 
@@ -304,6 +301,9 @@ impl FaultHandler<'_> {
 
 impl<'a> Renderer<'a> {
     pub fn new(open: &'a mut OpenScene, on_fault: FaultHandler<'a>) -> Renderer<'a> {
+        if open.engine.is_cpu() && open.lost.is_none() {
+            open.info = DeviceInfo::cpu(); // the number of threads is that of the current pool
+        }
         Renderer { open, on_fault }
     }
 
@@ -343,7 +343,7 @@ impl<'a> Renderer<'a> {
         Ok(())
     }
 
-    /// Runs `work`, and repeats it after reopening a lost device. With [`Device::Auto`], the CPU takes over permanently
+    /// Opens a device that was lost before, runs `work`, and repeats it after reopening a lost device. With [`Device::Auto`], the CPU takes over permanently
     /// if reopening fails or memory is insufficient. With any device, the CPU takes over if the driver truncates loops.
     ///
     /// # Errors
@@ -356,14 +356,16 @@ impl<'a> Renderer<'a> {
     ) -> Result<T, RenderError> {
         let open = &mut *self.open;
         loop {
-            if let Some((device, message)) = open.lost.clone() {
-                return Err(RenderError::Lost { device, message });
+            if let Some((device, message)) = open.lost.take() {
+                open.losses = 0;
+                open.reopen(device, message, &mut self.on_fault)?;
             }
             match work(open.engine.backend(), &open.info) {
                 Ok(value) => {
                     open.losses = 0;
                     return Ok(value);
                 }
+                Err(error) if open.engine.is_cpu() => return Err(error),
                 Err(error) => open.recover(error, &mut self.on_fault)?,
             }
         }

@@ -191,10 +191,7 @@ impl Session {
     }
 
     fn prepare(&mut self, options: &Options, cancel: &CancelToken) -> Result<ImageSetup, Error> {
-        if let Some(cancelled) = self.cancelled.take() {
-            // The result is for the current scene, possibly with other options.
-            self.receive(cancelled, cancel)?.ok();
-        }
+        self.receive_cancelled(cancel)?;
         if cancel.is_cancelled() {
             return Err(RenderError::Cancelled.into());
         }
@@ -219,6 +216,17 @@ impl Session {
             let _ = sender.send(prepare());
         });
         self.receive(receiver, cancel)?
+    }
+
+    /// Waits for a cancelled preparation, whose result is for the current scene, possibly with other options. On a thread
+    /// of a rayon pool, the result is used only if it is complete, because the preparation may need this thread.
+    fn receive_cancelled(&mut self, cancel: &CancelToken) -> Result<(), Error> {
+        if rayon::current_thread_index().is_some() {
+            self.drop_cancelled();
+        } else if let Some(cancelled) = self.cancelled.take() {
+            self.receive(cancelled, cancel)?.ok();
+        }
+        Ok(())
     }
 
     /// Waits for a preparation. The outer error is [`RenderError::Cancelled`]; the inner result is the result of the
@@ -258,9 +266,7 @@ impl Session {
         options: &Options,
         on_fault: FaultHandler<'a>,
     ) -> Result<Renderer<'a>, Error> {
-        if let Some(cancelled) = self.cancelled.take() {
-            self.receive(cancelled, &CancelToken::new())?.ok();
-        }
+        self.receive_cancelled(&CancelToken::new())?;
         self.state
             .renderer(&self.context, &self.scene, options, self.workload, on_fault)
     }

@@ -129,3 +129,59 @@ fn a_sample_too_long_for_the_driver_is_rendered_by_the_cpu() {
         }
     }
 }
+
+/// Only failures of the render itself are handled by another device.
+#[test]
+fn errors_of_the_callback_end_the_render() {
+    let scene = scene(Overrides::default());
+    let foreign_error = || RenderError::OutOfMemory {
+        device: "another device".to_owned(),
+        message: None,
+    };
+    for device in [Device::Auto, Device::Cpu, Device::Gpu] {
+        if device == Device::Gpu && adapter::device().is_none() {
+            continue;
+        }
+        let result = wgray::render_progressive(&scene, &options_for(device), &mut |_| Err(foreign_error().into()));
+        let Err(Error::Render(RenderError::OutOfMemory { device, .. })) = result else {
+            panic!("{result:?}")
+        };
+        assert_eq!(device, "another device");
+    }
+}
+
+#[test]
+fn the_device_states_the_number_of_threads_of_the_render() {
+    let mut session = wgray::Session::new(&wgray::Context::new(), scene(Overrides::default()));
+    let mut driver = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .expect("threads");
+        let picture = pool
+            .install(|| session.render(&options_for(Device::Cpu)))
+            .expect("an image");
+        picture.device().driver.clone()
+    };
+    assert!(driver(3).ends_with(" 3 threads"));
+    assert!(driver(1).ends_with(" 1 thread"));
+}
+
+#[test]
+fn an_image_with_layers_that_does_not_fit_into_memory_is_an_error() {
+    let scene = scene(Overrides {
+        size: Some((65_536, 65_536)),
+        ..Overrides::default()
+    });
+    for aovs in [vec![], vec![Aov::Depth]] {
+        let options = Options {
+            aovs,
+            ..options_for(Device::Cpu)
+        };
+        let result = wgray::render(&scene, &options);
+        assert!(
+            matches!(result, Err(Error::Render(RenderError::Memory(_)))),
+            "{result:?}"
+        );
+    }
+}

@@ -547,6 +547,45 @@ fn images_written_to_memory_equal_files() {
             }
         }
     }
+    // Content before the image is kept.
+    let mut alone = Cursor::new(Vec::new());
+    let mut appended = Cursor::new(b"content".to_vec());
+    appended.set_position(7);
+    for writer in [&mut alone, &mut appended] {
+        picture
+            .write_to(&mut *writer, Format::Exr, &SaveOptions::default())
+            .unwrap();
+        writer.write_all(b"end").unwrap();
+    }
+    assert_eq!(appended.into_inner(), [&b"content"[..], alone.get_ref()].concat());
+    // Exif tags of a JPEG are limited.
+    let with_text = |length: usize| SaveOptions {
+        metadata: Metadata {
+            pairs: vec![("note".to_owned(), "x".repeat(length))],
+        },
+        ..SaveOptions::default()
+    };
+    for (length, fits) in [(65_000, true), (65_535, false), (70_000, false), (131_000, false)] {
+        let mut jpeg = Cursor::new(Vec::new());
+        let written = picture.write_to(&mut jpeg, Format::Jpeg, &with_text(length));
+        assert_eq!(written.is_ok(), fits, "{length}");
+        match written {
+            Ok(()) => assert!(image::load_from_memory(jpeg.get_ref()).is_ok()),
+            Err(error) => assert!(error.to_string().contains("exceed the limit of a JPEG"), "{error}"),
+        }
+    }
+    let denoised = wgray::render(
+        &scene,
+        &Options {
+            device: Device::Cpu,
+            aovs: vec![Aov::Denoised],
+            ..Options::default()
+        },
+    );
+    let layer = denoised
+        .unwrap()
+        .write_layer_to(Aov::Denoised, Cursor::new(Vec::new()), &SaveOptions::default());
+    assert!(layer.is_err_and(|error| error.to_string().contains("use write_to")));
     let missing = picture.write_layer_to(Aov::Albedo, Cursor::new(Vec::new()), &SaveOptions::default());
     assert_eq!(
         missing.unwrap_err().to_string(),

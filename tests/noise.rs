@@ -474,6 +474,8 @@ fn the_library_renders_until_the_noise_is_low() {
     let cancel = CancelToken::new();
     let mut session = Session::new(&Context::new(), scene(512));
     let mut render = session.start(&options, &cancel).expect("a render");
+    let before = render.noise().expect("the noise");
+    assert_eq!([before.percentile_95, before.median], [f64::INFINITY; 2]);
     assert_eq!(
         render.run_until_noise(0.2, &cancel).expect("samples"),
         Status::Converged
@@ -489,6 +491,14 @@ fn the_library_renders_until_the_noise_is_low() {
     assert_eq!(picture.pixels().colors, plain.pixels().colors);
     let half = wgray::render(&scene(count / 2), &options).expect("an image");
     assert!(half.noise().expect("the noise").percentile_95 >= 0.2);
+    // The limit may be reached by the last sample.
+    let mut session_of_count = Session::new(&Context::new(), scene(count));
+    let mut render_of_count = session_of_count.start(&options, &cancel).expect("a render");
+    assert_eq!(
+        render_of_count.run_until_noise(0.2, &cancel).expect("samples"),
+        Status::Converged
+    );
+    assert_eq!(render_of_count.samples(), count);
     // A lower limit continues; a limit that is not reached ends with all samples.
     assert_eq!(
         render.run_until_noise(0.15, &cancel).expect("samples"),
@@ -518,4 +528,29 @@ fn the_library_renders_until_the_noise_is_low() {
     assert_eq!(render.noise(), None);
     let message = render.run_until_noise(0.1, &cancel).map_err(|error| error.to_string());
     assert_eq!(message, Err("noise: 0.1 needs Options::noise".to_owned()));
+}
+
+#[test]
+fn a_snapshot_into_a_denoised_picture_is_not_denoised() {
+    let scene = Scene::parse_with(SCENE, "s.toml", &Overrides::default()).unwrap_or_else(|error| panic!("{error}"));
+    let options_with = |aov: Aov| Options {
+        device: Device::Cpu,
+        noise: true,
+        aovs: vec![aov],
+        ..Options::default()
+    };
+    let cancel = CancelToken::new();
+    let mut session = Session::new(&Context::new(), scene);
+    let mut rendered = |aov: Aov| {
+        let mut render = session.start(&options_with(aov), &cancel).expect("a render");
+        render.run(&cancel).expect("samples");
+        render.snapshot()
+    };
+    let (denoised, plain) = (rendered(Aov::Denoised), rendered(Aov::Albedo));
+    assert_ne!(denoised.rgb8(), plain.rgb8());
+    let mut render = session.start(&options_with(Aov::Albedo), &cancel).expect("a render");
+    render.run(&cancel).expect("samples");
+    let mut reused = denoised;
+    render.snapshot_into(&mut reused);
+    assert!(reused == plain && reused.rgb8() == plain.rgb8());
 }

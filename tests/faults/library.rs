@@ -4,7 +4,8 @@
 use std::ops::ControlFlow;
 use std::process::Command;
 
-use wgray::{Device, Options, Picture, Scene};
+use wgray::error::RenderError;
+use wgray::{CancelToken, Context, Device, Error, Options, Picture, Scene, Session, Status};
 
 use crate::test_folder::TestFolder;
 
@@ -45,6 +46,45 @@ fn render_in_the_child_process() {
     });
     assert_eq!(progressive.expect("an image").pixels(), expected.pixels());
     assert!(callbacks > 0);
+}
+
+/// Renders in the child process that [`a_step_after_a_permanent_loss_opens_the_device_again`] starts.
+#[test]
+fn steps_in_the_child_process() {
+    let Ok(file) = std::env::var(SCENE_VARIABLE) else {
+        return;
+    };
+    let scene = Scene::load(&file).expect("a scene");
+    let expected = render(&scene, Device::Cpu);
+    let options = Options {
+        device: Device::Gpu,
+        ..Options::default()
+    };
+    let cancel = CancelToken::new();
+    let mut session = Session::new(&Context::new(), scene);
+    let mut progressive = session.start(&options, &cancel).expect("a render");
+    let lost = progressive.run(&cancel);
+    assert!(matches!(lost, Err(Error::Render(RenderError::Lost { .. }))), "{lost:?}");
+    assert_eq!(progressive.run(&cancel).expect("samples"), Status::Finished);
+    assert_eq!(progressive.finish().pixels(), expected.pixels());
+}
+
+/// The device is lost, and three attempts to open it fail.
+#[test]
+fn a_step_after_a_permanent_loss_opens_the_device_again() {
+    let Some(driver) = driver() else { return };
+    let folder = TestFolder::with_scene(SCENE);
+    let log = folder.path("log");
+    let output = Command::new(std::env::current_exe().expect("this program"))
+        .args(["--exact", "--nocapture", "faults::library::steps_in_the_child_process"])
+        .envs(driver.environment(&log))
+        .env(SCENE_VARIABLE, folder.path("scene.toml"))
+        .envs([("FAULTS_LOSE", "2"), ("FAULTS_REFUSE", "3")])
+        .output()
+        .expect("the test program runs");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let log = std::fs::read_to_string(&log).expect("the driver's log");
+    assert_eq!(log.matches("device refused").count(), 3, "{log}");
 }
 
 #[test]

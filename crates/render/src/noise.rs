@@ -56,6 +56,12 @@ impl NoiseMeter {
             .extend(pixels.map(|pixel| self::pixel(film, pixel, self.factor)));
     }
 
+    /// Adds the pixels that are missing to `pixels` pixels, which have no samples: their noise is infinite.
+    pub fn complete(&mut self, pixels: u64) {
+        let pixels = usize::try_from(pixels).unwrap_or(usize::MAX).max(self.pixels.len());
+        self.pixels.resize(pixels, f64::INFINITY);
+    }
+
     /// Returns the noise of all pixels, which does not depend on their order; 0 without pixels.
     pub fn noise(&mut self) -> Noise {
         Noise {
@@ -107,6 +113,13 @@ mod tests {
         assert_eq!(quantiles(21), [20.0, 11.0]);
         assert_eq!(quantiles(100), [95.0, 50.0]);
         assert_eq!(quantiles(101), [96.0, 51.0]);
+        let mut meter = NoiseMeter {
+            factor: 1.0,
+            pixels: vec![1.0, 2.0],
+        };
+        meter.complete(3);
+        let noise = meter.noise();
+        assert_eq!([noise.percentile_95, noise.median], [f64::INFINITY, 2.0]);
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! OpenEXR files: scan lines of 32-bit or 16-bit values, lossless, written block by block.
 
 use std::fs::File;
-use std::io::{self, BufReader, Seek, Write};
+use std::io::{self, BufReader, Seek, SeekFrom, Write};
 use std::path::Path;
 
 use ::exr::block::writer::{ChunkWriter, ChunksWriter};
@@ -23,7 +23,7 @@ use crate::film::mean;
 /// part. The display window is the whole image, the data window is the region. Returns the number of finite values that
 /// became infinite.
 pub fn write(
-    file: impl Write + Seek,
+    mut file: impl Write + Seek,
     layout: &Layout,
     options: &SaveOptions,
     render: &mut dyn FnMut(&mut Sink) -> Result<(), RenderError>,
@@ -33,7 +33,12 @@ pub fn write(
     let mut too_large = 0;
     // The closure can only return errors of the library, so an error of the render is stored here.
     let mut render_error = None;
-    let written = write_blocks(file, [header].into_iter().collect(), true, |meta, writer| {
+    let start = file.stream_position()?;
+    let output = FromStart {
+        inner: &mut file,
+        start,
+    };
+    let written = write_blocks(output, [header].into_iter().collect(), true, |meta, writer| {
         let mut rows = Rows {
             columns: &columns,
             layout,
@@ -52,9 +57,37 @@ pub fn write(
             Error::Aborted
         })
     });
-    match render_error {
-        Some(error) => Err(error),
-        None => Ok(written.map(|()| too_large).map_err(to_io_error)?),
+    if let Some(error) = render_error {
+        return Err(error);
+    }
+    written.map_err(to_io_error)?;
+    file.seek(SeekFrom::End(0))?; // the table of offsets, at the start, is written last
+    Ok(too_large)
+}
+
+/// A writer whose positions are counted from `start`.
+struct FromStart<W> {
+    inner: W,
+    start: u64,
+}
+
+impl<W: Write> Write for FromStart<W> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.inner.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.inner.flush()
+    }
+}
+
+impl<W: Seek> Seek for FromStart<W> {
+    fn seek(&mut self, position: SeekFrom) -> io::Result<u64> {
+        let position = match position {
+            SeekFrom::Start(offset) => SeekFrom::Start(self.start.saturating_add(offset)),
+            relative => relative,
+        };
+        Ok(self.inner.seek(position)?.saturating_sub(self.start))
     }
 }
 

@@ -14,6 +14,9 @@ use super::{Band, Format, Layout, Metadata, SaveOptions, Sink};
 use crate::error::RenderError;
 use wgray_image::memory::fallible;
 
+/// Maximum size of the Exif tags of a JPEG in bytes: a segment has a length of 16 bits, which includes itself, and starts
+/// with 6 bytes that identify Exif.
+const JPEG_EXIF_BYTES: usize = 65_535 - 2 - 6;
 /// Bytes per pixel that the WebP encoder allocates: a copy of four channels, and the file in a growing buffer.
 const WEBP_ENCODER_BYTES: u64 = 12;
 
@@ -25,6 +28,12 @@ pub fn write(
     options: &SaveOptions,
     render: &mut dyn FnMut(&mut Sink) -> Result<(), RenderError>,
 ) -> Result<(), RenderError> {
+    let exif = exif(&options.metadata)?;
+    let exif_bytes = exif.as_ref().map_or(0, Vec::len);
+    if format == Format::Jpeg && exif_bytes > JPEG_EXIF_BYTES {
+        let rule = format!("metadata: {exif_bytes} bytes of Exif tags exceed the limit of a JPEG, {JPEG_EXIF_BYTES}");
+        return Err(RenderError::Output(io::Error::new(io::ErrorKind::InvalidInput, rule)));
+    }
     let (width, height) = (layout.region.width(), layout.region.height());
     format.check_size(width, height).map_err(io::Error::other)?;
     let alpha = layout.alpha && format == Format::WebP;
@@ -48,7 +57,6 @@ pub fn write(
         });
         Ok(())
     })?;
-    let exif = exif(&options.metadata)?;
     let written = match format {
         Format::WebP => {
             let mut encoder = WebPEncoder::new_lossless(&mut file);
