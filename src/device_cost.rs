@@ -111,7 +111,7 @@ pub(crate) fn select_without_gpu(context: &Context, scene: &Packed, workload: Wo
     let prediction = Prediction::of(scene, workload, rayon::current_num_threads());
     let (is_cpu, reason) = if scene.specialization.tlas_kinds != 0 {
         (true, format!("the CPU traverses the BVH faster than {name}"))
-    } else if !adapter.is_lavapipe() {
+    } else if !wgray_render::gpu::is_lavapipe(name) {
         (true, format!("the CPU is faster than {name}"))
     } else {
         let [cpu, lavapipe] = [prediction.cpu, prediction.lavapipe].map(seconds);

@@ -16,7 +16,7 @@ fn list(out: &mut impl Write) -> io::Result<()> {
     list_adapters(out, &adapters)?;
     list_cpu(out)?;
     match adapters.first() {
-        Some(info) if info.is_lavapipe() => {
+        Some(info) if gpu::is_lavapipe(&info.name) => {
             writeln!(out, "auto selects: {}, or cpu if predicted to be faster", info.name)?;
         }
         Some(info) if !info.is_software() => writeln!(out, "auto selects: {}", info.name)?,

@@ -47,11 +47,6 @@ impl GpuInfo {
     pub fn is_software(&self) -> bool {
         self.kind == SOFTWARE
     }
-
-    /// Returns true for Mesa's software driver.
-    pub fn is_lavapipe(&self) -> bool {
-        is_lavapipe(&self.name)
-    }
 }
 
 const SOFTWARE: &str = "software";
@@ -134,7 +129,7 @@ fn preference(info: &wgpu::AdapterInfo) -> (u8, bool) {
 }
 
 /// Returns true for Mesa's software Vulkan, lavapipe, which reports the name llvmpipe.
-fn is_lavapipe(name: &str) -> bool {
+pub fn is_lavapipe(name: &str) -> bool {
     name.starts_with("llvmpipe")
 }
 

@@ -29,7 +29,7 @@ mod texels;
 mod timer;
 mod validate;
 
-pub use adapter::{AdapterChoice, GpuInfo, adapters, preferred};
+pub use adapter::{AdapterChoice, GpuInfo, adapters, is_lavapipe, preferred};
 pub use bake::bake;
 pub use compile::{ValidKernel, check};
 pub use denoise::denoise;
