@@ -109,10 +109,14 @@ async function showFrame(data) {
   }
 }
 
+const acknowledged = new WeakMap(); // the last acknowledged number of each connection
+
 // Acknowledges a frame, and all earlier frames, once the browser has drawn it. The program keeps few frames in flight,
-// so that newer frames are not delayed on a slow connection.
+// so that newer frames are not delayed on a slow connection. An earlier frame may be decoded later.
 function acknowledge(source, number) {
   requestAnimationFrame(() => {
-    if (source.readyState === WebSocket.OPEN) source.send(JSON.stringify({ shown: number }));
+    if (source.readyState !== WebSocket.OPEN || acknowledged.get(source) > number) return;
+    acknowledged.set(source, number);
+    source.send(JSON.stringify({ shown: number }));
   });
 }
