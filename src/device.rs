@@ -3,8 +3,8 @@
 /// The requested device. Without the feature `gpu` only the CPU is available.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum Device {
-    /// A hardware GPU, if available. Otherwise software Vulkan or the CPU, whichever is predicted to render the image in
-    /// less time.
+    /// A hardware GPU, if available. Otherwise software Vulkan or the CPU, whichever is predicted to take less time for
+    /// the image.
     #[default]
     Auto,
     /// The CPU, without any driver.

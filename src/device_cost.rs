@@ -1,8 +1,8 @@
 //! Predicts how long the CPU and lavapipe take for images, to select the device of [`Device::Auto`] without a GPU.
 //!
-//! Lavapipe first compiles a kernel. It then renders `phong` about twice as fast as the CPU, paths about as fast, textures
-//! more slowly, and scenes with a BVH many times more slowly. `scripts/figures-devices` compares the prediction with
-//! measurements.
+//! Lavapipe first compiles a kernel. It then renders `phong` about twice as fast as the CPU, paths about as fast,
+//! textures more slowly, and scenes with a BVH many times more slowly. `scripts/figures-devices` compares the prediction
+//! with measurements.
 //!
 //! [`Device::Auto`]: crate::Device::Auto
 #![cfg_attr(
@@ -46,6 +46,7 @@ pub(crate) struct Workload {
     pub images: usize,
     /// True if division and square root are computed in software on an adapter.
     pub exact_rounding: bool,
+    /// Limit for each image.
     pub time_limit: Option<Duration>,
 }
 
@@ -88,10 +89,11 @@ impl Prediction {
         let rounding = if workload.exact_rounding { EXACT_ROUNDING } else { 1.0 };
         let threads = threads.max(1);
         let speed = kernel_speed * rounding * threads.min(MAX_THREADS) as f64 / threads as f64;
-        let samples = workload.pixels as f64 * workload.images as f64 * f64::from(workload.samples);
+        let samples = workload.pixels as f64 * f64::from(workload.samples);
         let sample = SAMPLE + LIGHT_SAMPLE * scene.light_samples() as f64;
         let limit = workload.time_limit.map_or(f64::INFINITY, |limit| limit.as_secs_f64());
-        let cpu = (samples * sample / threads as f64).min(limit);
+        let image = (samples * sample / threads as f64).min(limit);
+        let cpu = image * workload.images as f64;
         Prediction {
             cpu,
             lavapipe: START + cpu / speed,
@@ -220,6 +222,17 @@ mod tests {
         );
         assert_eq!(cropped.pixels, 6);
         assert_eq!(cropped.samples, 4);
+    }
+
+    #[test]
+    fn the_time_limit_is_for_each_image() {
+        let scene = packed("mirror-glass.toml", 4);
+        let limited = Workload {
+            time_limit: Some(Duration::from_millis(500)),
+            images: 16,
+            ..workload(&scene, 1 << 24)
+        };
+        assert_eq!(Prediction::of(&scene, limited, 2).cpu, 8.0);
     }
 
     #[test]

@@ -343,8 +343,9 @@ impl<'a> Renderer<'a> {
         Ok(())
     }
 
-    /// Opens a device that was lost before, runs `work`, and repeats it after reopening a lost device. With [`Device::Auto`], the CPU takes over permanently
-    /// if reopening fails or memory is insufficient. With any device, the CPU takes over if the driver truncates loops.
+    /// Runs `work`, and repeats it after reopening a lost device. A device that an earlier call lost is opened first.
+    /// With [`Device::Auto`], the CPU takes over permanently if reopening fails or memory is insufficient. With any
+    /// device, the CPU takes over if the driver truncates loops.
     ///
     /// # Errors
     ///

@@ -66,7 +66,7 @@ impl Session {
 
     /// Sets the work that [`Device::Auto`](crate::Device::Auto) selects a device for.
     #[cfg(feature = "cli")]
-    pub(crate) fn expect(&mut self, workload: Workload) {
+    pub(crate) fn set_workload(&mut self, workload: Workload) {
         self.workload = Some(workload);
     }
 
@@ -218,8 +218,8 @@ impl Session {
         self.receive(receiver, cancel)?
     }
 
-    /// Waits for a cancelled preparation, whose result is for the current scene, possibly with other options. On a thread
-    /// of a rayon pool, the result is used only if it is complete, because the preparation may need this thread.
+    /// Waits for a cancelled preparation. Its result is for the current scene, possibly with other options. A thread of a
+    /// rayon pool does not wait, because the preparation runs tasks on the pool: an incomplete result is dropped.
     fn receive_cancelled(&mut self, cancel: &CancelToken) -> Result<(), Error> {
         if rayon::current_thread_index().is_some() {
             self.drop_cancelled();

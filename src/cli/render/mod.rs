@@ -47,7 +47,7 @@ pub fn run(args: Args, start: Instant) -> anyhow::Result<ExitCode> {
         }
         job.select_frame(frame)?;
         let plan = Plan::resolve(&args, &mut job.session, &job.log, frame, start)?;
-        job.session.expect(plan.workload(count - i));
+        job.session.set_workload(plan.workload(count - i));
         outputs.check_size(plan.region())?;
         if let Some(part) = outputs.part().filter(|_| exists) {
             if plan.is_done(part) {
