@@ -125,6 +125,7 @@ mod progressive;
 mod render;
 mod renderer;
 mod session;
+#[cfg(not(target_family = "wasm"))]
 mod task;
 
 pub use cancel::CancelToken;

@@ -99,6 +99,18 @@ impl<'s> ProgressiveRender<'s> {
     ///
     /// The errors of [`render`](crate::render()). The samples of complete steps are kept, and the step can be repeated.
     pub fn step(&mut self, cancel: &CancelToken) -> Result<Status, Error> {
+        self.step_while(cancel, &|| true)
+    }
+
+    /// Renders a part of a step that takes about this time.
+    #[cfg(target_family = "wasm")]
+    pub(crate) fn step_for(&mut self, duration: Duration, cancel: &CancelToken) -> Result<Status, Error> {
+        let start = web_time::Instant::now();
+        self.step_while(cancel, &|| start.elapsed() < duration)
+    }
+
+    /// Renders a step, or the part of it that is complete when `has_time` returns false. The next call continues it.
+    fn step_while(&mut self, cancel: &CancelToken, has_time: &dyn Fn() -> bool) -> Result<Status, Error> {
         if cancel.is_cancelled() {
             return Ok(Status::Cancelled);
         }
@@ -110,14 +122,15 @@ impl<'s> ProgressiveRender<'s> {
         let mut renderer = Renderer::new(self.open, on_fault);
         let _span = render_span(&renderer);
         let mut watch = |_: &mut dyn Backend, _: Region, _: f64| -> Result<Flow, RenderError> {
-            Ok((!cancel.is_cancelled()).into())
+            Ok((!cancel.is_cancelled() && has_time()).into())
         };
         let bands = &mut self.bands;
         let rendered = renderer.work(|backend, _| bands.next_pass(backend, &mut watch, &mut || counter.increment()));
         match rendered {
             Ok(Some(samples)) if samples < bands.requested_samples() => Ok(Status::Running),
             Ok(_) => Ok(Status::Finished),
-            Err(RenderError::Cancelled) => Ok(Status::Cancelled),
+            Err(RenderError::Cancelled) if cancel.is_cancelled() => Ok(Status::Cancelled),
+            Err(RenderError::Cancelled) => Ok(Status::Running), // out of time
             Err(error) => Err(error.into()),
         }
     }

@@ -2,7 +2,9 @@
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
-use std::sync::mpsc::{self, Receiver, RecvTimeoutError};
+#[cfg(not(target_family = "wasm"))]
+use std::sync::mpsc;
+use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::time::Duration;
 
 use wgray_render::pack::{self, PackedShading};
@@ -18,6 +20,7 @@ use crate::picture::Picture;
 use crate::progressive::{ProgressiveRender, Status};
 use crate::render::{ImageSetup, Progressive, render_progressive_with, render_with};
 use crate::renderer::{FaultHandler, OpenScene, Renderer, warnings};
+#[cfg(not(target_family = "wasm"))]
 use crate::task::{Task, spawn_thread};
 
 /// Number of images for which [`Device::Auto`](crate::Device::Auto) selects the device of a session.
@@ -139,8 +142,9 @@ impl Session {
         ProgressiveRender::new(open, setup)
     }
 
-    /// Renders the scene on another thread, so that the future never blocks. On wasm32, which has no threads, this call
-    /// renders before it returns the future.
+    /// Renders the scene on another thread, so that the future never blocks. On wasm32, which has no threads, the future
+    /// packs the scene when it is polled first, and renders for about 50 ms each time it is polled. To keep a web page
+    /// responsive, poll it from tasks of the event loop, for example from `setTimeout` or a `MessageChannel`.
     ///
     /// Dropping the future cancels the render; the next render packs the scene again.
     ///
@@ -158,10 +162,19 @@ impl Session {
     /// # Errors
     ///
     /// The errors of [`render`](crate::render()), and [`RenderError::Cancelled`].
-    pub fn render_async(
-        &mut self,
+    pub fn render_async<'s>(
+        &'s mut self,
         options: &Options,
         cancel: &CancelToken,
+    ) -> impl Future<Output = Result<Picture, Error>> + Send + use<'s> {
+        self.start_async(options.clone(), cancel.child())
+    }
+
+    #[cfg(not(target_family = "wasm"))]
+    fn start_async(
+        &mut self,
+        options: Options,
+        cancel: CancelToken,
     ) -> impl Future<Output = Result<Picture, Error>> + Send {
         let mut worker = Session {
             context: self.context.clone(),
@@ -170,7 +183,6 @@ impl Session {
             state: std::mem::take(&mut self.state),
             cancelled: self.cancelled.take(),
         };
-        let (options, cancel) = (options.clone(), cancel.child());
         let task = Task::spawn(&cancel.clone(), move || {
             let result = worker.render_until_cancelled(&options, &cancel);
             (worker, result)
@@ -182,6 +194,20 @@ impl Session {
         }
     }
 
+    #[cfg(target_family = "wasm")]
+    async fn start_async(&mut self, options: Options, cancel: CancelToken) -> Result<Picture, Error> {
+        const POLL_DURATION: Duration = Duration::from_millis(50);
+        let mut render = self.start(&options, &cancel)?;
+        loop {
+            match render.step_for(POLL_DURATION, &cancel)? {
+                Status::Running => yield_now().await,
+                Status::Cancelled => return Err(RenderError::Cancelled.into()),
+                Status::Converged | Status::Finished => return Ok(render.finish()),
+            }
+        }
+    }
+
+    #[cfg(not(target_family = "wasm"))]
     fn render_until_cancelled(&mut self, options: &Options, cancel: &CancelToken) -> Result<Picture, Error> {
         let mut render = self.start(options, cancel)?;
         match render.run(cancel)? {
@@ -201,21 +227,21 @@ impl Session {
             let setup = state.prepare(&context, &scene, &options, workload);
             (state, setup)
         };
-        let is_pool_thread = rayon::current_thread_index().is_some();
-        if is_pool_thread || cfg!(target_family = "wasm") {
-            let (state, setup) = prepare();
-            self.state = state;
-            return match cancel.is_cancelled() {
-                true => Err(RenderError::Cancelled.into()),
-                false => setup,
-            };
+        #[cfg(not(target_family = "wasm"))]
+        if rayon::current_thread_index().is_none() {
+            let (sender, receiver) = mpsc::channel();
+            spawn_thread(move || {
+                // The receiver is dropped if the scene has changed since.
+                let _ = sender.send(prepare());
+            });
+            return self.receive(receiver, cancel)?;
         }
-        let (sender, receiver) = mpsc::channel();
-        spawn_thread(move || {
-            // The receiver is dropped if the scene has changed since.
-            let _ = sender.send(prepare());
-        });
-        self.receive(receiver, cancel)?
+        let (state, setup) = prepare();
+        self.state = state;
+        match cancel.is_cancelled() {
+            true => Err(RenderError::Cancelled.into()),
+            false => setup,
+        }
     }
 
     /// Waits for a cancelled preparation. Its result is for the current scene, possibly with other options. A thread of a
@@ -379,6 +405,20 @@ impl SceneState {
             self.packed = Some(open.into_scene());
         }
     }
+}
+
+/// Returns a future that is pending once, and that can be polled again at once.
+#[cfg(target_family = "wasm")]
+fn yield_now() -> impl Future<Output = ()> + Send {
+    let mut has_yielded = false;
+    std::future::poll_fn(move |context| {
+        if has_yielded {
+            return std::task::Poll::Ready(());
+        }
+        has_yielded = true;
+        context.waker().wake_by_ref();
+        std::task::Poll::Pending
+    })
 }
 
 /// Returns true if only the camera's record changes: neither the origin of coordinates nor the kernel.

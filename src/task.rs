@@ -49,16 +49,11 @@ pub(crate) fn spawn_thread(work: impl FnOnce() + Send + 'static) {
 }
 
 impl<T: Send + 'static> Task<T> {
-    /// Runs `work` on another thread; on wasm32, which has no threads, on this thread. `cancel` is the token of the
-    /// work.
+    /// Runs `work` on another thread. `cancel` is the token of the work.
     pub(crate) fn spawn(cancel: &CancelToken, work: impl FnOnce() -> T + Send + 'static) -> Task<T> {
         let slot = Arc::new(Mutex::new(Slot::Running(None)));
         let finish = Finish(Arc::clone(&slot));
-        let run = move || finish.set(Slot::Finished(work()));
-        match cfg!(target_family = "wasm") {
-            true => run(),
-            false => spawn_thread(run),
-        }
+        spawn_thread(move || finish.set(Slot::Finished(work())));
         Task {
             slot,
             cancel: cancel.clone(),

@@ -26,14 +26,36 @@ for (const { module: source, name } of WebAssembly.Module.imports(module)) {
     imports[source][name] = implementation;
 }
 
-function render(text) {
+// Instantiates the module and writes the text of a scene to its memory.
+function instantiate(text) {
     const { exports } = new WebAssembly.Instance(module, imports);
     const bytes = new TextEncoder().encode(text);
     const address = exports.allocate(bytes.length);
     new Uint8Array(exports.memory.buffer, address, bytes.length).set(bytes);
-    const result = exports.render(address, bytes.length);
-    const [count] = new Uint32Array(exports.memory.buffer, result, 1);
-    return Buffer.from(exports.memory.buffer.slice(result + 4, result + 4 + 4 * count));
+    return { exports, scene: [address, bytes.length] };
+}
+
+function pixelsAt({ memory }, result) {
+    const [count] = new Uint32Array(memory.buffer, result, 1);
+    return Buffer.from(memory.buffer.slice(result + 4, result + 4 + 4 * count));
+}
+
+function render(text) {
+    const { exports, scene } = instantiate(text);
+    return pixelsAt(exports, exports.render(...scene));
+}
+
+// Renders with `Session::render_async`. Returns the pixels and the number of times that other tasks could run.
+async function renderAsync(text) {
+    const { exports, scene } = instantiate(text);
+    exports.start(...scene);
+    for (let pauses = 0; ; pauses++) {
+        const result = exports.poll();
+        if (result !== 0) {
+            return { pixels: pixelsAt(exports, result), pauses };
+        }
+        await new Promise((resolve) => setTimeout(resolve));
+    }
 }
 
 test("a scene from bytes renders the recorded pixels", () => {
@@ -45,4 +67,14 @@ test("a scene from bytes renders the recorded pixels", () => {
 test("another seed renders other pixels", () => {
     const text = readFile("scene.toml").toString().replace("pixel_samples = 4", "pixel_samples = 4\nseed = 1");
     assert.ok(!render(text).equals(readFile("pixels.f32")));
+});
+
+test("an asynchronous render yields to other tasks and has the same pixels", async () => {
+    const text = readFile("scene.toml")
+        .toString()
+        .replace("width = 8, height = 8", "width = 32, height = 32")
+        .replace("pixel_samples = 4", "pixel_samples = 16");
+    const { pixels, pauses } = await renderAsync(text);
+    assert.ok(pauses > 2, `${pauses} pauses`);
+    assert.ok(pixels.equals(render(text)));
 });
