@@ -5,7 +5,7 @@ use std::hint::black_box;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use glam::Vec3;
 use rayon::prelude::*;
-use wgray_render::bvh::{Aabb, MAX_LEAF_SIZE, Tree, build};
+use wgray_render::bvh::{Aabb, DecodedMesh, MAX_LEAF_SIZE, Tree, build};
 use wgray_render::cpu::traversal::{Directions, Level, Line, Mesh, Nearest, Segments, closest, occluded};
 
 /// An indexed triangle mesh.
@@ -96,6 +96,7 @@ struct View {
     tree: Tree,
     vertices: Vec<[f32; 4]>,
     triangles: Vec<[u32; 4]>,
+    decoded: DecodedMesh,
 }
 
 const EYE: Vec3 = Vec3::new(0.0, -4.5, 1.5);
@@ -115,9 +116,12 @@ impl View {
             let [a, b, c] = surface.triangles[*i as usize];
             [a, b, c, *i]
         };
+        let triangles: Vec<[u32; 4]> = tree.order.iter().map(corners_and_index).collect();
+        let vertices: Vec<[f32; 4]> = surface.corners.iter().map(|v| v.extend(0.0).to_array()).collect();
         View {
-            triangles: tree.order.iter().map(corners_and_index).collect(),
-            vertices: surface.corners.iter().map(|v| v.extend(0.0).to_array()).collect(),
+            decoded: DecodedMesh::new(&tree.nodes, &vertices, &triangles),
+            triangles,
+            vertices,
             tree,
             surface,
         }
@@ -128,6 +132,7 @@ impl View {
             nodes: &self.tree.nodes,
             vertices: &self.vertices,
             triangles: &self.triangles,
+            decoded: Some(&self.decoded),
         }
     }
 

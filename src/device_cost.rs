@@ -23,9 +23,9 @@ use crate::options::Options;
 const START: f64 = 0.7;
 /// CPU seconds for a sample, and for a light sample, on one thread.
 const SAMPLE: f64 = 6e-7;
-const LIGHT_SAMPLE: f64 = 1e-8;
+const LIGHT_SAMPLE: f64 = 7e-9;
 /// Speed of lavapipe relative to the CPU on the same number of threads.
-const SPEED_OF_PHONG: f64 = 2.3;
+const SPEED_OF_PHONG: f64 = 2.0;
 const SPEED_OF_PATHS: f64 = 1.2;
 const SPEED_OF_TEXTURES: f64 = 0.8;
 /// Factor of the speed if division and square root are computed in software, which takes 2.1 to 5.9 times as long.

@@ -42,6 +42,7 @@ const SHADERS_WITHOUT_TWIN: &[(&str, &str)] = &[
 
 /// Files in crates/render/src/cpu that are not twins of a shader.
 const RUST_FILES_WITHOUT_SHADER: &[&str] = &[
+    "decoded_meshes.rs",
     "ewa.rs",
     "mod.rs",
     "renderer.rs",
@@ -96,6 +97,11 @@ const ONE_SIDED: &[(&str, &str, &str)] = &[
         "integrators/path.wgsl",
         "sample_direct_light",
         "in WGSL, `add_direct_light` also traces the shadow ray",
+    ),
+    (
+        "integrators/phong.wgsl",
+        "radiance_after",
+        "only in Rust: the part of `radiance` after the closest hit of the camera ray",
     ),
     (
         "pixel.wgsl",
@@ -236,8 +242,8 @@ fn a_changed_twin_is_detected() {
         (
             "moved fields",
             "phong.rs",
-            "pub diffuse: f32,\n    pub specular: f32",
-            "pub specular: f32,\n    pub diffuse: f32",
+            "pub diffuse: F,\n    pub specular: F",
+            "pub specular: F,\n    pub diffuse: F",
         ),
     ] {
         let twin = edited_twin(file, from, to);

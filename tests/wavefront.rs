@@ -1,15 +1,15 @@
 //! Tests that the wavefront of the CPU backend and the scalar integrator trace bit-identical paths.
 
 use std::fmt::Write as _;
-use std::sync::Arc;
 
 use glam::{UVec2, Vec3, Vec4};
 use proptest::strategy::{Strategy as _, ValueTree as _};
 use proptest::test_runner::TestRunner;
 use wgray::scene::Integrator;
+use wgray_render::cpu::decoded_meshes::{are_decoded, decode_meshes, decode_meshes_up_to};
 use wgray_render::cpu::integrators::path::{path_layers, path_value};
 use wgray_render::cpu::pixel::{Layers, pixel_radiance};
-use wgray_render::cpu::wavefront::{BatchMeshes, LaneHits, MaterialKind, SurfaceKind, Wavefront};
+use wgray_render::cpu::wavefront::{LaneHits, MaterialKind, SurfaceKind, Wavefront};
 use wgray_render::records::{
     DIFFUSE, EMITTER, LOBE_ANISOTROPY, LOBE_COAT, LOBE_SHEEN, LOBE_SPECULAR, METAL, Material, NO_COLORS, NO_INDEX,
     OPAQUE, PRINCIPLED, Packed, RANDOM, SOBOL,
@@ -47,17 +47,13 @@ fn samples(packed: &Packed, step: u32, count: u32) -> Vec<(UVec2, u32)> {
 }
 
 fn wavefront(packed: &Packed, samples: &[(UVec2, u32)], batch_size: usize) -> Vec<PathBits> {
-    wavefront_with(BatchMeshes::new(packed), packed, samples, batch_size).0
+    decode_meshes(packed);
+    wavefront_with_hits(packed, samples, batch_size).0
 }
 
 /// Returns the bits of the paths, and the numbers of hits shaded in lanes.
-fn wavefront_with(
-    meshes: BatchMeshes,
-    packed: &Packed,
-    samples: &[(UVec2, u32)],
-    batch_size: usize,
-) -> (Vec<PathBits>, LaneHits) {
-    let mut wavefront = Wavefront::new(Arc::new(meshes));
+fn wavefront_with_hits(packed: &Packed, samples: &[(UVec2, u32)], batch_size: usize) -> (Vec<PathBits>, LaneHits) {
+    let mut wavefront = Wavefront::new(packed);
     let mut paths = Vec::new();
     for samples in samples.chunks(batch_size) {
         let traced = wavefront.trace(packed, samples.iter().copied());
@@ -345,8 +341,10 @@ fn random_scenes_have_the_paths_of_the_scalar_integrator() {
         let [diffuse, principled, metal] = MATERIALS.map(|kind| with_lane_materials(packed.clone(), i, kind));
         for (packed, step) in [(&packed, 2), (&diffuse, 3), (&principled, 3), (&metal, 3)] {
             let samples = samples(packed, step, 3);
-            let (paths, lane_hits) = wavefront_with(BatchMeshes::new(packed), packed, &samples, batch_size);
-            let differing = count_differing(&paths, &scalar(packed, &samples));
+            let expected = scalar(packed, &samples);
+            decode_meshes(packed);
+            let (paths, lane_hits) = wavefront_with_hits(packed, &samples, batch_size);
+            let differing = count_differing(&paths, &expected);
             assert_eq!(
                 differing,
                 0,
@@ -385,14 +383,13 @@ fn paths_do_not_depend_on_the_limit_of_triangles() {
     let triangles = packed.bvh.meshes.iter().map(|mesh| mesh.triangles.len()).sum::<usize>();
     let samples = samples(&packed, 2, 2);
     let expected = scalar(&packed, &samples);
-    for (limit, are_not_converted) in [(triangles, false), (triangles - 1, true)] {
-        let meshes = BatchMeshes::with_limit(&packed, limit);
-        assert_eq!(meshes.are_not_converted(&packed), are_not_converted);
-        assert_eq!(
-            count_differing(&wavefront_with(meshes, &packed, &samples, 256).0, &expected),
-            0
-        );
+    for (limit, is_decoded) in [(triangles - 1, false), (triangles, true)] {
+        decode_meshes_up_to(&packed, limit);
+        assert_eq!(are_decoded(&packed), is_decoded);
+        let (paths, _) = wavefront_with_hits(&packed, &samples, 256);
+        assert_eq!(count_differing(&paths, &expected), 0);
     }
+    assert_eq!(count_differing(&scalar(&packed, &samples), &expected), 0);
 }
 
 #[test]
@@ -401,7 +398,8 @@ fn changed_scenes_are_detected() {
     assert!(packed.bvh.items.len() > 70 && packed.bvh.instances.len() == 8);
     let samples = samples(&packed, 1, 2);
     let expected = scalar(&packed, &samples);
-    let (paths, lane_hits) = wavefront_with(BatchMeshes::new(&packed), &packed, &samples, 256);
+    decode_meshes(&packed);
+    let (paths, lane_hits) = wavefront_with_hits(&packed, &samples, 256);
     assert_eq!(count_differing(&paths, &expected), 0);
     for surface in SURFACES {
         assert!(lane_hits.count(MaterialKind::Diffuse, surface) > 50, "{lane_hits:?}");

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use glam::{UVec2, Vec3, Vec4Swizzles as _};
 use proptest::strategy::{Strategy as _, ValueTree as _};
 use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
-use wgray_render::bvh::{self, Aabb};
+use wgray_render::bvh::{self, Aabb, DecodedOnce};
 use wgray_render::cpu::geometry::{closest_hit, occluded_samples};
 use wgray_render::cpu::light::{segment, segments_to_light};
 use wgray_render::cpu::linear_primitives::{closest_primitive, occluded_by_primitives};
@@ -330,6 +330,7 @@ fn with_bvhs(scene: &Packed, build: Builder) -> Packed {
     scene.bvh.items = order.iter().map(|i| scene.bvh.items[*i as usize]).collect();
     for mesh in &mut scene.bvh.meshes {
         let mesh = Arc::make_mut(mesh);
+        mesh.decoded = DecodedOnce::default();
         let position = |vertex: u32| mesh.vertices[vertex as usize].xyz();
         let bounds = |t: &glam::UVec4| {
             let [a, b, c] = [t.x, t.y, t.z].map(position);

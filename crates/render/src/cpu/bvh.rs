@@ -1,5 +1,7 @@
 //! Closest-hit and occlusion queries of the scene's BVHs: the results of `shaders/bvh.wgsl`, computed by [`traversal`].
 
+use std::rc::Rc;
+
 use bytemuck::cast_slice;
 use glam::{UVec2, Vec2, Vec3, Vec4Swizzles as _};
 
@@ -11,7 +13,7 @@ use super::math::max;
 use super::mesh::{mesh_pad, point_to_mesh, shear_of, triangle_crossing, vector_to_mesh};
 use super::primitive::intersect;
 use super::ray::{Hit, Ray, nearer_hit, no_hit, standalone_prim};
-use super::samples::{LEVEL, Samples};
+use super::samples::{LEVEL, Samples, box_hits};
 use super::shadow::{SampleBlock, occlusion_mask};
 use super::slab::{Slabs, box_interval, interval_hits, slabs};
 use super::surface::{Surface, largest};
@@ -186,6 +188,7 @@ pub fn traversal_mesh(mesh: &PackedMesh) -> traversal::Mesh<'_> {
         nodes: cast_slice(&mesh.nodes),
         vertices: cast_slice(&mesh.vertices),
         triangles: cast_slice(&mesh.triangles),
+        decoded: mesh.decoded.get(),
     }
 }
 
@@ -200,7 +203,7 @@ struct Rays<'a> {
     light: &'a Light,
     block: SampleBlock,
     light_segments: LightSegments,
-    samples: Samples,
+    samples: Rc<Samples>,
 }
 
 fn bits_of(mut bits: u32) -> impl Iterator<Item = u32> {
@@ -231,10 +234,23 @@ pub fn occluded_by_bvh(
         light_segments: segments_to_light(light, surface.ray_origin),
         samples: Samples::of(block),
     };
+    let directions = rays.samples.segments(*LEVEL, rays.light_segments);
+    let pad = item_pad(scene, surface.ray_origin);
+    let mut occluded = already_occluded & all_samples;
+    if scene.bvh.items.len() <= FEW_ITEMS {
+        for item in scene.bvh.items.iter().filter(|item| item.kind & CASTS_SHADOW != 0) {
+            let hits = box_hits(item.low, item.high, surface.ray_origin, pad, &directions, light.t_max);
+            let candidates = hits & !occluded;
+            if candidates != 0 {
+                occluded |= occluded_by_item(scene, item, candidates, &rays);
+            }
+        }
+        return occluded;
+    }
     let segments = traversal::Segments {
         o: surface.ray_origin,
-        pad: item_pad(scene, surface.ray_origin),
-        directions: &rays.samples.segments(*LEVEL, rays.light_segments),
+        pad,
+        directions: &directions,
         t_max: light.t_max,
         skip: NO_INDEX,
     };
@@ -243,8 +259,8 @@ pub fn occluded_by_bvh(
         (kind & CASTS_SHADOW != 0).then_some(Aabb { low, high })
     };
     let visit = |i: usize, candidates| occluded_by_item(scene, &scene.bvh.items[i], candidates, &rays);
-    (already_occluded & all_samples)
-        | traversal::occluded_items(*LEVEL, cast_slice(&scene.bvh.nodes), &segments, untested, bounds, visit)
+    occluded |= traversal::occluded_items(*LEVEL, cast_slice(&scene.bvh.nodes), &segments, untested, bounds, visit);
+    occluded
 }
 
 fn occluded_by_item(scene: &Packed, item: &BvhItem, candidates: u32, rays: &Rays) -> u32 {

@@ -1,7 +1,8 @@
 //! Twin of `shaders/light.wgsl`.
 
-use glam::{Vec2, Vec3};
+use glam::Vec3;
 
+use super::lanes::{Real, Vector2, Vector3, constant};
 use super::math::{dot, max, min, normalize};
 use super::ray::vector_to_local;
 use crate::records::{Light, Primitive};
@@ -29,8 +30,11 @@ pub fn segments_to_local(q: &Primitive, segments: LightSegments) -> LightSegment
     }
 }
 
-pub fn segment(segments: LightSegments, at: Vec2) -> Vec3 {
-    segments.towards + segments.u * (2.0 * at.x - 1.0) + segments.v * (2.0 * at.y - 1.0)
+#[inline(always)]
+pub fn segment<V: Vector3>(segments: LightSegments, at: <V::Real as Real>::Vec2) -> V {
+    let (x, y) = (constant(2.0) * at.x() - 1.0, constant(2.0) * at.y() - 1.0);
+    let [towards, u, v] = [segments.towards, segments.u, segments.v].map(|v| x.broadcast(v));
+    towards + u * x + v * y
 }
 
 pub fn spot_falloff(light: &Light, to_light: Vec3) -> f32 {

@@ -52,12 +52,13 @@ pub fn floor<F: Real>(x: F) -> F {
     select(x, select(integer, integer - 1.0, integer.gt(x)), small)
 }
 
-pub fn power_whole(x: f32, n: u32, bits: u32) -> f32 {
-    let mut result = 1.0;
+#[inline(always)]
+pub fn power_whole<F: Real>(x: F, n: u32, bits: u32) -> F {
+    let mut result = x.splat(1.0);
     let mut square = x;
     for i in 0..bits {
         result = if (n >> i) & 1 == 1 { result * square } else { result };
-        square *= square;
+        square = square * square;
     }
     result
 }

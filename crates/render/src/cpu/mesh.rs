@@ -4,7 +4,7 @@ use glam::{UVec2, Vec2, Vec3, Vec4};
 
 use super::differential::{Differential, HitDifferential, transferred};
 use super::footprint::Footprint;
-use super::lanes::{Real, Vector3, select};
+use super::lanes::{Real, Vector3, constant, select};
 use super::math::{cross, dot, max, max4, min, normalize, positive_zero};
 use super::primitive::Tangents;
 use super::ray::{Hit, Ray, point_to_local, vector_to_local};
@@ -246,12 +246,19 @@ pub fn lift<V: Vector3>(n: V, from_vertex: V, up: V) -> V {
     n * select(zero, max(-dot(n, from_vertex), zero), cosine.gt(cosine.splat(0.8)))
 }
 
-pub fn face_direction_allowed(face: &HitPrimitive, surface: &Surface, direction: Vec3) -> bool {
-    let fall = -dot(surface.normal, direction);
+#[inline(always)]
+pub fn face_direction_allowed<V: Vector3>(
+    face: &HitPrimitive,
+    surface: &Surface,
+    direction: V,
+) -> <V::Real as Real>::Mask {
+    let fall = -dot(direction.broadcast(surface.normal), direction);
+    let (zero, one) = (fall.splat(0.0), fall.splat(1.0));
     let height = dot(surface.normal, surface.terminator_offset);
-    let crossing = surface.position + surface.terminator_offset + direction * (height / max(fall, 1e-30));
+    let lifted = direction.broadcast(surface.position + surface.terminator_offset);
+    let crossing = lifted + direction * (constant(height) / max(fall, fall.splat(1e-30)));
     let b = point_to_local(&face.primitive, crossing);
-    (fall <= 0.0) | (b.x < 0.0) | (b.y < 0.0) | (b.x + b.y > 1.0)
+    fall.le(zero) | b.x().lt(zero) | b.y().lt(zero) | (b.x() + b.y()).gt(one)
 }
 
 pub fn face_tangents(face: &HitPrimitive) -> Tangents {

@@ -1,63 +1,59 @@
 //! Twin of `shaders/phong.wgsl`: Phong's reflection model.
 
-use glam::Vec3;
-
+use super::lanes::{Real, Vector3, constant, select};
 use super::light::LightSegments;
-use super::lobes::{lit_bits, lobes_of_all};
+use super::lobes::{allowed_bits, lobes_of_all};
 use super::math::{dot, max, power, power_whole};
-use super::mesh::{HitPrimitive, face_direction_allowed};
+use super::mesh::HitPrimitive;
 use super::samples::{LEVEL, Samples};
 use super::shadow::SampleBlock;
 use super::surface::Surface;
 use crate::records::Material;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Lobes {
-    pub diffuse: f32,
-    pub specular: f32,
+pub struct Lobes<F = f32> {
+    pub diffuse: F,
+    pub specular: F,
 }
 
-#[inline]
-pub fn phong_lobes(surface: &Surface, material: &Material, to_light: Vec3, exponent_bits: u32) -> Lobes {
-    let inverse_length = 1.0 / dot(to_light, to_light).sqrt();
-    let n_l = dot(surface.shading_normal, to_light);
+#[inline(always)]
+pub fn phong_lobes<V: Vector3>(
+    surface: &Surface,
+    material: &Material,
+    to_light: V,
+    exponent_bits: u32,
+) -> Lobes<V::Real> {
+    let zero = to_light.x().splat(0.0);
+    let inverse_length = constant(1.0) / dot(to_light, to_light).sqrt();
+    let n_l = dot(to_light.broadcast(surface.shading_normal), to_light);
     let n_v = dot(surface.shading_normal, surface.wo);
-    let r_v = (2.0 * n_l * n_v - dot(surface.wo, to_light)) * inverse_length;
-    let r_v_power = phong_power(max(r_v, 0.0), material, exponent_bits);
+    let r_v = (n_l * 2.0 * n_v - dot(to_light.broadcast(surface.wo), to_light)) * inverse_length;
+    let r_v_power = phong_power(max(r_v, zero), material, exponent_bits);
     let lit = is_lit(surface, to_light);
     Lobes {
-        diffuse: if lit { n_l * inverse_length } else { 0.0 },
-        specular: if lit { r_v_power } else { 0.0 },
+        diffuse: select(zero, n_l * inverse_length, lit),
+        specular: select(zero, r_v_power, lit),
     }
 }
 
-#[inline]
-pub fn is_lit(surface: &Surface, direction: Vec3) -> bool {
-    (dot(surface.shading_normal, direction) > 0.0) & (dot(surface.smooth_normal, direction) > 0.0)
+#[inline(always)]
+pub fn is_lit<V: Vector3>(surface: &Surface, direction: V) -> <V::Real as Real>::Mask {
+    let zero = direction.x().splat(0.0);
+    dot(direction.broadcast(surface.shading_normal), direction).gt(zero)
+        & dot(direction.broadcast(surface.smooth_normal), direction).gt(zero)
 }
 
 pub fn unlit_mask(prim: &HitPrimitive, surface: &Surface, segments: LightSegments, block: SampleBlock) -> u32 {
     let directions = Samples::of(block).segments(*LEVEL, segments);
-    let lit = lit_bits(*LEVEL, surface, &directions);
-    let mut bits = directions.all() & !lit;
-    if surface.smooth_normal != surface.normal {
-        for i in (0..directions.count).filter(|i| (lit >> i) & 1 == 1) {
-            bits |= if face_direction_allowed(prim, surface, directions.get(i)) {
-                0
-            } else {
-                1 << i
-            };
-        }
-    }
-    bits
+    directions.all() & !allowed_bits(*LEVEL, prim, surface, &directions)
 }
 
-#[inline]
-pub fn phong_power(x: f32, material: &Material, exponent_bits: u32) -> f32 {
+#[inline(always)]
+pub fn phong_power<F: Real>(x: F, material: &Material, exponent_bits: u32) -> F {
     if exponent_bits > 0 {
         return power_whole(x, material.exponent, exponent_bits);
     }
-    power(x, material.shininess)
+    power(x, x.splat(material.shininess))
 }
 
 pub fn phong_block(
@@ -69,6 +65,12 @@ pub fn phong_block(
     exponent_bits: u32,
     sum: Lobes,
 ) -> Lobes {
+    if occluded == u32::MAX >> (32 - block.count) {
+        return Lobes {
+            diffuse: sum.diffuse + 0.0, // -0 becomes 0
+            specular: sum.specular + 0.0,
+        };
+    }
     let directions = Samples::of(block).segments(*LEVEL, segments);
     let values = lobes_of_all(*LEVEL, surface, material, &directions, exponent_bits);
     let mut lobes = sum;

@@ -1,16 +1,17 @@
 //! CPU backend: evaluates the kernels' twins on a thread pool.
 
 use std::ops::{Deref, DerefMut, Range};
-use std::sync::{Arc, OnceLock};
 
 use glam::{UVec2, Vec4};
 use rayon::prelude::*;
 
 use super::adaptive::{layer_mean, pilot_add, pilot_finish, samples_wanted};
+use super::decoded_meshes::decode_meshes;
 use super::geometry::pixel_first_hit;
 use super::integrators::path::{path_layers, path_value};
-use super::pixel::{Layers, pixel_radiance};
-use super::wavefront::{BatchMeshes, MAX_PATHS, Wavefront};
+use super::integrators::phong;
+use super::pixel::Layers;
+use super::wavefront::{MAX_PATHS, Wavefront};
 use crate::backend::{Backend, FilmState, Rules};
 use crate::error::RenderError;
 use crate::film::{Film, Layer};
@@ -24,8 +25,6 @@ pub struct Cpu<P> {
     rules: Rules,
     film: Option<(Film, FilmState)>,
     pending: Option<(Region, Range<u32>)>,
-    /// The meshes of the scene for batches of rays, converted when the first samples are rendered.
-    meshes: OnceLock<Arc<BatchMeshes>>,
 }
 
 impl<P: Deref<Target = Packed>> Cpu<P> {
@@ -36,7 +35,6 @@ impl<P: Deref<Target = Packed>> Cpu<P> {
             scene,
             film: None,
             pending: None,
-            meshes: OnceLock::new(),
         }
     }
 
@@ -52,7 +50,6 @@ impl<P: Deref<Target = Packed>> Cpu<P> {
     pub fn edit_scene(&mut self, edit: impl FnOnce(&mut P)) {
         edit(&mut self.scene);
         (self.rules, self.film, self.pending) = (Rules::of(&self.scene), None, None);
-        self.meshes = OnceLock::new();
     }
 
     pub fn into_film(self) -> Option<Film> {
@@ -68,7 +65,7 @@ impl<P: Deref<Target = Packed>> Cpu<P> {
 }
 
 impl<P: DerefMut<Target = Packed>> Cpu<P> {
-    /// Changes the camera and discards the film. Keeps the converted meshes.
+    /// Changes the camera and discards the film.
     pub fn set_camera(&mut self, camera: &Camera) {
         self.scene.camera = *camera;
         (self.rules, self.film, self.pending) = (Rules::of(&self.scene), None, None);
@@ -105,13 +102,10 @@ impl<P: Deref<Target = Packed>> Backend for Cpu<P> {
     fn poll(&mut self) -> Result<bool, RenderError> {
         if let (Some((tile, mut samples)), Some((film, _))) = (self.pending.take(), &mut self.film) {
             let scene: &Packed = &self.scene;
-            let meshes = self.meshes.get_or_init(|| match scene.integrator {
-                Integrator::Phong => Arc::default(),
-                Integrator::Path => Arc::new(BatchMeshes::new(scene)),
-            });
+            decode_meshes(scene);
             while !samples.is_empty() {
                 let end = self.rules.end_of_part(&samples);
-                add_samples(scene, meshes, film, tile, samples.start..end);
+                add_samples(scene, film, tile, samples.start..end);
                 samples.start = end;
             }
         }
@@ -151,7 +145,7 @@ impl<P: Deref<Target = Packed>> Backend for Cpu<P> {
 }
 
 /// Adds samples to a tile. With adaptive sampling, the samples are either pilot samples or further samples.
-fn add_samples(scene: &Packed, meshes: &Arc<BatchMeshes>, film: &mut Film, tile: Region, samples: Range<u32>) {
+fn add_samples(scene: &Packed, film: &mut Film, tile: Region, samples: Range<u32>) {
     let Film {
         region,
         sums,
@@ -199,7 +193,7 @@ fn add_samples(scene: &Packed, meshes: &Arc<BatchMeshes>, film: &mut Film, tile:
     }
     let has_further_samples = scene.sampling.adaptive && !is_pilot;
     segments.into_par_iter().for_each_init(
-        || Wavefront::new(Arc::clone(meshes)),
+        || Wavefront::new(scene),
         |wavefront, mut run| {
             let (first, width) = (run.first, run.sums.len());
             let pixel = |x: usize| UVec2::new(first.x + x as u32, first.y);
@@ -212,15 +206,17 @@ fn add_samples(scene: &Packed, meshes: &Arc<BatchMeshes>, film: &mut Film, tile:
             };
             let camera_samples: Vec<(usize, u32)> = (0..width).flat_map(samples_of).collect();
             for batch in camera_samples.chunks(MAX_PATHS) {
+                let samples = batch.iter().map(|&(x, sample)| (pixel(x), sample));
                 match scene.integrator {
                     Integrator::Phong => {
-                        for &(x, sample) in batch {
-                            let (value, layers) = pixel_radiance(scene, pixel(x), sample);
-                            run.add(x, sample, value, layers);
+                        let first_hits = wavefront.first_hits(scene, samples);
+                        for (&(x, sample), (state, hit)) in batch.iter().zip(first_hits) {
+                            let radiance = phong::radiance_after(scene, state.path, hit, pixel(x), sample);
+                            let value = (radiance * state.weight).extend(state.weight);
+                            run.add(x, sample, value, Layers::default());
                         }
                     }
                     Integrator::Path => {
-                        let samples = batch.iter().map(|&(x, sample)| (pixel(x), sample));
                         let paths = wavefront.trace(scene, samples);
                         for (&(x, sample), path) in batch.iter().zip(paths) {
                             run.add(x, sample, path_value(path), path_layers(path));

@@ -7,7 +7,7 @@ use super::light::{LightSegments, segments_to_light, segments_to_local};
 use super::math::dot;
 use super::primitive::{occludes, solid_levels};
 use super::ray::vector_to_local;
-use super::samples::{LEVEL, Samples};
+use super::samples::{LEVEL, Samples, occluded_directions};
 use super::sampling::sample_square;
 use crate::records::{Light, Primitive, Sphere};
 
@@ -27,15 +27,7 @@ pub fn occlusion_mask(kind: u32, q: &Primitive, p: Vec3, from_inside: bool, ligh
     let o = from_anchor - q.middle;
     let levels = solid_levels(kind, q, from_anchor, from_inside);
     let directions = Samples::of(block).segments(*LEVEL, segments_to_local(q, segments_to_light(light, p)));
-    let mut bits = 0;
-    for i in 0..directions.count {
-        bits |= if occludes(kind, o, directions.get(i), levels, light.t_max) {
-            1 << i
-        } else {
-            0
-        };
-    }
-    bits
+    occluded_directions(kind, o, &directions, levels, light.t_max)
 }
 
 #[inline(always)] // compiled for each kind

@@ -6,7 +6,7 @@ use bytemuck::cast_vec;
 use glam::{UVec4, Vec4};
 use rayon::prelude::*;
 
-use crate::bvh::{Aabb, build};
+use crate::bvh::{Aabb, DecodedOnce, build};
 use crate::records::PackedMesh;
 use wgray_scene::mesh::{Mesh, VertexTangents};
 
@@ -90,6 +90,7 @@ impl PackedMesh {
             low: bounds.low,
             high: bounds.high,
             nodes: cast_vec(tree.nodes),
+            decoded: DecodedOnce::default(),
         }
     }
 }

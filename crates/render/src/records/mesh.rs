@@ -4,6 +4,7 @@ use bytemuck::cast_slice;
 use glam::{UVec4, Vec3, Vec4};
 
 use super::Node;
+use crate::bvh::DecodedOnce;
 
 /// A packed mesh, in object space.
 #[derive(Clone, Debug, PartialEq)]
@@ -29,6 +30,8 @@ pub struct PackedMesh {
     pub low: Vec3,
     /// Upper corner of the bounding box.
     pub high: Vec3,
+    /// The form for traversal on the CPU.
+    pub decoded: DecodedOnce,
 }
 
 impl PackedMesh {
@@ -50,6 +53,7 @@ impl PackedMesh {
             groups,
             low: _,
             high: _,
+            decoded: _,
         } = self;
         let lists: [&[u8]; 8] = [
             cast_slice(nodes),

@@ -23,7 +23,6 @@ use crate::records::{
 };
 
 pub fn radiance(scene: &Packed, ray: Ray, differential: Differential, pixel: UVec2, sample: u32) -> Vec3 {
-    let bounces = scene.specialization.bounces;
     let mut path = Path {
         ray,
         differential,
@@ -36,8 +35,15 @@ pub fn radiance(scene: &Packed, ray: Ray, differential: Differential, pixel: UVe
     if scene.specialization.camera_invisible != 0 {
         path = skip_camera_invisible(scene, path);
     }
+    let hit = closest_hit(scene, path.ray, path.origin_prim, path.inside_prim);
+    radiance_after(scene, path, hit, pixel, sample)
+}
+
+/// The part of [`radiance`] after the closest hit of the camera ray.
+pub fn radiance_after(scene: &Packed, camera_path: Path, first_hit: Hit, pixel: UVec2, sample: u32) -> Vec3 {
+    let bounces = scene.specialization.bounces;
+    let (mut path, mut hit) = (camera_path, first_hit);
     if bounces == 0 {
-        let hit = closest_hit(scene, path.ray, path.origin_prim, path.inside_prim);
         if hit.primitive == NO_INDEX {
             return scene.environment.background;
         }
@@ -49,7 +55,9 @@ pub fn radiance(scene: &Packed, ray: Ray, differential: Differential, pixel: UVe
     for _ in 0..MAX_PATH_LEAVES {
         let mut radiance = scene.environment.background;
         while path.depth <= bounces {
-            let hit = closest_hit(scene, path.ray, path.origin_prim, path.inside_prim);
+            if path.depth > 0 {
+                hit = closest_hit(scene, path.ray, path.origin_prim, path.inside_prim);
+            }
             if hit.primitive == NO_INDEX {
                 break;
             }

@@ -1,51 +1,46 @@
 //! Traversal of a BVH by a single ray, for the closest hit, any hit, or the leaves approximately from front to back.
 
-use std::ops::Range;
-
 use arrayvec::ArrayVec;
 use fearless_simd::f32x8;
 use fearless_simd::prelude::*;
 
-use super::four::Four;
 use super::line::maximum;
-use super::{Line, Mesh, Nearest, remaining_t_max};
-use crate::bvh::{BUILD_MAX_DEPTH, Node};
+use super::node::{TriangleBvh, Triangles as _, WideNode};
+use super::{Line, Nearest, remaining_t_max};
+use crate::bvh::BUILD_MAX_DEPTH;
 
 /// Maximum number of nodes on the stack: each level pops one node and pushes up to 8.
 pub const STACK: usize = BUILD_MAX_DEPTH as usize * 7 + 1;
 
-/// Decodes one side of all child boxes along an axis; `side` is `Node::low` or `Node::high`.
-#[inline(always)]
-pub fn side<S: Simd>(simd: S, node: &Node, side: &[[u8; 8]; 3], axis: usize, scale: f32) -> f32x8<S> {
-    let mut steps = [0.0; 8];
-    for (x, step) in steps.iter_mut().zip(&side[axis]) {
-        *x = f32::from(*step);
-    }
-    f32x8::simd_from(simd, steps) * scale + node.base[axis]
-}
-
 /// See [`super::closest`].
 #[inline(always)]
-pub fn closest<S: Simd>(simd: S, mesh: &Mesh, line: &Line, start: f32, skip: u32, mut best: Nearest) -> Nearest {
+pub fn closest<S: Simd>(
+    simd: S,
+    mesh: &impl TriangleBvh,
+    line: &Line,
+    start: f32,
+    skip: u32,
+    mut best: Nearest,
+) -> Nearest {
     leaves(
         simd,
-        mesh.nodes,
+        mesh.nodes(),
         line,
         remaining_t_max(start, best.t),
         #[inline(always)]
-        |items, _| {
-            let slots = items.clone().step_by(4);
-            for (first, triangles) in slots.zip(mesh.triangles[items].chunks(4)) {
-                let (mut hits, t) = Four::new(simd, mesh, triangles).intersect(simd, line);
-                while hits != 0 {
-                    let i = hits.trailing_zeros() as usize;
-                    hits &= hits - 1;
-                    let (t, triangle) = (start + maximum(t[i], 0.0), triangles[i][3]);
-                    let nearer = t < best.t || (t == best.t && triangle < best.triangle);
-                    if nearer && t > 0.0 && triangle != skip {
-                        let slot = (first + i) as u32;
-                        best = Nearest { t, triangle, slot };
-                    }
+        |leaf, limit| {
+            let Some(triangles) = mesh.triangles(leaf) else {
+                return limit;
+            };
+            let (mut hits, t) = triangles.intersect(simd, line);
+            while hits != 0 {
+                let i = hits.trailing_zeros() as usize;
+                hits &= hits - 1;
+                let (t, triangle) = (start + maximum(t[i], 0.0), triangles.index(i));
+                let nearer = t < best.t || (t == best.t && triangle < best.triangle);
+                if nearer && t > 0.0 && triangle != skip {
+                    let slot = triangles.slot(i);
+                    best = Nearest { t, triangle, slot };
                 }
             }
             remaining_t_max(start, best.t)
@@ -56,22 +51,23 @@ pub fn closest<S: Simd>(simd: S, mesh: &Mesh, line: &Line, start: f32, skip: u32
 
 /// See [`super::any`].
 #[inline(always)]
-pub fn any<S: Simd>(simd: S, mesh: &Mesh, line: &Line, skip: u32, t_max: f32) -> bool {
+pub fn any<S: Simd>(simd: S, mesh: &impl TriangleBvh, line: &Line, skip: u32, t_max: f32) -> bool {
     let mut found = false;
     leaves(
         simd,
-        mesh.nodes,
+        mesh.nodes(),
         line,
         t_max,
         #[inline(always)]
-        |items, limit| {
-            for triangles in mesh.triangles[items].chunks(4) {
-                let (mut hits, t) = Four::new(simd, mesh, triangles).intersect(simd, line);
-                while hits != 0 {
-                    let i = hits.trailing_zeros() as usize;
-                    hits &= hits - 1;
-                    found |= t[i] > 0.0 && t[i] < t_max && triangles[i][3] != skip;
-                }
+        |leaf, limit| {
+            let Some(triangles) = mesh.triangles(leaf) else {
+                return limit;
+            };
+            let (mut hits, t) = triangles.intersect(simd, line);
+            while hits != 0 {
+                let i = hits.trailing_zeros() as usize;
+                hits &= hits - 1;
+                found |= t[i] > 0.0 && t[i] < t_max && triangles.index(i) != skip;
             }
             if found { f32::NEG_INFINITY } else { limit }
         },
@@ -81,12 +77,12 @@ pub fn any<S: Simd>(simd: S, mesh: &Mesh, line: &Line, skip: u32, t_max: f32) ->
 
 /// See [`super::leaves`].
 #[inline(always)]
-pub fn leaves<S: Simd>(
+pub fn leaves<S: Simd, N: WideNode>(
     simd: S,
-    nodes: &[Node],
+    nodes: &[N],
     line: &Line,
     mut limit: f32,
-    mut visit: impl FnMut(Range<usize>, f32) -> f32,
+    mut visit: impl FnMut(N::Leaf, f32) -> f32,
 ) {
     // For each axis: near side (0: lower, 1: upper), origins for near and far sides, and reciprocal of the direction.
     let mut near_side_index = [0; 3];
@@ -108,28 +104,26 @@ pub fn leaves<S: Simd>(
             continue;
         }
         let node = &nodes[node_index as usize];
-        let scale = node.scale().to_array();
-        let planes = [&node.low, &node.high];
         let mut near = f32x8::splat(simd, f32::NEG_INFINITY);
         let mut far = f32x8::splat(simd, limit);
         for k in 0..3 {
-            near = near.max((side(simd, node, planes[near_side_index[k]], k, scale[k]) - origins[0][k]) * inverse[k]);
-            far = far.min((side(simd, node, planes[1 - near_side_index[k]], k, scale[k]) - origins[1][k]) * inverse[k]);
+            near = near.max((node.planes(simd, near_side_index[k], k) - origins[0][k]) * inverse[k]);
+            far = far.min((node.planes(simd, 1 - near_side_index[k], k) - origins[1][k]) * inverse[k]);
         }
         let hits = (near.simd_le(far) & far.simd_ge(f32x8::splat(simd, 0.0))).to_bitmask() as u32;
-        let mut leaves = hits & !u32::from(node.inner);
+        let inner = node.inner();
+        let mut leaves = hits & !inner;
         while leaves != 0 {
             let slot = leaves.trailing_zeros() as usize;
             leaves &= leaves - 1;
-            limit = visit(node.items(slot), limit);
+            limit = visit(node.leaf(slot), limit);
         }
         let first = stack.len();
-        let mut inner_hits = hits & u32::from(node.inner);
+        let mut inner_hits = hits & inner;
         while inner_hits != 0 {
-            let slot = inner_hits.trailing_zeros();
+            let slot = inner_hits.trailing_zeros() as usize;
             inner_hits &= inner_hits - 1;
-            let lower_slots = u32::from(node.inner) & ((1 << slot) - 1);
-            let child = (near[slot as usize], node.first_child + lower_slots.count_ones());
+            let child = (near[slot], node.node(slot));
             let mut i = stack.len();
             stack.push(child);
             while i > first && stack[i - 1].0 < child.0 {

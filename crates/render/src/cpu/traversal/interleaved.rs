@@ -2,11 +2,12 @@
 
 use fearless_simd::prelude::*;
 
-use super::batch_mesh::{BatchMesh, LEAF};
 use super::line::maximum;
 use super::mesh_stack::MeshStack;
+use super::node::Triangles as _;
 use super::stack::BoxRay;
 use super::{Line, Nearest, remaining_t_max};
+use crate::bvh::{DecodedMesh, LEAF};
 
 /// Number of interleaved rays. Traversal with 4 or 16 is slower.
 pub const RAYS: usize = 8;
@@ -40,7 +41,7 @@ impl MeshRay {
     };
 }
 
-static NO_MESH: BatchMesh = BatchMesh {
+static NO_MESH: DecodedMesh = DecodedMesh {
     nodes: Vec::new(),
     leaves: Vec::new(),
 };
@@ -48,17 +49,17 @@ static NO_MESH: BatchMesh = BatchMesh {
 /// The rays of a batch.
 pub trait RaySource<'a, S> {
     /// Stores the result of the ray that the lane has traced, if any. Returns the next ray of the lane, if any.
-    fn next(&mut self, simd: S, lane: usize, traced: Option<(&Line, Nearest)>) -> Option<(&'a BatchMesh, MeshRay)>;
+    fn next(&mut self, simd: S, lane: usize, traced: Option<(&Line, Nearest)>) -> Option<(&'a DecodedMesh, MeshRay)>;
 }
 
 /// One of the interleaved rays.
 struct Lane<'a, 's> {
-    mesh: &'a BatchMesh,
+    mesh: &'a DecodedMesh,
     ray: MeshRay,
     box_ray: BoxRay,
     best: Nearest,
     limit: f32,
-    /// The node or leaf to visit, as in [`BatchNode::children`](super::batch_mesh::BatchNode::children).
+    /// The node or leaf to visit, as in [`DecodedNode::children`](crate::bvh::DecodedNode::children).
     next: u32,
     stack: &'s mut MeshStack,
     state: LaneState,
@@ -73,7 +74,7 @@ enum LaneState {
 
 impl<'a> Lane<'a, '_> {
     #[inline(always)]
-    fn start(&mut self, mesh: &'a BatchMesh, ray: MeshRay) {
+    fn start(&mut self, mesh: &'a DecodedMesh, ray: MeshRay) {
         self.mesh = mesh;
         self.box_ray = BoxRay::of(&ray.line);
         self.best = ray.best;

@@ -4,11 +4,11 @@
 use fearless_simd::prelude::*;
 use fearless_simd::{f32x8, u8x32, u32x8};
 
-use super::batch_mesh::BatchNode;
 use super::closest::STACK;
 use super::stack::BoxRay;
+use crate::bvh::DecodedNode;
 
-/// Nodes and leaves to visit, as values of `BatchNode::children`. Visiting a node removes an entry and adds up to 8,
+/// Nodes and leaves to visit, as values of `DecodedNode::children`. Visiting a node removes an entry and adds up to 8,
 /// so that there are at most `STACK` entries. The arrays have 8 spare elements, because 8 are written at a time.
 #[derive(Clone, Debug)]
 pub struct MeshStack {
@@ -56,7 +56,13 @@ impl MeshStack {
     /// Adds those children of a node whose boxes the ray hits before `limit`. Sorts them if `SORTED`, with the nearest
     /// on top.
     #[inline(always)]
-    pub fn push_children<S: Simd, const SORTED: bool>(&mut self, simd: S, node: &BatchNode, ray: &BoxRay, limit: f32) {
+    pub fn push_children<S: Simd, const SORTED: bool>(
+        &mut self,
+        simd: S,
+        node: &DecodedNode,
+        ray: &BoxRay,
+        limit: f32,
+    ) {
         let mut near = f32x8::splat(simd, 0.0);
         let mut far = f32x8::splat(simd, limit);
         for k in 0..3 {

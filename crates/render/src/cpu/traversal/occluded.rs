@@ -1,15 +1,13 @@
 //! Occlusion of up to 32 segments from one point, which traverse the BVH together.
 
-use std::ops::Range;
-
 use arrayvec::ArrayVec;
 use fearless_simd::f32x8;
 use fearless_simd::prelude::*;
 
-use super::closest::{STACK, side};
-use super::four::Four;
+use super::closest::STACK;
 use super::line::{MIN_COMPONENT, axes_from, in_order, maximum, minimum};
-use super::{Directions, Line, MAX_SEGMENTS, Mesh, Segments};
+use super::node::{TriangleBvh, Triangles as _, WideNode};
+use super::{Directions, Line, MAX_SEGMENTS, Segments};
 use crate::bvh::{Aabb, Node};
 
 /// Maximum number of segments that are tested one by one. Each of them is tested against all boxes of a node, or
@@ -47,44 +45,36 @@ struct Slope {
 
 /// See [`super::occluded`].
 #[inline(always)]
-pub fn occluded<S: Simd>(simd: S, mesh: &Mesh, segments: &Segments, mask: u32) -> u32 {
+pub fn occluded<S: Simd>(simd: S, mesh: &impl TriangleBvh, segments: &Segments, mask: u32) -> u32 {
     let o = segments.o.to_array();
     traverse(
         simd,
-        mesh.nodes,
+        mesh.nodes(),
         segments,
         mask,
         #[inline(always)]
-        |lanes, items, leaf_mask| {
+        |lanes, leaf, leaf_mask| {
+            let Some(triangles) = mesh.triangles(leaf) else {
+                return 0;
+            };
             let mut pending = leaf_mask;
-            for triangles in mesh.triangles[items].chunks(4) {
-                if pending.count_ones() <= FEW_SEGMENTS {
-                    let four = Four::new(simd, mesh, triangles);
-                    for i in bits_of(pending) {
-                        let (hits, t) = four.intersect(simd, &line_at(lanes, i, &o, segments.pad));
-                        for lane in bits_of(hits) {
-                            if t[lane] > 0.0 && t[lane] < segments.t_max && triangles[lane][3] != segments.skip {
-                                pending &= !(1 << i);
-                            }
+            if pending.count_ones() <= FEW_SEGMENTS {
+                for i in bits_of(pending) {
+                    let (hits, t) = triangles.intersect(simd, &line_at(lanes, i, &o, segments.pad));
+                    for lane in bits_of(hits) {
+                        if t[lane] > 0.0 && t[lane] < segments.t_max && triangles.index(lane) != segments.skip {
+                            pending &= !(1 << i);
                         }
                     }
-                    continue;
                 }
-                for [a, b, c, index] in triangles {
-                    if *index == segments.skip {
-                        continue;
-                    }
-                    let vertices = [
-                        &mesh.vertices[*a as usize],
-                        &mesh.vertices[*b as usize],
-                        &mesh.vertices[*c as usize],
-                    ];
-                    pending &= !in_lanes(
-                        lanes,
-                        #[inline(always)]
-                        |lanes| occluded_by_triangle(simd, lanes, &o, segments, vertices),
-                    );
-                }
+                return leaf_mask & !pending;
+            }
+            for lane in (0..triangles.count()).filter(|lane| triangles.index(*lane) != segments.skip) {
+                pending &= !in_lanes(
+                    lanes,
+                    #[inline(always)]
+                    |lanes| occluded_by_triangle(simd, lanes, &o, segments, triangles.corners(lane)),
+                );
             }
             leaf_mask & !pending
         },
@@ -139,6 +129,26 @@ fn bits_of(mut bits: u32) -> impl Iterator<Item = usize> {
     )
 }
 
+/// Returns the bits of a mask of children, approximately from the farthest to the nearest child for directions in an
+/// octant. The child in slot c is approximately in octant c of its node.
+#[inline(always)]
+fn far_to_near(children: u32, octant: usize) -> impl Iterator<Item = usize> {
+    let mut bits = children; // bit j stands for slot `j ^ octant`
+    for (k, low) in [0x55, 0x33, 0x0f].into_iter().enumerate() {
+        let distance = 1 << k;
+        let swapped = (bits & low) << distance | bits >> distance & low;
+        bits = if octant & distance != 0 { swapped } else { bits };
+    }
+    std::iter::from_fn(
+        #[inline(always)]
+        move || {
+            let j = bits.checked_ilog2()? as usize;
+            bits ^= 1 << j;
+            Some(j ^ octant)
+        },
+    )
+}
+
 /// Concatenates the masks of all vectors of segments.
 #[inline(always)]
 fn in_lanes<S: Simd>(lanes: &[Lanes<S>], mut test: impl FnMut(&Lanes<S>) -> u64) -> u32 {
@@ -152,12 +162,12 @@ fn in_lanes<S: Simd>(lanes: &[Lanes<S>], mut test: impl FnMut(&Lanes<S>) -> u64)
 /// Visits each leaf with the mask of the segments that hit the leaf. `visit` returns the mask of the segments that the
 /// leaf occludes. Returns the mask of all occluded segments.
 #[inline(always)]
-fn traverse<S: Simd>(
+fn traverse<S: Simd, N: WideNode>(
     simd: S,
-    nodes: &[Node],
+    nodes: &[N],
     segments: &Segments,
     mask: u32,
-    mut visit: impl FnMut(&[Lanes<S>], Range<usize>, u32) -> u32,
+    mut visit: impl FnMut(&[Lanes<S>], N::Leaf, u32) -> u32,
 ) -> u32 {
     let mut pending = mask & segments.directions.all();
     if pending == 0 {
@@ -168,6 +178,10 @@ fn traverse<S: Simd>(
     let slopes = prepare(simd, segments, &mut lanes);
     let zero = f32x8::splat(simd, 0.0);
     let t_max = f32x8::splat(simd, segments.t_max);
+    // The octant of the first direction, with which most directions agree.
+    let octant = (0..3)
+        .map(|k| usize::from(segments.directions.components[k][0] < 0.0) << k)
+        .sum();
     let mut stack: ArrayVec<(u32, u32), STACK> = ArrayVec::new();
     stack.push((0, pending));
     while let Some((node_index, mask)) = stack.pop() {
@@ -176,13 +190,10 @@ fn traverse<S: Simd>(
             continue;
         }
         let node = &nodes[node_index as usize];
-        let scale = node.scale().to_array();
-        let planes = [&node.low, &node.high];
         let mut planes_from_origin = [[zero; 3]; 2];
         for k in 0..3 {
             for i in 0..2 {
-                planes_from_origin[i][k] =
-                    side(simd, node, planes[slopes[k].sides[i]], k, scale[k]) - slopes[k].origins[i];
+                planes_from_origin[i][k] = node.planes(simd, slopes[k].sides[i], k) - slopes[k].origins[i];
             }
         }
         // For each child, the mask of the segments that hit its box; mask of the children that any segment hits.
@@ -232,14 +243,14 @@ fn traverse<S: Simd>(
                 hit_children |= u32::from(children[slot] != 0) << slot;
             }
         }
-        for slot in bits_of(hit_children & u32::from(node.inner)) {
-            let lower_slots = u32::from(node.inner) & ((1 << slot) - 1);
-            stack.push((node.first_child + lower_slots.count_ones(), children[slot]));
+        let inner = node.inner();
+        for slot in far_to_near(hit_children & inner, octant) {
+            stack.push((node.node(slot), children[slot]));
         }
-        for slot in bits_of(hit_children & !u32::from(node.inner)) {
+        for slot in bits_of(hit_children & !inner) {
             let mask = children[slot] & pending;
             if mask != 0 {
-                pending &= !visit(&lanes, node.items(slot), mask);
+                pending &= !visit(&lanes, node.leaf(slot), mask);
             }
         }
     }
@@ -443,7 +454,7 @@ fn occluded_by_triangle<S: Simd>(
     lanes: &Lanes<S>,
     o: &[f32; 3],
     segments: &Segments,
-    vertices: [&[f32; 4]; 3],
+    vertices: [[f32; 3]; 3],
 ) -> u64 {
     let zero = S::f32s::splat(simd, 0.0);
     let mut sheared = [[zero; 3]; 3];

@@ -5,7 +5,8 @@ use fearless_simd::f32x8;
 use fearless_simd::prelude::*;
 
 use super::Line;
-use super::closest::{STACK, side};
+use super::closest::STACK;
+use super::node::WideNode as _;
 use crate::bvh::Node;
 
 /// A ray with precomputed values for tests against boxes.
@@ -103,14 +104,13 @@ impl Stack {
     /// Adds those children of a node whose boxes the ray hits before `limit`.
     #[inline(always)]
     pub fn push_children<S: Simd>(&mut self, simd: S, node: &Node, ray: &BoxRay, limit: f32) {
-        let scale = node.scale().to_array();
-        let planes = [&node.low, &node.high];
         let mut near = f32x8::splat(simd, f32::NEG_INFINITY);
         let mut far = f32x8::splat(simd, limit);
         for k in 0..3 {
-            let [near_side, far_side] = [planes[ray.near_side_index[k]], planes[1 - ray.near_side_index[k]]];
-            near = near.max((side(simd, node, near_side, k, scale[k]) - ray.origins[0][k]) * ray.inverse[k]);
-            far = far.min((side(simd, node, far_side, k, scale[k]) - ray.origins[1][k]) * ray.inverse[k]);
+            let near_side = node.planes(simd, ray.near_side_index[k], k);
+            let far_side = node.planes(simd, 1 - ray.near_side_index[k], k);
+            near = near.max((near_side - ray.origins[0][k]) * ray.inverse[k]);
+            far = far.min((far_side - ray.origins[1][k]) * ray.inverse[k]);
         }
         let mut hits = (near.simd_le(far) & far.simd_ge(f32x8::splat(simd, 0.0))).to_bitmask() as u32;
         let first = self.entries.len();

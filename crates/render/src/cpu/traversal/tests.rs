@@ -7,10 +7,10 @@ use glam::{DVec3, Vec3};
 use fearless_simd::dispatch;
 
 use super::{
-    BatchMesh, Directions, Level, Line, Mesh, MeshRay, MeshStack, Nearest, RAYS, RaySource, Segments, closest, leaves,
-    levels, occluded, occluded_items, trace,
+    Directions, Level, Line, Mesh, MeshRay, MeshStack, Nearest, RAYS, RaySource, Segments, closest, leaves, levels,
+    occluded, occluded_items, trace,
 };
-use crate::bvh::{Aabb, Tree, build};
+use crate::bvh::{Aabb, DecodedMesh, Tree, build};
 
 const NONE: Nearest = Nearest {
     t: f32::INFINITY,
@@ -47,6 +47,7 @@ struct Scene {
     tree: Tree,
     vertices: Vec<[f32; 4]>,
     triangles: Vec<[u32; 4]>,
+    decoded: DecodedMesh,
 }
 
 impl Scene {
@@ -66,9 +67,12 @@ impl Scene {
             let [a, b, c] = triangles[*i as usize];
             [a, b, c, *i]
         };
+        let triangles: Vec<[u32; 4]> = tree.order.iter().map(with_index).collect();
+        let vertices: Vec<[f32; 4]> = corners.iter().map(|v| v.extend(0.0).to_array()).collect();
         Scene {
-            triangles: tree.order.iter().map(with_index).collect(),
-            vertices: corners.iter().map(|v| v.extend(0.0).to_array()).collect(),
+            decoded: DecodedMesh::new(&tree.nodes, &vertices, &triangles),
+            triangles,
+            vertices,
             tree,
         }
     }
@@ -78,7 +82,17 @@ impl Scene {
             nodes: &self.tree.nodes,
             vertices: &self.vertices,
             triangles: &self.triangles,
+            decoded: None,
         }
+    }
+
+    /// Returns the mesh in both forms.
+    fn meshes(&self) -> [Mesh<'_>; 2] {
+        let decoded = Mesh {
+            decoded: Some(&self.decoded),
+            ..self.mesh()
+        };
+        [self.mesh(), decoded]
     }
 
     fn t(&self, triangle: &[u32; 4], line: &Line) -> Option<f32> {
@@ -150,8 +164,8 @@ fn compare(
         };
         let line = Line::new(o, d, pad);
         let expected = scene.closest(&line, skip, best);
-        for level in &levels {
-            let found = closest(*level, &scene.mesh(), &line, 0.0, skip, best);
+        for (level, mesh) in levels.iter().flat_map(|level| scene.meshes().map(|mesh| (level, mesh))) {
+            let found = closest(*level, &mesh, &line, 0.0, skip, best);
             assert_eq!(found, expected, "{level:?} {o} {d}");
             assert_eq!(found.t.to_bits(), expected.t.to_bits());
         }
@@ -182,8 +196,8 @@ fn compare(
         let all = (0..directions.len()).fold(0, |bits, i| bits | 1 << i);
         let mask = all & if i % 3 == 1 { random.bits() } else { !0 };
         let expected = scene.occluded(&segments, mask);
-        for level in &levels {
-            let bits = occluded(*level, &scene.mesh(), &segments, mask);
+        for (level, mesh) in levels.iter().flat_map(|level| scene.meshes().map(|mesh| (level, mesh))) {
+            let bits = occluded(*level, &mesh, &segments, mask);
             assert_eq!(bits, expected, "{level:?} {segments:?}");
         }
         outcomes.occluded += expected.count_ones();
@@ -221,7 +235,9 @@ fn random_triangles_match_brute_force() {
 fn empty_scenes_and_empty_masks_have_no_hits() {
     let scene = Scene::new(&[], &[], 4);
     let line = Line::new(Vec3::ZERO, Vec3::X, 0.0);
-    assert_eq!(closest(Level::new(), &scene.mesh(), &line, 0.0, u32::MAX, NONE), NONE);
+    for mesh in scene.meshes() {
+        assert_eq!(closest(Level::new(), &mesh, &line, 0.0, u32::MAX, NONE), NONE);
+    }
     let segments = Segments {
         o: Vec3::ZERO,
         pad: 0.0,
@@ -229,7 +245,9 @@ fn empty_scenes_and_empty_masks_have_no_hits() {
         t_max: 1.0,
         skip: u32::MAX,
     };
-    assert_eq!(occluded(Level::new(), &scene.mesh(), &segments, 3), 0);
+    for mesh in scene.meshes() {
+        assert_eq!(occluded(Level::new(), &mesh, &segments, 3), 0);
+    }
     let scene = soup(&mut Random(2), 10, 1.0);
     assert_eq!(occluded(Level::new(), &scene.mesh(), &segments, 0), 0);
 }
@@ -439,7 +457,7 @@ fn visits_up_to_the_limit_find_the_hits_of_brute_force() {
 
 /// A batch of rays and their results.
 struct Batch<'a> {
-    mesh: &'a BatchMesh,
+    mesh: &'a DecodedMesh,
     rays: &'a [MeshRay],
     next: usize,
     /// For each lane, the index of its ray.
@@ -448,7 +466,7 @@ struct Batch<'a> {
 }
 
 impl<'a, S> RaySource<'a, S> for Batch<'a> {
-    fn next(&mut self, _: S, lane: usize, traced: Option<(&Line, Nearest)>) -> Option<(&'a BatchMesh, MeshRay)> {
+    fn next(&mut self, _: S, lane: usize, traced: Option<(&Line, Nearest)>) -> Option<(&'a DecodedMesh, MeshRay)> {
         if let Some((_, found)) = traced {
             let previous = self.found[self.traced[lane]].replace(found);
             assert_eq!(previous, None, "each ray is traced once");
@@ -467,7 +485,7 @@ fn batches_have_the_hits_of_brute_force() {
     let (mut hits, mut misses) = (0, 0);
     for (count, size) in [(1, 1.0), (9, 0.8), (300, 0.1), (2000, 0.05), (500, 0.5)] {
         let scene = soup(random, count, size);
-        let mesh = BatchMesh::new(&scene.mesh());
+        let mesh = &scene.decoded;
         for batch_size in [0, 1, 7, 8, 9, 100] {
             let rays: Vec<MeshRay> = (0..batch_size)
                 .map(|i| {

@@ -8,10 +8,11 @@ use super::super::differential::Differential;
 use super::super::energy::principled_energy;
 use super::super::geometry::{fetch_hit_primitive, hit_differential, material_of, surface_of};
 use super::super::integrators::path::{PathState, add_emission, add_radiance, decision, decision_set};
-use super::super::lanes::{LaneMaterials, Lanes2, MaterialRows, Real, Vector3, Word, constant, select};
+use super::super::lanes::{LaneMaterials, Lanes2, MaterialFields, MaterialRows, Real, Vector3, Word, constant, select};
 use super::super::light_sample::power_heuristic;
 use super::super::math::{min, normalize};
 use super::super::mesh::HitPrimitive;
+use super::super::metal::metal_fresnel;
 use super::super::path::{Path, usable_normal};
 use super::super::principled::bounded_color;
 use super::super::ray::{Hit, Ray};
@@ -97,6 +98,21 @@ fn evaluate(scene: &Packed, path: &Path, hit: Hit) -> Evaluated {
         material,
         coat_normal,
         energy,
+    }
+}
+
+/// Records the layers of the first hit, like `record_first_hit_layers`. `albedo` includes the throughput.
+#[inline(always)]
+fn record_layers(scene: &Packed, state: &mut PathState, normal: Vec3, albedo: Vec3, t: f32) {
+    if state.path.depth == 0 {
+        state.layers.emission.w = 1.0;
+        let has_distance = scene.specialization.noise != 0;
+        let distance = if has_distance { t + state.skipped_distance } else { 0.0 };
+        state.layers.normal = normal.extend(distance);
+    }
+    if !state.albedo_recorded {
+        state.layers.albedo = albedo.extend(0.0);
+        state.albedo_recorded = true;
     }
 }
 
@@ -324,6 +340,19 @@ impl Batch<'_> {
         }
         let survives = (survives & largest(continued).gt(zero)).to_bitmask();
 
+        let mut albedos = Rows3::default();
+        if s.layers != 0 {
+            let material = LaneMaterials {
+                simd,
+                rows: rows_of_materials,
+            };
+            let albedo = match material_kind {
+                MaterialKind::Metal => metal_fresnel(&material, one),
+                MaterialKind::Diffuse | MaterialKind::Principled => material.diffuse(),
+            };
+            albedos = store3(throughput * albedo);
+        }
+        let sides: Row = surface.side.into();
         let (origins, normals) = (store3(surface.ray_origin), store3(surface.shading_normal));
         let (directions, throughputs) = (store3(next.wi), store3(continued));
         let pdfs: Row = next.pdf.into();
@@ -334,6 +363,10 @@ impl Batch<'_> {
             let (exclude_front, exclude_back) = (rows.exclude_front[lane], rows.exclude_back[lane]);
             let origin = get3(&origins, lane);
             let bounces = rows.depth[lane] + 1;
+            if s.layers != 0 {
+                let normal = get3(&normals, lane) * sides[lane];
+                record_layers(scene, state, normal, get3(&albedos, lane), queued.hit.t);
+            }
             if s.emitters != 0 {
                 let contribution = get3(&contributions, lane);
                 if queued_mask >> lane & 1 != 0 {

@@ -4,6 +4,7 @@ use fearless_simd::dispatch;
 use fearless_simd::prelude::*;
 
 use super::super::bvh::{FEW_ITEMS, closest_mesh_ray, closest_of_primitive, item_pad, mesh_hit};
+use super::super::decoded_meshes::decoded_mesh;
 use super::super::geometry::closest_hit;
 use super::super::integrators::path::PathState;
 use super::super::math::max;
@@ -11,23 +12,16 @@ use super::super::path::Path;
 use super::super::ray::{Hit, nearer_hit};
 use super::super::samples::LEVEL;
 use super::super::slab::{box_interval, interval_hits, slabs};
-use super::super::traversal::{BatchMesh, Line, MeshRay, Nearest, RAYS, RaySource, trace};
+use super::super::traversal::{Line, MeshRay, Nearest, RAYS, RaySource, trace};
 use super::linear::RayRows;
-use super::meshes::BatchMeshes;
 use super::rows::{F, LANES, Row, lane_mask, splat3};
 use super::scratch::{QueuedRay, RayLane, Scratch};
+use crate::bvh::DecodedMesh;
 use crate::records::{INSTANCE, NO_INDEX, Packed};
 
 /// Finds the closest hit of each active path, like `closest_hit`.
-pub fn closest_hits(
-    scene: &Packed,
-    paths: &[PathState],
-    active: &[u32],
-    hits: &mut Vec<Hit>,
-    scratch: &mut Scratch,
-    meshes: &BatchMeshes,
-) {
-    if meshes.are_not_converted(scene) {
+pub fn closest_hits(scene: &Packed, paths: &[PathState], active: &[u32], hits: &mut Vec<Hit>, scratch: &mut Scratch) {
+    if !scratch.has_decoded_meshes {
         hits.clear();
         hits.extend(active.iter().map(|i| {
             let path = &paths[*i as usize].path;
@@ -35,7 +29,7 @@ pub fn closest_hits(
         }));
         return;
     }
-    dispatch!(*LEVEL, simd => closest_hits_in_lanes(simd, scene, paths, active, hits, scratch, meshes))
+    dispatch!(*LEVEL, simd => closest_hits_in_lanes(simd, scene, paths, active, hits, scratch))
 }
 
 #[inline(always)]
@@ -46,7 +40,6 @@ fn closest_hits_in_lanes<S: Simd>(
     active: &[u32],
     hits: &mut Vec<Hit>,
     scratch: &mut Scratch,
-    meshes: &BatchMeshes,
 ) {
     hits.clear();
     scratch.clear();
@@ -102,7 +95,6 @@ fn closest_hits_in_lanes<S: Simd>(
     if !scratch.queue.is_empty() {
         let mut rays = Rays {
             scene,
-            meshes,
             paths,
             active,
             hits,
@@ -116,7 +108,6 @@ fn closest_hits_in_lanes<S: Simd>(
 /// The queued rays of the active paths. A ray traverses a single instance, or the BVH of the scene item by item.
 struct Rays<'a, 'h> {
     scene: &'a Packed,
-    meshes: &'a BatchMeshes,
     paths: &'a [PathState],
     active: &'a [u32],
     hits: &'h mut [Hit],
@@ -126,7 +117,7 @@ struct Rays<'a, 'h> {
 
 impl<'a, S: Simd> RaySource<'a, S> for Rays<'a, '_> {
     #[inline(always)]
-    fn next(&mut self, simd: S, lane: usize, traced: Option<(&Line, Nearest)>) -> Option<(&'a BatchMesh, MeshRay)> {
+    fn next(&mut self, simd: S, lane: usize, traced: Option<(&Line, Nearest)>) -> Option<(&'a DecodedMesh, MeshRay)> {
         let scene = self.scene;
         let lane = &mut self.lanes[lane];
         if let Some((line, found)) = traced
@@ -150,7 +141,7 @@ impl<'a, S: Simd> RaySource<'a, S> for Rays<'a, '_> {
                         lane.instance = item.index;
                         let start = max(interval.x, 0.0);
                         let ray = closest_mesh_ray(scene, *hit, item.index, path.ray, start, path.origin_prim);
-                        return Some((self.meshes.of_instance(scene, item.index), ray));
+                        return Some((decoded_mesh(scene, item.index)?, ray));
                     }
                     let (origin_prim, inside_prim) = (path.origin_prim, path.inside_prim);
                     *hit = closest_of_primitive(scene, *hit, item, path.ray, interval.x, origin_prim, inside_prim);
@@ -164,7 +155,7 @@ impl<'a, S: Simd> RaySource<'a, S> for Rays<'a, '_> {
             if !lane.in_bvh {
                 let (hit, start) = (self.hits[lane.position], max(queued.near, 0.0));
                 let ray = closest_mesh_ray(scene, hit, lane.instance, path.ray, start, path.origin_prim);
-                return Some((self.meshes.of_instance(scene, lane.instance), ray));
+                return Some((decoded_mesh(scene, lane.instance)?, ray));
             }
             lane.slabs = slabs(path.ray.origin, path.ray.direction, item_pad(scene, path.ray.origin));
             lane.items.start(lane.slabs);

@@ -11,24 +11,21 @@ mod items;
 mod lights;
 mod linear;
 mod materials;
-mod meshes;
 mod occlusion;
 mod rows;
 mod scratch;
 mod shade;
 mod surfaces;
 
-use std::sync::Arc;
-
 use glam::UVec2;
 
 use self::begin::begin_paths;
 use self::closest_hits::closest_hits;
-pub use self::meshes::BatchMeshes;
 use self::occlusion::occluded_rays;
 use self::scratch::Scratch;
 pub use self::shade::{LaneHits, MaterialKind, SurfaceKind};
 use self::shade::{ShadingQueues, shade_hits};
+use super::decoded_meshes::are_decoded;
 use super::integrators::path::{PathState, add_radiance};
 use super::ray::Hit;
 use super::shadow_ray::ShadowRay;
@@ -39,7 +36,6 @@ pub const MAX_PATHS: usize = 1024;
 
 /// A batch of paths with the queues of its stages. The memory is reused from batch to batch.
 pub struct Wavefront {
-    meshes: Arc<BatchMeshes>,
     paths: Vec<PathState>,
     pixels: Vec<UVec2>,
     /// Indices of the paths that have not ended.
@@ -60,17 +56,16 @@ struct QueuedShadowRay {
 }
 
 impl Wavefront {
-    /// Creates an empty batch for the scene that `meshes` were converted from.
-    pub fn new(meshes: Arc<BatchMeshes>) -> Wavefront {
+    /// Creates an empty batch for a scene. Rays are traced one by one if its meshes are not decoded.
+    pub fn new(scene: &Packed) -> Wavefront {
         Wavefront {
-            meshes,
             paths: Vec::new(),
             pixels: Vec::new(),
             active: Vec::new(),
             hits: Vec::new(),
             shadow_rays: Vec::new(),
             occluded: Vec::new(),
-            scratch: Scratch::default(),
+            scratch: Scratch::new(are_decoded(scene)),
             shading: ShadingQueues::default(),
             lane_hits: LaneHits::default(),
         }
@@ -89,6 +84,17 @@ impl Wavefront {
         &self.paths
     }
 
+    /// Returns the state before the first hit, and this hit, for the path of each camera sample.
+    pub fn first_hits(
+        &mut self,
+        scene: &Packed,
+        samples: impl Iterator<Item = (UVec2, u32)>,
+    ) -> impl Iterator<Item = (&PathState, Hit)> {
+        self.begin(scene, samples);
+        self.find_closest_hits(scene);
+        self.paths.iter().zip(self.hits.iter().copied())
+    }
+
     /// Returns the numbers of hits that were shaded in lanes, summed over all batches.
     pub fn lane_hits(&self) -> LaneHits {
         self.lane_hits
@@ -101,14 +107,7 @@ impl Wavefront {
     }
 
     fn find_closest_hits(&mut self, scene: &Packed) {
-        closest_hits(
-            scene,
-            &self.paths,
-            &self.active,
-            &mut self.hits,
-            &mut self.scratch,
-            &self.meshes,
-        );
+        closest_hits(scene, &self.paths, &self.active, &mut self.hits, &mut self.scratch);
     }
 
     /// Ends each active path or samples its next ray, and queues its shadow ray, if any.
@@ -133,7 +132,6 @@ impl Wavefront {
             &self.shadow_rays,
             &mut self.occluded,
             &mut self.scratch,
-            &self.meshes,
         );
         for (QueuedShadowRay { path, ray }, occluded) in self.shadow_rays.iter().zip(&self.occluded) {
             add_radiance(

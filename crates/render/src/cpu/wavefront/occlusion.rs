@@ -5,15 +5,16 @@ use fearless_simd::prelude::*;
 use glam::UVec2;
 
 use super::super::bvh::{FEW_ITEMS, is_occluded_by_primitive_item, item_pad, shadow_mesh_ray};
+use super::super::decoded_meshes::decoded_mesh;
 use super::super::integrators::path::{PathState, is_shadow_ray_occluded};
 use super::super::samples::LEVEL;
 use super::super::slab::{box_interval, interval_hits, slabs};
-use super::super::traversal::{BatchMesh, Line, MeshRay, Nearest, RAYS, RaySource, trace};
+use super::super::traversal::{Line, MeshRay, Nearest, RAYS, RaySource, trace};
 use super::QueuedShadowRay;
 use super::linear::ShadowRayRows;
-use super::meshes::BatchMeshes;
 use super::rows::{LANES, Row, lane_mask, splat3};
 use super::scratch::{QueuedRay, RayLane, Scratch};
+use crate::bvh::DecodedMesh;
 use crate::records::{CASTS_SHADOW, INSTANCE, NO_INDEX, Packed};
 
 /// Determines which shadow rays are occluded, like `is_shadow_ray_occluded`.
@@ -24,19 +25,18 @@ pub fn occluded_rays(
     rays: &[QueuedShadowRay],
     occluded: &mut Vec<bool>,
     scratch: &mut Scratch,
-    meshes: &BatchMeshes,
 ) {
     occluded.clear();
     // Rays are traced one by one if they may continue through surfaces with alpha, or if the meshes are too large to be
-    // converted for lanes.
-    if scene.specialization.alpha_surfaces != 0 || meshes.are_not_converted(scene) {
+    // decoded.
+    if scene.specialization.alpha_surfaces != 0 || !scratch.has_decoded_meshes {
         occluded.extend(rays.iter().map(|QueuedShadowRay { path, ray }| {
             let i = *path as usize;
             is_shadow_ray_occluded(scene, ray, pixels[i], paths[i].sample)
         }));
         return;
     }
-    dispatch!(*LEVEL, simd => occluded_rays_in_lanes(simd, scene, rays, occluded, scratch, meshes))
+    dispatch!(*LEVEL, simd => occluded_rays_in_lanes(simd, scene, rays, occluded, scratch))
 }
 
 #[inline(always)]
@@ -46,7 +46,6 @@ fn occluded_rays_in_lanes<S: Simd>(
     rays: &[QueuedShadowRay],
     occluded: &mut Vec<bool>,
     scratch: &mut Scratch,
-    meshes: &BatchMeshes,
 ) {
     scratch.clear();
     let has_bvh = scene.specialization.tlas_kinds != 0;
@@ -70,7 +69,6 @@ fn occluded_rays_in_lanes<S: Simd>(
     if !scratch.queue.is_empty() {
         let mut rays = Rays {
             scene,
-            meshes,
             rays,
             occluded,
             queue: scratch.queue.iter(),
@@ -144,7 +142,6 @@ fn queue_rays<S: Simd>(
 /// The queued shadow rays. A ray traverses a single instance, or the BVH of the scene item by item, up to any hit.
 struct Rays<'a, 'o> {
     scene: &'a Packed,
-    meshes: &'a BatchMeshes,
     rays: &'a [QueuedShadowRay],
     occluded: &'o mut [bool],
     queue: std::slice::Iter<'a, QueuedRay>,
@@ -153,7 +150,7 @@ struct Rays<'a, 'o> {
 
 impl<'a, S: Simd> RaySource<'a, S> for Rays<'a, '_> {
     #[inline(always)]
-    fn next(&mut self, simd: S, lane: usize, traced: Option<(&Line, Nearest)>) -> Option<(&'a BatchMesh, MeshRay)> {
+    fn next(&mut self, simd: S, lane: usize, traced: Option<(&Line, Nearest)>) -> Option<(&'a DecodedMesh, MeshRay)> {
         let scene = self.scene;
         let lane = &mut self.lanes[lane];
         if let Some((_, found)) = traced {
@@ -172,7 +169,7 @@ impl<'a, S: Simd> RaySource<'a, S> for Rays<'a, '_> {
                     }
                     if item.kind & 0xff == INSTANCE {
                         let ray = shadow_mesh_ray(scene, item.index, &surface, to_light, t_max);
-                        return Some((self.meshes.of_instance(scene, item.index), ray));
+                        return Some((decoded_mesh(scene, item.index)?, ray));
                     }
                     if is_occluded_by_primitive_item(scene, item, &surface, to_light, t_max, ray.target_prim) {
                         self.occluded[lane.position] = true;
@@ -189,7 +186,7 @@ impl<'a, S: Simd> RaySource<'a, S> for Rays<'a, '_> {
                 lane.items.start(lane.slabs);
             } else if !self.occluded[lane.position] {
                 let mesh_ray = shadow_mesh_ray(scene, queued.instance, &ray.surface(), ray.to_light, ray.t_max);
-                return Some((self.meshes.of_instance(scene, queued.instance), mesh_ray));
+                return Some((decoded_mesh(scene, queued.instance)?, mesh_ray));
             }
         }
     }

@@ -1,25 +1,15 @@
 //! The interface of `wavefront` on WebAssembly: paths are traced one by one. Without SIMD instructions, the lanes are
 //! not faster, and compiling them for this target takes many minutes and gigabytes.
 
-use std::sync::Arc;
-
 use glam::UVec2;
 
+use crate::cpu::geometry::closest_hit;
 use crate::cpu::integrators::path::{PathState, advance, begin_path};
+use crate::cpu::ray::Hit;
 use crate::records::Packed;
 
 /// Maximum number of paths in a batch.
 pub const MAX_PATHS: usize = 1024;
-
-/// Nothing: single rays are traced in the packed meshes.
-#[derive(Clone, Debug, Default)]
-pub struct BatchMeshes;
-
-impl BatchMeshes {
-    pub fn new(_: &Packed) -> BatchMeshes {
-        BatchMeshes
-    }
-}
 
 /// A batch of paths.
 pub struct Wavefront {
@@ -27,7 +17,7 @@ pub struct Wavefront {
 }
 
 impl Wavefront {
-    pub fn new(_: Arc<BatchMeshes>) -> Wavefront {
+    pub fn new(_: &Packed) -> Wavefront {
         Wavefront { paths: Vec::new() }
     }
 
@@ -42,5 +32,21 @@ impl Wavefront {
             path
         }));
         &self.paths
+    }
+
+    /// Returns the state before the first hit, and this hit, for the path of each camera sample.
+    pub fn first_hits(
+        &mut self,
+        scene: &Packed,
+        samples: impl Iterator<Item = (UVec2, u32)>,
+    ) -> impl Iterator<Item = (&PathState, Hit)> {
+        self.paths.clear();
+        self.paths
+            .extend(samples.map(|(pixel, sample)| begin_path(scene, pixel, sample)));
+        self.paths.iter().map(|state| {
+            let path = &state.path;
+            let hit = closest_hit(scene, path.ray, path.origin_prim, path.inside_prim);
+            (state, hit)
+        })
     }
 }

@@ -7,8 +7,8 @@ use super::super::traversal::{MeshStack, RAYS};
 use super::items::Items;
 
 /// Stacks and states of the interleaved rays, and the queue that they are taken from.
-#[derive(Default)]
 pub struct Scratch {
+    pub has_decoded_meshes: bool,
     pub stacks: [MeshStack; RAYS],
     pub lanes: [RayLane; RAYS],
     pub queue: Vec<QueuedRay>,
@@ -50,6 +50,15 @@ impl Default for RayLane {
 }
 
 impl Scratch {
+    pub fn new(has_decoded_meshes: bool) -> Scratch {
+        Scratch {
+            has_decoded_meshes,
+            stacks: Default::default(),
+            lanes: Default::default(),
+            queue: Vec::new(),
+        }
+    }
+
     /// Prepares for another batch.
     pub fn clear(&mut self) {
         for lane in &mut self.lanes {

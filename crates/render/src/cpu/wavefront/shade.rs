@@ -204,9 +204,11 @@ fn lane_queue(scene: &Packed, state: &PathState, hit: Hit) -> Option<(MaterialKi
         };
         (surface_kind, q.material)
     };
-    // Only the scalar `shade` records layers and computes absorption. Without absorption, the factor is exactly 1.
+    // Only the scalar `shade` records layers of the last hit and computes absorption. Without absorption, the factor is
+    // exactly 1.
+    let is_last = state.path.depth >= s.bounces;
     let records_layers = s.layers != 0 && (state.path.depth == 0 || !state.albedo_recorded);
-    if records_layers || s.absorption != 0 && state.absorption != Vec3::ZERO {
+    if records_layers && is_last || s.absorption != 0 && state.absorption != Vec3::ZERO {
         return None;
     }
     let material = &scene.materials[index as usize];
@@ -216,7 +218,7 @@ fn lane_queue(scene: &Packed, state: &PathState, hit: Hit) -> Option<(MaterialKi
         return None;
     }
     let is_emissive = material.density > 0.0;
-    if is_emissive && state.path.depth >= s.bounces {
+    if is_emissive && is_last {
         return None; // emission is added to the last hit
     }
     let has_plain_surface = material.lookups.y == 0 && material.vertex_colors == NO_COLORS && !is_emissive;
