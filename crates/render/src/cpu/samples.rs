@@ -36,10 +36,13 @@ pub struct Samples {
 /// Number of blocks whose samples a thread keeps. They suffice for the blocks of 512 light samples.
 const KEPT_BLOCKS: usize = 16;
 
+/// A block, as far as its samples depend on it, and its samples.
+type KeptBlock = (SampleBlock, Rc<Samples>);
+
 thread_local! {
     /// The last samples: several functions evaluate them for the same hit and light. Samples of grids are the same for
     /// all hits.
-    static KEPT: RefCell<[Option<(SampleBlock, Rc<Samples>)>; KEPT_BLOCKS]> = RefCell::default();
+    static KEPT: RefCell<[Option<KeptBlock>; KEPT_BLOCKS]> = RefCell::default();
 }
 
 impl Samples {

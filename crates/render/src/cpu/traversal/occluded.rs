@@ -192,8 +192,8 @@ fn traverse<S: Simd, N: WideNode>(
         let node = &nodes[node_index as usize];
         let mut planes_from_origin = [[zero; 3]; 2];
         for k in 0..3 {
-            for i in 0..2 {
-                planes_from_origin[i][k] = node.planes(simd, slopes[k].sides[i], k) - slopes[k].origins[i];
+            for (i, planes) in planes_from_origin.iter_mut().enumerate() {
+                planes[k] = node.planes(simd, slopes[k].sides[i], k) - slopes[k].origins[i];
             }
         }
         // For each child, the mask of the segments that hit its box; mask of the children that any segment hits.

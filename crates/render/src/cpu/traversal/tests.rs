@@ -505,7 +505,7 @@ fn batches_have_the_hits_of_brute_force() {
             for level in levels() {
                 for any in [false, true] {
                     let mut batch = Batch {
-                        mesh: &mesh,
+                        mesh,
                         rays: &rays,
                         next: 0,
                         traced: [0; RAYS],
