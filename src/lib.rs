@@ -24,11 +24,12 @@
 //! ```
 //! use wgray::image::{Format, SaveOptions};
 //! use wgray::scene::{LoadOptions, MemoryFiles, SceneFormat};
-//! use wgray::{Error, Options, Scene};
+//! use wgray::{Error, Options, Overrides, Scene};
 //!
 //! fn png(model: &[u8], texture: &[u8]) -> Result<Vec<u8>, Error> {
 //!     let files = MemoryFiles::new().with("wood.png", texture); // the files that the model refers to
-//!     let options = LoadOptions::new().with_source(files);
+//!     let smaller = Overrides { size: Some((320, 240)), pixel_samples: Some(16), ..Overrides::default() };
+//!     let options = LoadOptions::new().with_source(files).with_overrides(smaller);
 //!     let scene = Scene::from_slice(model, SceneFormat::Gltf, &options)?;
 //!     let mut png = std::io::Cursor::new(Vec::new());
 //!     wgray::render(&scene, &Options::default())?.write_to(&mut png, Format::Png, &SaveOptions::default())?;
@@ -75,8 +76,12 @@
 //! }
 //! ```
 //!
+//! The frames are those of an animated camera, or of an orbit around a model ([`Overrides::turntable`]).
+//!
 //! # More
 //!
+//! - The folder `examples` has programs: views of a model in memory (`from_memory.rs`) and of a file (`views.rs`), scenes
+//!   in code, steps with cancellation, a server.
 //! - [`Options`] selects the device, a region of the image, and layers such as depth and normals. [`Overrides`] changes
 //!   the size, number of samples or seed of a scene.
 //! - [`Session::start`] renders step by step, with the image so far at any time; [`CancelToken`] cancels from another
@@ -95,6 +100,13 @@
 //! - `gpu`: rendering on GPUs and software Vulkan. Without it, [`Device::Auto`] is the CPU, and wgpu is not linked.
 //! - `cli`: the program `wgray`.
 //! - `dev`: the program's development mode, a page that updates when a shader or scene is saved. Enables `cli` and `gpu`.
+//!
+//! Without optimization, the CPU renders far more slowly. To optimize the renderer in your debug builds:
+//!
+//! ```toml
+//! [profile.dev.package."*"]
+//! opt-level = 3
+//! ```
 //!
 //! # Stability
 //!

@@ -57,12 +57,12 @@ handle! {
 ///
 /// ```
 /// use glam::{DAffine3, DVec3};
-/// use wgray_scene::mesh::Mesh;
-/// use wgray_scene::{
-///     ColorDescription, DiffuseDescription, EnvironmentDescription, Integrator, PerspectiveDescription,
-///     RenderDescription, SceneBuilder, SphereDescription,
-/// };
-///
+/// # use wgray_scene::mesh::Mesh;
+/// # use wgray_scene::{
+/// #     ColorDescription, DiffuseDescription, EnvironmentDescription, Integrator, PerspectiveDescription,
+/// #     RenderDescription, SceneBuilder, SphereDescription,
+/// # };
+/// #
 /// let mut builder = SceneBuilder::new(64, 48, PerspectiveDescription::new([0.0, -5.0, 2.0], [0.0, 0.0, 0.0], 40.0));
 /// builder.render(RenderDescription { integrator: Some(Integrator::Path), ..Default::default() });
 /// builder.environment(EnvironmentDescription::new([1.0, 1.0, 1.0]));

@@ -14,8 +14,9 @@ impl CameraPath {
 }
 
 impl Scene {
-    /// Returns the camera at a frame; [`Scene::camera`] if the camera is not animated. Frames may be fractional, and
-    /// may lie outside of the path.
+    /// Returns the camera at a frame; [`Scene::camera`] if the camera is not animated. The frames of an animation or of a
+    /// turntable ([`Overrides::turntable`](crate::Overrides::turntable)) count from 1. A frame may be fractional. Before
+    /// its first and after its last key, a value of the camera is that of this key.
     ///
     /// # Errors
     ///

@@ -140,8 +140,8 @@ impl Scene {
     /// scene refers to are read from [`LoadOptions::with_source`].
     ///
     /// ```
-    /// use wgray_scene::{LoadOptions, MemoryFiles, Scene, SceneFormat};
-    ///
+    /// # use wgray_scene::{LoadOptions, MemoryFiles, Scene, SceneFormat};
+    /// #
     /// let triangle = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
     /// let scene = b"image = { width = 64, height = 48 }
     /// camera = { position = [0, 0, 3], look_at = [0, 0, 0], fov = 40 }

@@ -31,7 +31,7 @@ pub struct Overrides {
     pub pixel_pattern: Option<Pattern>,
     /// Target error of adaptive sampling, 0 to 1; the maximum number of samples is not changed.
     pub adaptive: Option<f64>,
-    /// Denoise the image.
+    /// Denoise the image. If `None`, the setting of the scene; a model without a scene is denoised.
     pub denoise: Option<bool>,
     /// The integrator.
     pub integrator: Option<Integrator>,
@@ -51,7 +51,8 @@ pub struct Overrides {
     /// The exposure in stops, -100 to 100.
     pub exposure: Option<f64>,
     /// Number of frames of an orbit around the look-at point, 1 to 100,000, instead of the camera's path.
-    /// [`Overrides::frame`] selects a frame, counted from 1.
+    /// [`Overrides::frame`] selects a frame, counted from 1; [`Scene::camera_at`](crate::Scene::camera_at) returns the
+    /// camera of any frame.
     pub turntable: Option<u32>,
     /// True to report damage to a file as an error, instead of using a placeholder with a warning.
     pub strict: bool,
