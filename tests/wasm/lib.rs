@@ -75,7 +75,7 @@ thread_local! {
     static RENDER: RefCell<Option<Render>> = const { RefCell::new(None) };
 }
 
-/// Starts to render the scene like [`render`], for [`poll`].
+/// Starts to render the scene like [`render`], for [`poll_render`].
 ///
 /// # Safety
 ///
@@ -85,7 +85,7 @@ thread_local! {
 ///
 /// If the text is not a valid scene.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn start(text: *mut u8, len: usize) {
+pub unsafe extern "C" fn start_render(text: *mut u8, len: usize) {
     // SAFETY: the caller passes the result of `allocate(len)`.
     let text = unsafe { Vec::from_raw_parts(text, len, len) };
     let scene = load(str::from_utf8(&text).expect("UTF-8")).expect("a valid scene");
@@ -100,7 +100,7 @@ pub unsafe extern "C" fn start(text: *mut u8, len: usize) {
 ///
 /// If no render was started, or if it fails.
 #[unsafe(no_mangle)]
-pub extern "C" fn poll() -> *const u32 {
+pub extern "C" fn poll_render() -> *const u32 {
     RENDER.with_borrow_mut(|render| {
         let render = render.as_mut().expect("a render was started");
         match render.as_mut().poll(&mut TaskContext::from_waker(Waker::noop())) {

@@ -48,9 +48,9 @@ function render(text) {
 // Renders with `Session::render_async`. Returns the pixels and the number of times that other tasks could run.
 async function renderAsync(text) {
     const { exports, scene } = instantiate(text);
-    exports.start(...scene);
+    exports.start_render(...scene);
     for (let pauses = 0; ; pauses++) {
-        const result = exports.poll();
+        const result = exports.poll_render();
         if (result !== 0) {
             return { pixels: pixelsAt(exports, result), pauses };
         }
