@@ -284,9 +284,8 @@ shapes = [{ type = 'sphere', material = 'a', center = [0, 0, 0], radius = 1 }]";
     assert!(render.add_samples(1).unwrap_err().to_string().contains("adaptive"));
 }
 
-/// The preparation of an environment map of 4096 x 2048 texels takes about a second.
-#[test]
-fn a_preparation_is_cancelled_at_once_and_used_later() {
+/// Returns a scene with an environment map of 4096 x 2048 texels. Its preparation takes about a second.
+fn large_environment() -> Arc<Scene> {
     let text = "image = { width = 8, height = 6 }
 camera = { position = [0, -5, 2], look_at = [0, 0, 0.5], fov = 40 }
 render = { integrator = 'path', pixel_samples = 1 }
@@ -299,11 +298,28 @@ environment = { file = 'map' }";
         texels: Texels::Floats(texels.collect()),
     };
     let load_options = LoadOptions::new().with_image("map", image);
-    let scene = Scene::from_slice(text.as_bytes(), SceneFormat::Toml, &load_options).expect("a scene");
-    let scene = Arc::new(scene);
-    let is_cancelled = |result: Result<ProgressiveRender, Error>| {
-        matches!(result, Err(Error::Render(wgray::error::RenderError::Cancelled)))
-    };
+    Arc::new(Scene::from_slice(text.as_bytes(), SceneFormat::Toml, &load_options).expect("a scene"))
+}
+
+fn is_cancelled(result: Result<ProgressiveRender, Error>) -> bool {
+    matches!(result, Err(Error::Render(wgray::error::RenderError::Cancelled)))
+}
+
+/// Starts a render and cancels it after 50 ms.
+fn cancel_start(session: &mut Session, options: &Options) {
+    let cancel = CancelToken::new();
+    std::thread::scope(|threads| {
+        threads.spawn(|| {
+            std::thread::sleep(Duration::from_millis(50));
+            cancel.cancel();
+        });
+        assert!(is_cancelled(session.start(options, &cancel)));
+    });
+}
+
+#[test]
+fn a_preparation_is_cancelled_at_once_and_used_later() {
+    let scene = large_environment();
     for device in devices() {
         let options = options_for(&device);
         let mut session = Session::new(&Context::new(), Arc::clone(&scene));
@@ -328,15 +344,8 @@ environment = { file = 'map' }";
         let mut render = session.start(&options, &no_cancel).expect("a start");
         assert_eq!(render.run(&no_cancel).expect("samples"), Status::Finished);
         assert!(is_same(&render.finish(), &expected));
-        let cancel = CancelToken::new();
         let mut second_session = Session::new(&Context::new(), Arc::clone(&scene));
-        std::thread::scope(|threads| {
-            threads.spawn(|| {
-                std::thread::sleep(Duration::from_millis(50));
-                cancel.cancel();
-            });
-            assert!(is_cancelled(second_session.start(&options, &cancel)));
-        });
+        cancel_start(&mut second_session, &options);
         let mut camera = scene.camera;
         camera.position.x += 1.0;
         second_session.set_camera(camera).expect("a camera");
@@ -359,6 +368,49 @@ fn renders_start_on_threads_of_a_pool() {
         render.finish().pixels()
     });
     assert!(image == expected.pixels());
+}
+
+/// Marks the child process of the test below.
+const CHILD_VARIABLE: &str = "WGRAY_TEST_POOL_OF_ONE_THREAD";
+
+/// The preparation needs the global pool of rayon, which has one thread in the child process.
+#[test]
+fn a_thread_of_the_pool_does_not_wait_for_a_cancelled_preparation() {
+    let mut child = std::process::Command::new(std::env::current_exe().expect("this program"))
+        .args([
+            "--exact",
+            "--nocapture",
+            "sessions::a_render_on_the_only_thread_of_the_pool",
+        ])
+        .envs([(CHILD_VARIABLE, "1"), ("RAYON_NUM_THREADS", "1")])
+        .stdout(std::process::Stdio::null())
+        .spawn()
+        .expect("the test program runs");
+    let start = Instant::now();
+    let status = loop {
+        match child.try_wait().expect("the state of the child process") {
+            None if start.elapsed() < Duration::from_secs(120) => std::thread::sleep(Duration::from_millis(20)),
+            status => break status,
+        }
+    };
+    if status.is_none() {
+        child.kill().expect("the child process ends");
+        child.wait().expect("the child process ends");
+    }
+    assert!(status.is_some_and(|status| status.success()), "{status:?}");
+}
+
+#[test]
+fn a_render_on_the_only_thread_of_the_pool() {
+    if std::env::var_os(CHILD_VARIABLE).is_none() {
+        return; // only the child process has a pool of one thread
+    }
+    let scene = large_environment();
+    let options = options_for(&Device::Cpu);
+    let mut session = Session::new(&Context::new(), Arc::clone(&scene));
+    cancel_start(&mut session, &options);
+    let image = rayon::scope(|_| session.render(&options)).expect("an image");
+    assert!(is_same(&image, &wgray::render(&scene, &options).expect("an image")));
 }
 
 /// Wakes the thread that waits in [`block_on`].

@@ -3,9 +3,12 @@
 
 use std::any::Any;
 use std::cell::Cell;
+use std::future::{Future, poll_fn};
 use std::mem::ManuallyDrop;
 use std::ops::Deref;
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::pin::pin;
+use std::task::Poll;
 
 thread_local! {
     static DEPTH: Cell<u32> = const { Cell::new(0) };
@@ -35,6 +38,17 @@ pub fn install_quiet_hook() {
 pub fn catch_panic<T>(closure: impl FnOnce() -> T) -> Result<T, String> {
     let _guard = DepthGuard::enter();
     catch_unwind(AssertUnwindSafe(closure)).map_err(|panic| message(panic.as_ref()))
+}
+
+/// Like [`catch_panic`], for each poll of a future.
+pub async fn catch_panic_of_future<T>(future: impl Future<Output = T>) -> Result<T, String> {
+    let mut future = pin!(future);
+    poll_fn(|context| match catch_panic(|| future.as_mut().poll(context)) {
+        Ok(Poll::Pending) => Poll::Pending,
+        Ok(Poll::Ready(value)) => Poll::Ready(Ok(value)),
+        Err(message) => Poll::Ready(Err(message)),
+    })
+    .await
 }
 
 fn message(panic: &(dyn Any + Send)) -> String {

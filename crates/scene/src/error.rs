@@ -65,8 +65,8 @@ pub enum SceneError {
         /// The format, and advice for the user.
         message: String,
     },
-    /// An override is invalid; the key of the problem is the field of [`Overrides`](super::Overrides), or `camera.path`
-    /// for a camera path that was created in code.
+    /// An override is invalid; the key of the problem is the field of [`Overrides`](super::Overrides), `camera.path` for a
+    /// camera path that was created in code, or `name` for the name of a scene in memory.
     #[error("{0}")]
     Override(Problem),
 }

@@ -7,6 +7,7 @@ mod assets;
 mod builder;
 mod camera_at;
 mod camera_path;
+mod content;
 mod course;
 mod decode;
 mod define;

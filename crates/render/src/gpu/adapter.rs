@@ -4,7 +4,7 @@ use wgpu::{Backends, DeviceType};
 
 use super::float_controls::FloatControls;
 use crate::error::{DeviceError, RenderError};
-use wgray_image::panic_guard::catch_panic;
+use wgray_image::panic_guard::catch_panic_of_future;
 
 /// A requested device.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -53,7 +53,7 @@ const SOFTWARE: &str = "software";
 
 /// Returns all adapters, in the order of preference.
 pub fn adapters() -> Vec<GpuInfo> {
-    enumerate().iter().map(info).collect()
+    pollster::block_on(enumerate()).iter().map(info).collect()
 }
 
 /// Returns the adapter that [`choose`](super::choose) would try first, without opening it.
@@ -104,13 +104,13 @@ pub(super) fn matching(infos: &[GpuInfo], choice: &AdapterChoice) -> Result<Vec<
     }
 }
 
-pub(super) fn enumerate() -> Vec<wgpu::Adapter> {
+pub(super) async fn enumerate() -> Vec<wgpu::Adapter> {
     // wgpu may panic while a driver is being reset; the list is empty in this case.
-    let adapters = catch_panic(|| {
+    let adapters = catch_panic_of_future(async {
         let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle_from_env());
-        pollster::block_on(instance.enumerate_adapters(Backends::PRIMARY))
+        instance.enumerate_adapters(Backends::PRIMARY).await
     });
-    let mut adapters = adapters.unwrap_or_default();
+    let mut adapters = adapters.await.unwrap_or_default();
     adapters.sort_by_key(|adapter| preference(&adapter.get_info()));
     adapters
 }

@@ -28,6 +28,11 @@ const MAX_PIXELS: usize = 1 << 17;
 ///
 /// The device is lost, or its driver reports an error.
 pub fn denoise(device: &Device, film: &Film, exact: Option<Rounding>) -> Result<Vec<Vec3>, RenderError> {
+    pollster::block_on(denoise_async(device, film, exact))
+}
+
+/// Like [`denoise`], as a future that does not block in browsers.
+pub async fn denoise_async(device: &Device, film: &Film, exact: Option<Rounding>) -> Result<Vec<Vec3>, RenderError> {
     let guides = Guides::of(film);
     let source = Shaders::built_in().compose_alone(&DENOISE);
     let layout = layout_of(device, BINDINGS);
@@ -59,7 +64,7 @@ pub fn denoise(device: &Device, film: &Film, exact: Option<Rounding>) -> Result<
             device.queue.submit([encoder.finish()]);
             output
         })?;
-        let colors: Vec<Vec4> = device.download(&output)?;
+        let colors: Vec<Vec4> = device.download(&output).await?;
         filtered.extend(colors.iter().map(|color| color.xyz()));
     }
     Ok(guides.colors(film, &filtered))

@@ -1,15 +1,14 @@
 //! An open GPU device: opening, errors, buffers and transfers.
 
-use std::sync::mpsc;
-
 use bytemuck::{Pod, bytes_of, cast_slice};
 use wgpu::BufferUsages;
 
 use super::adapter::{AdapterChoice, GpuInfo, enumerate, info, matching};
 use super::failure::{Failure, error_of_opening};
+use super::mapping::Mapping;
 use super::pipeline_cache::PipelineCache;
 use crate::error::{DeviceError, RenderError};
-use wgray_image::panic_guard::{CatchPanicOnDrop, catch_panic};
+use wgray_image::panic_guard::{CatchPanicOnDrop, catch_panic, catch_panic_of_future};
 
 /// An open device. Clones are handles to the same device.
 #[derive(Clone)]
@@ -39,12 +38,24 @@ pub fn choose(choice: &AdapterChoice) -> Result<Device, RenderError> {
 ///
 /// The errors of [`choose`].
 pub fn choose_among(choice: &AdapterChoice, is_eligible: &dyn Fn(&GpuInfo) -> bool) -> Result<Device, RenderError> {
-    let adapters = enumerate();
+    pollster::block_on(choose_among_async(choice, is_eligible))
+}
+
+/// Like [`choose_among`], as a future that does not block in browsers.
+///
+/// # Errors
+///
+/// The errors of [`choose`].
+pub async fn choose_among_async(
+    choice: &AdapterChoice,
+    is_eligible: &dyn Fn(&GpuInfo) -> bool,
+) -> Result<Device, RenderError> {
+    let adapters = enumerate().await;
     let infos: Vec<GpuInfo> = adapters.iter().map(info).collect();
     let mut failure = None;
     let matching = matching(&infos, choice)?;
     for i in matching.into_iter().filter(|i| is_eligible(&infos[*i])) {
-        match open(&adapters[i]) {
+        match open(&adapters[i]).await {
             Ok(device) => return Ok(device),
             Err(error) => failure = Some(error),
         }
@@ -52,7 +63,7 @@ pub fn choose_among(choice: &AdapterChoice, is_eligible: &dyn Fn(&GpuInfo) -> bo
     Err(failure.unwrap_or(RenderError::NoDevice(DeviceError::NoneFound)))
 }
 
-fn open(adapter: &wgpu::Adapter) -> Result<Device, RenderError> {
+async fn open(adapter: &wgpu::Adapter) -> Result<Device, RenderError> {
     let info = info(adapter);
     let (features, experimental) = if info.exact {
         // SAFETY: the only experimental feature is SPIR-V passthrough, and naga generates all SPIR-V.
@@ -71,8 +82,7 @@ fn open(adapter: &wgpu::Adapter) -> Result<Device, RenderError> {
         memory_hints: wgpu::MemoryHints::MemoryUsage,
         trace: wgpu::Trace::Off,
     };
-    let opened = catch_panic(|| pollster::block_on(adapter.request_device(&descriptor)));
-    let (device, queue) = match opened {
+    let (device, queue) = match catch_panic_of_future(adapter.request_device(&descriptor)).await {
         Ok(Ok(opened)) => opened,
         Ok(Err(error)) => return Err(error_of_opening(&info.name, &error)),
         Err(message) => {
@@ -100,6 +110,15 @@ impl Device {
     }
 
     /// Makes wgpu calls and returns their error, if any.
+    #[cfg(target_family = "wasm")]
+    pub(super) fn checked<T>(&self, calls: impl FnOnce() -> T) -> Result<T, RenderError> {
+        // Browsers report errors of scopes later, to futures. Without scopes, the errors are recorded, and the next check
+        // returns them.
+        self.failure.check(&self.info.name, Ok(calls()), None)
+    }
+
+    /// Makes wgpu calls and returns their error, if any.
+    #[cfg(not(target_family = "wasm"))]
     pub(super) fn checked<T>(&self, calls: impl FnOnce() -> T) -> Result<T, RenderError> {
         let memory = self.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
         let internal = self.device.push_error_scope(wgpu::ErrorFilter::Internal);
@@ -123,6 +142,7 @@ impl Device {
         self.poll_for(wgpu::PollType::Poll)
     }
 
+    #[cfg(not(target_family = "wasm"))]
     pub(super) fn wait(&self) -> Result<(), RenderError> {
         self.poll_for(wgpu::PollType::wait_indefinitely())
     }
@@ -170,7 +190,9 @@ impl Device {
         buffer
     }
 
-    pub(super) fn download<T: Pod>(&self, buffer: &wgpu::Buffer) -> Result<Vec<T>, RenderError> {
+    /// Returns the contents of a buffer after all submitted work. In browsers, the future does not block; natively, it
+    /// blocks, because wgpu maps buffers only while the device is polled.
+    pub(super) async fn download<T: Pod>(&self, buffer: &wgpu::Buffer) -> Result<Vec<T>, RenderError> {
         let staging = self.checked(|| {
             let staging = self.buffer(buffer.size(), BufferUsages::COPY_DST | BufferUsages::MAP_READ);
             let mut encoder = self.device.create_command_encoder(&Default::default());
@@ -178,52 +200,26 @@ impl Device {
             self.queue.submit([encoder.finish()]);
             staging
         })?;
+        let mapping = self.checked(|| Mapping::start(&staging))?;
+        self.mapped(&mapping).await?;
         self.read(&staging)
     }
 
-    /// Returns the contents of a mappable buffer after all submitted work.
-    pub(super) fn read<T: Pod>(&self, staging: &wgpu::Buffer) -> Result<Vec<T>, RenderError> {
-        let mapping = self.checked(|| self.map(staging))?;
-        self.wait_for(&mapping)?;
-        self.mapped(staging)
-    }
-
-    /// Starts mapping a buffer, after the work submitted so far.
-    pub(super) fn map(&self, staging: &wgpu::Buffer) -> Mapping {
-        let (sender, receiver) = mpsc::channel();
-        staging.map_async(wgpu::MapMode::Read, .., move |result| {
-            let _ = sender.send(result); // fails if the wait has failed and dropped the receiver
-        });
-        Mapping(receiver)
-    }
-
-    pub(super) fn wait_for(&self, mapping: &Mapping) -> Result<(), RenderError> {
+    /// Ends when a buffer is mapped. Blocks natively, as [`Device::download`].
+    pub(super) async fn mapped(&self, mapping: &Mapping) -> Result<(), RenderError> {
+        #[cfg(not(target_family = "wasm"))]
         self.wait()?;
         // Another thread that waits for the device may run the callback a little later.
-        let result = mapping.0.recv().map_err(|error| self.error(error))?;
-        result.map_err(|error| self.error(error))
+        mapping.await.map_err(|message| self.error(message))
     }
 
     /// Returns the contents of a mapped buffer, and unmaps it.
-    pub(super) fn mapped<T: Pod>(&self, staging: &wgpu::Buffer) -> Result<Vec<T>, RenderError> {
+    pub(super) fn read<T: Pod>(&self, staging: &wgpu::Buffer) -> Result<Vec<T>, RenderError> {
         let view = staging.get_mapped_range(..).map_err(|error| self.error(error))?;
         let records = bytemuck::pod_collect_to_vec(&view);
         drop(view);
         staging.unmap();
         Ok(records)
-    }
-}
-
-pub(super) struct Mapping(mpsc::Receiver<Result<(), wgpu::BufferAsyncError>>);
-
-impl Mapping {
-    /// Returns the result once; `None` while pending.
-    pub(super) fn done(&self) -> Option<Result<(), String>> {
-        match self.0.try_recv() {
-            Ok(result) => Some(result.map_err(|error| error.to_string())),
-            Err(mpsc::TryRecvError::Empty) => None,
-            Err(error) => Some(Err(error.to_string())),
-        }
     }
 }
 

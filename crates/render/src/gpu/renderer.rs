@@ -10,8 +10,9 @@ use wgpu::BufferUsages;
 
 use super::bake::bake_if_small;
 use super::compose::{ADAPTIVE, FIRST_HITS, Kernel, RENDER, Shaders};
-use super::device::{Device, Mapping};
+use super::device::Device;
 use super::loop_budget::samples_per_dispatch;
+use super::mapping::Mapping;
 use super::memory::{FailedAllocation, MemoryUse};
 use super::pipeline::{WORKGROUP, bind_group, bind_group_layouts, pipeline};
 use super::rounding::Rounding;
@@ -156,8 +157,28 @@ impl Gpu {
         Gpu::with_sliders(device, packed, shaders, options, Vec::new())
     }
 
+    /// Like [`Gpu::new`], as a future that does not block in browsers.
+    pub async fn new_async(
+        device: &Device,
+        packed: &Packed,
+        shaders: &Shaders,
+        options: Options,
+    ) -> Result<Gpu, RenderError> {
+        Gpu::with_sliders_async(device, packed, shaders, options, Vec::new()).await
+    }
+
     /// Like [`Gpu::new`], with overrides that are read from a buffer. Their values are 0 until [`Gpu::set_sliders`].
     pub fn with_sliders(
+        device: &Device,
+        packed: &Packed,
+        shaders: &Shaders,
+        options: Options,
+        sliders: Vec<Slider>,
+    ) -> Result<Gpu, RenderError> {
+        pollster::block_on(Gpu::with_sliders_async(device, packed, shaders, options, sliders))
+    }
+
+    async fn with_sliders_async(
         device: &Device,
         packed: &Packed,
         shaders: &Shaders,
@@ -211,7 +232,7 @@ impl Gpu {
         };
         gpu.begin(single_pixel)?;
         gpu.dispatch_part(single_pixel, 0..0)?;
-        gpu.wait()?;
+        gpu.finished().await?;
         gpu.film = None;
         Ok(gpu)
     }
@@ -244,10 +265,66 @@ impl Gpu {
     ///
     /// The device is lost, or its driver reports an error.
     pub fn denoise(&self, film: &Film) -> Result<Vec<Vec3>, RenderError> {
+        pollster::block_on(self.denoise_async(film))
+    }
+
+    /// Like [`Gpu::denoise`], as a future that does not block in browsers.
+    ///
+    /// # Errors
+    ///
+    /// The errors of [`Gpu::denoise`].
+    pub async fn denoise_async(&self, film: &Film) -> Result<Vec<Vec3>, RenderError> {
         match self.device.info.is_software() {
             true => Ok(denoise(film)),
-            false => super::denoise::denoise(&self.device, film, self.kernels.exact),
+            false => super::denoise::denoise_async(&self.device, film, self.kernels.exact).await,
         }
+    }
+
+    /// Ends when no dispatch is pending. Does not block in browsers.
+    ///
+    /// # Errors
+    ///
+    /// The errors of [`Backend::wait`].
+    pub async fn finished(&mut self) -> Result<(), RenderError> {
+        while let Some(pending) = &self.pending {
+            let result = self.device.mapped(&pending.completion).await;
+            let result = result.and_then(|()| self.step());
+            self.discard_film_on_error(result)?;
+        }
+        Ok(())
+    }
+
+    /// Like [`Backend::film`], as a future that does not block in browsers.
+    ///
+    /// # Errors
+    ///
+    /// The errors of [`Backend::film`].
+    pub async fn film_async(&mut self) -> Result<Film, RenderError> {
+        self.check_idle()?;
+        let (film, _) = self.film.as_ref().ok_or(RenderError::NoFilm)?;
+        let region = film.region;
+        if region.is_empty() {
+            return Ok(self.rules.empty_film(region));
+        }
+        let result = self.device.download(&film.buffer).await;
+        let result = self.explain(result, Some(("a copy of the film".to_string(), film.buffer.size())));
+        let records: Vec<Vec4> = self.discard_film_on_error(result)?;
+        Ok(film_of(region, self.rules.film_layout(), &records))
+    }
+
+    /// Like [`Backend::first_hits`], as a future that does not block in browsers.
+    ///
+    /// # Errors
+    ///
+    /// The errors of [`Backend::first_hits`].
+    pub async fn first_hits_async(&mut self, region: Region) -> Result<Vec<FirstHit>, RenderError> {
+        self.check_idle()?;
+        self.rules.in_picture(region)?;
+        if region.is_empty() {
+            return Ok(Vec::new());
+        }
+        let result = self.find_first_hits(region).await;
+        self.discard_film_on_error(result)
     }
 
     /// Enables timing of dispatches; see [`Gpu::dispatches`].
@@ -373,7 +450,7 @@ impl Gpu {
                 timer.resolve(&mut encoder, read, COMPLETION_BYTES);
             }
             queue.submit([encoder.finish()]);
-            self.device.map(read)
+            Mapping::start(read)
         })
     }
 
@@ -387,7 +464,7 @@ impl Gpu {
         start: Instant,
     ) -> Result<bool, RenderError> {
         let elapsed = start.elapsed();
-        let completion: Vec<u32> = self.device.mapped(&self.completion[1])?;
+        let completion: Vec<u32> = self.device.read(&self.completion[1])?;
         let (completion, ticks) = completion.split_at((COMPLETION_BYTES / 4) as usize);
         if let Some(timer) = &self.timer {
             let measured = timer.duration(ticks);
@@ -490,7 +567,7 @@ impl Gpu {
         let Some(pending) = self.pending.take() else {
             return Ok(());
         };
-        match pending.completion.done() {
+        match pending.completion.result() {
             None => {
                 self.pending = Some(pending);
                 Ok(())
@@ -511,7 +588,7 @@ impl Gpu {
         result
     }
 
-    fn find_first_hits(&mut self, region: Region) -> Result<Vec<FirstHit>, RenderError> {
+    async fn find_first_hits(&mut self, region: Region) -> Result<Vec<FirstHit>, RenderError> {
         let pipeline = match self.first_hits.take() {
             Some(pipeline) => pipeline,
             None => self.kernels.compile(&self.device, &FIRST_HITS)?,
@@ -520,9 +597,9 @@ impl Gpu {
         let start = Instant::now();
         let completion = self.dispatch(&pipeline, &target, region, 0..0, |_| ())?;
         self.first_hits = Some(pipeline);
-        self.device.wait_for(&completion)?;
+        self.device.mapped(&completion).await?;
         match self.ran_completely(FIRST_HITS.entry_point, region, 1, start)? {
-            true => self.device.download(&target.buffer),
+            true => self.device.download(&target.buffer).await,
             false => Err(self.truncation_error()),
         }
     }
@@ -611,34 +688,15 @@ impl Backend for Gpu {
     }
 
     fn wait(&mut self) -> Result<(), RenderError> {
-        while self.pending.is_some() {
-            let result = self.device.wait().and_then(|()| self.step());
-            self.discard_film_on_error(result)?;
-        }
-        Ok(())
+        pollster::block_on(self.finished())
     }
 
     fn film(&mut self) -> Result<Film, RenderError> {
-        self.check_idle()?;
-        let (film, _) = self.film.as_ref().ok_or(RenderError::NoFilm)?;
-        let region = film.region;
-        if region.is_empty() {
-            return Ok(self.rules.empty_film(region));
-        }
-        let result = self.device.download(&film.buffer);
-        let result = self.explain(result, Some(("a copy of the film".to_string(), film.buffer.size())));
-        let records: Vec<Vec4> = self.discard_film_on_error(result)?;
-        Ok(film_of(region, self.rules.film_layout(), &records))
+        pollster::block_on(self.film_async())
     }
 
     fn first_hits(&mut self, region: Region) -> Result<Vec<FirstHit>, RenderError> {
-        self.check_idle()?;
-        self.rules.in_picture(region)?;
-        if region.is_empty() {
-            return Ok(Vec::new());
-        }
-        let result = self.find_first_hits(region);
-        self.discard_film_on_error(result)
+        pollster::block_on(self.first_hits_async(region))
     }
 
     fn unskippable_samples(&self) -> u32 {

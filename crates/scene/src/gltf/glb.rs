@@ -17,7 +17,7 @@ pub(super) struct Chunks {
 }
 
 /// Returns true if the bytes are a GLB file, independent of the file name.
-pub(super) fn is_container(bytes: &[u8]) -> bool {
+pub(crate) fn is_container(bytes: &[u8]) -> bool {
     bytes.starts_with(MAGIC)
 }
 

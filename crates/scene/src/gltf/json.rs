@@ -5,6 +5,8 @@ use gltf_json::validation::{Checked, Error, Validate as _};
 use gltf_json::{Path, Root};
 use serde_json::{Map, Number, Value};
 
+use crate::content::binary_format;
+
 use super::error::{GltfFault, Location, json_message, quoted};
 
 /// Maximum length of the JSON in bytes. The limit is high because data URIs are long.
@@ -49,6 +51,9 @@ const INDEX_KEYS: &[&str] = &[
 ];
 
 pub(super) fn root(text: &[u8], notes: &mut Vec<String>) -> Result<Root, GltfFault> {
+    if let Some(format) = binary_format(text) {
+        return Err(GltfFault::file(format!("the file has the format {format}, not glTF")));
+    }
     let text = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text);
     // Some exporters pad the JSON chunk with zeros.
     let text = text.trim_ascii_end().trim_suffix_zeros();

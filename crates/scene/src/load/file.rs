@@ -96,6 +96,19 @@ camera = { position = [0, 1, 0], look_at = [1, 0, 0], fov = 40 }
             );
             assert_eq!(message_of(name), message);
         }
+        for (name, bytes, format) in [
+            ("model.toml", &b"glTF\x02\0\0\0\xff"[..], "binary glTF"),
+            ("image.toml", b"\x89PNG\r\n\x1a\n", "PNG"),
+        ] {
+            write(name, bytes);
+            let message = format!("{}:1:1: the file has the format {format}, not TOML or JSON", path(name));
+            assert_eq!(message_of(name), message);
+        }
+        write("image.gltf", b"\x89PNG\r\n\x1a\n");
+        assert_eq!(
+            message_of("image.gltf"),
+            format!("{}: the file has the format PNG, not glTF", path("image.gltf"))
+        );
         assert!(message_of("none.toml").starts_with(&format!("{}: cannot be read: ", path("none.toml"))));
         File::create(folder.path().join("huge.toml"))
             .unwrap()

@@ -175,7 +175,10 @@ impl Scene {
         }
         let loaded: Arc<[u8]> = if is_text { Arc::default() } else { Arc::from(bytes) };
         let source = Arc::clone(&options.source);
-        let file_system = FileSystem::with_loaded(source, &path, loaded).map_err(read_error)?;
+        let file_system = FileSystem::with_loaded(source, &path, loaded).map_err(|error| {
+            let rule = format!("'{}' is no name of a scene in memory: {error}", options.name);
+            SceneError::Override(Problem::of("name", rule))
+        })?;
         let folder = folder_of(&path);
         let assets = Assets {
             folder: folder.to_owned(),

@@ -1,17 +1,19 @@
 //! Errors of texts that are not valid TOML: the parser's message, a hint and the line.
 
+use crate::content::binary_format;
 use crate::error::SceneError;
 use crate::key_path::cut;
 use wgray_image::sanitize::escape_control;
 
 pub const NOT_UTF8: &str = "not valid UTF-8";
 
-/// Returns a message if the bytes are UTF-16, which is recognized by the byte order mark.
+/// Returns a message if the bytes are UTF-16, which is recognized by the byte order mark, or a binary file of a known
+/// format.
 pub fn encoding(bytes: &[u8]) -> Option<String> {
     let name = match bytes {
         [0xff, 0xfe, ..] => "UTF-16 (little-endian)",
         [0xfe, 0xff, ..] => "UTF-16 (big-endian)",
-        _ => return None,
+        _ => return binary_format(bytes).map(|name| format!("the file has the format {name}, not TOML or JSON")),
     };
     Some(format!("the file is encoded in {name}; save it as UTF-8"))
 }
