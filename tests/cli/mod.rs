@@ -56,9 +56,8 @@ struct RunResult {
 impl RunResult {
     fn new(code: Option<i32>, stdout: String, stderr: &str, arguments: &[&str]) -> RunResult {
         let requests_progress = arguments.contains(&"--progress");
-        let is_progress = |line: &str| !requests_progress && line.contains(" % done after ") && !line.starts_with('{');
-        let (summary, messages): (Vec<&str>, Vec<&str>) =
-            (stderr.split_inclusive('\n')).partition(|line| is_summary(line) || is_progress(line));
+        let (summary, messages): (Vec<&str>, Vec<&str>) = (stderr.split_inclusive('\n'))
+            .partition(|line| is_summary(line) || !requests_progress && is_progress(line));
         RunResult {
             code: code.unwrap_or(-1),
             stdout,
@@ -68,8 +67,15 @@ impl RunResult {
     }
 }
 
+/// Removes summary lines and progress lines.
 pub fn without_summary(stderr: &str) -> String {
-    stderr.split_inclusive('\n').filter(|line| !is_summary(line)).collect()
+    let lines = stderr.split_inclusive('\n');
+    lines.filter(|line| !is_summary(line) && !is_progress(line)).collect()
+}
+
+/// Returns true for progress lines, which the program prints after ten seconds without a terminal.
+fn is_progress(line: &str) -> bool {
+    line.contains(" % done after ") && !line.starts_with('{')
 }
 
 /// Returns true for `NAMES: WIDTH x HEIGHT, SAMPLES spp, SECONDS s`, also with the noise after the samples.
