@@ -1,11 +1,13 @@
 //! Detection of binary formats, for messages about files that should contain something else.
 
 use crate::decode::Format;
-use crate::gltf::is_binary_gltf;
+
+/// The first bytes of a binary glTF file.
+pub const GLTF_MAGIC: &[u8] = b"glTF";
 
 /// Returns the name of a binary format, detected from the first bytes; `None` if they are of no known format.
 pub fn binary_format(bytes: &[u8]) -> Option<&'static str> {
-    match is_binary_gltf(bytes) {
+    match bytes.starts_with(GLTF_MAGIC) {
         true => Some("binary glTF"),
         false => Format::of(bytes).map(Format::name),
     }

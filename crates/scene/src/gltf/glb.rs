@@ -3,8 +3,8 @@
 use std::ops::Range;
 
 use super::error::{GltfFault, Location};
+use crate::content::GLTF_MAGIC;
 
-const MAGIC: &[u8] = b"glTF";
 const HEADER: usize = 12;
 const CHUNK_HEADER: usize = 8;
 const JSON: u32 = 0x4E4F_534A;
@@ -17,8 +17,8 @@ pub(super) struct Chunks {
 }
 
 /// Returns true if the bytes are a GLB file, independent of the file name.
-pub(crate) fn is_container(bytes: &[u8]) -> bool {
-    bytes.starts_with(MAGIC)
+pub(super) fn is_container(bytes: &[u8]) -> bool {
+    bytes.starts_with(GLTF_MAGIC)
 }
 
 /// Finds the JSON and binary chunks. Chunks of other types, repeated chunks, and bytes beyond the declared length are
@@ -83,7 +83,7 @@ mod tests {
     use super::*;
 
     fn glb(length: u32, chunks: &[(u32, &[u8])]) -> Vec<u8> {
-        let mut bytes = MAGIC.to_vec();
+        let mut bytes = GLTF_MAGIC.to_vec();
         for word in [2, length] {
             bytes.extend(word.to_le_bytes());
         }

@@ -56,7 +56,6 @@ use crate::{
 
 pub use self::contents::ModelContents;
 pub use self::error::GltfError;
-pub(crate) use self::glb::is_container as is_binary_gltf;
 
 /// Maximum number of instances, and maximum total number of their groups. An instance uses more than 1 KiB of memory.
 const MAX_INSTANCES: usize = 1 << 20;
