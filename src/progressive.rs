@@ -105,7 +105,7 @@ impl<'s> ProgressiveRender<'s> {
     /// Renders a part of a step that takes about this time.
     #[cfg(target_family = "wasm")]
     pub(crate) fn step_for(&mut self, duration: Duration, cancel: &CancelToken) -> Result<Status, Error> {
-        let start = web_time::Instant::now();
+        let start = wgray_render::clock::Instant::now();
         self.step_while(cancel, &|| start.elapsed() < duration)
     }
 

@@ -5,9 +5,9 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 use tracing::warn;
-use web_time::Instant;
 use wgray_image::panic_guard::catch_panic;
 use wgray_render::backend::Backend;
+use wgray_render::clock::Instant;
 use wgray_render::film::{Film, FilmLayout};
 use wgray_render::records::Packed;
 

@@ -3,6 +3,7 @@
 
 pub mod backend;
 pub mod bvh;
+pub mod clock;
 pub mod cpu;
 pub mod denoise;
 pub mod error;

@@ -5,7 +5,6 @@ use std::time::Duration;
 
 use bytemuck::{bytes_of, cast_slice};
 use glam::{UVec2, Vec3, Vec4};
-use web_time::Instant;
 use wgpu::BufferUsages;
 
 use super::bake::bake_if_small;
@@ -21,6 +20,7 @@ use super::sliders::{Slider, with_buffer};
 use super::texels::TexelParts;
 use super::timer::{TIMESTAMP_BYTES, Timer};
 use crate::backend::{Backend, FilmState, Rules};
+use crate::clock::Instant;
 use crate::denoise::denoise;
 use crate::error::RenderError;
 use crate::film::{Film, FilmLayout};

@@ -3,12 +3,11 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use web_time::Instant;
-
 use super::piece::{CheckpointStore, FilmPiece, StoredPiece};
 use super::steps::{Order, SampleProgress, Steps};
 use super::{DISPATCH_DURATION, WorkSplit, bands};
 use crate::backend::Backend;
+use crate::clock::Instant;
 use crate::error::RenderError;
 use crate::film::{Film, FilmLayout};
 use wgray_image::Region;

@@ -3,11 +3,10 @@
 use std::ops::Range;
 use std::time::Duration;
 
-use web_time::Instant;
-
 use super::WorkSplit;
 use super::pace::Pace;
 use crate::backend::Backend;
+use crate::clock::Instant;
 use crate::error::RenderError;
 use wgray_image::Region;
 
