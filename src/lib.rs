@@ -94,11 +94,13 @@
 //! All are enabled by default, so that `cargo install wgray` installs the program. Libraries usually need less:
 //!
 //! ```toml
-//! wgray = { version = "0.2", default-features = false, features = ["gpu"] }
+//! wgray = { version = "0.2", default-features = false, features = ["gpu", "formats"] }
 //! ```
 //!
 //! - `gpu`: rendering on GPUs and software Vulkan. Without it, [`Device::Auto`] is the CPU, and wgpu is not linked.
-//! - `cli`: the program `wgray`.
+//! - `formats`: OpenEXR, WebP and KTX 2 files, and metadata of JPEG files. Without it, such files are errors, JPEG files
+//!   have no metadata, and textures of glTF files use the PNG or JPEG image if there is one.
+//! - `cli`: the program `wgray`. Enables `formats`.
 //! - `dev`: the program's development mode, a page that updates when a shader or scene is saved. Enables `cli` and `gpu`.
 //!
 //! Without optimization, the CPU renders far more slowly. To optimize the renderer in your debug builds:

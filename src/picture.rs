@@ -138,7 +138,8 @@ impl Picture {
     ///
     /// # Errors
     ///
-    /// The file type is unknown, the image is too large for the format, or a file cannot be written.
+    /// The file type is unknown or needs the cargo feature `formats`, the image is too large for the format, or a file
+    /// cannot be written.
     pub fn save(&self, path: impl AsRef<Path>) -> Result<(), Error> {
         self.save_with(path, &SaveOptions::default())
     }
@@ -184,7 +185,7 @@ impl Picture {
     ///
     /// # Errors
     ///
-    /// The image is too large for the format, or the writer fails.
+    /// The image is too large for the format, the format needs the cargo feature `formats`, or the writer fails.
     pub fn write_to(&self, writer: impl Write + Seek, format: Format, options: &SaveOptions) -> Result<(), Error> {
         let size = format.check_size(self.width(), self.height());
         size.map_err(|rule| RenderError::Output(io::Error::new(io::ErrorKind::InvalidInput, rule)))?;

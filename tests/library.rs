@@ -204,8 +204,6 @@ fn the_extension_selects_the_format() {
     };
     let picture = wgray::render(&scene(), &options).unwrap();
     assert_eq!(picture.aovs(), [Aov::Depth]);
-    picture.save(path("a.exr")).unwrap();
-    assert_eq!(read_exr(&path("a.exr")).unwrap(), picture.pixels());
     picture.save(path("a.png")).unwrap();
     let png = |name: &str| image::open(path(name)).unwrap().into_rgb8();
     assert_eq!(png("a.png").into_raw(), picture.rgb8());
@@ -224,11 +222,16 @@ fn the_extension_selects_the_format() {
         },
         ..SaveOptions::default()
     };
-    for name in ["b.png", "b.jpg", "b.webp", "b.exr"] {
+    for name in ["b.png", "b.jpg"] {
         picture.save_with(path(name), &save_options).unwrap();
     }
     assert_eq!(image::open(path("b.png")).unwrap().color(), image::ColorType::Rgb16);
-    assert_eq!(png("b.webp").into_raw(), picture.rgb8());
+    if cfg!(feature = "formats") {
+        picture.save_with(path("b.exr"), &save_options).unwrap();
+        assert_eq!(read_exr(&path("b.exr")).unwrap(), picture.pixels());
+        picture.save_with(path("b.webp"), &save_options).unwrap();
+        assert_eq!(png("b.webp").into_raw(), picture.rgb8());
+    }
     let mut description = description();
     description.image.view_transform = ViewTransform::Srgb;
     description.image.exposure = -1.0;
@@ -375,6 +378,46 @@ fn all_kinds_of_materials_fit_into_the_stack_of_a_thread() {
         let scene = Scene::load(path.path()).expect("a valid scene");
         let picture = wgray::render(&scene, &cpu_options()).expect("an image");
         assert!(floats(&picture, "R").iter().any(|value| *value > 0.0), "{material}");
+    }
+}
+
+#[cfg(not(feature = "formats"))]
+#[test]
+fn without_the_feature_formats_files_are_rejected() {
+    use wgray::image::Format;
+
+    let folder = tempfile::tempdir().unwrap();
+    let picture = wgray::render(&scene(), &cpu_options()).unwrap();
+    for (format, name) in [(Format::Exr, "OpenEXR"), (Format::WebP, "WebP")] {
+        let rule = format!("{name} files need the cargo feature \"formats\"");
+        let path = folder.path().join(format!("a.{}", format.name()));
+        let error = picture.save(&path).unwrap_err();
+        assert!(matches!(error, Error::Render(RenderError::Output(_))), "{error:?}");
+        assert_eq!(error.to_string(), format!("{}: {rule}", path.display()));
+        let in_memory = std::io::Cursor::new(Vec::new());
+        let error = picture
+            .write_to(in_memory, format, &SaveOptions::default())
+            .unwrap_err();
+        assert_eq!(error.to_string(), rule);
+    }
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+    let error = read_exr(&folder.path().join("a.exr")).unwrap_err();
+    assert_eq!(error.kind(), std::io::ErrorKind::Unsupported);
+
+    let description = description()
+        .with_texture("a", ImageTextureDescription::new("a.image"))
+        .with_material("red", PhongDescription::new(ColorDescription::texture("a")));
+    for (bytes, name) in [
+        (&b"\x76\x2f\x31\x01"[..], "EXR"),
+        (b"RIFF\0\0\0\0WEBP", "WebP"),
+        (b"\xabKTX 20\xbb\r\n\x1a\n", "KTX2"),
+    ] {
+        std::fs::write(folder.path().join("a.image"), bytes).unwrap();
+        let error = description.validate_with(&Assets::beside(folder.path())).unwrap_err();
+        assert_eq!(
+            error.to_string(),
+            format!("textures.a.file: \"a.image\" cannot be decoded: {name} files need the cargo feature \"formats\"")
+        );
     }
 }
 

@@ -8,6 +8,7 @@ pub mod compare;
 mod complete;
 mod difference;
 mod file;
+pub mod formats;
 pub mod memory;
 mod output;
 pub mod panic_guard;

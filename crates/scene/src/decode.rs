@@ -1,16 +1,14 @@
 //! Decodes image files. The size in the header is checked against limits before any texel is decoded.
 
-mod gray_exr;
+#[cfg(feature = "formats")]
+mod formats;
 
-use std::cell::Cell;
 use std::io::Cursor;
 use std::path::Path;
 
 use image::error::{DecodingError, LimitError, LimitErrorKind};
 use image::{DynamicImage, ImageBuffer, ImageDecoder as _, ImageError, ImageFormat, ImageReader, Limits};
 
-use self::gray_exr::gray_exr;
-use super::ktx2::{self, Ktx2};
 use super::texture::{Image, Texels};
 
 /// Maximum number of texels along a side.
@@ -22,9 +20,8 @@ const MAX_DECODER_BYTES: usize = 64 << 20;
 /// declare 16,384 x 16,384 texels. A decoder may use twice this limit in total.
 const DECODED_LIMIT: (u64, u64) = (256 << 20, 32);
 
-/// Memory limit in bytes for texels of an EXR display window outside of the stored data window, because a small file
-/// may declare a huge display window. The limit increases with the file size like [`DECODED_LIMIT`].
-const UNSTORED_TEXELS_LIMIT: u64 = 64 << 20;
+/// First bytes of a KTX 2 file (Khronos Group, "KTX File Format Specification", version 2.0.4, section 3.1).
+const KTX2_IDENTIFIER: &[u8] = b"\xabKTX 20\xbb\r\n\x1a\n";
 
 /// Format of an image file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -48,7 +45,7 @@ const FORMATS: [(Format, &str); 6] = [
 impl Format {
     /// Detects the format from the first bytes of a file; `None` if the format is not supported.
     pub fn of(bytes: &[u8]) -> Option<Format> {
-        let format = match bytes.starts_with(ktx2::IDENTIFIER) {
+        let format = match bytes.starts_with(KTX2_IDENTIFIER) {
             true => Format::Ktx2,
             false => Format::Image(image::guess_format(bytes).ok()?),
         };
@@ -94,19 +91,17 @@ pub(super) enum DecodeError {
     Image(ImageError),
     /// The caller's rule for headers is violated.
     Rule(String),
-    /// A size limit is violated. The message follows the file's name.
-    Large(String),
-    /// A rule of the format is violated. The message follows the file's name.
-    Damaged(String),
-    Channels(Channels),
+    /// A limit, or a rule of the format, is violated. The rule follows the file's name.
+    File {
+        rule: String,
+        is_damage: bool,
+    },
 }
 
-/// The channels of an EXR file without supported channels, for the error message.
-pub(super) struct Channels {
-    /// The channel names in all layers.
-    pub names: Vec<String>,
-    /// True if the pixels have a variable number of values per channel ("deep" data).
-    pub are_deep: bool,
+impl DecodeError {
+    fn unsupported(rule: String) -> DecodeError {
+        DecodeError::File { rule, is_damage: false }
+    }
 }
 
 impl From<ImageError> for DecodeError {
@@ -140,30 +135,28 @@ pub(super) fn decode(
     format: Format,
     fits: impl Fn(Header) -> Result<(), String>,
 ) -> Result<DynamicImage, DecodeError> {
-    let format = match format {
-        Format::Image(format) => format,
-        Format::Ktx2 => return decode_ktx2(bytes, fits),
-    };
-    if format == ImageFormat::Png {
-        return decode_png(bytes, fits);
+    match format {
+        Format::Image(ImageFormat::Png) => decode_png(bytes, fits),
+        Format::Image(format @ (ImageFormat::Jpeg | ImageFormat::Hdr)) => {
+            decode_with_reader(bytes, format, fits, |_| Ok(()))
+        }
+        #[cfg(feature = "formats")]
+        _ => formats::decode(bytes, format, fits),
+        #[cfg(not(feature = "formats"))]
+        _ => Err(DecodeError::unsupported(format!(
+            "cannot be decoded: {}",
+            wgray_image::formats::rule(format.name())
+        ))),
     }
-    // Number of texels that an EXR file stores; the display window may have a different size.
-    let stored = Cell::new(0);
-    if format == ImageFormat::OpenExr
-        && let Some(image) = gray_exr(
-            bytes,
-            |size, bytes_per_pixel| {
-                stored.set(stored.get() + u64::from(size.0) * u64::from(size.1));
-                check_sides(size).and_then(|()| check_decoded_size(bytes, size, bytes_per_pixel))
-            },
-            |header| {
-                check_header(header, &fits)?;
-                check_decoded_size(bytes, (header.width, header.height), 3 * size_of::<f32>() as u64)
-            },
-        )?
-    {
-        return Ok(image);
-    }
+}
+
+/// Decodes an image with the crate `image`. `check_size` checks the size before texels are decoded.
+fn decode_with_reader(
+    bytes: &[u8],
+    format: ImageFormat,
+    fits: impl Fn(Header) -> Result<(), String>,
+    check_size: impl Fn((u32, u32)) -> Result<(), DecodeError>,
+) -> Result<DynamicImage, DecodeError> {
     let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
     let mut limits = Limits::no_limits();
     limits.max_image_width = Some(MAX_IMAGE_SIDE);
@@ -180,10 +173,19 @@ pub(super) fn decode(
     };
     check_header(header, &fits)?;
     check_decoded_size(bytes, (width, height), color.bytes_per_pixel().into())?;
-    if format == ImageFormat::OpenExr {
-        check_unstored_size(bytes, (width, height), stored.get())?;
-    }
+    check_size((width, height))?;
     Ok(DynamicImage::from_decoder(decoder)?)
+}
+
+/// Returns true if an image has alpha; false for unreadable images, which [`decode`] reports.
+pub(super) fn has_alpha(bytes: &[u8]) -> bool {
+    #[cfg(feature = "formats")]
+    if let Some(has_alpha) = formats::ktx2::has_alpha(bytes) {
+        return has_alpha;
+    }
+    let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format();
+    let decoder = reader.ok().and_then(|reader| reader.into_decoder().ok());
+    decoder.is_some_and(|decoder| decoder.color_type().has_alpha())
 }
 
 /// Rejects an image that is too large for the size of its file.
@@ -193,21 +195,8 @@ fn check_decoded_size(file: &[u8], (width, height): (u32, u32), bytes_per_texel:
     let limit = DECODED_LIMIT.0 + length * DECODED_LIMIT.1;
     match bytes <= limit {
         true => Ok(()),
-        false => Err(DecodeError::Large(format!(
+        false => Err(DecodeError::unsupported(format!(
             "has {width} x {height} texels and needs {bytes} bytes; the limit for a file of {length} bytes is {limit} bytes"
-        ))),
-    }
-}
-
-/// Rejects an EXR file that declares too many texels without storing them.
-fn check_unstored_size(file: &[u8], (width, height): (u32, u32), stored: u64) -> Result<(), DecodeError> {
-    let unstored = (u64::from(width) * u64::from(height)).saturating_sub(stored);
-    let (bytes, length) = (unstored * 3 * size_of::<f32>() as u64, file.len() as u64);
-    let limit = UNSTORED_TEXELS_LIMIT + length * DECODED_LIMIT.1;
-    match bytes <= limit {
-        true => Ok(()),
-        false => Err(DecodeError::Large(format!(
-            "declares {width} x {height} texels and stores {stored}; the missing texels need {bytes} bytes; the limit for a file of {length} bytes is {limit} bytes"
         ))),
     }
 }
@@ -222,19 +211,6 @@ fn check_sides((width, height): (u32, u32)) -> Result<(), DecodeError> {
 fn check_header(header: Header, fits: impl Fn(Header) -> Result<(), String>) -> Result<(), DecodeError> {
     check_sides((header.width, header.height))?;
     fits(header).map_err(DecodeError::Rule)
-}
-
-fn decode_ktx2(bytes: &[u8], fits: impl Fn(Header) -> Result<(), String>) -> Result<DynamicImage, DecodeError> {
-    let file = Ktx2::parse(bytes).map_err(DecodeError::Damaged)?;
-    let (width, height) = (file.width, file.height);
-    let header = Header {
-        width,
-        height,
-        exceeds_8_bits: false,
-    };
-    check_header(header, fits)?;
-    check_decoded_size(bytes, (width, height), 4)?;
-    file.decode().map_err(DecodeError::Damaged)
 }
 
 /// Decodes a PNG file with the crate `png`, which can skip color profiles and text chunks, whose decompressed size is

@@ -7,9 +7,8 @@ use image::error::LimitErrorKind;
 use image::{DynamicImage, ImageError, ImageFormat};
 
 use super::Problem;
-use super::decode::{Channels, DecodeError, Format, Header, MAX_IMAGE_SIDE, decode};
+use super::decode::{DecodeError, Format, Header, MAX_IMAGE_SIDE, decode};
 use super::downsample::halved;
-use super::key_path::list;
 use super::texture::{Encoding, Image, Texels};
 use crate::assets::{AssetKey, Assets};
 use crate::file_system::NoFiles;
@@ -112,9 +111,10 @@ impl Assets {
         };
         let decoded = decode(&bytes, format, fits).map_err(|error| match error {
             DecodeError::Rule(rule) => Problem::new(rule),
-            DecodeError::Large(rule) => Problem::new(format!("{file:?} {rule}")),
-            DecodeError::Damaged(rule) => Problem::damage(format!("{file:?} {rule}")),
-            DecodeError::Channels(channels) => Problem::new(format!("{file:?} {}", channels_message(&channels))),
+            DecodeError::File { rule, is_damage } => Problem {
+                is_damage,
+                ..Problem::new(format!("{file:?} {rule}"))
+            },
             DecodeError::Image(error) => Problem {
                 is_damage: !matches!(error, ImageError::Limits(_)),
                 ..Problem::new(format!("{file:?} {}", image_message(&error)))
@@ -277,17 +277,6 @@ fn image_message(error: &ImageError) -> String {
         ImageError::Limits(_) => "needs too much memory to be decoded".to_string(),
         ImageError::Unsupported(_) => format!("must have a supported format: {error}"),
         _ => format!("is damaged or truncated: {error}"),
-    }
-}
-
-/// Returns the message about an EXR file without supported channels, without the name of the file.
-fn channels_message(channels: &Channels) -> String {
-    match channels.are_deep {
-        true => "must have one value for each pixel and channel; deep images are not supported".to_owned(),
-        false => format!(
-            "must have the channels \"R\", \"G\" and \"B\", or a single channel; it has {}",
-            list(&channels.names)
-        ),
     }
 }
 

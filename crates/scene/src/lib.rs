@@ -24,7 +24,6 @@ pub mod gltf;
 mod gltf_shape;
 mod image_file;
 mod key_path;
-pub mod ktx2;
 pub mod limits;
 mod load;
 mod material;

@@ -1,16 +1,13 @@
 //! JPEG and WebP files, for thumbnails: 8 bits per channel. The encoders require the whole image in memory.
 
-use std::fs::File;
-use std::io::{self, BufReader, Cursor, Write};
+use std::io::{self, Write};
 
 use ::image::codecs::jpeg::JpegEncoder;
-use ::image::codecs::webp::WebPEncoder;
-use ::image::{ExtendedColorType, ImageEncoder, ImageError};
-use exif::experimental::Writer as ExifWriter;
-use exif::{Field, In, Tag, Value};
+use ::image::{ExtendedColorType, ImageEncoder, ImageError, ImageResult};
 use rayon::prelude::*;
 
-use super::{Band, Format, Layout, Metadata, SaveOptions, Sink};
+use super::formats::{exif, webp};
+use super::{Band, Format, Layout, SaveOptions, Sink};
 use crate::error::RenderError;
 use wgray_image::memory::fallible;
 
@@ -28,7 +25,7 @@ pub fn write(
     options: &SaveOptions,
     render: &mut dyn FnMut(&mut Sink) -> Result<(), RenderError>,
 ) -> Result<(), RenderError> {
-    let exif = exif(&options.metadata)?;
+    let exif = exif::encode(&options.metadata)?;
     let exif_bytes = exif.as_ref().map_or(0, Vec::len);
     if format == Format::Jpeg && exif_bytes > JPEG_EXIF_BYTES {
         let rule = format!("metadata: {exif_bytes} bytes of Exif tags exceed the limit of a JPEG, {JPEG_EXIF_BYTES}");
@@ -57,17 +54,15 @@ pub fn write(
         });
         Ok(())
     })?;
+    let content = Content {
+        pixels: &pixels,
+        size: (width, height),
+        color,
+        exif,
+    };
     let written = match format {
-        Format::WebP => {
-            let mut encoder = WebPEncoder::new_lossless(&mut file);
-            set_exif(&mut encoder, exif)?;
-            encoder.write_image(&pixels, width, height, color)
-        }
-        _ => {
-            let mut encoder = JpegEncoder::new_with_quality(&mut file, options.quality);
-            set_exif(&mut encoder, exif)?;
-            encoder.write_image(&pixels, width, height, color)
-        }
+        Format::WebP => webp::write(&mut file, content),
+        _ => content.encode(JpegEncoder::new_with_quality(&mut file, options.quality)),
     };
     written.map_err(|error| match error {
         ImageError::IoError(error) => RenderError::Output(error),
@@ -92,41 +87,19 @@ fn with_alpha(band: Band, layout: &Layout) -> Vec<u8> {
     (0..band.film.sums.len()).into_par_iter().flat_map_iter(pixel).collect()
 }
 
-fn set_exif(encoder: &mut impl ImageEncoder, exif: Option<Vec<u8>>) -> io::Result<()> {
-    match exif {
-        Some(exif) => encoder.set_exif_metadata(exif).map_err(io::Error::other),
-        None => Ok(()),
-    }
+/// Content of a file.
+pub(super) struct Content<'a> {
+    pixels: &'a [u8],
+    size: (u32, u32),
+    color: ExtendedColorType,
+    exif: Option<Vec<u8>>,
 }
 
-/// Reads Exif tags of a JPEG or WebP file.
-pub(super) fn read_metadata(mut file: BufReader<File>) -> Option<Metadata> {
-    let exif = exif::Reader::new().read_from_container(&mut file).ok()?;
-    let text = |tag| match &exif.get_field(tag, In::PRIMARY)?.value {
-        Value::Ascii(lines) => Some(String::from_utf8_lossy(lines.first()?).into_owned()),
-        _ => None,
-    };
-    let lines = text(Tag::ImageDescription).unwrap_or_default();
-    Some(Metadata::from_lines(text(Tag::Software), &lines))
-}
-
-fn exif(metadata: &Metadata) -> io::Result<Option<Vec<u8>>> {
-    let tags = [
-        (Tag::Software, metadata.software().map(str::to_owned)),
-        (Tag::ImageDescription, metadata.lines()),
-    ];
-    let field = |(tag, text): (Tag, Option<String>)| {
-        let value = Value::Ascii(vec![text?.into_bytes()]);
-        let ifd_num = In::PRIMARY;
-        Some(Field { tag, ifd_num, value })
-    };
-    let fields: Vec<Field> = tags.into_iter().filter_map(field).collect();
-    if fields.is_empty() {
-        return Ok(None);
+impl Content<'_> {
+    pub fn encode(self, mut encoder: impl ImageEncoder) -> ImageResult<()> {
+        if let Some(exif) = self.exif {
+            encoder.set_exif_metadata(exif).map_err(ImageError::Unsupported)?;
+        }
+        encoder.write_image(self.pixels, self.size.0, self.size.1, self.color)
     }
-    let mut writer = ExifWriter::new();
-    fields.iter().for_each(|field| writer.push_field(field));
-    let mut bytes = Cursor::new(Vec::new());
-    writer.write(&mut bytes, false).map_err(io::Error::other)?;
-    Ok(Some(bytes.into_inner()))
 }

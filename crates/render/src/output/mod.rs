@@ -2,8 +2,9 @@
 //! row by row, so that an image need not fit into memory. Files have temporary names until they are complete.
 
 mod aov;
-mod exr;
 mod flat;
+#[cfg_attr(not(feature = "formats"), path = "no_formats.rs")]
+mod formats;
 mod metadata;
 mod png;
 mod save_options;
@@ -17,7 +18,7 @@ use wgray_scene::ViewSettings;
 
 pub use aov::Channel;
 pub use aov::{Aov, AovSource};
-pub use exr::read_exr;
+pub use formats::exr::read_exr;
 pub use metadata::read_metadata;
 pub use png::in_memory;
 pub use save_options::{BitDepth, ExrCompression, ExrType, Metadata, SaveOptions};

@@ -1,7 +1,5 @@
 //! Encoding of image files: bit depth, precision, compression, quality and metadata.
 
-use ::exr::compression::Compression;
-
 use wgray_scene::ViewSettings;
 
 /// Encoding of image files. Settings of other formats have no effect.
@@ -15,7 +13,7 @@ pub struct SaveOptions {
     pub exr_compression: ExrCompression,
     /// Quality of JPEG files, 1 to 100.
     pub quality: u8,
-    /// Metadata of all files.
+    /// Metadata of all files; of PNG files only, without the cargo feature `formats`.
     pub metadata: Metadata,
 }
 
@@ -117,16 +115,6 @@ impl ExrCompression {
             ExrCompression::Piz => "piz",
         }
     }
-
-    pub(super) fn method(self) -> Compression {
-        match self {
-            ExrCompression::None => Compression::Uncompressed,
-            ExrCompression::Rle => Compression::RLE,
-            ExrCompression::Zips => Compression::ZIP1,
-            ExrCompression::Zip => Compression::ZIP16,
-            ExrCompression::Piz => Compression::PIZ,
-        }
-    }
 }
 
 /// Metadata of an image file: pairs of key and text, in order.
@@ -149,22 +137,5 @@ impl Metadata {
 
     pub(super) fn software(&self) -> Option<&str> {
         self.get(Metadata::SOFTWARE)
-    }
-
-    /// Inverse of [`Metadata::software`] and [`Metadata::lines`].
-    pub(super) fn from_lines(software: Option<String>, lines: &str) -> Metadata {
-        let software = software.map(|text| (Metadata::SOFTWARE.to_owned(), text));
-        let pairs = lines.lines().filter_map(|line| line.split_once(": "));
-        let pairs = pairs.map(|(name, text)| (name.to_owned(), text.to_owned()));
-        Metadata {
-            pairs: software.into_iter().chain(pairs).collect(),
-        }
-    }
-
-    /// Returns all pairs except the program's name, one per line, such as `seed: 0`.
-    pub(super) fn lines(&self) -> Option<String> {
-        let pairs = self.pairs.iter().filter(|(name, _)| name != Metadata::SOFTWARE);
-        let lines: Vec<String> = pairs.map(|(name, text)| format!("{name}: {text}")).collect();
-        (!lines.is_empty()).then(|| lines.join("\n"))
     }
 }

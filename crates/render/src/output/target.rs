@@ -1,21 +1,23 @@
 //! Output of a render to several image files, which receive the same rows.
 
-use std::io::{Seek, Write};
+use std::io::{self, Seek, Write};
 use std::path::{Path, PathBuf};
 
-use super::{Aov, Band, Layout, Pending, SaveOptions, Sink, exr, flat, png};
+use super::formats::exr;
+use super::{Aov, Band, Layout, Pending, SaveOptions, Sink, flat, png};
 use crate::error::RenderError;
+use wgray_image::formats::missing;
 
 /// A format of image files.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
     /// Display RGB of 8 or 16 bits per channel, with linear alpha if any. [`Aov`]s are separate files.
     Png,
-    /// Linear float RGB, with alpha if any. [`Aov`]s are further layers.
+    /// Linear float RGB, with alpha if any. [`Aov`]s are further layers. Needs the cargo feature `formats`.
     Exr,
     /// Display RGB of 8 bits per channel, lossy, without alpha and [`Aov`]s. Kept in memory until complete.
     Jpeg,
-    /// Like [`Format::Jpeg`], but lossless, and with alpha if any.
+    /// Like [`Format::Jpeg`], but lossless, and with alpha if any. Needs the cargo feature `formats`.
     WebP,
 }
 
@@ -69,6 +71,15 @@ impl Format {
                 "{width} x {height} pixels are too many for {}; the limit is {max} along a side",
                 self.title()
             )),
+            _ => Ok(()),
+        }
+    }
+
+    /// Rejects the formats that need the cargo feature `formats` if it is disabled.
+    fn check_feature(self) -> io::Result<()> {
+        match self {
+            Format::Exr if !cfg!(feature = "formats") => Err(missing("OpenEXR")),
+            Format::WebP if !cfg!(feature = "formats") => Err(missing("WebP")),
             _ => Ok(()),
         }
     }
@@ -129,13 +140,20 @@ pub fn files(path: &Path, format: Format, aovs: &[Aov]) -> Vec<PathBuf> {
 ///
 /// # Errors
 ///
-/// Errors of `render`, and [`RenderError::Output`] if a file cannot be written.
+/// Errors of `render`, and [`RenderError::Output`] if a file cannot be written or a format needs the disabled cargo
+/// feature `formats`.
 pub fn save(
     mut targets: Vec<Target>,
     layout: &Layout,
     options: &SaveOptions,
     render: &mut dyn FnMut(&mut Sink) -> Result<(), RenderError>,
 ) -> Result<SaveReport, RenderError> {
+    for Target { format, files } in &targets {
+        format.check_feature().map_err(|error| match files.first() {
+            Some(file) => io::Error::new(error.kind(), format!("{}: {error}", file.name())),
+            None => error,
+        })?;
+    }
     let mut report = SaveReport::default();
     write(&mut targets, layout, options, &mut report, &mut |_| Ok(()), render)?;
     let mut files: Vec<Pending> = targets.into_iter().flat_map(|target| target.files).collect();
@@ -194,7 +212,8 @@ fn write(
 ///
 /// # Errors
 ///
-/// Errors of `render`, and [`RenderError::Output`] if the writer fails or the image is too large for the format.
+/// Errors of `render`, and [`RenderError::Output`] if the writer fails, the image is too large for the format, or the
+/// format needs the disabled cargo feature `formats`.
 pub fn write_to(
     writer: impl Write + Seek,
     (format, layer): (Format, Option<Aov>),
@@ -202,6 +221,7 @@ pub fn write_to(
     options: &SaveOptions,
     render: &mut dyn FnMut(&mut Sink) -> Result<(), RenderError>,
 ) -> Result<(), RenderError> {
+    format.check_feature()?;
     let display_options = options.with_view(layout.view);
     match format {
         Format::Png => png::write([(writer, layer)], layout, &display_options, render),

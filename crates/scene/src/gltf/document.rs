@@ -155,10 +155,14 @@ impl Document {
         if let Some((name, source)) = source_from_extension {
             let count = self.json.images.len();
             let source = source.as_u64().and_then(|source| usize::try_from(source).ok());
-            return source.filter(|source| *source < count).ok_or_else(|| {
+            let source = source.filter(|source| *source < count).ok_or_else(|| {
                 let rule = format!("must be the index of an image; number of images: {count}");
                 GltfFault::key(format!("{key}.extensions.{name}.source"), rule)
-            });
+            })?;
+            // Without the feature `formats`, only the core source can be decoded.
+            if cfg!(feature = "formats") || self.json.get(texture.source).is_none() {
+                return Ok(source);
+            }
         }
         // The crate `gltf-json` represents a missing source by an index that is out of range.
         match self.json.get(texture.source) {

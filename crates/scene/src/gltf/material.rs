@@ -10,7 +10,8 @@ use serde_json::{Map, Value};
 use super::document::Document;
 use super::error::GltfError;
 use super::light::note;
-use super::texture::{Slot, has_alpha};
+use super::texture::Slot;
+use crate::decode::has_alpha;
 use crate::{
     AlphaMode, Channel, ColorDescription, Encoding, NormalMapDescription, PrincipledDescription, TextureDescription,
     TextureReference, ValueDescription, VertexColors,

@@ -1,16 +1,12 @@
 //! glTF textures (section 3.8) with KHR_texture_basisu, KHR_texture_transform and EXT_texture_webp.
 
-use std::io::Cursor;
-
 use gltf_json::texture::{MagFilter, WrappingMode};
 use gltf_json::validation::Checked;
-use image::{ImageDecoder as _, ImageReader};
 use serde::Deserialize;
 use serde_json::{Map, Value};
 
 use super::document::Document;
 use super::error::{GltfError, json_message};
-use crate::ktx2;
 use crate::{Encoding, ImageTextureDescription, TextureFilter, Wrap};
 
 /// Limits of texture transforms: a scale whose magnitude is below the first value is replaced by this value; scales and
@@ -168,14 +164,4 @@ impl Document {
             ..ImageTextureDescription::new(file)
         })
     }
-}
-
-/// Returns true if the image has alpha; false for unreadable images, which the decoder reports.
-pub(super) fn has_alpha(bytes: &[u8]) -> bool {
-    if let Some(has_alpha) = ktx2::has_alpha(bytes) {
-        return has_alpha;
-    }
-    let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format();
-    let decoder = reader.ok().and_then(|reader| reader.into_decoder().ok());
-    decoder.is_some_and(|decoder| decoder.color_type().has_alpha())
 }

@@ -1,12 +1,11 @@
 //! A decoded image: named channels, each in the value type of the file.
 
+#[cfg_attr(not(feature = "formats"), path = "no_exr.rs")]
 mod exr;
 mod read;
 
 use std::ops::Range;
 use std::sync::Arc;
-
-use ::exr::prelude::f16;
 
 pub use read::Unreadable;
 
@@ -70,9 +69,7 @@ impl Plane {
             Plane::Bytes(values) => copy(&values[pixels], output, |value| f64::from(value) / 255.0),
             Plane::Shorts(values) => copy(&values[pixels], output, |value| f64::from(value) / 65_535.0),
             Plane::Integers(values) => copy(&values[pixels], output, f64::from),
-            Plane::Halves(values) => copy(&values[pixels], output, |value| {
-                f64::from(f16::from_bits(value).to_f32())
-            }),
+            Plane::Halves(values) => copy(&values[pixels], output, |value| f64::from(half_to_f32(value))),
             Plane::Floats(values) => copy(&values[pixels], output, f64::from),
             Plane::One => output.fill(1.0),
         }
@@ -94,6 +91,19 @@ impl Plane {
             (Plane::One, Plane::One) => true,
             _ => false,
         }
+    }
+}
+
+/// Converts the bits of a half-precision float (IEEE 754 binary16), exactly.
+fn half_to_f32(bits: u16) -> f32 {
+    /// 2 to the difference of the exponent biases.
+    const SCALE: f32 = f32::from_bits((127 + 127 - 15) << 23);
+    let is_finite = bits & 0x7c00 != 0x7c00;
+    let magnitude = u32::from(bits & 0x7fff) << 13;
+    let sign = u32::from(bits >> 15) << 31;
+    match is_finite {
+        true => f32::from_bits(sign | magnitude) * SCALE,
+        false => f32::from_bits(sign | magnitude | 0x7f80_0000),
     }
 }
 
@@ -194,5 +204,23 @@ fn displayed(plane: &Plane, alpha: Option<&Arc<Plane>>, pixels: usize, bits: u8,
         Plane::Bytes(bytes)
     } else {
         Plane::Shorts(words)
+    }
+}
+
+#[cfg(all(test, feature = "formats"))]
+mod tests {
+    use super::half_to_f32;
+
+    #[test]
+    fn half_precision_floats_are_converted_exactly() {
+        for bits in 0..=u16::MAX {
+            let expected = ::exr::prelude::f16::from_bits(bits).to_f32();
+            let value = half_to_f32(bits);
+            assert!(
+                value.to_bits() == expected.to_bits() || value.is_nan() && expected.is_nan(),
+                "{bits}"
+            );
+        }
+        assert_eq!(half_to_f32(0xc000), -2.0);
     }
 }

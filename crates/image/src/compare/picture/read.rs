@@ -9,6 +9,7 @@ use image::{DynamicImage, ImageDecoder as _, ImageFormat, ImageReader, Limits};
 
 use super::{Channel, Kind, Picture, Plane};
 use crate::blocking_path;
+use crate::formats;
 use crate::memory::fallible;
 
 /// Memory limit of a decoder in addition to the image, in bytes.
@@ -131,6 +132,7 @@ fn decode(source: &mut dyn Source, max_pixels: u64) -> Result<Picture, Unreadabl
     match image::guess_format(&start) {
         Ok(ImageFormat::Png) => png(source, max_pixels),
         Ok(ImageFormat::OpenExr) => super::exr::read(source, max_pixels),
+        Ok(ImageFormat::WebP) if !cfg!(feature = "formats") => Err(Unreadable::Kind(formats::rule("WebP"))),
         Ok(format @ (ImageFormat::Jpeg | ImageFormat::WebP | ImageFormat::Hdr)) => {
             decode_8_bit_or_hdr(source, format, max_pixels)
         }

@@ -6,6 +6,7 @@ use std::path::Path;
 
 use ::exr::block::writer::{ChunkWriter, ChunksWriter};
 use ::exr::block::{BlockIndex, UncompressedBlock, write as write_blocks};
+use ::exr::compression::Compression;
 use ::exr::error::{Error, UnitResult};
 use ::exr::math::Vec2;
 use ::exr::meta::attribute::{ChannelDescription, IntegerBounds, LineOrder, SampleType, Text};
@@ -14,8 +15,8 @@ use ::exr::meta::{BlockDescription, MetaData};
 use ::exr::prelude::{ReadChannels, ReadLayers, ReadSpecificChannel, f16};
 use rayon::prelude::*;
 
-use super::aov::Channel;
-use super::{Band, ExrType, Layout, Metadata, Pixels, SaveOptions, Sink};
+use super::super::aov::Channel;
+use super::super::{Band, ExrCompression, ExrType, Layout, Metadata, Pixels, SaveOptions, Sink};
 use crate::error::RenderError;
 use crate::film::mean;
 
@@ -45,7 +46,7 @@ pub fn write(
             meta,
             writer,
             is_half: options.exr_type == ExrType::Half,
-            block_rows: options.exr_compression.method().scan_lines_per_block(),
+            block_rows: method(options.exr_compression).scan_lines_per_block(),
             lines: Vec::new(),
             next: 0,
             too_large: 0,
@@ -135,7 +136,7 @@ fn header(layout: &Layout, options: &SaveOptions, columns: &[(&str, Column)]) ->
         channels,
     )
     .with_encoding(
-        options.exr_compression.method(),
+        method(options.exr_compression),
         BlockDescription::ScanLines,
         LineOrder::Increasing,
     )
@@ -148,6 +149,16 @@ fn header(layout: &Layout, options: &SaveOptions, columns: &[(&str, Column)]) ->
     header.own_attributes.software_name = options.metadata.software().map(text);
     header.own_attributes.comments = options.metadata.lines().as_deref().map(text);
     header
+}
+
+fn method(compression: ExrCompression) -> Compression {
+    match compression {
+        ExrCompression::None => Compression::Uncompressed,
+        ExrCompression::Rle => Compression::RLE,
+        ExrCompression::Zips => Compression::ZIP1,
+        ExrCompression::Zip => Compression::ZIP16,
+        ExrCompression::Piz => Compression::PIZ,
+    }
 }
 
 /// Encodes text as UTF-8, since the format defines no encoding.
@@ -243,7 +254,7 @@ fn to_io_error(error: Error) -> io::Error {
     }
 }
 
-pub(super) fn read_metadata(file: BufReader<File>) -> Option<Metadata> {
+pub fn read_metadata(file: BufReader<File>) -> Option<Metadata> {
     let meta = MetaData::read_from_buffered(file, false).ok()?;
     let attributes = &meta.headers.first()?.own_attributes;
     let comments = attributes.comments.as_ref().map(Text::to_string);
@@ -256,7 +267,8 @@ pub(super) fn read_metadata(file: BufReader<File>) -> Option<Metadata> {
 ///
 /// # Errors
 ///
-/// Unreadable files, files of other formats, and files without these channels.
+/// Unreadable files, files of other formats, files without these channels, and all files without the cargo feature
+/// `formats`.
 pub fn read_exr(path: &Path) -> io::Result<Pixels> {
     let create = |size: Vec2<usize>, _: &_| Pixels {
         width: size.x() as u32,

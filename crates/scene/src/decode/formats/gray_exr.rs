@@ -8,7 +8,8 @@ use exr::prelude::{ReadChannels as _, ReadLayers as _};
 use image::error::DecodingError;
 use image::{DynamicImage, ImageBuffer, ImageError, ImageFormat};
 
-use super::{Channels, DecodeError, Header};
+use super::{DecodeError, Header};
+use crate::key_path::list;
 
 const COLORS: [&str; 3] = ["R", "G", "B"];
 
@@ -41,9 +42,12 @@ pub(super) fn gray_exr(
         return Ok(None);
     }
     let unsupported_channels = || {
-        DecodeError::Channels(Channels {
-            names: meta.headers.iter().flat_map(names).collect(),
-            are_deep: meta.headers.iter().all(|header| header.deep),
+        DecodeError::unsupported(match meta.headers.iter().all(|header| header.deep) {
+            true => "must have one value for each pixel and channel; deep images are not supported".to_owned(),
+            false => format!(
+                "must have the channels \"R\", \"G\" and \"B\", or a single channel; it has {}",
+                list(meta.headers.iter().flat_map(names).collect::<Vec<_>>())
+            ),
         })
     };
     let [header] = meta.headers.as_slice() else {

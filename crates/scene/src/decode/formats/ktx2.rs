@@ -9,10 +9,9 @@ use basisu::{DecodeFlags, TargetFormat, Transcoder};
 use image::{DynamicImage, ImageBuffer, RgbaImage};
 use ruzstd::decoding::StreamingDecoder;
 
+use super::super::KTX2_IDENTIFIER as IDENTIFIER;
 use wgray_image::panic_guard::catch_panic;
 
-/// First bytes of a file (section 3.1).
-pub(super) const IDENTIFIER: &[u8] = b"\xabKTX 20\xbb\r\n\x1a\n";
 /// Position of the index of levels (section 2), and the size of an entry of the index, in bytes.
 const INDEX: usize = 80;
 const ENTRY: usize = 24;
