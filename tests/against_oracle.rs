@@ -166,13 +166,16 @@ fn images_match_the_oracle() {
     }
 }
 
-/// At least one scene detects each flaw; every scene detects the flaws that affect all scenes.
+/// At least one scene detects each flaw; every scene detects the flaws that affect all scenes. A part of the pixels is
+/// enough for that.
 #[test]
 fn flaws_of_the_oracle_are_detected() {
+    const STEP: usize = 5;
     let mode = *both().last().expect("the CPU at least");
     let mut found = Vec::new();
     for (name, description) in supported_scenes() {
         let picture = means(&render(&scenes::packed(&description), mode));
+        let pixels: Vec<[f64; 3]> = picture.into_iter().step_by(STEP).collect();
         for flaw in [
             Flaw::MissingCosine,
             Flaw::SwappedAxes,
@@ -189,7 +192,7 @@ fn flaws_of_the_oracle_are_detected() {
             if !affects_all_scenes && found.contains(&flaw) {
                 continue;
             }
-            let fraction = differing_fraction(&picture, &Oracle::new(&description, flaw).picture());
+            let fraction = differing_fraction(&pixels, &Oracle::new(&description, flaw).pixels(STEP));
             if fraction > 10.0 * MAX_EDGE_FRACTION {
                 found.push(flaw);
             }

@@ -147,8 +147,14 @@ impl<'a> Oracle<'a> {
 
     /// Renders all pixels. For every pattern, samples are at the cell centers of square grids.
     pub fn picture(&self) -> Vec<[f64; 3]> {
-        let pixels = self.scene.image.width * self.scene.image.height;
-        (0..pixels).into_par_iter().map(|i| self.pixel(i)).collect()
+        self.pixels(1)
+    }
+
+    /// Renders every pixel whose index is a multiple of `step`.
+    pub fn pixels(&self, step: usize) -> Vec<[f64; 3]> {
+        let count = self.scene.image.width * self.scene.image.height;
+        let indices = (0..count).into_par_iter().step_by(step);
+        indices.map(|i| self.pixel(i)).collect()
     }
 
     /// Renders pixel `i` in row-major order, top row first.
