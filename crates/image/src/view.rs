@@ -3,14 +3,14 @@
 //! Light is linear RGB with the primaries of sRGB (Rec. 709, D65). NaN and negative values are treated as 0, and
 //! infinity is treated as the largest finite value.
 
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::agx::{Rgb, agx};
 use crate::color::{linear_to_srgb, srgb_to_linear};
 
 /// Transform from linear light to display values. [`ViewTransform::name`] is the name in files.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Deserialize, Serialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub enum ViewTransform {
     /// Clamps to 0 ... 1, then applies gamma 1/2.2.
     #[default]

@@ -36,6 +36,7 @@ mod presentation;
 mod problem;
 mod read;
 mod scene;
+#[cfg(feature = "schema")]
 mod schema;
 mod sky;
 mod spline;
@@ -69,9 +70,11 @@ pub use parse::{Pieces, Places, is_json_scene};
 pub use presentation::{Presentation, UpAxis};
 pub use problem::{ErrorPlace, Problem, UnreadableFile};
 pub use scene::*;
-pub use schema::fields::Kind as FieldKind;
-pub use schema::fields::{Field, Names, fields};
-pub use schema::schema;
+#[cfg(feature = "schema")]
+pub use schema::{
+    fields::{Field, Kind as FieldKind, Names, fields},
+    schema,
+};
 pub use texture::{
     Channel, Color, Encoding, Image, NormalMap, Texels, Texture, TextureFilter, TextureKind, Value, Wrap,
 };

@@ -3,7 +3,6 @@
 use std::sync::Arc;
 
 use glam::DVec3;
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// A color of a material.
@@ -31,7 +30,8 @@ pub enum Value {
 }
 
 /// A channel of a texture. In a file, the names are in lower case: `"g"`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum Channel {
     /// Red.
@@ -102,7 +102,8 @@ pub enum TextureKind {
 }
 
 /// Texture addressing outside of the image. In a file, the names are in snake case: `"repeat"`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum Wrap {
     /// Repeats the image.
@@ -115,7 +116,8 @@ pub enum Wrap {
 }
 
 /// Texture filter. In a file, the names are in snake case: `"ewa"`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum TextureFilter {
     /// Nearest texel.
@@ -137,7 +139,8 @@ impl TextureFilter {
 }
 
 /// Encoding of 8-bit and 16-bit values. In a file, the names are in snake case: `"srgb"`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Deserialize, Serialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum Encoding {
     /// The sRGB transfer function of IEC 61966-2-1.

@@ -1,14 +1,13 @@
 //! The section `[camera]` of scene files.
 
 use glam::DVec3;
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use toml::Table;
 
 use super::tables::ReadError;
 use super::tagged::{Tagged, tagged};
 use super::{CameraPathDescription, one};
-use crate::description::kinds::{Aperture, Blades, Degrees, FNumber, Fov, Length, Point, Vector};
+use crate::description::kinds::*;
 
 tagged! {
     /// The camera. The key `type` selects the variant.

@@ -1,10 +1,9 @@
 //! `[camera.path]`: a camera animation with keys.
 
 use glam::DVec3;
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::description::kinds::{Aperture, Fov, FrameNumber, Length, Point, Vector};
+use crate::description::kinds::*;
 
 /// A camera animation with keys. Before the first key and after the last key, the camera does not move.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]

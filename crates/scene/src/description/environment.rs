@@ -1,11 +1,10 @@
 //! The section `[environment]` of scene files.
 
 use glam::DVec3;
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{Rotation, one};
-use crate::description::kinds::{Degrees, Elevation, EnvironmentScale, Rgb, Turbidity};
+use crate::description::kinds::*;
 
 /// The environment, for `integrator = "path"`: exactly one of `color`, `file` and `name`.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]

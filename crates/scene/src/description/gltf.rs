@@ -4,11 +4,10 @@ use std::collections::BTreeMap;
 use std::fmt;
 
 use glam::DVec3;
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{Rotation, Scale};
-use crate::description::kinds::{ListIndex, Matrix, Point, Seconds};
+use crate::description::kinds::*;
 
 /// A glTF file: meshes with materials and textures, and lights.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]

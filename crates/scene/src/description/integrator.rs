@@ -1,9 +1,9 @@
 //! The integrators and their properties.
 
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::Pattern;
+use crate::description::kinds::*;
 use crate::limits::MAX_DEPTH;
 
 /// A light transport algorithm. In a file, the names are in snake case: `"path"`.

@@ -1,9 +1,11 @@
 //! Kinds of values of scene files: JSON schemas independent of the Rust types. Fields of descriptions refer to kinds,
-//! as in `#[schemars(with = "Length")]`.
+//! as in `#[schemars(with = "Length")]`, and import this module with `*`: `no_kinds.rs` replaces it without the cargo
+//! feature `schema`.
 
 use std::borrow::Cow;
 
-use schemars::{JsonSchema, Schema, SchemaGenerator};
+pub(crate) use schemars::JsonSchema;
+use schemars::{Schema, SchemaGenerator};
 use serde_json::{Value, json};
 
 use crate::limits::*;

@@ -1,13 +1,12 @@
 //! Lights of scene files.
 
 use glam::DVec3;
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use toml::Table;
 
 use super::tables::ReadError;
 use super::tagged::{Tagged, tagged};
-use crate::description::kinds::{ConeAngle, InnerAngle, Point, Rgb, Size, Vector};
+use crate::description::kinds::*;
 
 tagged! {
     /// A light. The key `type` selects the variant.

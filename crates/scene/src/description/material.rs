@@ -1,14 +1,13 @@
 //! Materials of scene files.
 
 use glam::DVec3;
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use toml::Table;
 
 use super::tables::ReadError;
 use super::tagged::{Tagged, tagged};
 use super::{ColorDescription, NormalMapDescription, PrincipledDescription, ValueDescription};
-use crate::description::kinds::{Absorption, Degrees, Etas, Fraction, FractionColor, Ior, Ks, Metal, Shininess};
+use crate::description::kinds::*;
 
 tagged! {
     /// A material. The key `type` selects the variant.

@@ -3,12 +3,11 @@
 use std::collections::BTreeMap;
 
 use glam::DVec3;
-use schemars::JsonSchema;
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize};
 use toml::Table;
 
-use crate::description::kinds::{Angles, Degrees, Factor, Factor3, Matrix, Point, Vector};
+use crate::description::kinds::*;
 use crate::mesh::Normals;
 
 /// A mesh file and its import settings.

@@ -9,6 +9,7 @@ mod camera_path;
 mod environment;
 mod gltf;
 mod integrator;
+#[cfg_attr(not(feature = "schema"), path = "no_kinds.rs")]
 pub(crate) mod kinds;
 mod light;
 mod material;
@@ -18,17 +19,17 @@ mod render;
 mod shape;
 pub(crate) mod tables;
 pub(super) mod tagged;
+#[cfg(feature = "schema")]
 pub(crate) mod tagged_schema;
 mod texture;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{Assets, ViewTransform};
-use crate::description::kinds::{Pixels, Stops};
+use crate::description::kinds::*;
 
 pub use self::camera::*;
 pub use self::camera_path::*;

@@ -1,13 +1,10 @@
 //! The material `principled` of scene files.
 
 use glam::DVec3;
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{ColorDescription, NormalMapDescription, TextureReference, ValueDescription};
-use crate::description::kinds::{
-    AttenuationDistance, Degrees, Fraction, FractionColor, FractionRgb, PrincipledIor, Thickness,
-};
+use crate::description::kinds::*;
 
 /// glTF's metallic-roughness material with extensions and glTF's defaults, for `integrator = "path"`.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]

@@ -1,17 +1,14 @@
 //! Render settings of scene files.
 
-use std::borrow::Cow;
 use std::fmt;
 
 use glam::DVec3;
-use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{Deserializer, Error, MapAccess, Unexpected, Visitor};
 use serde::{Deserialize, Serialize};
-use serde_json::json;
 
 use super::integrator::Integrator;
-use crate::description::kinds::{Clamp, Count, Depth, FilterRadius, Fraction, MaxSamples, Rgb, Seed, ShadowEpsilon};
+use crate::description::kinds::*;
 use crate::limits::MAX_COUNT;
 
 /// Shadows of glass. In a file, the names are in snake case: `"opaque"`.
@@ -160,15 +157,18 @@ impl<'de> Deserialize<'de> for SamplesDescription {
     }
 }
 
+#[cfg(feature = "schema")]
 impl JsonSchema for SamplesDescription {
-    fn schema_name() -> Cow<'static, str> {
+    fn schema_name() -> std::borrow::Cow<'static, str> {
         "SamplesDescription".into()
     }
 
-    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+    fn json_schema(generator: &mut schemars::SchemaGenerator) -> schemars::Schema {
         let table = generator.subschema_for::<SamplesTable>();
         let number = generator.subschema_for::<Count>();
-        json!({ "anyOf": [table, number] }).try_into().unwrap_or_default()
+        serde_json::json!({ "anyOf": [table, number] })
+            .try_into()
+            .unwrap_or_default()
     }
 }
 

@@ -1,7 +1,6 @@
 //! Shapes of scene files.
 
 use glam::DVec3;
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use toml::Table;
 
@@ -9,7 +8,7 @@ use super::gltf::GltfDescription;
 use super::mesh::MeshDescription;
 use super::tables::ReadError;
 use super::tagged::{Tagged, tagged};
-use crate::description::kinds::{Length, Point, Points3, Points4, Size, Vector};
+use crate::description::kinds::*;
 
 tagged! {
     /// A shape. The key `type` selects the variant.

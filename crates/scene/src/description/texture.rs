@@ -3,7 +3,6 @@
 use std::fmt;
 
 use glam::DVec3;
-use schemars::JsonSchema;
 use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer, StrDeserializer};
 use serde::de::{Deserializer, MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Serialize};
@@ -11,9 +10,7 @@ use toml::Table;
 
 use super::tables::ReadError;
 use super::tagged::{Tagged, tagged};
-use crate::description::kinds::{
-    Anisotropy, Degrees, Factors, Fraction, LineWidth, Rgb, Strength, UvOffset, UvScale, UvSet, copy_plain_title,
-};
+use crate::description::kinds::*;
 use crate::{Channel, Encoding, TextureFilter, Wrap};
 
 /// A color of a material: `[r, g, b]` or `{ texture = "NAME" }`.

@@ -23,7 +23,6 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use glam::{DVec3, Vec2, Vec3, Vec4};
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 pub use self::builder::MeshBuilder;
@@ -171,7 +170,8 @@ impl MtlMaterial {
 }
 
 /// Source of the shading normals of a mesh.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum Normals {
