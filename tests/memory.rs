@@ -241,7 +241,9 @@ fn errors_have_file_line_and_rule() {
         );
         let error = scene.unwrap_err().to_string();
         assert!(
-            error.starts_with(&format!("name: '{name}' is no name of a scene in memory: it must")),
+            error.starts_with(&format!(
+                "name: '{name}' cannot be the name of a scene in memory: it must"
+            )),
             "{error}"
         );
     }

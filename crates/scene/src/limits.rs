@@ -1,6 +1,5 @@
 //! Ranges of the values of scene files, for validation (`validate`) and the JSON Schema (`schema`).
 
-pub(super) const COORDINATES: (f64, f64) = (-MAX_COORDINATE, MAX_COORDINATE);
 /// Maximum absolute coordinate.
 pub(super) const MAX_COORDINATE: f64 = 1e9;
 pub(super) const LENGTHS: (f64, f64) = (1e-9, 1e9);

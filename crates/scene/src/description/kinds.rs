@@ -14,6 +14,8 @@ use crate::{MetalIndex, ViewSettings};
 /// Separator of a kind's label and its range, in schema titles.
 pub(crate) const TITLE_SEPARATOR: &str = "|";
 
+const COORDINATES: (f64, f64) = (-MAX_COORDINATE, MAX_COORDINATE);
+
 /// Defines kinds by name, label and schema.
 macro_rules! kinds {
     ($($name:ident, $label:literal, $schema:expr;)+) => { $(

@@ -176,7 +176,7 @@ impl Scene {
         let loaded: Arc<[u8]> = if is_text { Arc::default() } else { Arc::from(bytes) };
         let source = Arc::clone(&options.source);
         let file_system = FileSystem::with_loaded(source, &path, loaded).map_err(|error| {
-            let rule = format!("'{}' is no name of a scene in memory: {error}", options.name);
+            let rule = format!("'{}' cannot be the name of a scene in memory: {error}", options.name);
             SceneError::Override(Problem::of("name", rule))
         })?;
         let folder = folder_of(&path);
