@@ -12,7 +12,7 @@ use wgray::scene::{
     MirrorDescription, PerspectiveDescription, PhongDescription, PlaneDescription, PointLightDescription,
     RenderDescription, SphereDescription, Texels,
 };
-use wgray::{Aov, Channel, DVec3, Description, Error, Options};
+use wgray::{Aov, ChannelValues, DVec3, Description, Error, Options};
 
 fn main() -> Result<(), Error> {
     let file = std::env::args().nth(1).unwrap_or("target/build_scene.exr".to_string());
@@ -63,7 +63,7 @@ fn main() -> Result<(), Error> {
     let image = wgray::render(&scene, &options)?;
     image.save(&file)?;
 
-    if let Some(Channel::Floats(depths)) = image.channel("depth.Z") {
+    if let Some(ChannelValues::Floats(depths)) = image.channel("depth.Z") {
         let hits = depths.iter().filter(|depth| **depth > 0.0);
         let nearest = hits.copied().fold(f32::INFINITY, f32::min);
         println!("{file}: the nearest surface is at distance {nearest}");

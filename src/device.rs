@@ -2,6 +2,7 @@
 
 /// The requested device. Without the feature `gpu` only the CPU is available.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Device {
     /// A hardware GPU, if available. Otherwise software Vulkan or the CPU, whichever is predicted to take less time for
     /// the image.

@@ -151,7 +151,7 @@ pub use glam;
 pub use glam::DVec3;
 pub use image::{Aov, AovSource, Pixels};
 pub use options::Options;
-pub use picture::{Channel, Picture};
+pub use picture::{ChannelValues, Picture};
 pub use progressive::{ProgressiveRender, Status};
 pub use render::{Progressive, render, render_progressive};
 pub use scene::{Camera, Description, Overrides, Scene};

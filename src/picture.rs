@@ -9,6 +9,7 @@ use crate::image::{self, Aov, Band, Format, Layout, Output, Pending, Pixels, Sav
 use wgray_image::Region;
 use wgray_render::film::Film;
 use wgray_render::noise::{Noise, NoiseMeter};
+use wgray_render::output::channels_of;
 use wgray_render::records::FirstHit;
 
 /// A rendered image, or a region of one: linear radiance and additional layers (AOVs).
@@ -22,7 +23,8 @@ pub struct Picture {
 
 /// Values of a channel in row-major order, top row first.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Channel {
+#[non_exhaustive]
+pub enum ChannelValues {
     /// Values of a floating-point channel, such as `R`, `A` or `normal.X`.
     Floats(Vec<f32>),
     /// Values of an integer channel: `primitive.ID` or `sample_count.N`.
@@ -97,21 +99,23 @@ impl Picture {
         self.colors().enumerate().flat_map(pixel).collect()
     }
 
-    /// Returns a channel by its OpenEXR name, if it exists: `R`, `G`, `B`, `A`, and the channels of requested layers,
-    /// such as `depth.Z` or `normal.X`.
-    pub fn channel(&self, name: &str) -> Option<Channel> {
+    /// Returns a channel by its OpenEXR name: `R`, `G`, `B`, `A`, and the channels of requested layers, such as `depth.Z`
+    /// or `normal.X` ([`Aov::channel_names`]). `None` if the image has no channel with this name.
+    pub fn channel(&self, name: &str) -> Option<ChannelValues> {
         if let Some(color) = ["R", "G", "B"].iter().position(|color_name| *color_name == name) {
-            return Some(Channel::Floats(self.film.means().map(|mean| mean[color]).collect()));
+            return Some(ChannelValues::Floats(
+                self.film.means().map(|mean| mean[color]).collect(),
+            ));
         }
         if name == "A" {
-            return self.alpha().map(Channel::Floats);
+            return self.alpha().map(ChannelValues::Floats);
         }
-        let mut channels = self.layout.aovs.iter().flat_map(|aov| aov.channels());
+        let mut channels = self.layout.aovs.iter().flat_map(|aov| channels_of(*aov));
         let channel = channels.find(|channel| channel.name() == name)?;
         let bytes = (0..self.film.sums.len()).map(|pixel| channel.bytes(self.band(), pixel));
         Some(match channel.is_whole() {
-            true => Channel::Whole(bytes.map(u32::from_ne_bytes).collect()),
-            false => Channel::Floats(bytes.map(f32::from_ne_bytes).collect()),
+            true => ChannelValues::Whole(bytes.map(u32::from_ne_bytes).collect()),
+            false => ChannelValues::Floats(bytes.map(f32::from_ne_bytes).collect()),
         })
     }
 

@@ -3,7 +3,7 @@
 use glam::{Vec3, Vec4};
 use wgray::film::Film;
 use wgray::scene::{Overrides, Scene};
-use wgray::{Aov, CancelToken, Channel, Context, Device, Options, Pixels, Session};
+use wgray::{Aov, CancelToken, ChannelValues, Context, Device, Options, Pixels, Session};
 use wgray_image::Region;
 use wgray_render::denoise::denoise;
 use wgray_render::film::FilmLayout;
@@ -111,7 +111,7 @@ fn the_library_denoises_with_equal_bits_on_all_devices() {
             );
             assert_eq!(picture.aovs(), [Aov::Denoised]);
         }
-        let Some(Channel::Floats(red)) = option.channel("denoised.R") else {
+        let Some(ChannelValues::Floats(red)) = option.channel("denoised.R") else {
             panic!("no channel");
         };
         assert_eq!(red[7].to_bits(), expected[7][0]);

@@ -2,7 +2,7 @@
 
 use glam::{Vec3, Vec4};
 use wgray::scene::ViewSettings;
-use wgray::{Aov, Channel, Description, Device, Options, Picture};
+use wgray::{Aov, ChannelValues, Description, Device, Options, Picture};
 use wgray_image::Region;
 use wgray_render::film::{Film, FilmLayout, Layer};
 use wgray_render::gpu::{Gpu, Options as GpuOptions};
@@ -414,7 +414,7 @@ fn picture(text: &str, aovs: Vec<Aov>) -> Picture {
 
 fn floats(picture: &Picture, name: &str) -> Vec<f32> {
     match picture.channel(name) {
-        Some(Channel::Floats(values)) => values,
+        Some(ChannelValues::Floats(values)) => values,
         other => panic!("{name}: {other:?}"),
     }
 }

@@ -12,7 +12,7 @@ use wgray::scene::{
     PerspectiveDescription, PhongDescription, PlaneDescription, RectangleLightDescription, RenderDescription,
     SamplesDescription, SphereDescription, Texels, ViewSettings, ViewTransform,
 };
-use wgray::{Aov, Channel, DVec3, Description, Device, Error, Options, Overrides, Picture, Region, Scene};
+use wgray::{Aov, ChannelValues, DVec3, Description, Device, Error, Options, Overrides, Picture, Region, Scene};
 
 const FILE: &str = r#"
 image = { width = 24, height = 16 }
@@ -85,7 +85,7 @@ fn scene() -> Scene {
 
 fn floats(picture: &Picture, name: &str) -> Vec<f32> {
     match picture.channel(name) {
-        Some(Channel::Floats(values)) => values,
+        Some(ChannelValues::Floats(values)) => values,
         other => panic!("{name}: {other:?}"),
     }
 }
@@ -187,7 +187,7 @@ fn a_crop_equals_the_region_of_the_full_image() {
         let cropped = rows.chunks(24).take(11).skip(3).flat_map(|row| row[5..20].to_vec());
         assert_eq!(floats(&crop, name), cropped.collect::<Vec<_>>(), "{name}");
     }
-    let Some(Channel::Whole(shapes)) = crop.channel("primitive.ID") else {
+    let Some(ChannelValues::Whole(shapes)) = crop.channel("primitive.ID") else {
         panic!("no shapes")
     };
     assert!(shapes.contains(&0) && shapes.contains(&1));
@@ -401,8 +401,13 @@ fn without_the_feature_formats_files_are_rejected() {
         assert_eq!(error.to_string(), rule);
     }
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
-    let error = read_exr(&folder.path().join("a.exr")).unwrap_err();
+    let path = folder.path().join("a.exr");
+    let error = read_exr(&path).unwrap_err();
     assert_eq!(error.kind(), std::io::ErrorKind::Unsupported);
+    assert_eq!(
+        error.to_string(),
+        format!("{}: OpenEXR files need the cargo feature \"formats\"", path.display())
+    );
 
     let description = description()
         .with_texture("a", ImageTextureDescription::new("a.image"))

@@ -2,7 +2,7 @@
 
 use glam::{DVec4, UVec2, Vec3, Vec4};
 use wgray::scene::{Overrides, Scene};
-use wgray::{Aov, CancelToken, Channel, Context, Device, Options, Picture, Session, Status};
+use wgray::{Aov, CancelToken, ChannelValues, Context, Device, Options, Picture, Session, Status};
 use wgray_image::Region;
 use wgray_render::cpu::pixel::pixel_radiance;
 use wgray_render::film::{Film, FilmLayout, Half, Layer};
@@ -380,7 +380,7 @@ fn statistics_need_no_adaptive_sampling() {
     let [picture, without_statistics] = [&aovs[..], &[]].map(|aovs| picture(SCENE, aovs, 8));
     let film = reference(&parse(SCENE).with_noise());
     let floats = |name: &str| match picture.channel(name) {
-        Some(Channel::Floats(values)) => values,
+        Some(ChannelValues::Floats(values)) => values,
         _ => panic!("no floats of {name}"),
     };
     for (channel, name) in ["variance.R", "variance.G", "variance.B"].into_iter().enumerate() {
@@ -389,7 +389,7 @@ fn statistics_need_no_adaptive_sampling() {
     }
     assert!(floats("variance.R").iter().any(|variance| *variance > 0.0));
     let counts = picture.channel("sample_count.N");
-    assert_eq!(counts, Some(Channel::Whole(vec![8; film.sums.len()])));
+    assert_eq!(counts, Some(ChannelValues::Whole(vec![8; film.sums.len()])));
     assert_eq!(picture.rgba8(), without_statistics.rgba8());
 }
 

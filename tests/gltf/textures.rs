@@ -1,7 +1,7 @@
 //! glTF textures: images, samplers, texture coordinates, channels, normal maps.
 
 use serde_json::{Value, json};
-use wgray::{Aov, Channel, Device, Options, Scene};
+use wgray::{Aov, ChannelValues, Device, Options, Scene};
 
 use super::build::{Builder, Component, Packing, QUAD, QUAD_INDICES, QUAD_UVS, png};
 use super::read::{assert_all, load_scene, pixels, scene};
@@ -561,7 +561,7 @@ fn shading_normal(name: &str, map: Value, uvs: [[f64; 2]; 4], tangent: Option<[f
     };
     let picture = wgray::render(&scene, &options).expect("an image");
     let component = |axis: &str| match picture.channel(&format!("shading_normal.{axis}")) {
-        Some(Channel::Floats(values)) => f64::from(values[14]),
+        Some(ChannelValues::Floats(values)) => f64::from(values[14]),
         other => panic!("{other:?}"),
     };
     [component("X"), component("Z"), -component("Y")]

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use wgray::mesh::{Group, Mesh};
 use wgray::scene::{Assets, MeshDescription, PerspectiveDescription, PhongDescription, Scene};
-use wgray::{Aov, Channel, DVec3, Description, Device, Options};
+use wgray::{Aov, ChannelValues, DVec3, Description, Device, Options};
 
 /// Returns a square in the plane z = 0, visible to the camera of [`scene`].
 fn square() -> Mesh {
@@ -43,7 +43,7 @@ fn depth(mesh: &Arc<Mesh>) -> f32 {
     };
     let picture = wgray::render(&scene(Arc::clone(mesh)).unwrap(), &options).unwrap();
     match picture.channel("depth.Z") {
-        Some(Channel::Floats(depths)) => depths[8 * 4 + 4],
+        Some(ChannelValues::Floats(depths)) => depths[8 * 4 + 4],
         other => panic!("{other:?}"),
     }
 }

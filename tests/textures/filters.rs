@@ -460,7 +460,7 @@ fn mip_levels_of_8_bit_images_keep_the_mean() {
                 background + (1.0 - background) / count
             });
             let uv = Vec2::new(
-                0.5 + f32::from((77u8 >> level) << level),
+                0.5 + ((77 >> level) << level) as f32,
                 0.5 + (((255 - 130) >> level) << level) as f32,
             );
             let level_center = (f32::powi(2.0, level) - 1.0) / 2.0;

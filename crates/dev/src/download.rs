@@ -9,7 +9,7 @@ use ::exr::prelude::{
 
 use super::picture::{Content, Frame, png, png_of};
 use wgray_image::Pixels;
-use wgray_render::output::Channel;
+use wgray_render::output::{Channel, channels_of};
 
 /// Encodes a frame as PNG, without marks. For a comparison, encodes the first image.
 pub fn encode_png(frame: &Frame) -> Vec<u8> {
@@ -33,15 +33,13 @@ pub fn encode_exr(frame: &Frame) -> io::Result<Vec<u8>> {
     let channels: SmallVec<[AnyChannel<FlatSamples>; 4]> = match &frame.content {
         Content::Color(pixels) | Content::Compare(pixels, _) => colors(pixels, ["R", "G", "B"]),
         Content::Film(layer) => {
-            let channels = layer.aov.channels();
-            let names = channels.iter().map(Channel::name).collect::<Vec<_>>();
+            let names: Vec<&str> = layer.aov.channel_names().collect();
             colors(&layer.values, names)
         }
         Content::Samples(counts, _) => [AnyChannel::new("sample_count.N", FlatSamples::U32(counts.clone()))]
             .into_iter()
             .collect(),
-        Content::Hits(aov, hits) => aov
-            .channels()
+        Content::Hits(aov, hits) => channels_of(*aov)
             .iter()
             .filter_map(|channel| {
                 let values = match channel {

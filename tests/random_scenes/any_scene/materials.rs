@@ -232,6 +232,7 @@ pub fn path_material() -> BoxedStrategy<MaterialDescription> {
                 MaterialDescription::Conductor(m) => &mut m.emission,
                 MaterialDescription::Dielectric(m) => &mut m.emission,
                 MaterialDescription::Principled(m) => &mut m.emission,
+                other => panic!("a material without emission: {other:?}"),
             };
             *target = emission;
             material

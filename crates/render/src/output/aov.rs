@@ -12,6 +12,7 @@ use wgray_scene::Integrator;
 
 /// An output variable.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Aov {
     /// Outward geometric normal.
     Normal,
@@ -67,6 +68,7 @@ impl FromStr for Aov {
 
 /// Source of an output variable.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum AovSource {
     /// First hit of the ray through the pixel's center.
     FirstHit,
@@ -92,6 +94,11 @@ pub enum Channel {
     Variance(&'static str, usize),
     /// A denoised color channel.
     Denoised(&'static str, usize),
+}
+
+/// Returns the channels of an AOV's layer in an EXR file.
+pub fn channels_of(aov: Aov) -> &'static [Channel] {
+    aov.row().channels
 }
 
 impl Channel {
@@ -169,7 +176,7 @@ impl Aov {
 
     /// Returns the film layer that contains the color of the variable, if any.
     pub fn light(self) -> Option<Layer> {
-        self.channels().iter().find_map(|channel| match channel {
+        channels_of(self).iter().find_map(|channel| match channel {
             Channel::Mean(_, layer, _) => Some(*layer),
             _ => None,
         })
@@ -186,9 +193,9 @@ impl Aov {
         self.row().name
     }
 
-    /// Returns the channels of the AOV's layer in an EXR file.
-    pub fn channels(self) -> &'static [Channel] {
-        self.row().channels
+    /// Returns the names of the channels in an EXR file, such as `normal.X`.
+    pub fn channel_names(self) -> impl Iterator<Item = &'static str> {
+        channels_of(self).iter().map(Channel::name)
     }
 
     const fn row(self) -> Row {

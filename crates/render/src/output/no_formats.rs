@@ -39,8 +39,9 @@ pub(super) mod exr {
     }
 
     /// Returns an error.
-    pub fn read_exr(_: &Path) -> io::Result<Pixels> {
-        Err(super::missing("OpenEXR"))
+    pub fn read_exr(path: &Path) -> io::Result<Pixels> {
+        let error = super::missing("OpenEXR");
+        Err(io::Error::new(error.kind(), format!("{}: {error}", path.display())))
     }
 }
 

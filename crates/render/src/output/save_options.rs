@@ -48,6 +48,7 @@ impl SaveOptions {
 
 /// Bits per channel of a PNG file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum BitDepth {
     /// 256 steps.
     #[default]
@@ -58,6 +59,7 @@ pub enum BitDepth {
 
 /// Float channels of an OpenEXR file. Integer channels are always u32.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum ExrType {
     /// 32 bits, as computed.
     #[default]
@@ -81,6 +83,7 @@ impl ExrType {
 
 /// Lossless compression of an OpenEXR file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum ExrCompression {
     /// Uncompressed.
     None,

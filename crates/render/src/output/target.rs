@@ -10,6 +10,7 @@ use wgray_image::formats::missing;
 
 /// A format of image files.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Format {
     /// Display RGB of 8 or 16 bits per channel, with linear alpha if any. [`Aov`]s are separate files.
     Png,

@@ -95,6 +95,7 @@ impl EnvironmentDescription {
 /// Built-in environments, computed by formulas. In a file, the names are in snake case: `"studio"`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
+#[non_exhaustive]
 pub enum EnvironmentName {
     /// A gray photo studio with area lights.
     Studio,

@@ -10,6 +10,7 @@ use crate::description::kinds::*;
 
 tagged! {
     /// A light. The key `type` selects the variant.
+    #[non_exhaustive]
     LightDescription {
         /// An area light.
         "rectangle" => Rectangle(RectangleLightDescription),

@@ -11,6 +11,7 @@ use crate::description::kinds::*;
 
 tagged! {
     /// A material. The key `type` selects the variant.
+    #[non_exhaustive]
     MaterialDescription {
         /// Phong reflection model.
         "phong" => Phong(PhongDescription),

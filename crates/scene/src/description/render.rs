@@ -14,6 +14,7 @@ use crate::limits::MAX_COUNT;
 /// Shadows of glass. In a file, the names are in snake case: `"opaque"`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
+#[non_exhaustive]
 pub enum Shadows {
     /// Glass casts shadows.
     #[default]

@@ -12,6 +12,7 @@ use crate::description::kinds::*;
 
 tagged! {
     /// A shape. The key `type` selects the variant.
+    #[non_exhaustive]
     ShapeDescription {
         /// A rectangle.
         "rectangle" => Rectangle(RectangleDescription),

@@ -176,6 +176,7 @@ pub struct NormalMapDescription {
 
 tagged! {
     /// A texture. The key `type` selects the variant.
+    #[non_exhaustive]
     TextureDescription {
         /// One color.
         "constant" => Constant(ConstantDescription),
@@ -345,6 +346,7 @@ impl ImageTextureDescription {
 /// Texture addressing beyond the edges of the image: `"repeat"`, or `["repeat", "clamp"]` along u and v.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(untagged)]
+#[non_exhaustive]
 pub enum WrapDescription {
     /// The same addressing along u and v.
     Both(Wrap),

@@ -15,7 +15,7 @@ use ::exr::meta::{BlockDescription, MetaData};
 use ::exr::prelude::{ReadChannels, ReadLayers, ReadSpecificChannel, f16};
 use rayon::prelude::*;
 
-use super::super::aov::Channel;
+use super::super::aov::{Channel, channels_of};
 use super::super::{Band, ExrCompression, ExrType, Layout, Metadata, Pixels, SaveOptions, Sink};
 use crate::error::RenderError;
 use crate::film::mean;
@@ -105,7 +105,7 @@ fn columns(layout: &Layout) -> Vec<(&'static str, Column)> {
     if layout.alpha {
         columns.push(("A", Column::Alpha));
     }
-    for channel in layout.aovs.iter().flat_map(|aov| aov.channels()) {
+    for channel in layout.aovs.iter().flat_map(|aov| channels_of(*aov)) {
         columns.push((channel.name(), Column::Aov(channel)));
     }
     columns.sort_by_key(|(name, _)| *name);
