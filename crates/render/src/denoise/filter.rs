@@ -42,7 +42,7 @@ fn filter_rows(guides: &Guides, y: usize) -> Vec<Vec3> {
     let mut tile = Tile::new();
     for x in (0..guides.width).step_by(TILE_WIDTH) {
         let width = TILE_WIDTH.min(guides.width - x);
-        tile.read(guides, x, y);
+        tile.read(guides, [x, y], [width, height]);
         dispatch!(*LEVEL, simd => tile.filter(simd));
         for row in 0..height {
             let start = row * guides.width + x;
@@ -56,6 +56,9 @@ fn filter_rows(guides: &Guides, y: usize) -> Vec<Vec3> {
 
 /// A tile of the image: its guides with margins, and the sums of its pixels.
 struct Tile {
+    /// Columns, in whole lanes, and rows of the part of the tile that lies in the image.
+    columns: usize,
+    rows: usize,
     planes: Vec<Vec<f32>>,
     /// Distances of a row of pixels.
     distances: Vec<f32>,
@@ -68,6 +71,8 @@ struct Tile {
 impl Tile {
     fn new() -> Tile {
         Tile {
+            columns: 0,
+            rows: 0,
             planes: vec![vec![0.0; COLUMNS * ROWS]; Guides::PLANES],
             distances: vec![0.0; PATCH_COLUMNS],
             row_sums: vec![0.0; PATCH_ROWS * TILE_WIDTH],
@@ -75,8 +80,10 @@ impl Tile {
         }
     }
 
-    /// Copies the guides of the tile at a position. Pixels outside of the guides keep any value.
-    fn read(&mut self, guides: &Guides, x: usize, y: usize) {
+    /// Copies the guides of the tile at a position, of which a part with this size lies in the image. Pixels outside of
+    /// the guides keep any value.
+    fn read(&mut self, guides: &Guides, [x, y]: [usize; 2], [width, height]: [usize; 2]) {
+        (self.columns, self.rows) = (width.next_multiple_of(LANES), height);
         let columns = COLUMNS.min(guides.stride - x);
         let rows = ROWS.min(guides.height + 2 * MARGIN - y);
         for (k, plane) in self.planes.iter_mut().enumerate() {
@@ -108,10 +115,10 @@ impl Tile {
     /// Sums the distances of the pixels at an offset over the rows of all patches.
     #[inline(always)]
     fn sum_rows<S: Simd>(&mut self, simd: S, dx: usize, dy: usize) {
-        for row in 0..PATCH_ROWS {
+        for row in 0..self.rows + PATCH - 1 {
             let p = (row + RADIUS) * COLUMNS + RADIUS;
             let q = (row + dy) * COLUMNS + dx;
-            for x in (0..PATCH_COLUMNS).step_by(LANES) {
+            for x in (0..self.columns + PATCH - 1).step_by(LANES) {
                 let planes = Loader {
                     simd,
                     planes: &self.planes,
@@ -125,7 +132,7 @@ impl Tile {
                 );
                 distance.store_slice(&mut self.distances[x..x + LANES]);
             }
-            for x in (0..TILE_WIDTH).step_by(LANES) {
+            for x in (0..self.columns).step_by(LANES) {
                 let mut sum = load(simd, &self.distances, x);
                 for i in 1..PATCH {
                     sum += load(simd, &self.distances, x + i);
@@ -139,10 +146,10 @@ impl Tile {
     /// Adds the pixels at an offset to the sums.
     #[inline(always)]
     fn add_offset<S: Simd>(&mut self, simd: S, dx: usize, dy: usize) {
-        for row in 0..TILE_HEIGHT {
+        for row in 0..self.rows {
             let p = (row + MARGIN) * COLUMNS + MARGIN;
             let q = (row + dy + MARGIN - RADIUS) * COLUMNS + dx + MARGIN - RADIUS;
-            for x in (0..TILE_WIDTH).step_by(LANES) {
+            for x in (0..self.columns).step_by(LANES) {
                 let i = row * TILE_WIDTH + x;
                 let mut patch = load(simd, &self.row_sums, i);
                 for j in 1..PATCH {
