@@ -7,16 +7,16 @@ use bytemuck::{bytes_of, cast_slice};
 use glam::{UVec2, Vec3, Vec4};
 use wgpu::BufferUsages;
 
-use super::bake::bake_if_small;
 use super::compose::{ADAPTIVE, FIRST_HITS, Kernel, RENDER, Shaders};
 use super::device::Device;
+use super::film_rows::FilmRows;
+use super::kernels::{Kernels, Options};
 use super::loop_budget::samples_per_dispatch;
 use super::mapping::Mapping;
 use super::memory::{FailedAllocation, MemoryUse};
-use super::pipeline::{WORKGROUP, bind_group, bind_group_layouts, pipeline};
-use super::rounding::Rounding;
+use super::pipeline::{WORKGROUP, bind_group};
 use super::scene::SceneBuffers;
-use super::sliders::{Slider, with_buffer};
+use super::sliders::Slider;
 use super::texels::TexelParts;
 use super::timer::{TIMESTAMP_BYTES, Timer};
 use crate::backend::{Backend, FilmState, Rules};
@@ -24,29 +24,8 @@ use crate::clock::Instant;
 use crate::denoise::denoise;
 use crate::error::RenderError;
 use crate::film::{Film, FilmLayout};
-use crate::records::{Camera, DispatchParams, FirstHit, Packed, Specialization};
+use crate::records::{Camera, DispatchParams, FirstHit, Packed};
 use wgray_image::Region;
-use wgray_scene::Integrator;
-
-/// Compilation options of kernels.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Options {
-    /// SPIR-V that is executed as written, with this rounding of quotients and square roots. `None` lets wgpu compile
-    /// the WGSL.
-    pub exact: Option<Rounding>,
-    /// Embeds a small scene in the kernel as constants.
-    pub baked: bool,
-}
-
-impl Options {
-    /// Returns the fastest options for a device.
-    pub fn best(device: &Device) -> Options {
-        Options {
-            exact: device.info.exact.then_some(Rounding::Device),
-            baked: device.info.is_software(),
-        }
-    }
-}
 
 /// A scene on a GPU.
 pub struct Gpu {
@@ -96,53 +75,11 @@ struct Pending {
     completion: Mapping,
 }
 
-struct Kernels {
-    shaders: Shaders,
-    integrator: Integrator,
-    baked: Option<String>,
-    constants: Specialization,
-    layouts: Vec<wgpu::BindGroupLayout>,
-    exact: Option<Rounding>,
-    texels: TexelParts,
-    sliders: Vec<Slider>,
-}
-
 /// A buffer with a record for each pixel of a region, and the bind group of the kernel that writes the buffer.
 struct Target {
     region: Region,
     buffer: wgpu::Buffer,
     group: wgpu::BindGroup,
-}
-
-/// Film rows that contain a tile: a range of bytes in each list of the film.
-struct Rows {
-    list_count: u64,
-    list_bytes: u64,
-    /// Start and size of the range in bytes.
-    start: u64,
-    size: u64,
-}
-
-impl Rows {
-    fn of(film: &Target, tile: Region) -> Rows {
-        let row = u64::from(film.region.width()) * size_of::<Vec4>() as u64;
-        let list_bytes = u64::from(film.region.height()) * row;
-        Rows {
-            list_count: film.buffer.size() / list_bytes,
-            list_bytes,
-            start: u64::from(tile.y0 - film.region.y0) * row,
-            size: u64::from(tile.height()) * row,
-        }
-    }
-
-    fn bytes(&self) -> u64 {
-        self.list_count * self.size
-    }
-
-    /// Returns the offset of the rows of each list, in the film and in a copy of the rows.
-    fn offsets(&self) -> impl Iterator<Item = (u64, u64)> {
-        (0..self.list_count).map(|i| (i * self.list_bytes + self.start, i * self.size))
-    }
 }
 
 const FIRST_HIT_BYTES: usize = size_of::<FirstHit>();
@@ -186,16 +123,7 @@ impl Gpu {
         sliders: Vec<Slider>,
     ) -> Result<Gpu, RenderError> {
         let texels = TexelParts::of(&device.info, packed)?;
-        let kernels = Kernels {
-            shaders: shaders.clone(),
-            integrator: packed.integrator,
-            baked: options.baked.then(|| bake_if_small(packed)).flatten(),
-            constants: packed.specialization,
-            layouts: bind_group_layouts(device, texels.count - 1, !sliders.is_empty()),
-            exact: options.exact,
-            texels,
-            sliders,
-        };
+        let kernels = Kernels::new(device, packed, texels, shaders, options, sliders);
         let render = kernels.compile(device, kernel_of(packed.sampling.adaptive))?;
         let scene = SceneBuffers::upload(device, packed, texels, &kernels.layouts, None)?;
         let params = device.buffer(
@@ -208,7 +136,7 @@ impl Gpu {
         let usage = BufferUsages::STORAGE | BufferUsages::COPY_SRC | BufferUsages::COPY_DST;
         let completion = [device.buffer(COMPLETION_BYTES, usage), completion_staging(device)];
         let mut gpu = Gpu {
-            samples_per_dispatch: samples_per_dispatch(packed, kernels.baked.is_some()),
+            samples_per_dispatch: samples_per_dispatch(packed, kernels.is_baked()),
             device: device.clone(),
             kernels,
             render,
@@ -352,9 +280,7 @@ impl Gpu {
     pub fn update(&mut self, packed: &Packed) -> Result<bool, RenderError> {
         self.check_idle()?;
         let texels = TexelParts::of(&self.device.info, packed)?;
-        let same_kernel = self.kernels.baked.is_none()
-            && (self.kernels.constants, self.rules.film_layout()) == (packed.specialization, packed.film_layout())
-            && (self.kernels.integrator, self.kernels.texels) == (packed.integrator, texels);
+        let same_kernel = self.kernels.suit(packed, texels) && self.rules.film_layout() == packed.film_layout();
         if same_kernel {
             self.film = None;
             let previous = Some(&self.scene);
@@ -490,7 +416,7 @@ impl Gpu {
     /// truncating loops.
     fn dispatch_part(&mut self, tile: Region, samples: Range<u32>) -> Result<(), RenderError> {
         let (film, _) = self.film.as_ref().ok_or(RenderError::NoFilm)?;
-        let rows = Rows::of(film, tile);
+        let rows = FilmRows::of(&film.buffer, film.region, tile);
         let saved_rows = match self.saved_rows.take().filter(|buffer| buffer.size() >= rows.bytes()) {
             Some(buffer) => buffer,
             None => {
@@ -502,11 +428,7 @@ impl Gpu {
         };
         let max_samples = self.rules.end_of_part(&samples) - samples.start;
         let end = samples.start + self.samples_per_dispatch.min(max_samples);
-        let save = |encoder: &mut wgpu::CommandEncoder| {
-            for (film_offset, copy_offset) in rows.offsets() {
-                encoder.copy_buffer_to_buffer(&film.buffer, film_offset, &saved_rows, copy_offset, rows.size);
-            }
-        };
+        let save = |encoder: &mut wgpu::CommandEncoder| rows.save(encoder, &film.buffer, &saved_rows);
         let start = Instant::now();
         let completion = self.dispatch(&self.render, film, tile, samples.start..end, save)?;
         self.saved_rows = Some(saved_rows);
@@ -553,12 +475,10 @@ impl Gpu {
         let (Some((film, _)), Some(saved_rows)) = (&self.film, &self.saved_rows) else {
             return Ok(());
         };
-        let rows = Rows::of(film, tile);
+        let rows = FilmRows::of(&film.buffer, film.region, tile);
         self.device.checked(|| {
             let mut encoder = self.device.device.create_command_encoder(&Default::default());
-            for (film_offset, copy_offset) in rows.offsets() {
-                encoder.copy_buffer_to_buffer(saved_rows, copy_offset, &film.buffer, film_offset, rows.size);
-            }
+            rows.restore(&mut encoder, saved_rows, &film.buffer);
             self.device.queue.submit([encoder.finish()]);
         })
     }
@@ -721,15 +641,5 @@ impl Backend for Gpu {
             true => max_pixels,
             false => max_pixels.saturating_sub(neighbors), // the film of a region includes neighbors of the region
         }
-    }
-}
-
-impl Kernels {
-    fn compile(&self, device: &Device, kernel: &Kernel) -> Result<wgpu::ComputePipeline, RenderError> {
-        let texels = self.texels.wgsl();
-        let (baked, texels) = (self.baked.as_deref(), texels.as_deref());
-        let source = self.shaders.compose_with_texels(kernel, self.integrator, baked, texels);
-        let source = with_buffer(source, kernel, &self.sliders)?;
-        pipeline(device, &self.layouts, kernel, &source, &self.constants, self.exact)
     }
 }

@@ -16,8 +16,7 @@ use crate::records::FirstHit;
 use wgray_image::{Pending, Pixels, Region, to_8_bits, to_16_bits};
 use wgray_scene::ViewSettings;
 
-pub use aov::{Aov, AovSource};
-pub use aov::{Channel, channels_of};
+pub use aov::{Aov, AovSource, Channel, channels_of};
 pub use formats::exr::read_exr;
 pub use metadata::read_metadata;
 pub use png::in_memory;

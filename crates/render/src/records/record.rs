@@ -30,16 +30,27 @@ macro_rules! fields {
 }
 
 fields! {
-    f32: "f32", |x| format!("{x:?}f"), |words| format!("bitcast<f32>({words})");
+    f32: "f32", |x| literal(x), |words| format!("bitcast<f32>({words})");
     u32: "u32", |n| format!("{n}u"), |words| words.to_string();
-    Vec2: "vec2f", |v| format!("vec2f({:?}f, {:?}f)", v.x, v.y), |words| format!("bitcast<vec2f>({words})");
-    Vec3: "vec3f", |v| format!("vec3f({:?}f, {:?}f, {:?}f)", v.x, v.y, v.z), |words| format!("bitcast<vec3f>({words})");
-    Vec4: "vec4f", |v| format!("vec4f({:?}f, {:?}f, {:?}f, {:?}f)", v.x, v.y, v.z, v.w),
-        |words| format!("bitcast<vec4f>({words})");
+    Vec2: "vec2f", |v| format!("vec2f({})", literals(&v.to_array())), |words| format!("bitcast<vec2f>({words})");
+    Vec3: "vec3f", |v| format!("vec3f({})", literals(&v.to_array())), |words| format!("bitcast<vec3f>({words})");
+    Vec4: "vec4f", |v| format!("vec4f({})", literals(&v.to_array())), |words| format!("bitcast<vec4f>({words})");
     UVec2: "vec2u", |v| format!("vec2u({}u, {}u)", v.x, v.y), |words| words.to_string();
     [UVec4; KINDS as usize]: "array<vec4u, KINDS>",
         |ranges| format!("array({})", ranges.map(Field::constant).join(", ")), |words| words.to_string();
     UVec4: "vec4u", |v| format!("vec4u({}u, {}u, {}u, {}u)", v.x, v.y, v.z, v.w), |words| words.to_string();
+}
+
+/// Returns a WGSL literal. The shortest decimal form of the largest float is above this float, which browsers reject.
+fn literal(x: f32) -> String {
+    match x.abs() == f32::MAX {
+        true => format!("{:?}f", f64::from(x)),
+        false => format!("{x:?}f"),
+    }
+}
+
+fn literals(values: &[f32]) -> String {
+    values.iter().map(|x| literal(*x)).collect::<Vec<_>>().join(", ")
 }
 
 /// A record that the shaders declare under [`Record::NAME`].
@@ -119,3 +130,28 @@ macro_rules! constants {
 }
 
 pub(super) use {constants, records};
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// WGSL rejects literals beyond the range of their type, even if the nearest float is in the range.
+    #[test]
+    fn literals_are_floats_in_range_with_the_same_bits() {
+        for x in [
+            f32::MAX,
+            -f32::MAX,
+            f32::MAX.next_down(),
+            f32::MIN_POSITIVE,
+            1e-45,
+            0.1,
+            -0.0,
+        ] {
+            let text = x.constant();
+            let number = text.strip_suffix('f').expect("a literal of the type f32");
+            assert!(number.parse::<f64>().unwrap().abs() <= f64::from(f32::MAX), "{text}");
+            assert_eq!(number.parse::<f32>().unwrap().to_bits(), x.to_bits(), "{text}");
+        }
+        assert_eq!(Vec2::new(1.0, 0.5).constant(), "vec2f(1.0f, 0.5f)");
+    }
+}

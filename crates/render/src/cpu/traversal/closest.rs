@@ -5,7 +5,7 @@ use fearless_simd::f32x8;
 use fearless_simd::prelude::*;
 
 use super::line::maximum;
-use super::node::{TriangleBvh, Triangles as _, WideNode};
+use super::node::{TriangleBvh, Triangles, WideNode};
 use super::{Line, Nearest, remaining_t_max};
 use crate::bvh::BUILD_MAX_DEPTH;
 
@@ -28,21 +28,20 @@ pub fn closest<S: Simd>(
         line,
         remaining_t_max(start, best.t),
         #[inline(always)]
-        |leaf, limit| {
-            let Some(triangles) = mesh.triangles(leaf) else {
-                return limit;
-            };
-            let (mut hits, t) = triangles.intersect(simd, line);
-            while hits != 0 {
-                let i = hits.trailing_zeros() as usize;
-                hits &= hits - 1;
-                let (t, triangle) = (start + maximum(t[i], 0.0), triangles.index(i));
-                let nearer = t < best.t || (t == best.t && triangle < best.triangle);
-                if nearer && t > 0.0 && triangle != skip {
-                    let slot = triangles.slot(i);
-                    best = Nearest { t, triangle, slot };
-                }
-            }
+        |leaf, _| {
+            for_each_hit(
+                simd,
+                mesh.triangles(leaf),
+                line,
+                #[inline(always)]
+                |t, triangle, slot| {
+                    let t = start + maximum(t, 0.0);
+                    let nearer = t < best.t || (t == best.t && triangle < best.triangle);
+                    if nearer && t > 0.0 && triangle != skip {
+                        best = Nearest { t, triangle, slot };
+                    }
+                },
+            );
             remaining_t_max(start, best.t)
         },
     );
@@ -60,19 +59,34 @@ pub fn any<S: Simd>(simd: S, mesh: &impl TriangleBvh, line: &Line, skip: u32, t_
         t_max,
         #[inline(always)]
         |leaf, limit| {
-            let Some(triangles) = mesh.triangles(leaf) else {
-                return limit;
-            };
-            let (mut hits, t) = triangles.intersect(simd, line);
-            while hits != 0 {
-                let i = hits.trailing_zeros() as usize;
-                hits &= hits - 1;
-                found |= t[i] > 0.0 && t[i] < t_max && triangles.index(i) != skip;
-            }
+            for_each_hit(
+                simd,
+                mesh.triangles(leaf),
+                line,
+                #[inline(always)]
+                |t, triangle, _| found |= t > 0.0 && t < t_max && triangle != skip,
+            );
             if found { f32::NEG_INFINITY } else { limit }
         },
     );
     found
+}
+
+/// Calls `visit` with the distance, the index and the slot of each triangle of a leaf that the line intersects.
+#[inline(always)]
+fn for_each_hit<S: Simd>(
+    simd: S,
+    triangles: Option<impl Triangles>,
+    line: &Line,
+    mut visit: impl FnMut(f32, u32, u32),
+) {
+    let Some(triangles) = triangles else { return };
+    let (mut hits, t) = triangles.intersect(simd, line);
+    while hits != 0 {
+        let i = hits.trailing_zeros() as usize;
+        hits &= hits - 1;
+        visit(t[i], triangles.index(i), triangles.slot(i));
+    }
 }
 
 /// See [`super::leaves`].

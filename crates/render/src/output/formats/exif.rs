@@ -19,7 +19,7 @@ pub fn read_metadata(mut file: BufReader<File>) -> Option<Metadata> {
     Some(Metadata::from_lines(text(Tag::Software), &lines))
 }
 
-/// Encodes metadata as Exif tags; `None` if there is no metadata.
+/// Returns the Exif tags of metadata as bytes. Returns `None` if the metadata is empty.
 pub fn encode(metadata: &Metadata) -> io::Result<Option<Vec<u8>>> {
     let tags = [
         (Tag::Software, metadata.software().map(str::to_owned)),
