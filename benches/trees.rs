@@ -3,10 +3,13 @@
 use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use fearless_simd::dispatch;
 use glam::Vec3;
 use rayon::prelude::*;
 use wgray_render::bvh::{Aabb, DecodedMesh, MAX_LEAF_SIZE, Tree, build};
-use wgray_render::cpu::traversal::{Directions, Level, Line, Mesh, Nearest, Segments, closest, occluded};
+use wgray_render::cpu::traversal::{
+    Directions, Level, Line, Mesh, MeshRay, MeshStack, Nearest, RaySource, Segments, closest, occluded, trace,
+};
 
 /// An indexed triangle mesh.
 struct Surface {
@@ -99,6 +102,11 @@ struct View {
     decoded: DecodedMesh,
 }
 
+const MISS: Nearest = Nearest {
+    t: f32::INFINITY,
+    triangle: u32::MAX,
+    slot: 0,
+};
 const EYE: Vec3 = Vec3::new(0.0, -4.5, 1.5);
 
 impl View {
@@ -146,12 +154,32 @@ impl View {
 
     fn first_hit(&self, level: Level, pixel: usize) -> Nearest {
         let line = Line::new(EYE, View::direction(pixel), PAD);
-        let miss = Nearest {
-            t: f32::INFINITY,
-            triangle: u32::MAX,
-            slot: 0,
+        closest(level, &self.mesh(), &line, 0.0, u32::MAX, MISS)
+    }
+
+    /// Returns a ray from the first hit of a pixel in a pseudorandom direction, distributed with the cosine.
+    fn bounced(&self, pixel: usize, hit: Nearest) -> Option<MeshRay> {
+        let triangle = self.surface.triangles.get(hit.triangle as usize)?;
+        let [a, b, c] = triangle.map(|i| self.surface.corners[i as usize]);
+        let ray_direction = View::direction(pixel);
+        let normal = (b - a).cross(c - a).normalize();
+        let normal = normal * -normal.dot(ray_direction).signum();
+        let random = |salt: u32| {
+            let mut x = (pixel as u32).wrapping_mul(0x9e37_79b9) ^ salt;
+            for multiplier in [0x85eb_ca6b, 0xc2b2_ae35] {
+                x = (x ^ x >> 15).wrapping_mul(multiplier);
+            }
+            (x >> 8) as f32 / 16_777_216.0
         };
-        closest(level, &self.mesh(), &line, 0.0, u32::MAX, miss)
+        let (z, angle) = (1.0 - 2.0 * random(1), std::f32::consts::TAU * random(2));
+        let r = (1.0 - z * z).sqrt();
+        let on_sphere = Vec3::new(r * angle.cos(), r * angle.sin(), z);
+        Some(MeshRay {
+            line: Line::new(EYE + ray_direction * hit.t + normal * 1e-4, normal + on_sphere, PAD),
+            start: 0.0,
+            skip: hit.triangle,
+            best: MISS,
+        })
     }
 
     /// Returns the mask of occluded samples; `None` if the light is behind the surface or the ray misses.
@@ -184,6 +212,52 @@ impl View {
     }
 }
 
+/// Rays to trace interleaved, and the number of hits.
+struct Rays<'a> {
+    mesh: &'a DecodedMesh,
+    rays: std::slice::Iter<'a, MeshRay>,
+    hits: usize,
+}
+
+impl<'a, S> RaySource<'a, S> for Rays<'a> {
+    fn next(&mut self, _simd: S, _lane: usize, traced: Option<(&Line, Nearest)>) -> Option<(&'a DecodedMesh, MeshRay)> {
+        self.hits += usize::from(traced.is_some_and(|(_, found)| found != MISS));
+        Some((self.mesh, *self.rays.next()?))
+    }
+}
+
+/// Benchmarks rays after a bounce, with one thread. `benches/peers/embree.c` times Embree on the same rays.
+fn bounced_rays(criterion: &mut Criterion) {
+    let view = View::new();
+    let level = Level::new();
+    let pixels = (0..SIDE * SIDE).filter_map(|i| view.bounced(i, view.first_hit(level, i)));
+    let rays: Vec<MeshRay> = pixels.collect();
+    let mut group = criterion.benchmark_group("bounced rays, one thread");
+    group.sample_size(20);
+    group.throughput(Throughput::Elements(rays.len() as u64));
+    let one_by_one = || {
+        let found = rays
+            .iter()
+            .map(|ray| closest(level, &view.mesh(), &ray.line, 0.0, ray.skip, MISS));
+        found.filter(|found| *found != MISS).count()
+    };
+    let mut stacks: [MeshStack; 8] = Default::default();
+    let mut interleaved = || {
+        let mut source = Rays {
+            mesh: &view.decoded,
+            rays: rays.iter(),
+            hits: 0,
+        };
+        dispatch!(level, simd => trace::<_, false>(simd, &mut stacks, &mut source));
+        source.hits
+    };
+    assert_eq!(one_by_one(), interleaved());
+    println!("bounced rays: {} of {} hit", interleaved(), rays.len());
+    group.bench_function("one by one", |b| b.iter(one_by_one));
+    group.bench_function("interleaved", |b| b.iter(&mut interleaved));
+    group.finish();
+}
+
 fn traversals(criterion: &mut Criterion) {
     let view = View::new();
     let level = Level::new();
@@ -210,5 +284,5 @@ fn traversals(criterion: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(trees, builds, traversals);
+criterion_group!(trees, builds, traversals, bounced_rays);
 criterion_main!(trees);

@@ -1,6 +1,7 @@
 //! Tests that the wavefront of the CPU backend and the scalar integrator trace bit-identical paths.
 
 use std::fmt::Write as _;
+use std::sync::Arc;
 
 use glam::{UVec2, Vec3, Vec4};
 use proptest::strategy::{Strategy as _, ValueTree as _};
@@ -11,8 +12,9 @@ use wgray_render::cpu::integrators::path::{path_layers, path_value};
 use wgray_render::cpu::pixel::{Layers, pixel_radiance};
 use wgray_render::cpu::wavefront::{LaneHits, MaterialKind, SurfaceKind, Wavefront};
 use wgray_render::records::{
-    DIFFUSE, EMITTER, LOBE_ANISOTROPY, LOBE_COAT, LOBE_SHEEN, LOBE_SPECULAR, METAL, Material, NO_COLORS, NO_INDEX,
-    OPAQUE, PRINCIPLED, Packed, RANDOM, SOBOL,
+    CULL_BACKFACE, CULL_BOTH_FACES, DIFFUSE, EMITTER, ENERGY_SIZE, LOBE_ANISOTROPY, LOBE_COAT, LOBE_SHEEN,
+    LOBE_SPECULAR, LOBE_TRANSMISSION, METAL, Material, NO_COLORS, NO_INDEX, OPAQUE, PRINCIPLED, Packed, RANDOM,
+    ROUGH_GLASS, SOBOL,
 };
 
 use crate::random_scenes::any_scene;
@@ -75,15 +77,19 @@ fn count_differing(paths: &[PathBits], expected: &[PathBits]) -> usize {
     paths.iter().zip(expected).filter(|(a, b)| a != b).count()
 }
 
-/// Makes most materials diffuse, `principled` or metal, so that their hits are shaded in lanes. Half of these materials get no
+/// Makes most materials diffuse, `principled`, metal or dielectric, so that their hits are shaded in lanes. Half of these materials get no
 /// emission, and two thirds get no textures. The maximum number of bounces is at least 3. A third of the scenes get a
-/// pinhole camera with Sobol' points.
+/// pinhole camera with Sobol' points; in half of them, the camera does not see all surfaces.
 fn with_lane_materials(mut packed: Packed, scene_index: usize, kind: MaterialKind) -> Packed {
     packed.specialization.bounces = packed.specialization.bounces.max(3);
+    let energy_table = packed.textures.texels.len() as u32;
+    let albedos = (0..2 * ENERGY_SIZE * ENERGY_SIZE).map(|i| (1.0 - 0.4 * (i % ENERGY_SIZE) as f32 / 31.0).to_bits());
+    Arc::make_mut(&mut packed.textures.texels).extend(albedos);
     if scene_index.is_multiple_of(3) {
         let s = &mut packed.specialization;
         (s.pixel_pattern, s.pixel_side, s.filter_bins) = (SOBOL, s.pixel_samples, 0);
-        (s.lens, s.panoramic, s.camera_invisible) = (0, 0, 0);
+        (s.lens, s.panoramic) = (0, 0);
+        s.camera_invisible = (scene_index % 2) as u32;
     }
     for (i, material) in packed.materials.iter_mut().enumerate() {
         if material.kind == EMITTER || (scene_index + i) % 4 == 3 {
@@ -95,10 +101,14 @@ fn with_lane_materials(mut packed: Packed, scene_index: usize, kind: MaterialKin
                 material.diffuse = Vec3::new(0.9, 0.6, 0.3);
                 material.roughness = 0.0;
             }
-            MaterialKind::Principled => make_principled(material, scene_index + i),
+            MaterialKind::Principled => make_principled(material, energy_table, scene_index + i),
             MaterialKind::Metal => make_metal(material, scene_index + i),
+            MaterialKind::Dielectric => make_dielectric(material, energy_table, scene_index + i),
         }
         material.alpha_mode = OPAQUE;
+        if packed.specialization.camera_invisible != 0 {
+            material.camera_culling = [0, CULL_BACKFACE, CULL_BACKFACE, CULL_BOTH_FACES][(scene_index + i) % 4];
+        }
         if i % 2 == 0 {
             material.density = 0.0;
         }
@@ -108,9 +118,10 @@ fn with_lane_materials(mut packed: Packed, scene_index: usize, kind: MaterialKin
         }
     }
     let s = &mut packed.specialization;
-    s.materials |= 1 << PRINCIPLED | 1 << METAL;
+    s.materials |= 1 << PRINCIPLED | 1 << METAL | 1 << ROUGH_GLASS;
     if kind == MaterialKind::Principled {
-        s.lobes |= LOBE_SPECULAR | [LOBE_COAT, LOBE_SHEEN, LOBE_COAT | LOBE_SHEEN, 0][scene_index % 4];
+        s.lobes |= LOBE_SPECULAR | LOBE_TRANSMISSION;
+        s.lobes |= [LOBE_COAT, LOBE_SHEEN, LOBE_COAT | LOBE_SHEEN, 0][scene_index % 4];
         s.lobes |= if scene_index.is_multiple_of(5) {
             LOBE_ANISOTROPY
         } else {
@@ -123,8 +134,8 @@ fn with_lane_materials(mut packed: Packed, scene_index: usize, kind: MaterialKin
     packed
 }
 
-/// Makes a material `principled`, without transmission. `variant` selects the parameters.
-fn make_principled(material: &mut Material, variant: usize) {
+/// Makes a material `principled`; a third of the variants transmit light. `variant` selects the parameters.
+fn make_principled(material: &mut Material, energy_table: u32, variant: usize) {
     let fraction = |step: usize| (variant * step % 8) as f32 / 7.0;
     material.kind = PRINCIPLED;
     material.diffuse = Vec3::new(0.9, 0.6, 0.3);
@@ -133,7 +144,24 @@ fn make_principled(material: &mut Material, variant: usize) {
     (material.roughness, material.metallic, material.anisotropy) = (fraction(1), fraction(3), fraction(5));
     (material.clearcoat, material.clearcoat_roughness) = (fraction(3), fraction(7));
     (material.specular_weight, material.sheen_roughness, material.ior) = (fraction(7), fraction(3), 1.5);
-    (material.transmission, material.aniso_table) = (0.0, 0);
+    material.transmission = [0.0, 0.6, 0.0][variant % 3];
+    material.thin = u32::from(variant.is_multiple_of(2));
+    (material.energy, material.aniso_table) = (energy_table, 0);
+}
+
+/// Makes a material a rough dielectric. `variant` selects the parameters.
+fn make_dielectric(material: &mut Material, energy_table: u32, variant: usize) {
+    material.kind = ROUGH_GLASS;
+    material.tint = Vec3::new(0.9, 0.6, 0.3);
+    material.ior = [1.5, 1.1, 0.7, 2.4][variant % 4];
+    material.roughness = [0.3, 0.05, 1.0, 0.6][variant % 4];
+    material.anisotropy = if variant.is_multiple_of(3) { 0.7 } else { 0.0 };
+    material.aniso_table = 0;
+    material.energy = if variant.is_multiple_of(5) {
+        NO_INDEX
+    } else {
+        energy_table
+    };
 }
 
 /// Makes a material a rough conductor. `variant` selects the parameters.
@@ -150,18 +178,25 @@ fn make_metal(material: &mut Material, variant: usize) {
     material.energy = if variant.is_multiple_of(5) { NO_INDEX } else { 0 };
 }
 
-const MATERIALS: [MaterialKind; 3] = [MaterialKind::Diffuse, MaterialKind::Principled, MaterialKind::Metal];
+const MATERIALS: [MaterialKind; 4] = [
+    MaterialKind::Diffuse,
+    MaterialKind::Principled,
+    MaterialKind::Metal,
+    MaterialKind::Dielectric,
+];
 const SURFACES: [SurfaceKind; 3] = [SurfaceKind::Flat, SurfaceKind::Face, SurfaceKind::Evaluated];
 
 /// For each feature, the number of scenes with this feature in which hits are shaded in lanes.
 #[derive(Debug, Default)]
 struct LaneCoverage {
     camera: usize,
+    camera_invisible: usize,
     /// Scenes with hits on each kind of material (rows) and surface.
-    kinds: [[usize; 3]; 3],
+    kinds: [[usize; 3]; 4],
     coat: usize,
     sheen: usize,
     anisotropy: usize,
+    transmission: usize,
     absorption: usize,
     emission: usize,
     without_lights: usize,
@@ -180,7 +215,7 @@ impl LaneCoverage {
     fn add(&mut self, packed: &Packed, hits: LaneHits) {
         let s = &packed.specialization;
         // SIMD lanes compute only the rays of these cameras.
-        let has_pinhole = s.lens == 0 && s.panoramic == 0 && s.camera_invisible == 0;
+        let has_pinhole = s.lens == 0 && s.panoramic == 0;
         let has_lane_camera = has_pinhole && s.pixel_pattern == SOBOL && s.filter_bins == 0;
         if hits == LaneHits::default() {
             return;
@@ -195,9 +230,14 @@ impl LaneCoverage {
         }
         for (count, has_feature) in [
             (&mut self.camera, has_lane_camera),
+            (&mut self.camera_invisible, has_lane_camera && s.camera_invisible != 0),
             (&mut self.coat, is_principled && s.lobes & LOBE_COAT != 0),
             (&mut self.sheen, is_principled && s.lobes & LOBE_SHEEN != 0),
             (&mut self.anisotropy, is_principled && s.lobes & LOBE_ANISOTROPY != 0),
+            (
+                &mut self.transmission,
+                is_principled && s.lobes & LOBE_TRANSMISSION != 0,
+            ),
             (&mut self.absorption, s.absorption != 0),
             (&mut self.emission, s.emissive != 0),
             (&mut self.without_lights, s.emitters == 0),
@@ -218,10 +258,12 @@ impl LaneCoverage {
     fn assert_all_covered(&self) {
         let LaneCoverage {
             camera,
+            camera_invisible,
             kinds,
             coat,
             sheen,
             anisotropy,
+            transmission,
             absorption,
             emission,
             without_lights,
@@ -237,9 +279,11 @@ impl LaneCoverage {
         } = *self;
         let features = [
             camera,
+            camera_invisible,
             coat,
             sheen,
             anisotropy,
+            transmission,
             absorption,
             emission,
             one_emitter,
@@ -253,7 +297,11 @@ impl LaneCoverage {
             alpha,
             layers,
         ];
-        assert!(kinds.as_flattened().iter().all(|count| *count > 10), "{self:?}");
+        let [other_kinds @ .., [0, 0, dielectrics]] = kinds else {
+            panic!("dielectrics are evaluated one by one: {self:?}");
+        };
+        assert!(other_kinds.as_flattened().iter().all(|count| *count > 10), "{self:?}");
+        assert!(dielectrics > 10, "{self:?}");
         assert!(features.into_iter().all(|count| count > 5), "{self:?}");
     }
 }
@@ -338,8 +386,8 @@ fn random_scenes_have_the_paths_of_the_scalar_integrator() {
         let packed = if i % 2 == 0 { packed.with_layers() } else { packed };
         let packed = if i % 3 == 0 { packed.with_noise() } else { packed }; // layers then contain the depth
         let batch_size = [1, 7, 64, 1024][i % 4];
-        let [diffuse, principled, metal] = MATERIALS.map(|kind| with_lane_materials(packed.clone(), i, kind));
-        for (packed, step) in [(&packed, 2), (&diffuse, 3), (&principled, 3), (&metal, 3)] {
+        let with_lanes = MATERIALS.map(|kind| with_lane_materials(packed.clone(), i, kind));
+        for (packed, step) in with_lanes.iter().map(|packed| (packed, 3)).chain([(&packed, 2)]) {
             let samples = samples(packed, step, 3);
             let expected = scalar(packed, &samples);
             decode_meshes(packed);

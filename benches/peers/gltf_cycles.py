@@ -14,6 +14,7 @@ import os
 import pathlib
 import subprocess
 import sys
+import time
 
 sys.dont_write_bytecode = True
 HERE = pathlib.Path(__file__).resolve().parent
@@ -34,7 +35,7 @@ file = "{name}.glb"
 
 
 def cycles(job):
-    """Renders a job with Cycles; runs in Blender's Python."""
+    """Renders a job with Cycles and returns the seconds of rendering; runs in Blender's Python."""
     import bpy
     import mathutils
 
@@ -43,7 +44,13 @@ def cycles(job):
     out = bpy.context.scene
     world = bpy.data.worlds.new("sky")
     world.use_nodes = True
-    world.node_tree.nodes["Background"].inputs["Color"].default_value = (*job["sky"], 1)
+    background = world.node_tree.nodes["Background"]
+    if "map" in job:
+        texture = world.node_tree.nodes.new("ShaderNodeTexEnvironment")
+        texture.image = bpy.data.images.load(job["map"])
+        world.node_tree.links.new(texture.outputs["Color"], background.inputs["Color"])
+    else:
+        background.inputs["Color"].default_value = (*job["sky"], 1)
     out.world = world
     # The lights of the file have no size.
     for light in bpy.data.lights:
@@ -75,12 +82,15 @@ def cycles(job):
     out.view_settings.view_transform = "Standard"
     out.render.use_compositing = out.render.use_sequencer = False
     c = out.cycles
-    c.samples, c.use_adaptive_sampling, c.use_denoising, c.use_guiding = job["spp"], False, False, False
-    c.max_bounces = c.diffuse_bounces = c.glossy_bounces = c.transmission_bounces = 15
+    c.samples, c.use_adaptive_sampling, c.use_guiding = job["spp"], False, False
+    c.use_denoising, c.denoiser, c.denoising_input_passes = job.get("denoise", False), "OPENIMAGEDENOISE", "RGB_ALBEDO_NORMAL"
+    c.max_bounces = c.diffuse_bounces = c.glossy_bounces = c.transmission_bounces = job.get("bounces", 15)
     c.sample_clamp_direct = c.sample_clamp_indirect = c.blur_glossy = 0
     c.pixel_filter_type, c.seed = job.get("filter", "BOX"), job.get("seed", 0)
     out.render.filepath = job["output"]
+    start = time.monotonic()
     bpy.ops.render.render(write_still=True)
+    return time.monotonic() - start
 
 
 def main():

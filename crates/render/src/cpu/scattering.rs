@@ -103,6 +103,7 @@ pub fn reflection(
     result
 }
 
+#[inline(always)] // a call copies the material twice
 pub fn bounded(original: Material) -> Material {
     let mut material = original;
     let clamped = |color: Vec3| color.map(|x| if x > 1.0 { 1.0 } else { x });

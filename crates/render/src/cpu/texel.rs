@@ -18,6 +18,9 @@ pub fn near_coordinate(u: f32, wrap: u32) -> f32 {
 }
 
 pub fn wrapped_index(i: i32, size: u32, wrap: u32) -> u32 {
+    if (i as u32) < size {
+        return i as u32; // most indices; saves a division
+    }
     let n = size as i32;
     if wrap == CLAMP {
         return if i < 0 { 0 } else { i.min(n - 1) as u32 };

@@ -187,6 +187,7 @@ pub fn channel_of(color: Vec3, lookup: &Lookup, slot: u32) -> f32 {
     }
 }
 
+#[inline(always)] // a call copies the material twice
 pub fn with_principled(before: Material, color: Vec3, lookup: &Lookup) -> Material {
     let mut m = before;
     if lookup.purposes & FOR_SHEEN != 0 {

@@ -20,6 +20,9 @@ use crate::cpu::principled::{
     principled_mixture, principled_pdf, refracting_density, sheen_albedo, sheen_probability,
 };
 use crate::cpu::rng::{hash4, unit_float};
+use crate::cpu::rough_dielectric::{
+    dielectric_gain, refracting_normal, rough_dielectric_eval, rough_dielectric_pdf, rough_dielectric_sample,
+};
 use crate::cpu::sequence::{scramble, shuffled_index, sobol_bits, sobol_reversed};
 use crate::cpu::specular::{fresnel, reflected_direction, refracted_cosine, refracted_direction};
 use crate::cpu::surface::largest;
@@ -189,6 +192,8 @@ fn append_facet_results<F: Real>(n: [F; 9], u: F::Vec2, mut append: impl FnMut(&
         ("sheen_albedo", sheen_albedo(n[0], n[1])),
         ("conductor_fresnel", conductor_fresnel(n[0], n[1], n[2])),
         ("metal_pdf", metal_pdf(&parameters, wo, wi)),
+        ("dielectric_gain", dielectric_gain(&parameters)),
+        ("rough_dielectric_pdf", rough_dielectric_pdf(&parameters, wo, wi)),
         ("facet_loss", facet_loss(alpha, wo)),
         ("power", power(n[0], n[1])),
         ("fresnel", fresnel(n[0], n[1], n[2])),
@@ -206,6 +211,8 @@ fn append_facet_results<F: Real>(n: [F; 9], u: F::Vec2, mut append: impl FnMut(&
     let frame = frame_around(normal);
     let metal_sample = metal_sample(&parameters, wo, u);
     append("metal_sample pdf", &[metal_sample.pdf]);
+    let glass_sample = rough_dielectric_sample(&parameters, wo, u, n[8].abs());
+    append("rough_dielectric_sample pdf", &[glass_sample.pdf, glass_sample.eta]);
     for (name, v) in [
         ("ggx_sample", ggx_sample(alpha, wo, u)),
         ("cap_sample", cap_sample(u, n[0])),
@@ -219,6 +226,10 @@ fn append_facet_results<F: Real>(n: [F; 9], u: F::Vec2, mut append: impl FnMut(&
         ("metal_eval", metal_eval(&parameters, wo, wi)),
         ("metal_sample", metal_sample.wi),
         ("metal_sample weight", metal_sample.weight),
+        ("refracting_normal", refracting_normal(&parameters, wo, wi)),
+        ("rough_dielectric_eval", rough_dielectric_eval(&parameters, wo, wi)),
+        ("rough_dielectric_sample", glass_sample.wi),
+        ("rough_dielectric_sample weight", glass_sample.weight),
     ] {
         append(name, &[v.x(), v.y(), v.z()]);
     }

@@ -10,14 +10,14 @@ use super::super::geometry::{fetch_hit_primitive, hit_differential, material_of,
 use super::super::integrators::path::{PathState, add_emission, add_radiance, decision, decision_set};
 use super::super::lanes::{LaneMaterials, Lanes2, MaterialFields, MaterialRows, Real, Vector3, Word, constant, select};
 use super::super::light_sample::power_heuristic;
-use super::super::math::{min, normalize};
+use super::super::math::{dot, min, normalize};
 use super::super::mesh::HitPrimitive;
 use super::super::metal::metal_fresnel;
 use super::super::path::{Path, usable_normal};
 use super::super::principled::bounded_color;
 use super::super::ray::{Hit, Ray};
 use super::super::rng::{hash4, unit_float};
-use super::super::scattering::{bounded, facet_frame, local_wo, material_for_view, shaded_normal};
+use super::super::scattering::{bounded, facet_frame, is_transmissive, local_wo, material_for_view, shaded_normal};
 use super::super::shadow_ray::ShadowRay;
 use super::super::surface::{Surface, largest};
 use super::super::texture::evaluate_material;
@@ -25,11 +25,13 @@ use super::super::vertices::with_vertex_colors;
 use super::QueuedShadowRay;
 use super::environment::leave_to_environment;
 use super::lights::{LightChoices, LightRows, only_light};
-use super::materials::{Diffuse, Directions, Metal, Principled};
-use super::rows::{F, LANES, Row, Rows3, get3, load3, set3, store3};
+use super::materials::{Diffuse, Directions, Facets, Principled};
+use super::rows::{F, LANES, Row, Rows3, get3, load3, set3, splat3, store3};
 use super::shade::{IS_OPTIMIZED, MaterialKind, QueuedHit, ShadingQueues, SurfaceKind};
 use super::surfaces::{FaceHits, FlatHits, LaneSurfaces, ScalarHits};
-use crate::records::{DIFFUSE, ENVIRONMENT_MAP, INFINITE_T, INSTANCE, METAL, Material, NO_INDEX, Packed};
+use crate::records::{
+    DIFFUSE, ENVIRONMENT_MAP, INFINITE_T, INSTANCE, LOBE_TRANSMISSION, Material, NO_INDEX, PRINCIPLED, Packed,
+};
 
 /// The paths of a batch, and the queue of their shadow rays.
 pub struct Batch<'a> {
@@ -81,15 +83,15 @@ fn evaluate(scene: &Packed, path: &Path, hit: Hit) -> Evaluated {
         coat_normal = shading.coat_normal;
     }
     let mut energy = Vec3::ONE;
-    if material.kind != DIFFUSE && s.anisotropic != 0 {
+    if material.kind != DIFFUSE && (s.anisotropic != 0 || is_transmissive(&material)) {
         surface.shading_normal = shaded_normal(surface, &material, surface.shading_normal);
         let frame = facet_frame(scene, surface, &material);
         (surface.du, surface.dv) = (frame.u, frame.v);
-        if material.kind == METAL {
+        if material.kind == PRINCIPLED {
+            energy = principled_energy(scene, &material, local_wo(&surface), surface.side);
+        } else {
             material = material_for_view(scene, &surface, material);
             material.energy = NO_INDEX; // the loss is known
-        } else {
-            energy = principled_energy(scene, &material, local_wo(&surface), surface.side);
         }
     }
     Evaluated {
@@ -258,9 +260,19 @@ impl Batch<'_> {
         if !is_diffuse {
             surface.shading_normal = usable_normal(surface, surface.shading_normal);
         }
-        if s.tlas_kinds & (1 << INSTANCE) != 0 {
+        surface.transmits = match material_kind {
+            MaterialKind::Principled if s.lobes & LOBE_TRANSMISSION != 0 => {
+                let rows = &materials.rows;
+                Some(LaneMaterials { simd, rows }.transmission().gt(zero))
+            }
+            MaterialKind::Dielectric => Some(zero.le(zero)), // true in all lanes
+            _ => None,
+        };
+        let has_instances = s.tlas_kinds & (1 << INSTANCE) != 0;
+        if has_instances {
             surface.ray_origin = surface.ray_origin + surface.terminator_offset;
         }
+        let normal_to_light = surface.lit_normal();
         let throughput = load3(simd, &rows.throughput);
         let (mut random, mut roulette_random) = (zero, zero);
         if has_roulette || !is_diffuse {
@@ -284,14 +296,7 @@ impl Batch<'_> {
                 u: decision(scene, Lanes2 { x: key[0], y: key[1] }, sample),
             };
             let samples = &rows.sample[..hits.len()];
-            light = Some(lights.sample(
-                simd,
-                scene,
-                choices,
-                surface.ray_origin,
-                surface.shading_normal,
-                samples,
-            ));
+            light = Some(lights.sample(simd, scene, choices, surface.ray_origin, normal_to_light, samples));
         }
         let directions = Directions {
             to_light: light.as_ref().map(|light| normalize(light.to_light)),
@@ -308,7 +313,10 @@ impl Batch<'_> {
                 Principled::new(scene, &material, &surface, &materials.energy).scatter(&surface, directions)
             }
             MaterialKind::Metal if IS_OPTIMIZED => {
-                Metal::new(simd, rows_of_materials, &surface).scatter(&surface, directions)
+                Facets::metal(simd, rows_of_materials, &surface).scatter(&surface, directions)
+            }
+            MaterialKind::Dielectric if IS_OPTIMIZED => {
+                Facets::dielectric(simd, rows_of_materials, &surface).scatter(&surface, directions)
             }
             _ => {
                 let material = LaneMaterials {
@@ -319,9 +327,19 @@ impl Batch<'_> {
             }
         };
 
-        let mut contributions = Rows3::default();
-        let mut queued_mask = 0;
+        let (mut contributions, mut to_lights) = (Rows3::default(), lights.to_light);
+        let (mut queued_mask, mut lit_behind) = (0, 0);
+        let origin_behind = surface.origin_behind(has_instances);
         if let (Some(light), Some(reflected)) = (light, result.reflections) {
+            if let Some(transmits) = surface.transmits {
+                let to_light = light.to_light;
+                let is_behind = transmits & dot(surface.normal, to_light).lt(zero);
+                let zeros = splat3(simd, Vec3::ZERO);
+                let is_finite = f32x8::simd_from(simd, lights.t_max).lt(zero.splat(2.0));
+                let shift = Vector3::select(zeros, surface.ray_origin - origin_behind, is_finite);
+                to_lights = store3(Vector3::select(to_light, to_light + shift, is_behind));
+                lit_behind = is_behind.to_bitmask();
+            }
             let mut contribution = throughput * reflected.value * light.radiance * (constant(1.0) / light.pdf);
             contribution = contribution * select(power_heuristic(light.pdf, reflected.pdf), one, light.is_delta);
             let max_component = largest(contribution);
@@ -330,11 +348,17 @@ impl Batch<'_> {
         }
         let next = result.next_rays;
         let mut continued = throughput * next.weight;
+        let mut eta2 = f32x8::simd_from(simd, rows.eta2);
+        let mut leaves_behind = 0;
+        if let Some(transmitted) = next.transmitted {
+            eta2 = select(eta2, eta2 * transmitted.eta * transmitted.eta, transmitted.mask);
+            leaves_behind = transmitted.mask.to_bitmask();
+        }
         let mut survives = zero.le(zero); // true in all lanes
         if has_roulette {
             let first_depth = x.splat(s.rr_depth);
             let in_roulette = (depth + 1).simd_ge(first_depth);
-            let chance = min(largest(continued) / f32x8::simd_from(simd, rows.eta2), one);
+            let chance = min(largest(continued) / eta2, one);
             survives = !(in_roulette & roulette_random.ge(chance));
             continued = Vector3::select(continued, continued * (constant(1.0) / chance), in_roulette);
         }
@@ -349,19 +373,28 @@ impl Batch<'_> {
             let albedo = match material_kind {
                 MaterialKind::Metal => metal_fresnel(&material, one),
                 MaterialKind::Diffuse | MaterialKind::Principled => material.diffuse(),
+                MaterialKind::Dielectric => material.tint(),
             };
             albedos = store3(throughput * albedo);
         }
         let sides: Row = surface.side.into();
         let (origins, normals) = (store3(surface.ray_origin), store3(surface.shading_normal));
+        let (origins_behind, normals_to_light) = (store3(origin_behind), store3(normal_to_light));
         let (directions, throughputs) = (store3(next.wi), store3(continued));
-        let pdfs: Row = next.pdf.into();
+        let (pdfs, eta2): (Row, Row) = (next.pdf.into(), eta2.into());
         let has_light_tree = s.light_tree != 0;
         let has_previous_normal = has_light_tree || s.environment_flags & ENVIRONMENT_MAP != 0;
         for (lane, queued) in hits.iter().enumerate() {
             let state = &mut self.paths[queued.path as usize];
-            let (exclude_front, exclude_back) = (rows.exclude_front[lane], rows.exclude_back[lane]);
-            let origin = get3(&origins, lane);
+            // The origin of rays that leave on the side of the mask, and the primitives that they exclude.
+            let exit = |behind_mask: u64| match behind_mask >> lane & 1 != 0 {
+                true => (
+                    get3(&origins_behind, lane),
+                    rows.exclude_back[lane],
+                    rows.exclude_front[lane],
+                ),
+                false => (get3(&origins, lane), rows.exclude_front[lane], rows.exclude_back[lane]),
+            };
             let bounces = rows.depth[lane] + 1;
             if s.layers != 0 {
                 let normal = get3(&normals, lane) * sides[lane];
@@ -370,11 +403,12 @@ impl Batch<'_> {
             if s.emitters != 0 {
                 let contribution = get3(&contributions, lane);
                 if queued_mask >> lane & 1 != 0 {
+                    let (origin, exclude_front, exclude_back) = exit(lit_behind);
                     self.shadow_rays.push(QueuedShadowRay {
                         path: queued.path,
                         ray: ShadowRay {
                             origin,
-                            to_light: get3(&lights.to_light, lane),
+                            to_light: get3(&to_lights, lane),
                             t_max: lights.t_max[lane],
                             exclude_front,
                             exclude_back,
@@ -387,6 +421,7 @@ impl Batch<'_> {
                     add_radiance(scene, state, contribution, false, bounces);
                 }
             }
+            let (origin, origin_prim, inside_prim) = exit(leaves_behind);
             state.path = Path {
                 ray: Ray {
                     origin,
@@ -396,17 +431,18 @@ impl Batch<'_> {
                 throughput: get3(&throughputs, lane),
                 depth: bounces,
                 branch: 0,
-                origin_prim: exclude_front,
-                inside_prim: exclude_back,
+                origin_prim,
+                inside_prim,
             };
             state.pdf = pdfs[lane];
+            state.eta2 = eta2[lane];
             state.skipped_distance = 0.0;
             state.ended |= survives >> lane & 1 == 0;
             if has_light_tree {
-                state.prev_position = origin;
+                state.prev_position = get3(&origins, lane);
             }
             if has_previous_normal {
-                state.prev_normal = get3(&normals, lane);
+                state.prev_normal = get3(&normals_to_light, lane);
             }
         }
     }

@@ -17,13 +17,14 @@ use super::super::sequence::sobol_sample;
 use super::rows::{LANES, Row, get3, store3};
 use crate::records::{NO_PRIMITIVE, Packed, SOBOL};
 
-/// Begins a path for each camera sample, like `begin_path`. A camera sample is a pixel and a sample number.
+/// Begins a path for each camera sample, like `begin_path`. A camera sample is a pixel and a sample number. Returns true if
+/// the rays have yet to pass surfaces that are invisible to the camera.
 pub fn begin_paths(
     scene: &Packed,
     samples: impl Iterator<Item = (UVec2, u32)>,
     paths: &mut Vec<PathState>,
     pixels: &mut Vec<UVec2>,
-) {
+) -> bool {
     paths.clear();
     pixels.clear();
     if !has_lane_camera(scene) {
@@ -31,18 +32,19 @@ pub fn begin_paths(
             paths.push(begin_path(scene, pixel, sample));
             pixels.push(pixel);
         }
-        return;
+        return false;
     }
     dispatch!(*LEVEL, simd => begin_in_lanes(simd, scene, samples, paths, pixels));
+    scene.specialization.camera_invisible != 0
 }
 
 /// Returns true if `begin_in_lanes` can compute the camera rays: each depends only on its pixel and a Sobol' point.
 fn has_lane_camera(scene: &Packed) -> bool {
     let s = &scene.specialization;
-    s.pixel_pattern == SOBOL && s.filter_bins == 0 && s.lens == 0 && s.panoramic == 0 && s.camera_invisible == 0
+    s.pixel_pattern == SOBOL && s.filter_bins == 0 && s.lens == 0 && s.panoramic == 0
 }
 
-/// Begins paths in SIMD lanes, with the results of `camera_sample` and `begin_path`.
+/// Begins paths in SIMD lanes, with the results of `camera_sample` and of `begin_path` without invisible surfaces.
 #[inline(always)]
 fn begin_in_lanes<S: Simd>(
     simd: S,

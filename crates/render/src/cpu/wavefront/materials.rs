@@ -1,11 +1,11 @@
 //! Scattering of materials in SIMD lanes.
 
-use fearless_simd::Simd;
+use fearless_simd::{Simd, mask32x8};
 use glam::Vec3;
 
 use super::super::diffuse::{angles_at, diffuse_pdf, diffuse_sample};
 use super::super::lanes::{LaneMaterials, Lanes2, MaterialFields, MaterialRows, Real, Vector3, constant, select};
-use super::super::lobe::{facet_alpha, facet_loss, vector_from_lobe, vector_to_lobe};
+use super::super::lobe::{LobeSample, facet_alpha, facet_loss, vector_from_lobe, vector_to_lobe};
 use super::super::math::{max, normalize};
 use super::super::metal::{metal_eval, metal_pdf, metal_sample};
 use super::super::path::usable_normal;
@@ -13,6 +13,7 @@ use super::super::primitive::Tangents;
 use super::super::principled::{
     PrincipledLobes, evaluated_sample, principled_direction, principled_eval, principled_mixture, principled_pdf,
 };
+use super::super::rough_dielectric::{rough_dielectric_eval, rough_dielectric_pdf, rough_dielectric_sample};
 use super::super::warp::frame_around;
 use super::rows::{F, Rows3, V, load3, splat3};
 use super::surfaces::LaneSurfaces;
@@ -29,6 +30,26 @@ pub struct NextRays<S: Simd> {
     pub wi: V<S>,
     pub weight: V<S>,
     pub pdf: F<S>,
+    /// [`None`] if no material transmits light.
+    pub transmitted: Option<Transmitted<S>>,
+}
+
+/// Rays that leave on the other side of a surface.
+#[derive(Clone, Copy)]
+pub struct Transmitted<S: Simd> {
+    pub mask: mask32x8<S>,
+    /// Index of refraction on the side of the previous vertex, relative to that behind the surface.
+    pub eta: F<S>,
+}
+
+impl<S: Simd> Transmitted<S> {
+    #[inline(always)]
+    fn of(surface: &LaneSurfaces<S>, sample: &LobeSample<F<S>>) -> Option<Self> {
+        surface.transmits.map(|_| Transmitted {
+            mask: sample.wi.z.lt(sample.wi.z.splat(0.0)),
+            eta: sample.eta,
+        })
+    }
 }
 
 /// Directions to light samples, and random numbers to sample the next rays.
@@ -91,6 +112,7 @@ impl<S: Simd> Diffuse<S> {
             wi,
             weight: value * inverse_pdf,
             pdf,
+            transmitted: None,
         }
     }
 }
@@ -111,12 +133,11 @@ impl<S: Simd> Principled<S> {
         let simd = material.simd;
         let s = &scene.specialization;
         let normal = surface.shading_normal;
-        let frame = surface.tangents.unwrap_or_else(|| frame_around(normal));
+        let (frame, local) = frame_and_wo(surface);
         let mut coat = splat3(simd, Vec3::Z);
         if (s.lobes & LOBE_COAT != 0) & (s.normal_maps == 1) {
             coat = vector_to_lobe(frame, normal, usable_normal(*surface, surface.coat_normal));
         }
-        let local = vector_to_lobe(frame, normal, surface.wo);
         let wo: V<S> = Vector3::new(local.x, local.y, max(local.z, local.z.splat(1e-6)));
         let outside = surface.side.gt(surface.side.splat(0.0));
         Principled {
@@ -151,29 +172,42 @@ impl<S: Simd> Principled<S> {
                 wi,
                 weight: surface.where_allowed(wi, sample.weight),
                 pdf: sample.pdf,
+                transmitted: Transmitted::of(surface, &sample),
             },
         }
     }
 }
 
-/// Rough conductors.
-pub struct Metal<'a, S: Simd> {
+/// Rough conductors or rough dielectrics.
+pub struct Facets<'a, S: Simd> {
     material: LaneMaterials<'a, S>,
+    is_metal: bool,
     frame: Tangents<V<S>>,
     wo: V<S>,
 }
 
-impl<'a, S: Simd> Metal<'a, S> {
-    /// Returns the materials, like the scalar `material_for_view`. The shading normals of the surfaces are usable.
+impl<'a, S: Simd> Facets<'a, S> {
+    /// Returns conductors, like the scalar `material_for_view`. The shading normals of the surfaces are usable.
     #[inline(always)]
-    pub fn new(simd: S, rows: &'a mut MaterialRows, surface: &LaneSurfaces<S>) -> Self {
-        let normal = surface.shading_normal;
-        let frame = surface.tangents.unwrap_or_else(|| frame_around(normal));
-        let wo = vector_to_lobe(frame, normal, surface.wo);
+    pub fn metal(simd: S, rows: &'a mut MaterialRows, surface: &LaneSurfaces<S>) -> Self {
+        let (frame, wo) = frame_and_wo(surface);
         let alpha = facet_alpha(&LaneMaterials { simd, rows });
         rows.set_loss(facet_loss(alpha, wo));
-        Metal {
+        Facets {
             material: LaneMaterials { simd, rows },
+            is_metal: true,
+            frame,
+            wo,
+        }
+    }
+
+    /// Returns dielectrics for materials that were evaluated by the scalar `material_for_view`.
+    #[inline(always)]
+    pub fn dielectric(simd: S, rows: &'a MaterialRows, surface: &LaneSurfaces<S>) -> Self {
+        let (frame, wo) = frame_and_wo(surface);
+        Facets {
+            material: LaneMaterials { simd, rows },
+            is_metal: false,
             frame,
             wo,
         }
@@ -182,21 +216,44 @@ impl<'a, S: Simd> Metal<'a, S> {
     #[inline(always)]
     pub fn scatter(&self, surface: &LaneSurfaces<S>, directions: Directions<S>) -> ScatterResult<S> {
         let normal = surface.shading_normal;
-        let sample = metal_sample(&self.material, self.wo, directions.u);
+        let sample = match self.is_metal {
+            true => metal_sample(&self.material, self.wo, directions.u),
+            false => rough_dielectric_sample(&self.material, self.wo, directions.u, directions.random),
+        };
         let wi = normalize(vector_from_lobe(self.frame, normal, sample.wi));
         ScatterResult {
-            reflections: directions.to_light.map(|wi| {
-                let local = vector_to_lobe(self.frame, normal, wi);
-                Reflections {
-                    value: surface.where_allowed(wi, metal_eval(&self.material, self.wo, local)),
-                    pdf: metal_pdf(&self.material, self.wo, local),
-                }
-            }),
+            reflections: directions.to_light.map(|wi| self.reflections(surface, wi)),
             next_rays: NextRays {
                 wi,
                 weight: surface.where_allowed(wi, sample.weight),
                 pdf: sample.pdf,
+                transmitted: Transmitted::of(surface, &sample),
             },
         }
     }
+
+    #[inline(always)]
+    fn reflections(&self, surface: &LaneSurfaces<S>, wi: V<S>) -> Reflections<S> {
+        let local = vector_to_lobe(self.frame, surface.shading_normal, wi);
+        let (value, pdf) = match self.is_metal {
+            true => (
+                metal_eval(&self.material, self.wo, local),
+                metal_pdf(&self.material, self.wo, local),
+            ),
+            false => (
+                rough_dielectric_eval(&self.material, self.wo, local),
+                rough_dielectric_pdf(&self.material, self.wo, local),
+            ),
+        };
+        let value = surface.where_allowed(wi, value);
+        Reflections { value, pdf }
+    }
+}
+
+/// Returns the frames of lobes around the shading normals, and the directions to the previous vertices in these frames.
+#[inline(always)]
+fn frame_and_wo<S: Simd>(surface: &LaneSurfaces<S>) -> (Tangents<V<S>>, V<S>) {
+    let normal = surface.shading_normal;
+    let frame = surface.tangents.unwrap_or_else(|| frame_around(normal));
+    (frame, vector_to_lobe(frame, normal, surface.wo))
 }

@@ -6,6 +6,7 @@
 mod batch;
 mod begin;
 mod closest_hits;
+mod culling;
 mod environment;
 mod items;
 mod lights;
@@ -21,6 +22,7 @@ use glam::UVec2;
 
 use self::begin::begin_paths;
 use self::closest_hits::closest_hits;
+use self::culling::pass_invisible_hits;
 use self::occlusion::occluded_rays;
 use self::scratch::Scratch;
 pub use self::shade::{LaneHits, MaterialKind, SurfaceKind};
@@ -76,10 +78,10 @@ impl Wavefront {
     pub fn trace(&mut self, scene: &Packed, samples: impl Iterator<Item = (UVec2, u32)>) -> &[PathState] {
         self.begin(scene, samples);
         while !self.active.is_empty() {
-            self.find_closest_hits(scene);
             self.shade(scene);
             self.trace_shadow_rays(scene);
             self.compact();
+            self.find_closest_hits(scene);
         }
         &self.paths
     }
@@ -91,7 +93,6 @@ impl Wavefront {
         samples: impl Iterator<Item = (UVec2, u32)>,
     ) -> impl Iterator<Item = (&PathState, Hit)> {
         self.begin(scene, samples);
-        self.find_closest_hits(scene);
         self.paths.iter().zip(self.hits.iter().copied())
     }
 
@@ -100,10 +101,15 @@ impl Wavefront {
         self.lane_hits
     }
 
+    /// Begins the paths, and finds the closest hits of the camera rays.
     fn begin(&mut self, scene: &Packed, samples: impl Iterator<Item = (UVec2, u32)>) {
-        begin_paths(scene, samples, &mut self.paths, &mut self.pixels);
+        let has_invisible_hits = begin_paths(scene, samples, &mut self.paths, &mut self.pixels);
         self.active.clear();
         self.active.extend(0..self.paths.len() as u32);
+        self.find_closest_hits(scene);
+        if has_invisible_hits {
+            pass_invisible_hits(scene, &mut self.paths, &mut self.hits);
+        }
     }
 
     fn find_closest_hits(&mut self, scene: &Packed) {

@@ -12,11 +12,12 @@ use super::super::lobe::is_polished;
 use super::super::primitive::is_solid;
 use super::super::ray::Hit;
 use super::super::samples::LEVEL;
+use super::super::scattering::is_transmissive;
 use super::QueuedShadowRay;
 use super::batch::Batch;
 use crate::records::{
-    DIFFUSE, ENVIRONMENT_MAP, FOR_ANISOTROPY, FOR_ROUGHNESS, FOR_TRANSMISSION, METAL, Material, NO_COLORS, NO_INDEX,
-    NO_SHADOW, OPAQUE, PRINCIPLED, Packed,
+    DIFFUSE, ENVIRONMENT_MAP, FOR_ANISOTROPY, FOR_ROUGHNESS, METAL, Material, NO_COLORS, NO_INDEX, NO_SHADOW, OPAQUE,
+    PRINCIPLED, Packed, ROUGH_GLASS,
 };
 
 /// True in builds with optimization. Otherwise, only diffuse surfaces are shaded in lanes, because the stack frame of the
@@ -39,10 +40,17 @@ pub enum MaterialKind {
     Principled,
     /// A rough conductor.
     Metal,
+    /// A rough dielectric.
+    Dielectric,
 }
 
 impl MaterialKind {
-    const ALL: [MaterialKind; 3] = [MaterialKind::Diffuse, MaterialKind::Principled, MaterialKind::Metal];
+    const ALL: [MaterialKind; 4] = [
+        MaterialKind::Diffuse,
+        MaterialKind::Principled,
+        MaterialKind::Metal,
+        MaterialKind::Dielectric,
+    ];
 }
 
 /// The kind of surface of a hit.
@@ -52,8 +60,8 @@ pub enum SurfaceKind {
     Flat,
     /// A triangle of a mesh.
     Face,
-    /// A solid; a surface with emission, a texture or vertex colors; with anisotropy in the scene, any surface that is
-    /// not diffuse. The scalar functions evaluate surface and material of each hit, which is then shaded in lanes.
+    /// A solid; a surface with emission, a texture, vertex colors or transmission; with anisotropy in the scene, any surface
+    /// that is not diffuse. The scalar functions evaluate surface and material of each hit, which is then shaded in lanes.
     Evaluated,
 }
 
@@ -193,25 +201,25 @@ impl ShadingQueues {
 #[inline(always)]
 fn lane_queue(scene: &Packed, state: &PathState, hit: Hit) -> Option<(MaterialKind, SurfaceKind, u32)> {
     let s = &scene.specialization;
-    let (surface_kind, index) = if is_on_mesh(hit) {
-        let material = group_word(scene, instance_of(scene, hit), hit.slot) & !NO_SHADOW;
-        (SurfaceKind::Face, material)
-    } else {
-        let q = scene.primitives.get(hit.primitive as usize)?;
-        let surface_kind = match is_solid(q.kind) {
-            false => SurfaceKind::Flat,
-            true => SurfaceKind::Evaluated,
-        };
-        (surface_kind, q.material)
+    if hit.primitive == NO_INDEX {
+        return None;
+    }
+    let surface_kind = match is_on_mesh(hit) {
+        true => SurfaceKind::Face,
+        false if is_solid(scene.primitives[hit.primitive as usize].kind) => SurfaceKind::Evaluated,
+        false => SurfaceKind::Flat,
     };
+    let index = material_index(scene, hit);
     // Only the scalar `shade` records layers of the last hit and computes absorption. Without absorption, the factor is
     // exactly 1.
     let is_last = state.path.depth >= s.bounces;
     let records_layers = s.layers != 0 && (state.path.depth == 0 || !state.albedo_recorded);
-    if records_layers && is_last || s.absorption != 0 && state.absorption != Vec3::ZERO {
+    let material = &scene.materials[index as usize];
+    let transmits = is_transmissive(material);
+    let absorbs = state.absorption != Vec3::ZERO || material.absorption != Vec3::ZERO;
+    if records_layers && is_last || s.absorption != 0 && absorbs {
         return None;
     }
-    let material = &scene.materials[index as usize];
     let (material_kind, scalar_purposes) = lane_material(material)?;
     let mut lookups = (0..material.lookups.y).map(|i| &scene.textures.lookups[(material.lookups.x + i) as usize]);
     if lookups.any(|lookup| lookup.purposes & scalar_purposes != 0) {
@@ -222,11 +230,20 @@ fn lane_queue(scene: &Packed, state: &PathState, hit: Hit) -> Option<(MaterialKi
         return None; // emission is added to the last hit
     }
     let has_plain_surface = material.lookups.y == 0 && material.vertex_colors == NO_COLORS && !is_emissive;
-    let has_frame = material_kind != MaterialKind::Diffuse && s.anisotropic != 0;
+    let has_frame = material_kind != MaterialKind::Diffuse && (s.anisotropic != 0 || transmits);
     if has_plain_surface && !has_frame {
         return Some((material_kind, surface_kind, index));
     }
     Some((material_kind, SurfaceKind::Evaluated, index))
+}
+
+/// Returns the index of the material at a hit.
+#[inline(always)]
+pub fn material_index(scene: &Packed, hit: Hit) -> u32 {
+    if is_on_mesh(hit) {
+        return group_word(scene, instance_of(scene, hit), hit.slot) & !NO_SHADOW;
+    }
+    scene.primitives[hit.primitive as usize].material
 }
 
 /// Returns the kind of a material without alpha, if its hits can be shaded in lanes. Hits on materials that have a texture
@@ -236,12 +253,12 @@ fn lane_material(material: &Material) -> Option<(MaterialKind, u32)> {
     if material.alpha_mode != OPAQUE {
         return None;
     }
-    let is_rough = material.roughness > 0.0;
-    let is_transmissive = material.transmission > 0.0;
+    let decides_polish = FOR_ROUGHNESS | FOR_ANISOTROPY;
     match material.kind {
-        DIFFUSE if !is_rough => Some((MaterialKind::Diffuse, FOR_ROUGHNESS)),
-        PRINCIPLED if IS_OPTIMIZED && !is_transmissive => Some((MaterialKind::Principled, FOR_TRANSMISSION)),
-        METAL if IS_OPTIMIZED && !is_polished(material) => Some((MaterialKind::Metal, FOR_ROUGHNESS | FOR_ANISOTROPY)),
+        DIFFUSE if material.roughness == 0.0 => Some((MaterialKind::Diffuse, FOR_ROUGHNESS)),
+        PRINCIPLED if IS_OPTIMIZED => Some((MaterialKind::Principled, 0)),
+        METAL if IS_OPTIMIZED && !is_polished(material) => Some((MaterialKind::Metal, decides_polish)),
+        ROUGH_GLASS if IS_OPTIMIZED && !is_polished(material) => Some((MaterialKind::Dielectric, decides_polish)),
         _ => None,
     }
 }

@@ -33,6 +33,8 @@ pub struct LaneSurfaces<S: Simd> {
     pub tangents: Option<Tangents<V<S>>>,
     /// [`None`] if no hit is on a mesh.
     pub triangle: Option<LaneTriangles<S>>,
+    /// True where the material transmits light. [`None`] if none does.
+    pub transmits: Option<mask32x8<S>>,
 }
 
 /// `anchor`, `x` and `y` of triangles ([`Primitive`](crate::records::Primitive)). They map a point p to barycentric
@@ -74,17 +76,49 @@ impl<S: Simd> LaneSurfaces<S> {
     #[inline(always)]
     pub fn direction_allowed(&self, wi: V<S>) -> mask32x8<S> {
         let zero = wi.x.splat(0.0);
-        let lit = dot(self.shading_normal, wi).gt(zero) & dot(self.smooth_normal, wi).gt(zero);
+        let (over_shaded, over_smooth) = (dot(self.shading_normal, wi), dot(self.smooth_normal, wi));
+        let mut lit = over_shaded.gt(zero) & over_smooth.gt(zero);
         // Without a mesh, the smooth normal is the geometric normal, so light from below is not in `lit`.
-        let Some(triangle) = &self.triangle else {
-            return lit;
-        };
+        if let Some(triangle) = &self.triangle {
+            lit &= self.face_direction_allowed(triangle, wi);
+        }
+        if let Some(transmits) = self.transmits {
+            let behind = over_shaded.lt(zero) & over_smooth.lt(zero) & dot(self.normal, wi).lt(zero);
+            lit |= transmits & behind;
+        }
+        lit
+    }
+
+    /// Returns true where the terminator of a triangle lets light from `wi` pass, like the scalar `face_direction_allowed`.
+    #[inline(always)]
+    fn face_direction_allowed(&self, triangle: &LaneTriangles<S>, wi: V<S>) -> mask32x8<S> {
+        let zero = wi.x.splat(0.0);
         let fall = -dot(self.normal, wi);
         let height = dot(self.normal, self.terminator_offset);
         let crossing = self.position + self.terminator_offset + wi * (height / max(fall, fall.splat(1e-30)));
         let from_anchor = crossing - triangle.anchor;
         let (x, y) = (dot(triangle.x, from_anchor), dot(triangle.y, from_anchor));
-        lit & (fall.le(zero) | x.lt(zero) | y.lt(zero) | (x + y).gt(zero.splat(1.0)))
+        fall.le(zero) | x.lt(zero) | y.lt(zero) | (x + y).gt(zero.splat(1.0))
+    }
+
+    /// Returns the normals that bound the directions to lights, like the scalar `lit_normal`.
+    #[inline(always)]
+    pub fn lit_normal(&self) -> V<S> {
+        match self.transmits {
+            Some(transmits) => Vector3::select(self.shading_normal, splat3(self.side.simd, Vec3::ZERO), transmits),
+            None => self.shading_normal,
+        }
+    }
+
+    /// Returns the origins of rays that leave on the other sides of the surfaces, like the scalar `flipped`.
+    /// `has_instances` is true if the scene has instances of meshes.
+    #[inline(always)]
+    pub fn origin_behind(&self, has_instances: bool) -> V<S> {
+        let origin = self.position - (self.ray_origin - self.position);
+        match has_instances {
+            true => origin + self.terminator_offset,
+            false => origin,
+        }
     }
 }
 
@@ -144,6 +178,7 @@ impl FlatHits {
             side,
             tangents: None,
             triangle: None,
+            transmits: None,
         }
     }
 }
@@ -312,6 +347,7 @@ impl FaceHits {
             side,
             tangents: None,
             triangle: Some(triangle),
+            transmits: None,
         }
     }
 }
@@ -380,6 +416,7 @@ impl ScalarHits {
                 x: load3(simd, &self.face_x),
                 y: load3(simd, &self.face_y),
             }),
+            transmits: None,
         }
     }
 }
