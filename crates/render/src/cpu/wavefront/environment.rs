@@ -9,7 +9,7 @@ use super::super::equirect::{EnvironmentCell, cell_towards, direction_in_cell};
 use super::super::integrators::path::{PathState, leave_scene};
 use super::super::lanes::{Lanes2, Lanes3};
 use super::super::math::{dot, normalize};
-use super::rows::{F, LANES, Row, Rows3, V, get3, load3, set3, splat3};
+use super::rows::{F, LANES, Row, Rows3, V, get3, lane_mask, lanes_of, load3, set3, splat3};
 use crate::records::Packed;
 
 /// Values of [`EnvironmentEval`] per path.
@@ -21,7 +21,7 @@ pub struct EnvironmentRows {
 
 impl EnvironmentRows {
     #[inline(always)]
-    fn eval(&self, lane: usize) -> EnvironmentEval {
+    pub fn eval(&self, lane: usize) -> EnvironmentEval {
         EnvironmentEval {
             radiance: get3(&self.radiance, lane),
             pdf: self.pdf[lane],
@@ -29,21 +29,21 @@ impl EnvironmentRows {
     }
 }
 
-/// Samples directions to the map for the first `count` paths, like `sample_environment`. `normals` are those for which
-/// the map is sampled.
+/// Samples directions to the map for the paths of the lanes of a mask, like `sample_environment`. `normals` are those for
+/// which the map is sampled.
 #[inline(always)]
 pub fn environment_samples<S: Simd>(
     simd: S,
     scene: &Packed,
     normals: &Rows3,
     u: Lanes2<F<S>>,
-    count: usize,
+    lanes: u64,
 ) -> (V<S>, EnvironmentRows) {
     let environment = &scene.environment;
     let (u_x, u_y): (Row, Row) = (u.x.into(), u.y.into());
     let (mut columns, mut rows) = ([0; LANES], [0; LANES]);
     let (mut x, mut y) = (Row::default(), Row::default());
-    for lane in 0..count {
+    for lane in lanes_of(lanes) {
         let point = environment_point(scene, get3(normals, lane), Vec2::new(u_x[lane], u_y[lane]));
         (columns[lane], rows[lane]) = (point.column, point.row);
         (x[lane], y[lane]) = (point.position.x, point.position.y);
@@ -56,18 +56,18 @@ pub fn environment_samples<S: Simd>(
     let d: V<S> = direction_in_cell(columns, rows, position, environment.width, environment.height);
     let vector = |v| splat3(simd, v);
     let directions = normalize(vector(environment.x) * d.x + vector(environment.y) * d.y + vector(environment.z) * d.z);
-    let evals = environment_evals(simd, scene, directions, normals, count);
+    let evals = environment_evals(simd, scene, directions, normals, lanes);
     (directions, evals)
 }
 
-/// Evaluates the map for the first `count` paths, like `environment_eval`.
+/// Evaluates the map for the paths of the lanes of a mask, like `environment_eval`.
 #[inline(always)]
 fn environment_evals<S: Simd>(
     simd: S,
     scene: &Packed,
     directions: V<S>,
     normals: &Rows3,
-    count: usize,
+    lanes: u64,
 ) -> EnvironmentRows {
     let environment = &scene.environment;
     let axis = |v| dot(splat3(simd, v), directions);
@@ -80,7 +80,7 @@ fn environment_evals<S: Simd>(
     let (columns, rows): ([u32; LANES], [u32; LANES]) = (cells.column.into(), cells.row.into());
     let (x, y): (Row, Row) = (cells.x.into(), cells.y.into());
     let mut evals = EnvironmentRows::default();
-    for lane in 0..count {
+    for lane in lanes_of(lanes) {
         let cell = EnvironmentCell {
             column: columns[lane],
             row: rows[lane],
@@ -104,7 +104,7 @@ pub fn leave_to_environment<S: Simd>(simd: S, scene: &Packed, paths: &mut [PathS
             set3(&mut directions, lane, state.path.ray.direction);
             set3(&mut normals, lane, state.prev_normal);
         }
-        let evals = environment_evals(simd, scene, load3(simd, &directions), &normals, missed.len());
+        let evals = environment_evals(simd, scene, load3(simd, &directions), &normals, lane_mask(missed.len()));
         for (lane, &path) in missed.iter().enumerate() {
             let state = &mut paths[path as usize];
             let light = environment_mis(evals.eval(lane), state.pdf);

@@ -5,12 +5,13 @@ use fearless_simd::{f32x8, mask32x8, u32x8};
 use glam::{UVec2, Vec2, Vec3};
 
 use super::super::emitter::{LightSample, sample_emitter, select_emitter};
+use super::super::environment::EnvironmentEval;
 use super::super::lanes::{Lanes2, Real, Vector3};
 use super::super::light_choice::{EmitterSelection, light_tree_select};
 use super::super::light_sample::solid_angle_pdf;
 use super::super::math::dot;
 use super::environment::environment_samples;
-use super::rows::{F, LANES, Row, Rows3, V, get3, load3, set3, splat3, store3};
+use super::rows::{F, LANES, Row, Rows3, V, get3, lane_mask, lanes_of, load3, set3, splat3, store3};
 use super::shade::IS_OPTIMIZED;
 use crate::records::{ENVIRONMENT, Light, NO_INDEX, Packed, RECTANGLE};
 
@@ -88,22 +89,11 @@ impl LightRows {
                 is_delta: zero.lt(zero), // false in all lanes
             };
         }
-        if let Some(light) = only_environment(scene) {
-            let (to_light, evals) = environment_samples(simd, scene, &store3(normals), choices.u, samples.len());
-            self.to_light = store3(to_light);
-            self.t_max = [light.t_max; LANES];
-            self.primitive = [NO_INDEX; LANES];
-            return LightSamples {
-                to_light,
-                radiance: load3(simd, &evals.radiance),
-                pdf: f32x8::simd_from(simd, evals.pdf),
-                is_delta: zero.lt(zero), // false in all lanes
-            };
-        }
         let (points, normals) = (store3(points), store3(normals));
         let (bits_x, bits_y): ([u32; LANES], [u32; LANES]) = (choices.emitter.x.into(), choices.emitter.y.into());
         let (key_x, key_y): ([u32; LANES], [u32; LANES]) = (choices.tree_key.x.into(), choices.tree_key.y.into());
         let (u_x, u_y): (Row, Row) = (choices.u.x.into(), choices.u.y.into());
+        let mut environment_lanes = 0;
         for (lane, &sample) in samples.iter().enumerate() {
             let (p, normal) = (get3(&points, lane), get3(&normals, lane));
             let mut selection = EmitterSelection {
@@ -114,8 +104,39 @@ impl LightRows {
                 let key = UVec2::new(key_x[lane], key_y[lane]);
                 selection = light_tree_select(scene, selection.emitter, p, normal, key, sample);
             }
+            if let Some(light) = environment_light(scene, &selection) {
+                environment_lanes |= 1 << lane;
+                self.t_max[lane] = light.t_max;
+                continue;
+            }
             let u = Vec2::new(u_x[lane], u_y[lane]);
             self.set(lane, sample_emitter(scene, selection, p, normal, u));
+        }
+        if environment_lanes != 0 {
+            let (to_light, evals) = environment_samples(simd, scene, &normals, choices.u, environment_lanes);
+            if environment_lanes == lane_mask(samples.len()) {
+                self.to_light = store3(to_light);
+                self.primitive = [NO_INDEX; LANES];
+                return LightSamples {
+                    to_light,
+                    radiance: load3(simd, &evals.radiance),
+                    pdf: f32x8::simd_from(simd, evals.pdf),
+                    is_delta: zero.lt(zero), // false in all lanes
+                };
+            }
+            let to_light = store3(to_light);
+            for lane in lanes_of(environment_lanes) {
+                let EnvironmentEval { radiance, pdf } = evals.eval(lane);
+                let sample = LightSample {
+                    to: get3(&to_light, lane),
+                    radiance,
+                    pdf,
+                    is_delta: false,
+                    t_max: self.t_max[lane],
+                    primitive: NO_INDEX,
+                };
+                self.set(lane, sample);
+            }
         }
         LightSamples {
             to_light: load3(simd, &self.to_light),
@@ -137,14 +158,14 @@ pub fn only_light(scene: &Packed) -> Option<&Light> {
     (is_plain && light.kind == RECTANGLE).then_some(light)
 }
 
-/// Returns the environment map, if it is the only emitter of the scene.
-fn only_environment(scene: &Packed) -> Option<&Light> {
-    let [emitter] = scene.lighting.emitters[..] else {
+/// Returns the environment map, if it is the selected emitter and can be sampled in lanes.
+#[inline(always)]
+fn environment_light<'a>(scene: &'a Packed, selection: &EmitterSelection) -> Option<&'a Light> {
+    if !IS_OPTIMIZED || selection.emitter.instance != 0 {
         return None;
-    };
-    let light = scene.lighting.lights.get(emitter.index as usize)?;
-    let is_plain = IS_OPTIMIZED && scene.specialization.light_tree == 0 && emitter.instance == 0;
-    (is_plain && light.kind == ENVIRONMENT).then_some(light)
+    }
+    let light = &scene.lighting.lights[selection.emitter.index as usize];
+    (light.kind == ENVIRONMENT).then_some(light)
 }
 
 /// Returns the vectors to light samples, their radiance and their pdfs, like `sample_light` for rectangles.

@@ -57,6 +57,12 @@ pub fn splat3<S: Simd>(simd: S, v: Vec3) -> V<S> {
     }
 }
 
+/// Returns the numbers of the lanes of a mask.
+#[inline(always)]
+pub fn lanes_of(mask: u64) -> impl Iterator<Item = usize> {
+    (0..LANES).filter(move |lane| mask >> lane & 1 != 0)
+}
+
 /// Returns the mask of the first `count` lanes.
 #[inline(always)]
 pub fn lane_mask(count: usize) -> u64 {
