@@ -1,12 +1,17 @@
 //! Single-scattering albedo tables of rough glass and anisotropic microfacets, for multiple-scattering compensation, by
-//! quadrature over visible normals.
+//! quadrature over visible normals. Eight normals at a time are evaluated in SIMD lanes, and summed one after the other.
 
+use fearless_simd::prelude::*;
+use fearless_simd::{dispatch, f32x8};
 use glam::{DVec2, UVec2, Vec2, Vec3};
+use rayon::prelude::*;
 
 use super::{ANISO_COLUMNS, ANISO_LINES, ENERGY_SIZE, Material, SMALLEST_ALPHA};
 use crate::cpu::ggx::{ggx_g1, ggx_sample};
+use crate::cpu::lanes::{Lanes2, Real, Vector2, Vector3, constant, select};
 use crate::cpu::lobe::{facet_alpha, facet_weight};
 use crate::cpu::math::{dot, max};
+use crate::cpu::samples::LEVEL;
 use crate::cpu::sequence::sobol_sample;
 use crate::cpu::specular::{fresnel, refracted_cosine};
 
@@ -24,69 +29,116 @@ pub fn energy_table(ior: f32, alpha: Option<f32>) -> Vec<f32> {
     } else {
         NORMAL_SAMPLES.1
     });
-    let mut table = Vec::new();
-    for index in [ior, 1.0 / ior] {
-        for row in 0..ENERGY_SIZE {
-            let root = row as f32 / last;
-            let alpha = max(root * root, SMALLEST_ALPHA);
-            for column in 0..ENERGY_SIZE {
-                let cosine = max(column as f32 / last, 0.002);
-                table.push(if is_needed(row) {
-                    glass_albedo(index, alpha, cosine, &facets)
-                } else {
-                    1.0
-                });
-            }
+    let entry = |i: u32| {
+        let (table, row, column) = (
+            i / (ENERGY_SIZE * ENERGY_SIZE),
+            i / ENERGY_SIZE % ENERGY_SIZE,
+            i % ENERGY_SIZE,
+        );
+        if !is_needed(row) {
+            return 1.0;
         }
-    }
-    table
+        let root = row as f32 / last;
+        let alpha = max(root * root, SMALLEST_ALPHA);
+        let cosine = max(column as f32 / last, 0.002);
+        let wo = Vec3::new(max(1.0 - cosine * cosine, 0.0).sqrt(), 0.0, cosine);
+        let index = if table == 0 { ior } else { 1.0 / ior };
+        glass_albedo(index, Vec2::splat(alpha), wo, &facets)
+    };
+    (0..2 * ENERGY_SIZE * ENERGY_SIZE).into_par_iter().map(entry).collect()
 }
 
-fn points(count: u32) -> Vec<Vec2> {
-    (0..count).map(|i| sobol_sample(i, UVec2::new(1, 2))).collect()
+/// Coordinates of eight points on the unit square.
+type Points = [[f32; 8]; 2];
+
+fn points(count: u32) -> Vec<Points> {
+    let point = |i: u32| sobol_sample(i, UVec2::new(1, 2));
+    let coordinates = |first: u32| [0, 1].map(|axis| std::array::from_fn(|i| point(first + i as u32)[axis]));
+    (0..count).step_by(8).map(coordinates).collect()
 }
 
 /// Returns the single-scattering albedo of rough glass: the energy reflected and transmitted.
-fn glass_albedo(index: f32, alpha: f32, cosine: f32, facets: &[Vec2]) -> f32 {
-    let wo = Vec3::new(max(1.0 - cosine * cosine, 0.0).sqrt(), 0.0, cosine);
-    glass_albedo_aniso(index, Vec2::splat(alpha), wo, facets)
+fn glass_albedo(index: f32, alpha: Vec2, wo: Vec3, facets: &[Points]) -> f32 {
+    let mut sum = 0.0;
+    dispatch!(*LEVEL, simd => {
+        let eta: f32x8<_> = SimdBase::splat(simd, 1.0 / index);
+        let (alpha, wo) = in_lanes(simd, alpha, wo);
+        for u in facets {
+            let (mirrored, refracted) = glass_energy(eta, alpha, wo, point_in_lanes(simd, u));
+            let (mirrored, refracted): ([f32; 8], [f32; 8]) = (mirrored.into(), refracted.into());
+            for (mirrored, refracted) in mirrored.into_iter().zip(refracted) {
+                sum += f64::from(mirrored);
+                sum += f64::from(refracted);
+            }
+        }
+    });
+    (sum / (8 * facets.len()) as f64) as f32
 }
 
-/// Like `glass_albedo`, for any direction and anisotropic alpha.
-fn glass_albedo_aniso(index: f32, alpha: Vec2, wo: Vec3, facets: &[Vec2]) -> f32 {
-    let eta = 1.0 / index;
-    let mut sum = 0.0;
-    for u in facets {
-        let m = ggx_sample(alpha, wo, *u);
-        let c = max(dot(wo, m), 1e-6);
-        let t = refracted_cosine(c, eta);
-        let reflected = fresnel(c, t, eta);
-        let above = m * (2.0 * c) - wo;
-        let below = m * (eta * c - t) - wo * eta;
-        if above.z > 0.0 {
-            sum += f64::from(reflected * facet_weight(alpha, wo, above));
-        }
-        if below.z < 0.0 {
-            sum += f64::from((1.0 - reflected) * ggx_g1(alpha, below));
-        }
-    }
-    (sum / facets.len() as f64) as f32
+/// Returns the energy that the microfacet selected by `u` reflects, and the energy that it transmits.
+#[inline(always)]
+fn glass_energy<F: Real>(eta: F, alpha: F::Vec2, wo: F::Vec3, u: F::Vec2) -> (F, F) {
+    let zero = eta.splat(0.0);
+    let m = ggx_sample(alpha, wo, u);
+    let c = max(dot(wo, m), eta.splat(1e-6));
+    let t = refracted_cosine(c, eta);
+    let reflected = fresnel(c, t, eta);
+    let above = m * (constant(2.0) * c) - wo;
+    let below = m * (eta * c - t) - wo * eta;
+    let mirrored = reflected * facet_weight(alpha, wo, above);
+    let refracted = (constant(1.0) - reflected) * ggx_g1(alpha, below);
+    (
+        select(zero, mirrored, above.z().gt(zero)),
+        select(zero, refracted, below.z().lt(zero)),
+    )
 }
 
 /// Computes by quadrature the factors of F0 and F90 in the single-scattering albedo of reflection with Schlick's
 /// Fresnel term. `ggx_albedo` is a fit of the same factors for isotropic lobes.
-fn schlick_albedo(alpha: Vec2, wo: Vec3, facets: &[Vec2]) -> DVec2 {
+fn schlick_albedo(alpha: Vec2, wo: Vec3, facets: &[Points]) -> DVec2 {
     let mut sum = DVec2::ZERO;
-    for u in facets {
-        let m = ggx_sample(alpha, wo, *u);
-        let c = dot(wo, m);
-        let wi = m * (2.0 * c) - wo;
-        if wi.z > 0.0 {
-            let edge = f64::from(max(1.0 - c, 0.0)).powi(5);
-            sum += DVec2::new(1.0 - edge, edge) * f64::from(facet_weight(alpha, wo, wi));
+    dispatch!(*LEVEL, simd => {
+        let (alpha, wo) = in_lanes(simd, alpha, wo);
+        for u in facets {
+            let (cosine, weight) = mirrored_energy(alpha, wo, point_in_lanes(simd, u));
+            let (cosine, weight): ([f32; 8], [f32; 8]) = (cosine.into(), weight.into());
+            for (c, weight) in cosine.into_iter().zip(weight) {
+                let edge = f64::from(max(1.0 - c, 0.0)).powi(5);
+                sum += DVec2::new(1.0 - edge, edge) * f64::from(weight);
+            }
         }
-    }
-    sum / facets.len() as f64
+    });
+    sum / (8 * facets.len()) as f64
+}
+
+/// Returns the cosine of the angle to the microfacet selected by `u`, and the energy that it reflects without a Fresnel
+/// term.
+#[inline(always)]
+fn mirrored_energy<V: Vector3>(
+    alpha: <V::Real as Real>::Vec2,
+    wo: V,
+    u: <V::Real as Real>::Vec2,
+) -> (V::Real, V::Real) {
+    let m = ggx_sample(alpha, wo, u);
+    let c = dot(wo, m);
+    let zero = c.splat(0.0);
+    let wi = m * (constant(2.0) * c) - wo;
+    (c, select(zero, facet_weight(alpha, wo, wi), wi.z().gt(zero)))
+}
+
+/// Returns `alpha` and `wo` in all lanes.
+#[inline(always)]
+fn in_lanes<S: Simd>(simd: S, alpha: Vec2, wo: Vec3) -> (Lanes2<f32x8<S>>, <f32x8<S> as Real>::Vec3) {
+    let zero: f32x8<S> = SimdBase::splat(simd, 0.0);
+    (
+        Vector2::new(Real::splat(zero, alpha.x), Real::splat(zero, alpha.y)),
+        zero.broadcast(wo),
+    )
+}
+
+#[inline(always)]
+fn point_in_lanes<S: Simd>(simd: S, u: &Points) -> Lanes2<f32x8<S>> {
+    Vector2::new(f32x8::simd_from(simd, u[0]), f32x8::simd_from(simd, u[1]))
 }
 
 /// The lobes of a material that have albedo tables. Each variant lists its tables in order.
@@ -145,20 +197,22 @@ pub fn aniso_table(lobes: TableLobes, roughness: Option<f32>, anisotropy: Option
     let glass = |words: &mut Vec<u32>, ior_bits: u32| {
         let ior = f32::from_bits(ior_bits);
         for relative_ior in [ior, 1.0 / ior] {
-            words.extend(nodes.iter().map(|(alpha, wo)| {
-                (glass_albedo_aniso(relative_ior, *alpha, *wo, &facets) * KINK_CORRECTION).to_bits()
-            }));
+            words.par_extend(
+                nodes
+                    .par_iter()
+                    .map(|(alpha, wo)| (glass_albedo(relative_ior, *alpha, *wo, &facets) * KINK_CORRECTION).to_bits()),
+            );
         }
     };
     match lobes {
         TableLobes::Glass(ior_bits) => glass(&mut words, ior_bits),
-        TableLobes::Reflection => words.extend(nodes.iter().map(|(alpha, wo)| {
+        TableLobes::Reflection => words.par_extend(nodes.par_iter().map(|(alpha, wo)| {
             let albedo = schlick_albedo(*alpha, *wo, &facets);
             ((albedo.x + albedo.y) as f32).to_bits()
         })),
         TableLobes::Principled(ior_bits) => {
             let albedos: Vec<DVec2> = nodes
-                .iter()
+                .par_iter()
                 .map(|(alpha, wo)| schlick_albedo(*alpha, *wo, &facets))
                 .collect();
             words.extend(albedos.iter().map(|albedo| (albedo.x as f32).to_bits()));
