@@ -10,11 +10,11 @@ use wgray::scene::Integrator;
 use wgray_render::cpu::decoded_meshes::{are_decoded, decode_meshes, decode_meshes_up_to};
 use wgray_render::cpu::integrators::path::{path_layers, path_value};
 use wgray_render::cpu::pixel::{Layers, pixel_radiance};
-use wgray_render::cpu::wavefront::{LaneHits, MaterialKind, SurfaceKind, Wavefront};
+use wgray_render::cpu::wavefront::{LaneHits, MaterialKind, SmoothKind, SurfaceKind, Wavefront};
 use wgray_render::records::{
-    CULL_BACKFACE, CULL_BOTH_FACES, DIFFUSE, EMITTER, ENERGY_SIZE, LOBE_ANISOTROPY, LOBE_COAT, LOBE_SHEEN,
-    LOBE_SPECULAR, LOBE_TRANSMISSION, METAL, Material, NO_COLORS, NO_INDEX, OPAQUE, PRINCIPLED, Packed, RANDOM,
-    ROUGH_GLASS, SOBOL,
+    CULL_BACKFACE, CULL_BOTH_FACES, DIFFUSE, EMITTER, ENERGY_SIZE, GLASS, LOBE_ANISOTROPY, LOBE_COAT, LOBE_SHEEN,
+    LOBE_SPECULAR, LOBE_TRANSMISSION, METAL, MIRROR, Material, NO_COLORS, NO_INDEX, OPAQUE, PRINCIPLED, Packed, RANDOM,
+    ROUGH_GLASS, SOBOL, THIN,
 };
 
 use crate::random_scenes::any_scene;
@@ -77,7 +77,8 @@ fn count_differing(paths: &[PathBits], expected: &[PathBits]) -> usize {
     paths.iter().zip(expected).filter(|(a, b)| a != b).count()
 }
 
-/// Makes most materials diffuse, `principled`, metal or dielectric, so that their hits are shaded in lanes. Half of these materials get no
+/// Makes most materials those of a kind, so that their hits are shaded in lanes. [`MaterialKind::Smooth`] stands for
+/// smooth materials of all kinds. Half of these materials get no
 /// emission, and two thirds get no textures. The maximum number of bounces is at least 3. A third of the scenes get a
 /// pinhole camera with Sobol' points; in half of them, the camera does not see all surfaces.
 fn with_lane_materials(mut packed: Packed, scene_index: usize, kind: MaterialKind) -> Packed {
@@ -104,6 +105,7 @@ fn with_lane_materials(mut packed: Packed, scene_index: usize, kind: MaterialKin
             MaterialKind::Principled => make_principled(material, energy_table, scene_index + i),
             MaterialKind::Metal => make_metal(material, scene_index + i),
             MaterialKind::Dielectric => make_dielectric(material, energy_table, scene_index + i),
+            MaterialKind::Smooth(_) => make_smooth(material, scene_index + i),
         }
         material.alpha_mode = OPAQUE;
         if packed.specialization.camera_invisible != 0 {
@@ -130,6 +132,9 @@ fn with_lane_materials(mut packed: Packed, scene_index: usize, kind: MaterialKin
     }
     if kind != MaterialKind::Diffuse && scene_index.is_multiple_of(5) {
         s.anisotropic = 1;
+    }
+    if matches!(kind, MaterialKind::Smooth(_)) && !scene_index.is_multiple_of(7) {
+        s.differentials = 0;
     }
     packed
 }
@@ -164,6 +169,16 @@ fn make_dielectric(material: &mut Material, energy_table: u32, variant: usize) {
     };
 }
 
+/// Makes a material a mirror, a conductor, a dielectric or a thin sheet without roughness. `variant` selects the kind.
+fn make_smooth(material: &mut Material, variant: usize) {
+    material.kind = [MIRROR, METAL, GLASS, ROUGH_GLASS, THIN][variant % 5];
+    material.tint = Vec3::new(0.9, 0.6, 0.3);
+    (material.eta, material.k) = (Vec3::new(0.2, 0.4, 1.4), Vec3::new(3.9, 2.4, 1.6));
+    material.ior = [1.5, 1.1, 0.7, 2.4][variant % 4];
+    (material.roughness, material.anisotropy) = (0.0, 0.0);
+    (material.energy, material.aniso_table) = (NO_INDEX, 0);
+}
+
 /// Makes a material a rough conductor. `variant` selects the parameters.
 fn make_metal(material: &mut Material, variant: usize) {
     material.kind = METAL;
@@ -178,11 +193,15 @@ fn make_metal(material: &mut Material, variant: usize) {
     material.energy = if variant.is_multiple_of(5) { NO_INDEX } else { 0 };
 }
 
-const MATERIALS: [MaterialKind; 4] = [
+const MATERIALS: [MaterialKind; 8] = [
     MaterialKind::Diffuse,
     MaterialKind::Principled,
     MaterialKind::Metal,
     MaterialKind::Dielectric,
+    MaterialKind::Smooth(SmoothKind::Mirror),
+    MaterialKind::Smooth(SmoothKind::Metal),
+    MaterialKind::Smooth(SmoothKind::Dielectric),
+    MaterialKind::Smooth(SmoothKind::Thin),
 ];
 const SURFACES: [SurfaceKind; 3] = [SurfaceKind::Flat, SurfaceKind::Face, SurfaceKind::Evaluated];
 
@@ -192,7 +211,7 @@ struct LaneCoverage {
     camera: usize,
     camera_invisible: usize,
     /// Scenes with hits on each kind of material (rows) and surface.
-    kinds: [[usize; 3]; 4],
+    kinds: [[usize; 3]; MATERIALS.len()],
     coat: usize,
     sheen: usize,
     anisotropy: usize,
@@ -297,11 +316,13 @@ impl LaneCoverage {
             alpha,
             layers,
         ];
-        let [other_kinds @ .., [0, 0, dielectrics]] = kinds else {
-            panic!("dielectrics are evaluated one by one: {self:?}");
+        let [diffuse, principled, metal, [0, 0, dielectrics], smooth @ ..] = kinds else {
+            panic!("rough dielectrics are evaluated one by one: {self:?}");
         };
+        let other_kinds = [diffuse, principled, metal];
         assert!(other_kinds.as_flattened().iter().all(|count| *count > 10), "{self:?}");
         assert!(dielectrics > 10, "{self:?}");
+        assert!(smooth.as_flattened().iter().all(|count| *count > 5), "{self:?}");
         assert!(features.into_iter().all(|count| count > 5), "{self:?}");
     }
 }
@@ -386,7 +407,11 @@ fn random_scenes_have_the_paths_of_the_scalar_integrator() {
         let packed = if i % 2 == 0 { packed.with_layers() } else { packed };
         let packed = if i % 3 == 0 { packed.with_noise() } else { packed }; // layers then contain the depth
         let batch_size = [1, 7, 64, 1024][i % 4];
-        let with_lanes = MATERIALS.map(|kind| with_lane_materials(packed.clone(), i, kind));
+        let kinds = &MATERIALS[..5]; // the last one stands for all smooth materials
+        let with_lanes: Vec<Packed> = kinds
+            .iter()
+            .map(|kind| with_lane_materials(packed.clone(), i, *kind))
+            .collect();
         for (packed, step) in with_lanes.iter().map(|packed| (packed, 3)).chain([(&packed, 2)]) {
             let samples = samples(packed, step, 3);
             let expected = scalar(packed, &samples);

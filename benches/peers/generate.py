@@ -239,7 +239,7 @@ SCENES = {  # name: the function that returns the scene's text, and the mesh or 
     **{name: (terrain, name) for name in ("terrain1m", "terrain10m")},
     "dragon870k": (dragon, "dragon870k"),
     **{f"ellipsoids{count}": (lambda _, count=count: ellipsoids(count), None) for count in (10, 1000, 100000)},
-    "path-rock70k": (rock_in_box, "rock70k"),
+    **{f"path-{name}": (rock_in_box, name) for name in ("rock70k", "rock870k")},
     "path-spheres": (lambda _: spheres(), None),
     **{f"path-lamps{count}": (lambda _, count=count: area_lights(count), None) for count in (1, 1000)},
     "path-principled70k": (principled_rock, "rock70k"),

@@ -76,6 +76,7 @@ LARGE = {
 PATH = {
     "path": path("paths in scenes/cornell-path.toml", CORNELL_PATH, 400),
     "path-rock70k": path("paths around a rock of 69,312 triangles", "path-rock70k", 400),
+    "path-rock870k": dataclasses.replace(path("paths around a rock of 868,332 triangles", "path-rock870k", 400), renderers=WITHOUT_CYCLES),
     "path-cold": path("paths in scenes/cornell-path.toml, whole process, caches empty", CORNELL_PATH, 400, "cold"),
 }
 MATERIALS = {name: dataclasses.replace(workload, renderers=WITHOUT_CYCLES) for name, workload in {  # cycles_scenes.py does not support these scenes

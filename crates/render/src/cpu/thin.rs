@@ -3,17 +3,19 @@
 use glam::{Vec2, Vec3};
 
 use super::ggx::{ggx_d, ggx_length, ggx_sample};
+use super::lanes::{Real, constant};
 use super::lobe::{LobeSample, facet_alpha, facet_eval, facet_pdf, facet_weight, half_vector};
 use super::math::{dot, max, min};
 use super::rough_dielectric::dielectric_gain;
 use super::specular::{fresnel, refracted_cosine};
 use crate::records::Material;
 
-pub fn thin_reflectance(ior: f32, cosine: f32) -> f32 {
-    let c = min(max(cosine, 1e-6), 1.0);
-    let eta = 1.0 / ior;
+#[inline(always)]
+pub fn thin_reflectance<F: Real>(ior: F, cosine: F) -> F {
+    let c = min(max(cosine, ior.splat(1e-6)), ior.splat(1.0));
+    let eta = constant(1.0) / ior;
     let one_side = fresnel(c, refracted_cosine(c, eta), eta);
-    2.0 * one_side / (1.0 + one_side)
+    constant(2.0) * one_side / (constant(1.0) + one_side)
 }
 
 pub fn to_upper_side(wi: Vec3) -> Vec3 {

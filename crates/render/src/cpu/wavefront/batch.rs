@@ -17,7 +17,9 @@ use super::super::path::{Path, usable_normal};
 use super::super::principled::bounded_color;
 use super::super::ray::{Hit, Ray};
 use super::super::rng::{hash4, unit_float};
-use super::super::scattering::{bounded, facet_frame, is_transmissive, local_wo, material_for_view, shaded_normal};
+use super::super::scattering::{
+    bounded, facet_frame, is_delta, is_transmissive, local_wo, material_for_view, shaded_normal,
+};
 use super::super::shadow_ray::ShadowRay;
 use super::super::surface::{Surface, largest};
 use super::super::texture::evaluate_material;
@@ -28,6 +30,7 @@ use super::lights::{LightChoices, LightRows, only_light};
 use super::materials::{Diffuse, Directions, Facets, Principled};
 use super::rows::{F, LANES, Row, Rows3, get3, load3, set3, splat3, store3};
 use super::shade::{IS_OPTIMIZED, MaterialKind, QueuedHit, ShadingQueues, SurfaceKind};
+use super::smooth::{smooth_normal, smooth_rays};
 use super::surfaces::{FaceHits, FlatHits, LaneSurfaces, ScalarHits};
 use crate::records::{
     DIFFUSE, ENVIRONMENT_MAP, INFINITE_T, INSTANCE, LOBE_TRANSMISSION, Material, NO_INDEX, PRINCIPLED, Packed,
@@ -83,7 +86,7 @@ fn evaluate(scene: &Packed, path: &Path, hit: Hit) -> Evaluated {
         coat_normal = shading.coat_normal;
     }
     let mut energy = Vec3::ONE;
-    if material.kind != DIFFUSE && (s.anisotropic != 0 || is_transmissive(&material)) {
+    if material.kind != DIFFUSE && !is_delta(&material) && (s.anisotropic != 0 || is_transmissive(&material)) {
         surface.shading_normal = shaded_normal(surface, &material, surface.shading_normal);
         let frame = facet_frame(scene, surface, &material);
         (surface.du, surface.dv) = (frame.u, frame.v);
@@ -103,16 +106,19 @@ fn evaluate(scene: &Packed, path: &Path, hit: Hit) -> Evaluated {
     }
 }
 
-/// Records the layers of the first hit, like `record_first_hit_layers`. `albedo` includes the throughput.
+/// Records the layers of the first hit, like `record_first_hit_layers`. `albedo` includes the throughput; [`None`] for a
+/// smooth material.
 #[inline(always)]
-fn record_layers(scene: &Packed, state: &mut PathState, normal: Vec3, albedo: Vec3, t: f32) {
+fn record_layers(scene: &Packed, state: &mut PathState, normal: Vec3, albedo: Option<Vec3>, t: f32) {
     if state.path.depth == 0 {
         state.layers.emission.w = 1.0;
         let has_distance = scene.specialization.noise != 0;
         let distance = if has_distance { t + state.skipped_distance } else { 0.0 };
         state.layers.normal = normal.extend(distance);
     }
-    if !state.albedo_recorded {
+    if let Some(albedo) = albedo
+        && !state.albedo_recorded
+    {
         state.layers.albedo = albedo.extend(0.0);
         state.albedo_recorded = true;
     }
@@ -257,7 +263,14 @@ impl Batch<'_> {
         } else {
             key // not used
         };
-        if !is_diffuse {
+        let smooth_kind = match material_kind {
+            MaterialKind::Smooth(kind) if IS_OPTIMIZED => Some(kind),
+            _ => None,
+        };
+        if let Some(kind) = smooth_kind {
+            let rows = &materials.rows;
+            surface.shading_normal = smooth_normal(kind, &LaneMaterials { simd, rows }, &surface);
+        } else if !is_diffuse {
             surface.shading_normal = usable_normal(surface, surface.shading_normal);
         }
         surface.transmits = match material_kind {
@@ -268,8 +281,8 @@ impl Batch<'_> {
             MaterialKind::Dielectric => Some(zero.le(zero)), // true in all lanes
             _ => None,
         };
-        let has_instances = s.tlas_kinds & (1 << INSTANCE) != 0;
-        if has_instances {
+        let has_offset = s.tlas_kinds & (1 << INSTANCE) != 0 && smooth_kind.is_none();
+        if has_offset {
             surface.ray_origin = surface.ray_origin + surface.terminator_offset;
         }
         let normal_to_light = surface.lit_normal();
@@ -280,8 +293,9 @@ impl Batch<'_> {
             let choices = decision_set(scene, Lanes2 { x, y }, sample);
             (random, roulette_random) = (unit_float(choices.x), unit_float(choices.y));
         }
+        let has_lights = s.emitters != 0 && smooth_kind.is_none();
         let mut light = None;
-        if s.emitters != 0 {
+        if has_lights {
             let tree_key = Lanes2 {
                 x: decision_key[0],
                 y: decision_key[1],
@@ -299,6 +313,7 @@ impl Batch<'_> {
             light = Some(lights.sample(simd, scene, choices, surface.ray_origin, normal_to_light, samples));
         }
         let directions = Directions {
+            throughput,
             to_light: light.as_ref().map(|light| normalize(light.to_light)),
             u: decision(scene, Lanes2 { x: key[2], y: key[3] }, sample),
             random,
@@ -318,6 +333,13 @@ impl Batch<'_> {
             MaterialKind::Dielectric if IS_OPTIMIZED => {
                 Facets::dielectric(simd, rows_of_materials, &surface).scatter(&surface, directions)
             }
+            MaterialKind::Smooth(kind) if IS_OPTIMIZED => {
+                let material = LaneMaterials {
+                    simd,
+                    rows: rows_of_materials,
+                };
+                smooth_rays(kind, &material, &surface, directions)
+            }
             _ => {
                 let material = LaneMaterials {
                     simd,
@@ -329,7 +351,7 @@ impl Batch<'_> {
 
         let (mut contributions, mut to_lights) = (Rows3::default(), lights.to_light);
         let (mut queued_mask, mut lit_behind) = (0, 0);
-        let origin_behind = surface.origin_behind(has_instances);
+        let origin_behind = surface.origin_behind(has_offset);
         if let (Some(light), Some(reflected)) = (light, result.reflections) {
             if let Some(transmits) = surface.transmits {
                 let to_light = light.to_light;
@@ -347,7 +369,7 @@ impl Batch<'_> {
             contributions = store3(contribution);
         }
         let next = result.next_rays;
-        let mut continued = throughput * next.weight;
+        let mut continued = next.throughput;
         let mut eta2 = f32x8::simd_from(simd, rows.eta2);
         let mut leaves_behind = 0;
         if let Some(transmitted) = next.transmitted {
@@ -373,7 +395,7 @@ impl Batch<'_> {
             let albedo = match material_kind {
                 MaterialKind::Metal => metal_fresnel(&material, one),
                 MaterialKind::Diffuse | MaterialKind::Principled => material.diffuse(),
-                MaterialKind::Dielectric => material.tint(),
+                MaterialKind::Dielectric | MaterialKind::Smooth(_) => material.tint(),
             };
             albedos = store3(throughput * albedo);
         }
@@ -398,9 +420,10 @@ impl Batch<'_> {
             let bounces = rows.depth[lane] + 1;
             if s.layers != 0 {
                 let normal = get3(&normals, lane) * sides[lane];
-                record_layers(scene, state, normal, get3(&albedos, lane), queued.hit.t);
+                let albedo = smooth_kind.is_none().then(|| get3(&albedos, lane));
+                record_layers(scene, state, normal, albedo, queued.hit.t);
             }
-            if s.emitters != 0 {
+            if has_lights {
                 let contribution = get3(&contributions, lane);
                 if queued_mask >> lane & 1 != 0 {
                     let (origin, exclude_front, exclude_back) = exit(lit_behind);
@@ -438,6 +461,9 @@ impl Batch<'_> {
             state.eta2 = eta2[lane];
             state.skipped_distance = 0.0;
             state.ended |= survives >> lane & 1 == 0;
+            if smooth_kind.is_some() {
+                continue;
+            }
             if has_light_tree {
                 state.prev_position = get3(&origins, lane);
             }

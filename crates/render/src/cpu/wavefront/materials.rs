@@ -25,10 +25,10 @@ pub struct Reflections<S: Simd> {
     pub pdf: F<S>,
 }
 
-/// Directions of the next rays, with the factors of the throughputs.
+/// Directions of the next rays, with the throughputs of their paths.
 pub struct NextRays<S: Simd> {
     pub wi: V<S>,
-    pub weight: V<S>,
+    pub throughput: V<S>,
     pub pdf: F<S>,
     /// [`None`] if no material transmits light.
     pub transmitted: Option<Transmitted<S>>,
@@ -55,6 +55,8 @@ impl<S: Simd> Transmitted<S> {
 /// Directions to light samples, and random numbers to sample the next rays.
 #[derive(Clone, Copy)]
 pub struct Directions<S: Simd> {
+    /// Throughputs before the bounce.
+    pub throughput: V<S>,
     /// [`None`] if the scene has no emitters.
     pub to_light: Option<V<S>>,
     /// Point on the unit square.
@@ -88,7 +90,7 @@ impl<S: Simd> Diffuse<S> {
     pub fn scatter(&self, surface: &LaneSurfaces<S>, directions: Directions<S>) -> ScatterResult<S> {
         ScatterResult {
             reflections: directions.to_light.map(|wi| self.reflections(surface, wi)),
-            next_rays: self.next_rays(surface, directions.u),
+            next_rays: self.next_rays(surface, directions),
         }
     }
 
@@ -103,14 +105,14 @@ impl<S: Simd> Diffuse<S> {
     }
 
     #[inline(always)]
-    fn next_rays(&self, surface: &LaneSurfaces<S>, u: Lanes2<F<S>>) -> NextRays<S> {
-        let wi = diffuse_sample(surface.shading_normal, u);
+    fn next_rays(&self, surface: &LaneSurfaces<S>, directions: Directions<S>) -> NextRays<S> {
+        let wi = diffuse_sample(surface.shading_normal, directions.u);
         let Reflections { value, pdf } = self.reflections(surface, wi);
         let zero = pdf.splat(0.0);
         let inverse_pdf = select(zero, constant(1.0) / pdf, pdf.gt(zero));
         NextRays {
             wi,
-            weight: value * inverse_pdf,
+            throughput: directions.throughput * (value * inverse_pdf),
             pdf,
             transmitted: None,
         }
@@ -170,7 +172,7 @@ impl<S: Simd> Principled<S> {
             }),
             next_rays: NextRays {
                 wi,
-                weight: surface.where_allowed(wi, sample.weight),
+                throughput: directions.throughput * surface.where_allowed(wi, sample.weight),
                 pdf: sample.pdf,
                 transmitted: Transmitted::of(surface, &sample),
             },
@@ -225,7 +227,7 @@ impl<'a, S: Simd> Facets<'a, S> {
             reflections: directions.to_light.map(|wi| self.reflections(surface, wi)),
             next_rays: NextRays {
                 wi,
-                weight: surface.where_allowed(wi, sample.weight),
+                throughput: directions.throughput * surface.where_allowed(wi, sample.weight),
                 pdf: sample.pdf,
                 transmitted: Transmitted::of(surface, &sample),
             },

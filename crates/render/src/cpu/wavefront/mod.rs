@@ -16,6 +16,7 @@ mod occlusion;
 mod rows;
 mod scratch;
 mod shade;
+mod smooth;
 mod surfaces;
 
 use glam::UVec2;
@@ -27,6 +28,7 @@ use self::occlusion::occluded_rays;
 use self::scratch::Scratch;
 pub use self::shade::{LaneHits, MaterialKind, SurfaceKind};
 use self::shade::{ShadingQueues, shade_hits};
+pub use self::smooth::SmoothKind;
 use super::decoded_meshes::are_decoded;
 use super::integrators::path::{PathState, add_radiance};
 use super::ray::Hit;

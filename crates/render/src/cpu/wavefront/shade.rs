@@ -15,9 +15,10 @@ use super::super::samples::LEVEL;
 use super::super::scattering::is_transmissive;
 use super::QueuedShadowRay;
 use super::batch::Batch;
+use super::smooth::SmoothKind;
 use crate::records::{
-    DIFFUSE, ENVIRONMENT_MAP, FOR_ANISOTROPY, FOR_ROUGHNESS, METAL, Material, NO_COLORS, NO_INDEX, NO_SHADOW, OPAQUE,
-    PRINCIPLED, Packed, ROUGH_GLASS,
+    DIFFUSE, ENVIRONMENT_MAP, FOR_ANISOTROPY, FOR_ROUGHNESS, GLASS, METAL, MIRROR, Material, NO_COLORS, NO_INDEX,
+    NO_SHADOW, OPAQUE, PRINCIPLED, Packed, ROUGH_GLASS, THIN,
 };
 
 /// True in builds with optimization. Otherwise, only diffuse surfaces are shaded in lanes, because the stack frame of the
@@ -42,15 +43,32 @@ pub enum MaterialKind {
     Metal,
     /// A rough dielectric.
     Dielectric,
+    /// A material without roughness.
+    Smooth(SmoothKind),
 }
 
 impl MaterialKind {
-    const ALL: [MaterialKind; 4] = [
+    const ALL: [MaterialKind; 8] = [
         MaterialKind::Diffuse,
         MaterialKind::Principled,
         MaterialKind::Metal,
         MaterialKind::Dielectric,
+        MaterialKind::Smooth(SmoothKind::Mirror),
+        MaterialKind::Smooth(SmoothKind::Metal),
+        MaterialKind::Smooth(SmoothKind::Dielectric),
+        MaterialKind::Smooth(SmoothKind::Thin),
     ];
+
+    /// Returns the position in [`MaterialKind::ALL`].
+    fn index(self) -> usize {
+        match self {
+            MaterialKind::Diffuse => 0,
+            MaterialKind::Principled => 1,
+            MaterialKind::Metal => 2,
+            MaterialKind::Dielectric => 3,
+            MaterialKind::Smooth(kind) => 4 + kind as usize,
+        }
+    }
 }
 
 /// The kind of surface of a hit.
@@ -78,7 +96,7 @@ pub struct LaneHits {
 
 impl LaneHits {
     pub fn count(&self, material: MaterialKind, surface: SurfaceKind) -> usize {
-        self.counts[material as usize][surface as usize]
+        self.counts[material.index()][surface as usize]
     }
 }
 
@@ -127,7 +145,7 @@ pub fn shade_hits(
                 state.ended = true;
                 continue;
             }
-            let queue = &mut queues.hits[material_kind as usize][surface_kind as usize];
+            let queue = &mut queues.hits[material_kind.index()][surface_kind as usize];
             queue.push(QueuedHit { path, material, hit });
         } else if let Some(ray) = shade(scene, state, hit, pixels[path as usize]) {
             shadow_rays.push(QueuedShadowRay { path, ray });
@@ -189,7 +207,7 @@ impl ShadingQueues {
     /// Returns the queues that contain hits, with their kinds.
     pub fn filled(&self) -> impl Iterator<Item = (MaterialKind, SurfaceKind, &[QueuedHit])> {
         let of_material = |material: MaterialKind| {
-            SurfaceKind::ALL.map(|surface| (material, surface, &self.hits[material as usize][surface as usize][..]))
+            SurfaceKind::ALL.map(|surface| (material, surface, &self.hits[material.index()][surface as usize][..]))
         };
         let all = MaterialKind::ALL.into_iter().flat_map(of_material);
         all.filter(|(_, _, hits)| !hits.is_empty())
@@ -221,6 +239,10 @@ fn lane_queue(scene: &Packed, state: &PathState, hit: Hit) -> Option<(MaterialKi
         return None;
     }
     let (material_kind, scalar_purposes) = lane_material(material)?;
+    let is_smooth = matches!(material_kind, MaterialKind::Smooth(_));
+    if is_smooth && s.differentials != 0 {
+        return None; // only the scalar `shade` computes differentials of reflected rays
+    }
     let mut lookups = (0..material.lookups.y).map(|i| &scene.textures.lookups[(material.lookups.x + i) as usize]);
     if lookups.any(|lookup| lookup.purposes & scalar_purposes != 0) {
         return None;
@@ -230,7 +252,7 @@ fn lane_queue(scene: &Packed, state: &PathState, hit: Hit) -> Option<(MaterialKi
         return None; // emission is added to the last hit
     }
     let has_plain_surface = material.lookups.y == 0 && material.vertex_colors == NO_COLORS && !is_emissive;
-    let has_frame = material_kind != MaterialKind::Diffuse && (s.anisotropic != 0 || transmits);
+    let has_frame = !is_smooth && material_kind != MaterialKind::Diffuse && (s.anisotropic != 0 || transmits);
     if has_plain_surface && !has_frame {
         return Some((material_kind, surface_kind, index));
     }
@@ -259,6 +281,16 @@ fn lane_material(material: &Material) -> Option<(MaterialKind, u32)> {
         PRINCIPLED if IS_OPTIMIZED => Some((MaterialKind::Principled, 0)),
         METAL if IS_OPTIMIZED && !is_polished(material) => Some((MaterialKind::Metal, decides_polish)),
         ROUGH_GLASS if IS_OPTIMIZED && !is_polished(material) => Some((MaterialKind::Dielectric, decides_polish)),
+        THIN if !is_polished(material) => None,
+        MIRROR | METAL | GLASS | ROUGH_GLASS | THIN if IS_OPTIMIZED => {
+            let kind = match material.kind {
+                MIRROR => SmoothKind::Mirror,
+                METAL => SmoothKind::Metal,
+                THIN => SmoothKind::Thin,
+                _ => SmoothKind::Dielectric,
+            };
+            Some((MaterialKind::Smooth(kind), decides_polish))
+        }
         _ => None,
     }
 }
