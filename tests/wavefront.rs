@@ -10,7 +10,7 @@ use wgray::scene::Integrator;
 use wgray_render::cpu::decoded_meshes::{are_decoded, decode_meshes, decode_meshes_up_to};
 use wgray_render::cpu::integrators::path::{path_layers, path_value};
 use wgray_render::cpu::pixel::{Layers, pixel_radiance};
-use wgray_render::cpu::wavefront::{LaneHits, MaterialKind, SmoothKind, SurfaceKind, Wavefront};
+use wgray_render::cpu::wavefront::{LaneHits, MaterialKind, SurfaceKind, Wavefront};
 use wgray_render::records::{
     CULL_BACKFACE, CULL_BOTH_FACES, DIFFUSE, EMITTER, ENERGY_SIZE, GLASS, LOBE_ANISOTROPY, LOBE_COAT, LOBE_SHEEN,
     LOBE_SPECULAR, LOBE_TRANSMISSION, METAL, MIRROR, Material, NO_COLORS, NO_INDEX, OPAQUE, PRINCIPLED, Packed, RANDOM,
@@ -193,25 +193,13 @@ fn make_metal(material: &mut Material, variant: usize) {
     material.energy = if variant.is_multiple_of(5) { NO_INDEX } else { 0 };
 }
 
-const MATERIALS: [MaterialKind; 8] = [
-    MaterialKind::Diffuse,
-    MaterialKind::Principled,
-    MaterialKind::Metal,
-    MaterialKind::Dielectric,
-    MaterialKind::Smooth(SmoothKind::Mirror),
-    MaterialKind::Smooth(SmoothKind::Metal),
-    MaterialKind::Smooth(SmoothKind::Dielectric),
-    MaterialKind::Smooth(SmoothKind::Thin),
-];
-const SURFACES: [SurfaceKind; 3] = [SurfaceKind::Flat, SurfaceKind::Face, SurfaceKind::Evaluated];
-
 /// For each feature, the number of scenes with this feature in which hits are shaded in lanes.
 #[derive(Debug, Default)]
 struct LaneCoverage {
     camera: usize,
     camera_invisible: usize,
     /// Scenes with hits on each kind of material (rows) and surface.
-    kinds: [[usize; 3]; MATERIALS.len()],
+    kinds: [[usize; 3]; MaterialKind::ALL.len()],
     coat: usize,
     sheen: usize,
     anisotropy: usize,
@@ -240,8 +228,8 @@ impl LaneCoverage {
             return;
         }
         let mut is_principled = false;
-        for (material, counts) in MATERIALS.into_iter().zip(&mut self.kinds) {
-            for (surface, count) in SURFACES.into_iter().zip(counts) {
+        for (material, counts) in MaterialKind::ALL.into_iter().zip(&mut self.kinds) {
+            for (surface, count) in SurfaceKind::ALL.into_iter().zip(counts) {
                 let has_hits = hits.count(material, surface) > 0;
                 *count += usize::from(has_hits);
                 is_principled |= has_hits && material == MaterialKind::Principled;
@@ -407,7 +395,7 @@ fn random_scenes_have_the_paths_of_the_scalar_integrator() {
         let packed = if i % 2 == 0 { packed.with_layers() } else { packed };
         let packed = if i % 3 == 0 { packed.with_noise() } else { packed }; // layers then contain the depth
         let batch_size = [1, 7, 64, 1024][i % 4];
-        let kinds = &MATERIALS[..5]; // the last one stands for all smooth materials
+        let kinds = &MaterialKind::ALL[..5]; // the last one stands for all smooth materials
         let with_lanes: Vec<Packed> = kinds
             .iter()
             .map(|kind| with_lane_materials(packed.clone(), i, *kind))
@@ -474,7 +462,7 @@ fn changed_scenes_are_detected() {
     decode_meshes(&packed);
     let (paths, lane_hits) = wavefront_with_hits(&packed, &samples, 256);
     assert_eq!(count_differing(&paths, &expected), 0);
-    for surface in SURFACES {
+    for surface in SurfaceKind::ALL {
         assert!(lane_hits.count(MaterialKind::Diffuse, surface) > 50, "{lane_hits:?}");
     }
     let count_after = |change: fn(&mut Packed)| {

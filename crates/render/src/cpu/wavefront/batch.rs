@@ -5,36 +5,26 @@ use fearless_simd::{f32x8, u32x8};
 use glam::{UVec2, Vec3};
 
 use super::super::differential::Differential;
-use super::super::energy::principled_energy;
-use super::super::geometry::{fetch_hit_primitive, hit_differential, material_of, surface_of};
 use super::super::integrators::path::{PathState, add_emission, add_radiance, decision, decision_set};
-use super::super::lanes::{LaneMaterials, Lanes2, MaterialFields, MaterialRows, Real, Vector3, Word, constant, select};
+use super::super::lanes::{Lanes2, MaterialFields, Real, Vector3, Word, constant, select};
 use super::super::light_sample::power_heuristic;
 use super::super::math::{dot, min, normalize};
-use super::super::mesh::HitPrimitive;
 use super::super::metal::metal_fresnel;
 use super::super::path::{Path, usable_normal};
-use super::super::principled::bounded_color;
-use super::super::ray::{Hit, Ray};
+use super::super::ray::Ray;
 use super::super::rng::{hash4, unit_float};
-use super::super::scattering::{
-    bounded, facet_frame, is_delta, is_transmissive, local_wo, material_for_view, shaded_normal,
-};
 use super::super::shadow_ray::ShadowRay;
-use super::super::surface::{Surface, largest};
-use super::super::texture::evaluate_material;
-use super::super::vertices::with_vertex_colors;
+use super::super::surface::largest;
 use super::QueuedShadowRay;
 use super::environment::leave_to_environment;
+use super::hit_materials::{HitMaterials, evaluate};
 use super::lights::{LightChoices, LightRows, only_light};
 use super::materials::{Diffuse, Directions, Facets, Principled};
 use super::rows::{F, LANES, Row, Rows3, get3, load3, set3, splat3, store3};
 use super::shade::{IS_OPTIMIZED, MaterialKind, QueuedHit, ShadingQueues, SurfaceKind};
 use super::smooth::{smooth_normal, smooth_rays};
 use super::surfaces::{FaceHits, FlatHits, LaneSurfaces, ScalarHits};
-use crate::records::{
-    DIFFUSE, ENVIRONMENT_MAP, INFINITE_T, INSTANCE, LOBE_TRANSMISSION, Material, NO_INDEX, PRINCIPLED, Packed,
-};
+use crate::records::{ENVIRONMENT_MAP, INFINITE_T, INSTANCE, LOBE_TRANSMISSION, Packed};
 
 /// The paths of a batch, and the queue of their shadow rays.
 pub struct Batch<'a> {
@@ -57,55 +47,6 @@ struct PathRows {
     exclude_back: [UVec2; LANES],
 }
 
-/// A surface and its material, evaluated by scalar functions.
-struct Evaluated {
-    prim: HitPrimitive,
-    /// If the scene has anisotropic materials, the tangents are the frame of the material.
-    surface: Surface,
-    material: Material,
-    coat_normal: Vec3,
-    /// Albedos of `principled_energy`.
-    energy: Vec3,
-}
-
-/// Evaluates a surface and its material, like the first part of the scalar `shade`.
-fn evaluate(scene: &Packed, path: &Path, hit: Hit) -> Evaluated {
-    let s = &scene.specialization;
-    let prim = fetch_hit_primitive(scene, hit);
-    let mut surface = surface_of(scene, &prim, hit, path.ray);
-    let mut material = *material_of(scene, &prim);
-    let mut coat_normal = surface.shading_normal;
-    if (s.lookups != 0) | (s.vertex_colors != 0) {
-        let hit_diff = hit_differential(scene, &prim, hit, surface, path.ray, path.differential);
-        let mut shading = evaluate_material(scene, &prim, hit, &material, surface, hit_diff, s.lookups);
-        if s.vertex_colors != 0 {
-            shading.material = with_vertex_colors(scene, &shading.material, hit);
-        }
-        material = bounded(shading.material);
-        surface.shading_normal = shading.normal;
-        coat_normal = shading.coat_normal;
-    }
-    let mut energy = Vec3::ONE;
-    if material.kind != DIFFUSE && !is_delta(&material) && (s.anisotropic != 0 || is_transmissive(&material)) {
-        surface.shading_normal = shaded_normal(surface, &material, surface.shading_normal);
-        let frame = facet_frame(scene, surface, &material);
-        (surface.du, surface.dv) = (frame.u, frame.v);
-        if material.kind == PRINCIPLED {
-            energy = principled_energy(scene, &material, local_wo(&surface), surface.side);
-        } else {
-            material = material_for_view(scene, &surface, material);
-            material.energy = NO_INDEX; // the loss is known
-        }
-    }
-    Evaluated {
-        prim,
-        surface,
-        material,
-        coat_normal,
-        energy,
-    }
-}
-
 /// Records the layers of the first hit, like `record_first_hit_layers`. `albedo` includes the throughput; [`None`] for a
 /// smooth material.
 #[inline(always)]
@@ -124,49 +65,6 @@ fn record_layers(scene: &Packed, state: &mut PathState, normal: Vec3, albedo: Op
     }
 }
 
-/// The materials at the hits, one per lane.
-struct HitMaterials {
-    rows: MaterialRows,
-    /// Indices of the materials in the scene. [`NO_INDEX`] after a material that was evaluated for a hit.
-    index_of_lane: [u32; LANES],
-    energy: Rows3,
-}
-
-impl HitMaterials {
-    /// Sets a material of the scene.
-    #[inline(always)]
-    fn set(&mut self, scene: &Packed, lane: usize, index: u32) {
-        let s = &scene.specialization;
-        let material = &scene.materials[index as usize];
-        let is_bounded = (s.lookups != 0) | (s.vertex_colors != 0);
-        if material.kind == DIFFUSE {
-            self.index_of_lane[lane] = NO_INDEX; // the rest of the lane's material is left as it was
-            let color = material.diffuse;
-            self.rows
-                .set_diffuse(lane, if is_bounded { bounded_color(color) } else { color });
-            return;
-        }
-        if self.index_of_lane[lane] == index {
-            return;
-        }
-        self.index_of_lane[lane] = index;
-        if is_bounded {
-            self.rows.set(lane, &bounded(*material));
-        } else {
-            self.rows.set(lane, material);
-        }
-        set3(&mut self.energy, lane, Vec3::ONE);
-    }
-
-    /// Sets a material that was evaluated for a hit.
-    #[inline(always)]
-    fn set_evaluated(&mut self, lane: usize, evaluated: &Evaluated) {
-        self.index_of_lane[lane] = NO_INDEX;
-        self.rows.set(lane, &evaluated.material);
-        set3(&mut self.energy, lane, evaluated.energy);
-    }
-}
-
 impl Batch<'_> {
     /// Ends the paths that hit nothing, and shades all queued hits. Only one loop contains the code for all kinds, so
     /// that it is compiled only once.
@@ -177,11 +75,7 @@ impl Batch<'_> {
         let epsilon = scene.environment.shadow_epsilon;
         let (mut flat, mut faces, mut evaluated) = (FlatHits::new(), FaceHits::new(), ScalarHits::default());
         let mut lights = LightRows::new(only_light(scene));
-        let mut materials = HitMaterials {
-            rows: MaterialRows::default(),
-            index_of_lane: [NO_INDEX; LANES],
-            energy: Default::default(),
-        };
+        let mut materials = HitMaterials::default();
         for (material_kind, surface_kind, queue) in queues.filled() {
             for hits in queue.chunks(LANES) {
                 let mut rows = PathRows::default();
@@ -268,15 +162,13 @@ impl Batch<'_> {
             _ => None,
         };
         if let Some(kind) = smooth_kind {
-            let rows = &materials.rows;
-            surface.shading_normal = smooth_normal(kind, &LaneMaterials { simd, rows }, &surface);
+            surface.shading_normal = smooth_normal(kind, &materials.lanes(simd), &surface);
         } else if !is_diffuse {
             surface.shading_normal = usable_normal(surface, surface.shading_normal);
         }
         surface.transmits = match material_kind {
             MaterialKind::Principled if s.lobes & LOBE_TRANSMISSION != 0 => {
-                let rows = &materials.rows;
-                Some(LaneMaterials { simd, rows }.transmission().gt(zero))
+                Some(materials.lanes(simd).transmission().gt(zero))
             }
             MaterialKind::Dielectric => Some(zero.le(zero)), // true in all lanes
             _ => None,
@@ -318,35 +210,21 @@ impl Batch<'_> {
             u: decision(scene, Lanes2 { x: key[2], y: key[3] }, sample),
             random,
         };
-        let rows_of_materials = &mut materials.rows;
         let result = match material_kind {
             MaterialKind::Principled if IS_OPTIMIZED => {
-                let material = LaneMaterials {
-                    simd,
-                    rows: rows_of_materials,
-                };
+                let material = materials.lanes(simd);
                 Principled::new(scene, &material, &surface, &materials.energy).scatter(&surface, directions)
             }
             MaterialKind::Metal if IS_OPTIMIZED => {
-                Facets::metal(simd, rows_of_materials, &surface).scatter(&surface, directions)
+                Facets::metal(simd, &mut materials.rows, &surface).scatter(&surface, directions)
             }
             MaterialKind::Dielectric if IS_OPTIMIZED => {
-                Facets::dielectric(simd, rows_of_materials, &surface).scatter(&surface, directions)
+                Facets::dielectric(materials.lanes(simd), &surface).scatter(&surface, directions)
             }
             MaterialKind::Smooth(kind) if IS_OPTIMIZED => {
-                let material = LaneMaterials {
-                    simd,
-                    rows: rows_of_materials,
-                };
-                smooth_rays(kind, &material, &surface, directions)
+                smooth_rays(kind, &materials.lanes(simd), &surface, directions)
             }
-            _ => {
-                let material = LaneMaterials {
-                    simd,
-                    rows: rows_of_materials,
-                };
-                Diffuse::new(&material).scatter(&surface, directions)
-            }
+            _ => Diffuse::new(&materials.lanes(simd)).scatter(&surface, directions),
         };
 
         let (mut contributions, mut to_lights) = (Rows3::default(), lights.to_light);
@@ -388,10 +266,7 @@ impl Batch<'_> {
 
         let mut albedos = Rows3::default();
         if s.layers != 0 {
-            let material = LaneMaterials {
-                simd,
-                rows: rows_of_materials,
-            };
+            let material = materials.lanes(simd);
             let albedo = match material_kind {
                 MaterialKind::Metal => metal_fresnel(&material, one),
                 MaterialKind::Diffuse | MaterialKind::Principled => material.diffuse(),

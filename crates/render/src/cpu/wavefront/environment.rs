@@ -29,8 +29,8 @@ impl EnvironmentRows {
     }
 }
 
-/// Samples directions to the map for the paths of the lanes of a mask, like `sample_environment`. `normals` are those for
-/// which the map is sampled.
+/// Samples directions to the map for the paths of the lanes of a mask, like `sample_environment`. `normals` select the
+/// distribution of the samples (`block_distributions`).
 #[inline(always)]
 pub fn environment_samples<S: Simd>(
     simd: S,

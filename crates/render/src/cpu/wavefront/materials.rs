@@ -34,7 +34,7 @@ pub struct NextRays<S: Simd> {
     pub transmitted: Option<Transmitted<S>>,
 }
 
-/// Rays that leave on the other side of a surface.
+/// The rays that are transmitted: they leave on the other sides of their surfaces.
 #[derive(Clone, Copy)]
 pub struct Transmitted<S: Simd> {
     pub mask: mask32x8<S>,
@@ -205,10 +205,10 @@ impl<'a, S: Simd> Facets<'a, S> {
 
     /// Returns dielectrics for materials that were evaluated by the scalar `material_for_view`.
     #[inline(always)]
-    pub fn dielectric(simd: S, rows: &'a MaterialRows, surface: &LaneSurfaces<S>) -> Self {
+    pub fn dielectric(material: LaneMaterials<'a, S>, surface: &LaneSurfaces<S>) -> Self {
         let (frame, wo) = frame_and_wo(surface);
         Facets {
-            material: LaneMaterials { simd, rows },
+            material,
             is_metal: false,
             frame,
             wo,

@@ -8,6 +8,7 @@ mod begin;
 mod closest_hits;
 mod culling;
 mod environment;
+mod hit_materials;
 mod items;
 mod lights;
 mod linear;

@@ -48,7 +48,7 @@ pub enum MaterialKind {
 }
 
 impl MaterialKind {
-    const ALL: [MaterialKind; 8] = [
+    pub const ALL: [MaterialKind; 8] = [
         MaterialKind::Diffuse,
         MaterialKind::Principled,
         MaterialKind::Metal,
@@ -84,7 +84,7 @@ pub enum SurfaceKind {
 }
 
 impl SurfaceKind {
-    const ALL: [SurfaceKind; 3] = [SurfaceKind::Flat, SurfaceKind::Face, SurfaceKind::Evaluated];
+    pub const ALL: [SurfaceKind; 3] = [SurfaceKind::Flat, SurfaceKind::Face, SurfaceKind::Evaluated];
 }
 
 /// Numbers of hits shaded in lanes.
