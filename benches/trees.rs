@@ -220,6 +220,7 @@ struct Rays<'a> {
 }
 
 impl<'a, S> RaySource<'a, S> for Rays<'a> {
+    #[inline(always)]
     fn next(&mut self, _simd: S, _lane: usize, traced: Option<(&Line, Nearest)>) -> Option<(&'a DecodedMesh, MeshRay)> {
         self.hits += usize::from(traced.is_some_and(|(_, found)| found != MISS));
         Some((self.mesh, *self.rays.next()?))
