@@ -848,7 +848,7 @@ fn integer(function: &str, name: &str, random: &Random) -> u32 {
         "octant" | "slot" => random.below(8),
         "axis" => random.below(3),
         "side" => 1 + random.below(16),
-        "pilot_samples" => 1 + random.below(64),
+        "pilot_samples" | "step" => 1 + random.below(64),
         "max_samples" => random.below(65_537),
         _ => random.pick(&[
             0,

@@ -3,7 +3,7 @@
 use glam::{UVec2, UVec3, UVec4, Vec2, Vec3, Vec4};
 use wgray_render::cpu::adaptive::{
     display_slope_squared, display_variance, layer_mean, layer_moments_with, mean_of, moments_with, pilot_add,
-    pilot_finish, samples_wanted, squared_deviation, variance_of_mean,
+    pilot_finish, proportional_samples, samples_wanted, squared_deviation, variance_of_mean,
 };
 use wgray_render::cpu::bvh_node::{
     children_hit, children_in_interval, far_side, four_hit, four_in_interval, hit_bits, in_order, larger, leaf_items,
@@ -203,6 +203,7 @@ probes! {
     squared_deviation(sum: Vec4, sample: Vec4) -> Vec3;
     pilot_add(pilot: Vec4, sum: Vec4, sample: Vec4) -> Vec4;
     pilot_finish(pilot: Vec4, sum: Vec4, moments: Vec4) -> Vec4;
+    proportional_samples(pilot_sum: Vec4, pilot_samples: u32, step: u32, squared_error: f32, max_samples: u32) -> u32;
     samples_wanted(pilot_sum: Vec4, pilot_samples: u32, squared_error: f32, max_samples: u32) -> u32;
     mean_of(sum: Vec4) -> Vec3;
     variance_of_mean(sum: Vec4, moments: Vec4) -> Vec3;

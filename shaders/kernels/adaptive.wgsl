@@ -18,7 +18,7 @@ fn adaptive(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_
     var end = params.samples.y;
     let is_pilot = params.samples.x < PILOT_SAMPLES;
     if !is_pilot {
-        end = samples_wanted(neighbor_pilot_sum(film_pixel), PILOT_SAMPLES, bitcast<f32>(SQUARED_ERROR), end);
+        end = further_samples_end(film_pixel, end);
     }
     var layers = Layers();
     if LAYERS != 0u {
@@ -61,22 +61,29 @@ fn adaptive(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_
     report_completion(local);
 }
 
-// Returns the pilot statistics of up to four neighbors.
-fn neighbor_pilot_sum(film_pixel: vec2u) -> vec4f {
-    let width = params.film_size.x;
-    let index = 2u * width * params.film_size.y + film_pixel.y * width + film_pixel.x;
+fn further_samples_end(film_pixel: vec2u, end: u32) -> u32 {
+    let squared_error = bitcast<f32>(SQUARED_ERROR);
+    if SMOOTH_NOISE == 0u {
+        return samples_wanted(neighbor_pilot_sum(film_pixel, 1), PILOT_SAMPLES, squared_error, end);
+    }
+    // Incomplete rounds of patterns with cells are biased.
+    let step = select((PILOT_SAMPLES + 1u) / 2u, PILOT_SAMPLES, PIXEL_PATTERN == JITTERED);
+    return proportional_samples(neighbor_pilot_sum(film_pixel, 2), PILOT_SAMPLES, step, squared_error, end);
+}
+
+// Returns the sum of the pilot statistics of the pixels at a distance of at most `radius`, without the pixel itself.
+fn neighbor_pilot_sum(film_pixel: vec2u, radius: i32) -> vec4f {
+    let size = vec2i(params.film_size);
     var sum = vec4f(0.0);
-    if film_pixel.y > 0u {
-        sum += film[index - width];
-    }
-    if film_pixel.x > 0u {
-        sum += film[index - 1u];
-    }
-    if film_pixel.x + 1u < width {
-        sum += film[index + 1u];
-    }
-    if film_pixel.y + 1u < params.film_size.y {
-        sum += film[index + width];
+    for (var dy = -radius; dy <= radius; dy++) {
+        for (var dx = -radius; dx <= radius; dx++) {
+            let neighbor = vec2i(film_pixel) + vec2i(dx, dy);
+            let squared_distance = dx * dx + dy * dy;
+            let is_near = squared_distance > 0 & squared_distance <= radius * radius;
+            if is_near & all(neighbor >= vec2i(0)) & all(neighbor < size) {
+                sum += film[u32(2 * size.x * size.y + neighbor.y * size.x + neighbor.x)];
+            }
+        }
     }
     return sum;
 }

@@ -211,7 +211,16 @@ impl TestSession {
         }
     }
 
+    /// Returns a state that is not older than the newest frame: sessions publish a frame before its state.
+    #[track_caller]
     pub fn state(&self) -> Arc<State> {
+        let newest = self.frame().map_or(0, |frame| frame.header.number);
+        self.wait("the state of the newest frame", |session| {
+            Some(session.published_state()).filter(|state| state.frame >= newest)
+        })
+    }
+
+    fn published_state(&self) -> Arc<State> {
         self.inner.state.borrow().clone()
     }
 
@@ -230,7 +239,7 @@ impl TestSession {
         }
         panic!(
             "{event}: not within {TIMEOUT:?}; state: {:?}, frame: {:?}",
-            self.state(),
+            self.published_state(),
             self.frame().map(|frame| frame.header.clone())
         );
     }

@@ -46,13 +46,13 @@ impl Region {
         u64::from(self.width()) * u64::from(self.height())
     }
 
-    /// Returns the region enlarged by one pixel on each side. The added pixels may lie outside of the image.
-    pub fn with_neighbors(&self) -> Region {
+    /// Returns the region enlarged by `pixels` on each side. The added pixels may lie outside of the image.
+    pub fn with_border(&self, pixels: u32) -> Region {
         Region {
-            x0: self.x0.saturating_sub(1),
-            y0: self.y0.saturating_sub(1),
-            x1: self.x1.saturating_add(1),
-            y1: self.y1.saturating_add(1),
+            x0: self.x0.saturating_sub(pixels),
+            y0: self.y0.saturating_sub(pixels),
+            x1: self.x1.saturating_add(pixels),
+            y1: self.y1.saturating_add(pixels),
         }
     }
 

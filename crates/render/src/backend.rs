@@ -93,12 +93,24 @@ pub trait Backend {
     fn around(&self, region: Region) -> Region;
 }
 
+/// Maximum distance of the neighbors whose pilot samples determine a pixel's sample count under adaptive sampling.
+pub const MAX_NEIGHBOR_RADIUS: u32 = 2;
+
+/// Returns the maximum distance of the neighbors whose pilot samples determine a pixel's sample count.
+pub(crate) fn neighbor_radius(has_smooth_noise: bool) -> u32 {
+    match has_smooth_noise {
+        true => MAX_NEIGHBOR_RADIUS,
+        false => 1,
+    }
+}
+
 /// Argument checks and scene-derived limits shared by all backends.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Rules {
     picture: Region,
     film_layout: FilmLayout,
     pilot_samples: u32,
+    neighbor_radius: u32,
 }
 
 /// The state of a film that the checks depend on.
@@ -115,6 +127,7 @@ impl Rules {
             picture: Region::whole(scene.camera.width, scene.camera.height),
             film_layout: scene.film_layout(),
             pilot_samples: scene.specialization.pilot_samples,
+            neighbor_radius: neighbor_radius(scene.specialization.smooth_noise != 0),
         }
     }
 
@@ -142,7 +155,7 @@ impl Rules {
 
     pub fn around(&self, region: Region) -> Region {
         match self.film_layout.adaptive {
-            true => region.with_neighbors().within(self.picture),
+            true => region.with_border(self.neighbor_radius).within(self.picture),
             false => region,
         }
     }

@@ -4,7 +4,7 @@ use glam::{Vec3, Vec4, Vec4Swizzles};
 
 use super::math::{max, min, power};
 use crate::film;
-use crate::records::EFFECTIVE_SAMPLES_PER_MULTIPLE;
+use crate::records::{EFFECTIVE_SAMPLES_PER_MULTIPLE, MULTIPLES_PER_EFFECTIVE_SAMPLE};
 
 pub fn moments_with(moments: Vec4, sum: Vec4, sample: Vec4) -> Vec4 {
     moments + squared_deviation(sum, sample).extend(1.0)
@@ -85,5 +85,28 @@ pub fn samples_wanted(pilot_sum: Vec4, pilot_samples: u32, squared_error: f32, m
         }
         count *= 2;
     }
+    count.min(max_samples)
+}
+
+pub fn proportional_samples(
+    pilot_sum: Vec4,
+    pilot_samples: u32,
+    step: u32,
+    squared_error: f32,
+    max_samples: u32,
+) -> u32 {
+    // Not `x <= 0.0`, which is false for NaN.
+    if !(pilot_sum.w > 0.0) | !(squared_error > 0.0) {
+        return max_samples;
+    }
+    let wanted = (pilot_sum.x / pilot_sum.w / squared_error).sqrt() - 1.0;
+    let limit = pilot_sum.y / pilot_sum.z * pilot_sum.y * MULTIPLES_PER_EFFECTIVE_SAMPLE;
+    let multiple = if wanted < limit { wanted } else { limit };
+    let steps = multiple * pilot_samples as f32 / step as f32;
+    if steps >= max_samples as f32 {
+        return max_samples;
+    }
+    let whole = if steps > 0.0 { steps as u32 } else { 0 };
+    let count = pilot_samples + (whole + u32::from((whole as f32) < steps)) * step;
     count.min(max_samples)
 }

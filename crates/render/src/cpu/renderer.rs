@@ -5,17 +5,17 @@ use std::ops::{Deref, DerefMut, Range};
 use glam::{UVec2, Vec4};
 use rayon::prelude::*;
 
-use super::adaptive::{layer_mean, pilot_add, pilot_finish, samples_wanted};
+use super::adaptive::{layer_mean, pilot_add, pilot_finish, proportional_samples, samples_wanted};
 use super::decoded_meshes::decode_meshes;
 use super::geometry::pixel_first_hit;
 use super::integrators::path::{path_layers, path_value};
 use super::integrators::phong;
 use super::pixel::Layers;
 use super::wavefront::{MAX_PATHS, Wavefront};
-use crate::backend::{Backend, FilmState, Rules};
+use crate::backend::{Backend, FilmState, Rules, neighbor_radius};
 use crate::error::RenderError;
 use crate::film::{Film, Layer};
-use crate::records::{Camera, FirstHit, Packed};
+use crate::records::{Camera, FirstHit, JITTERED, Packed};
 use wgray_image::Region;
 use wgray_scene::Integrator;
 
@@ -353,26 +353,39 @@ fn runs(region: Region, records: &mut [Vec4], tile: Region) -> Vec<(UVec2, &mut 
 /// Returns the end of the range of a pixel's samples, from the pilot statistics of its neighbors.
 fn further_samples_end(scene: &Packed, pilot_sums: &[Vec4], region: Region, pixel: UVec2, end: u32) -> u32 {
     let s = &scene.specialization;
-    let pilot_sums = neighbor_pilot_sum(pilot_sums, region, pixel);
-    samples_wanted(pilot_sums, s.pilot_samples, f32::from_bits(s.squared_error), end)
+    let squared_error = f32::from_bits(s.squared_error);
+    let radius = neighbor_radius(s.smooth_noise != 0);
+    let pilot_sum = neighbor_pilot_sum(pilot_sums, region, pixel, radius);
+    if s.smooth_noise == 0 {
+        return samples_wanted(pilot_sum, s.pilot_samples, squared_error, end);
+    }
+    // Incomplete rounds of patterns with cells are biased.
+    let step = match s.pixel_pattern == JITTERED {
+        true => s.pilot_samples,
+        false => s.pilot_samples.div_ceil(2),
+    };
+    proportional_samples(pilot_sum, s.pilot_samples, step, squared_error, end)
 }
 
-fn neighbor_pilot_sum(pilot_sums: &[Vec4], region: Region, pixel: UVec2) -> Vec4 {
-    let (x, y) = (pixel.x - region.x0, pixel.y - region.y0);
-    let width = region.width() as usize;
-    let index = y as usize * width + x as usize;
+/// Returns the sum of the pilot statistics of the pixels at a distance of at most `radius`, without the pixel itself.
+fn neighbor_pilot_sum(pilot_sums: &[Vec4], region: Region, pixel: UVec2, radius: u32) -> Vec4 {
+    let (x, y) = (pixel.x, pixel.y);
+    let around = Region {
+        x0: x,
+        y0: y,
+        x1: x + 1,
+        y1: y + 1,
+    };
+    let neighbors = around.with_border(radius).within(region);
     let mut sum = Vec4::ZERO;
-    if y > 0 {
-        sum += pilot_sums[index - width];
-    }
-    if x > 0 {
-        sum += pilot_sums[index - 1];
-    }
-    if x + 1 < region.width() {
-        sum += pilot_sums[index + 1];
-    }
-    if y + 1 < region.height() {
-        sum += pilot_sums[index + width];
+    for row in neighbors.y0..neighbors.y1 {
+        for column in neighbors.x0..neighbors.x1 {
+            let squared_distance = column.abs_diff(x).pow(2) + row.abs_diff(y).pow(2);
+            if (1..=radius * radius).contains(&squared_distance) {
+                let index = (row - region.y0) as usize * region.width() as usize + (column - region.x0) as usize;
+                sum += pilot_sums[index];
+            }
+        }
     }
     sum
 }

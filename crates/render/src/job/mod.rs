@@ -236,7 +236,7 @@ mod tests {
         }
 
         fn around(&self, region: Region) -> Region {
-            region.with_neighbors().within(Region::whole(64, 64))
+            region.with_border(1).within(Region::whole(64, 64))
         }
     }
 

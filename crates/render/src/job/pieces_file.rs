@@ -20,6 +20,7 @@ use super::identity::Identity;
 use super::part::PartHeader;
 use super::piece::FilmPiece;
 use super::steps::SampleProgress;
+use crate::backend::MAX_NEIGHBOR_RADIUS;
 use crate::film::{Film, FilmLayout};
 use crate::records::FirstHit;
 use wgray_image::Region;
@@ -276,7 +277,7 @@ impl Head {
         let is_valid = lies_in(rows, job_region)
             && (rows.x0, rows.x1) == (job_region.x0, job_region.x1)
             && lies_in(rows, head.film_region)
-            && lies_in(head.film_region, rows.with_neighbors())
+            && lies_in(head.film_region, rows.with_border(MAX_NEIGHBOR_RADIUS))
             && lies_in(head.film_region, picture)
             && start <= end
             && end <= identity.pixel_samples

@@ -12,7 +12,10 @@ use super::{
 };
 use crate::cpu::lobe::is_polished;
 use crate::records::{LOBES, Lobe, PackedBvh};
-use wgray_scene::{self as scene, Integrator, Pattern, Projection, Reflection, Samples, Scene};
+use wgray_scene::{self as scene, Pattern, Projection, Reflection, Samples, Scene};
+
+/// Minimum number of pilot samples per pixel, after which adaptive sampling estimates the error.
+const MIN_PILOT_SAMPLES: u32 = 16;
 
 /// The parts of a scene that determine the specialization.
 pub(super) struct Parts<'a> {
@@ -65,8 +68,9 @@ impl Parts<'_> {
             light_samples: light_samples.count,
             filter_bins: self.filter_bins as u32,
             pilot_samples: adaptive.map_or(pixels.count, |adaptive| {
-                pilot_samples(scene.render.integrator, pixels.count, adaptive.max_samples)
+                pilot_samples(pixels.count, adaptive.max_samples)
             }),
+            smooth_noise: scene.render.integrator.has_smooth_noise().into(),
             squared_error: adaptive
                 .map_or(0.0, |adaptive| (adaptive.error * adaptive.error) as f32)
                 .to_bits(),
@@ -111,9 +115,8 @@ pub fn with_camera_features(specialization: &Specialization, camera: &scene::Cam
 
 /// Returns the number of pilot samples of adaptive sampling: complete rounds with at least as many samples as a
 /// variance estimate requires, but at most `max`.
-fn pilot_samples(integrator: Integrator, round: u32, max: u32) -> u32 {
-    let min = integrator.pilot_samples();
-    min.next_multiple_of(round).max(round).min(max)
+fn pilot_samples(round: u32, max: u32) -> u32 {
+    MIN_PILOT_SAMPLES.next_multiple_of(round).max(round).min(max)
 }
 
 fn pattern(samples: Samples) -> u32 {

@@ -225,6 +225,9 @@ constants! {
 
     /// Minimum effective sample size of the variance estimate for each multiple of the pilot samples after the first.
     pub const EFFECTIVE_SAMPLES_PER_MULTIPLE: f32 = 2.0;
+    /// With similar noise in neighboring pixels: maximum multiples of the pilot samples, after the first, for each
+    /// effective sample of the variance estimate.
+    pub const MULTIPLES_PER_EFFECTIVE_SAMPLE: f32 = 2.0;
 
     /// Radius of the denoiser's window in pixels: a pixel is averaged with the pixels of a square of 2 * radius + 1.
     pub const DENOISE_RADIUS: u32 = 7;

@@ -57,6 +57,8 @@ specialization! {
     filter_bins = "FILTER_BINS",
     /// Pilot samples per pixel; all samples if sampling is not adaptive.
     pilot_samples = "PILOT_SAMPLES",
+    /// Adaptive sampling: 1 if neighboring pixels have similar noise, as with path tracing; 0 if the noise is at edges.
+    smooth_noise = "SMOOTH_NOISE",
     /// Bits of the `f32` squared target error of adaptive sampling.
     squared_error = "SQUARED_ERROR",
     /// Bit length of the largest shininess if all values are integers up to 4096, else 0.

@@ -24,11 +24,10 @@ struct Properties {
     depths: (u32, u32),
     /// Default sampling pattern.
     pattern: Pattern,
-    /// Minimum number of pilot samples per pixel, after which adaptive sampling estimates the error.
-    pilot_samples: u32,
     follows_paths: bool,
     needs_emitters: bool,
     has_layers: bool,
+    has_smooth_noise: bool,
 }
 
 impl Integrator {
@@ -41,21 +40,19 @@ impl Integrator {
                 name: "phong",
                 depths: (1, 64),
                 pattern: Pattern::Grid,
-                pilot_samples: 16,
                 follows_paths: false,
                 needs_emitters: false,
                 has_layers: false,
+                has_smooth_noise: false,
             },
-            // More pilot samples than for `phong`, because a few samples may miss rare paths and underestimate the
-            // error.
             Integrator::Path => Properties {
                 name: "path",
                 depths: (0, MAX_DEPTH),
                 pattern: Pattern::Sobol,
-                pilot_samples: 64,
                 follows_paths: true,
                 needs_emitters: true,
                 has_layers: true,
+                has_smooth_noise: true,
             },
         }
     }
@@ -75,11 +72,6 @@ impl Integrator {
         self.properties().pattern
     }
 
-    /// Returns the minimum number of pilot samples per pixel, after which adaptive sampling estimates the error.
-    pub const fn pilot_samples(self) -> u32 {
-        self.properties().pilot_samples
-    }
-
     /// Returns true for path tracing, which supports scene keys that need `"path"`, but not ambient light and
     /// transparent shadows.
     pub const fn follows_paths(self) -> bool {
@@ -95,5 +87,10 @@ impl Integrator {
     /// Returns true if the film can have layers, such as the albedo.
     pub const fn has_layers(self) -> bool {
         self.properties().has_layers
+    }
+
+    /// Returns true if neighboring pixels have similar noise, as with indirect light; otherwise, most noise is at edges.
+    pub const fn has_smooth_noise(self) -> bool {
+        self.properties().has_smooth_noise
     }
 }
