@@ -69,8 +69,8 @@ fn pilot_finish(pilot: vec4f, sum: vec4f, moments: vec4f) -> vec4f {
     return vec4f(display_variance(sum, moments), pilot.y, pilot.z, 1.0);
 }
 
-// Returns the sample count that the neighbors' pilot statistics require, from `pilot_samples` samples each, if the noise
-// is at edges. Doubles the count until the mean squared error is small enough, as long as the variance is reliable. y^2 / z is the effective
+// For noise at edges: returns the sample count that the neighbors' pilot statistics require, from `pilot_samples` samples
+// each. Doubles the count until the mean squared error is small enough, as long as the variance is reliable. y^2 / z is the effective
 // number of samples behind the variance: about 1 if one outlier causes nearly all of it, and the full count if all
 // deviations from the mean are equally large.
 fn samples_wanted(pilot_sum: vec4f, pilot_samples: u32, squared_error: f32, max_samples: u32) -> u32 {
@@ -90,16 +90,19 @@ fn samples_wanted(pilot_sum: vec4f, pilot_samples: u32, squared_error: f32, max_
     return select(count, max_samples, count > max_samples);
 }
 
-// Like `samples_wanted`, if neighboring pixels have similar noise. Samples in proportion to the standard deviation
+// Like `samples_wanted`, for neighboring pixels with similar noise. Samples in proportion to the standard deviation
 // minimize the mean squared error of the image (Neyman, "On the Two Different Aspects of the Representative Method",
 // Journal of the Royal Statistical Society 97(4), 1934): if the standard error is k times the target, the count is k
-// times the pilot samples, plus what is missing from a multiple of `step`.
+// times the pilot samples. The samples after the pilot samples are rounded up to a multiple of `step`.
 fn proportional_samples(pilot_sum: vec4f, pilot_samples: u32, step: u32, squared_error: f32, max_samples: u32) -> u32 {
     if !(pilot_sum.w > 0.0) | !(squared_error > 0.0) {
         return max_samples;
     }
-    // In multiples of the pilot samples. If all samples are equal, the limit is NaN, and the comparisons are false.
+    // In multiples of the pilot samples.
     let wanted = sqrt(pilot_sum.x / pilot_sum.w / squared_error) - 1.0;
+    if !(wanted > 0.0) {
+        return select(pilot_samples, max_samples, pilot_samples > max_samples);
+    }
     let limit = pilot_sum.y / pilot_sum.z * pilot_sum.y * MULTIPLES_PER_EFFECTIVE_SAMPLE;
     let steps = select(limit, wanted, wanted < limit) * f32(pilot_samples) / f32(step);
     if steps >= f32(max_samples) {

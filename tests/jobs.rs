@@ -352,6 +352,46 @@ fn folder_with_checkpoint(packed: &Packed, identity: &Identity) -> (tempfile::Te
     (folder, path, film.expect("a film"))
 }
 
+/// With adaptive sampling, the film of an unfinished piece is larger than its region.
+#[test]
+fn unfinished_pieces_are_read_from_the_file() {
+    let mut borders = Vec::new();
+    for packed in subjects() {
+        let identity = Identity::of(&packed, whole(&packed), false);
+        let region = Region {
+            y0: 4,
+            y1: 7,
+            ..whole(&packed)
+        };
+        let mut cpu = Cpu::new(&packed);
+        let around = cpu.around(region);
+        borders.push(region.y0 - around.y0);
+        cpu.begin(around).expect("a film");
+        cpu.render(around, 0..1).expect("samples");
+        let piece = FilmPiece {
+            region,
+            reached: wgray_render::job::SampleProgress {
+                pass: 1..2,
+                next: [around.x0, around.y0],
+            },
+            film: cpu.film().expect("a film"),
+        };
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("c");
+        let (mut checkpoint, _) = open(&path, &packed, &identity).expect("a checkpoint");
+        checkpoint.keep(&piece);
+        checkpoint.sync();
+        drop(checkpoint);
+        let (mut checkpoint, warnings) = open(&path, &packed, &identity).expect("a checkpoint");
+        assert_eq!(warnings, Vec::<String>::new());
+        let [stored] = checkpoint.pieces().try_into().expect("one piece");
+        let loaded = checkpoint.load(stored.number).expect("a piece");
+        assert_eq!((loaded.region, loaded.reached), (piece.region, piece.reached));
+        assert!(bits(&loaded.film) == bits(&piece.film), "the films differ");
+    }
+    assert!([0, 1, 2].iter().all(|border| borders.contains(border)), "{borders:?}");
+}
+
 #[test]
 fn pieces_before_the_damage_are_used() {
     let (packed, identity) = cornell();

@@ -64,22 +64,23 @@ fn adaptive(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_
 fn further_samples_end(film_pixel: vec2u, end: u32) -> u32 {
     let squared_error = bitcast<f32>(SQUARED_ERROR);
     if SMOOTH_NOISE == 0u {
-        return samples_wanted(neighbor_pilot_sum(film_pixel, 1), PILOT_SAMPLES, squared_error, end);
+        return samples_wanted(neighbor_pilot_sum(film_pixel, EDGE_NEIGHBOR_RADIUS), PILOT_SAMPLES, squared_error, end);
     }
-    // Incomplete rounds of patterns with cells are biased.
+    // Whole rounds of patterns with cells, because the first cells of a round are not representative.
     let step = select((PILOT_SAMPLES + 1u) / 2u, PILOT_SAMPLES, PIXEL_PATTERN == JITTERED);
-    return proportional_samples(neighbor_pilot_sum(film_pixel, 2), PILOT_SAMPLES, step, squared_error, end);
+    return proportional_samples(neighbor_pilot_sum(film_pixel, SMOOTH_NEIGHBOR_RADIUS), PILOT_SAMPLES, step, squared_error, end);
 }
 
-// Returns the sum of the pilot statistics of the pixels at a distance of at most `radius`, without the pixel itself.
-fn neighbor_pilot_sum(film_pixel: vec2u, radius: i32) -> vec4f {
+// Returns the sum of the pilot statistics of the pixels at a distance of at most `max_distance`, without the pixel itself.
+fn neighbor_pilot_sum(film_pixel: vec2u, max_distance: u32) -> vec4f {
     let size = vec2i(params.film_size);
+    let radius = i32(max_distance);
     var sum = vec4f(0.0);
     for (var dy = -radius; dy <= radius; dy++) {
         for (var dx = -radius; dx <= radius; dx++) {
             let neighbor = vec2i(film_pixel) + vec2i(dx, dy);
             let squared_distance = dx * dx + dy * dy;
-            let is_near = squared_distance > 0 & squared_distance <= radius * radius;
+            let is_near = (squared_distance > 0) & (squared_distance <= radius * radius);
             if is_near & all(neighbor >= vec2i(0)) & all(neighbor < size) {
                 sum += film[u32(2 * size.x * size.y + neighbor.y * size.x + neighbor.x)];
             }

@@ -409,6 +409,31 @@ fn adaptive_paths_do_not_depend_on_backend_crop_or_work_split() {
     assert!(differing(&a, &b) > 0);
 }
 
+/// The tolerance includes three standard errors of the difference, which contain 99.7 % of differences.
+#[test]
+fn adaptive_paths_keep_the_brightness() {
+    let brightness = |packed: &Packed| {
+        let film = reference(packed);
+        film.means().flatten().map(f64::from).sum::<f64>() / (3 * film.sums.len()) as f64
+    };
+    for pattern in [Pattern::Sobol, Pattern::Jittered] {
+        let differences: Vec<f64> = (0..24)
+            .map(|seed| {
+                let adaptive = brightness(&paths(pattern, 16, seed, Some(0.01)));
+                adaptive / brightness(&paths(pattern, 64, seed + 100, None)) - 1.0
+            })
+            .collect();
+        let mean = differences.iter().sum::<f64>() / 24.0;
+        let variance = differences.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / 23.0;
+        let standard_error = (variance / 24.0).sqrt();
+        assert!(standard_error < 0.005, "{pattern:?}: {standard_error}");
+        assert!(
+            mean.abs() < 3.0 * standard_error,
+            "{pattern:?}: {mean} +- {standard_error}"
+        );
+    }
+}
+
 #[test]
 fn errors_of_paths_are_smaller_than_with_as_many_uniform_samples() {
     let displayed = |v: f32| f64::from(v.clamp(0.0, 1.0)).powf(1.0 / 2.2);

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use crate::error::RenderError;
 use crate::film::{Film, FilmLayout, Layer};
-use crate::records::{FirstHit, Packed};
+use crate::records::{EDGE_NEIGHBOR_RADIUS, FirstHit, Packed, SMOOTH_NEIGHBOR_RADIUS};
 use wgray_image::Region;
 
 /// A scene on a device, with at most one film at a time.
@@ -93,14 +93,12 @@ pub trait Backend {
     fn around(&self, region: Region) -> Region;
 }
 
-/// Maximum distance of the neighbors whose pilot samples determine a pixel's sample count under adaptive sampling.
-pub const MAX_NEIGHBOR_RADIUS: u32 = 2;
-
-/// Returns the maximum distance of the neighbors whose pilot samples determine a pixel's sample count.
+/// Returns the maximum distance of the neighbors whose pilot samples determine a pixel's sample count under adaptive
+/// sampling.
 pub(crate) fn neighbor_radius(has_smooth_noise: bool) -> u32 {
     match has_smooth_noise {
-        true => MAX_NEIGHBOR_RADIUS,
-        false => 1,
+        true => SMOOTH_NEIGHBOR_RADIUS,
+        false => EDGE_NEIGHBOR_RADIUS,
     }
 }
 
@@ -134,6 +132,11 @@ impl Rules {
     #[cfg(feature = "gpu")]
     pub fn film_layout(&self) -> FilmLayout {
         self.film_layout
+    }
+
+    #[cfg(feature = "gpu")]
+    pub fn neighbor_radius(&self) -> u32 {
+        self.neighbor_radius
     }
 
     #[cfg(feature = "gpu")]

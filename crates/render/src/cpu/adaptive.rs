@@ -100,6 +100,9 @@ pub fn proportional_samples(
         return max_samples;
     }
     let wanted = (pilot_sum.x / pilot_sum.w / squared_error).sqrt() - 1.0;
+    if !(wanted > 0.0) {
+        return pilot_samples.min(max_samples);
+    }
     let limit = pilot_sum.y / pilot_sum.z * pilot_sum.y * MULTIPLES_PER_EFFECTIVE_SAMPLE;
     let multiple = if wanted < limit { wanted } else { limit };
     let steps = multiple * pilot_samples as f32 / step as f32;

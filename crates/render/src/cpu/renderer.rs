@@ -359,7 +359,7 @@ fn further_samples_end(scene: &Packed, pilot_sums: &[Vec4], region: Region, pixe
     if s.smooth_noise == 0 {
         return samples_wanted(pilot_sum, s.pilot_samples, squared_error, end);
     }
-    // Incomplete rounds of patterns with cells are biased.
+    // Whole rounds of patterns with cells, because the first cells of a round are not representative.
     let step = match s.pixel_pattern == JITTERED {
         true => s.pilot_samples,
         false => s.pilot_samples.div_ceil(2),

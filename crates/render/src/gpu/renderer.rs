@@ -19,7 +19,7 @@ use super::scene::SceneBuffers;
 use super::sliders::Slider;
 use super::texels::TexelParts;
 use super::timer::{TIMESTAMP_BYTES, Timer};
-use crate::backend::{Backend, FilmState, MAX_NEIGHBOR_RADIUS, Rules};
+use crate::backend::{Backend, FilmState, Rules};
 use crate::clock::Instant;
 use crate::denoise::denoise;
 use crate::error::RenderError;
@@ -636,7 +636,7 @@ impl Backend for Gpu {
             return max_pixels;
         }
         let picture = self.rules.picture();
-        let border = u64::from(MAX_NEIGHBOR_RADIUS);
+        let border = u64::from(self.rules.neighbor_radius());
         let neighbors = 2 * border * (u64::from(picture.width()) + u64::from(picture.height()) + 2 * border);
         match picture.pixels() <= max_pixels {
             true => max_pixels,

@@ -124,8 +124,8 @@ enum Outcome {
 /// Target duration of a pass, at the end of which the films are copied.
 const PASS_DURATION: Duration = Duration::from_secs(1);
 
-/// Minimum number of rows of a shortened band, without and with adaptive sampling. Adaptive sampling adds two rows of
-/// neighbors.
+/// Minimum number of rows of a shortened band, without and with adaptive sampling. Adaptive sampling adds two or four
+/// rows of neighbors.
 const MIN_ROWS: [u32; 2] = [16, 64];
 
 impl<S: CheckpointStore> Bands<S> {

@@ -20,9 +20,8 @@ use super::identity::Identity;
 use super::part::PartHeader;
 use super::piece::FilmPiece;
 use super::steps::SampleProgress;
-use crate::backend::MAX_NEIGHBOR_RADIUS;
 use crate::film::{Film, FilmLayout};
-use crate::records::FirstHit;
+use crate::records::{FirstHit, SMOOTH_NEIGHBOR_RADIUS};
 use wgray_image::Region;
 
 /// First bytes of the file. As in PNG, a conversion of line endings or to 7-bit characters changes these bytes, so that
@@ -277,7 +276,7 @@ impl Head {
         let is_valid = lies_in(rows, job_region)
             && (rows.x0, rows.x1) == (job_region.x0, job_region.x1)
             && lies_in(rows, head.film_region)
-            && lies_in(head.film_region, rows.with_border(MAX_NEIGHBOR_RADIUS))
+            && lies_in(head.film_region, rows.with_border(SMOOTH_NEIGHBOR_RADIUS))
             && lies_in(head.film_region, picture)
             && start <= end
             && end <= identity.pixel_samples

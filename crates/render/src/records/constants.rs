@@ -225,8 +225,12 @@ constants! {
 
     /// Minimum effective sample size of the variance estimate for each multiple of the pilot samples after the first.
     pub const EFFECTIVE_SAMPLES_PER_MULTIPLE: f32 = 2.0;
-    /// With similar noise in neighboring pixels: maximum multiples of the pilot samples, after the first, for each
-    /// effective sample of the variance estimate.
+    /// For noise at edges: maximum distance of the neighbors whose pilot samples determine a pixel's sample count.
+    pub const EDGE_NEIGHBOR_RADIUS: u32 = 1;
+    /// The same, if neighboring pixels have similar noise.
+    pub const SMOOTH_NEIGHBOR_RADIUS: u32 = 2;
+    /// If neighboring pixels have similar noise: each effective sample of the variance estimate permits this many times the
+    /// pilot samples in addition.
     pub const MULTIPLES_PER_EFFECTIVE_SAMPLE: f32 = 2.0;
 
     /// Radius of the denoiser's window in pixels: a pixel is averaged with the pixels of a square of 2 * radius + 1.
