@@ -69,10 +69,10 @@ fn pilot_finish(pilot: vec4f, sum: vec4f, moments: vec4f) -> vec4f {
     return vec4f(display_variance(sum, moments), pilot.y, pilot.z, 1.0);
 }
 
-// For noise at edges: returns the sample count that the neighbors' pilot statistics require, from `pilot_samples` samples
-// each. Doubles the count until the mean squared error is small enough, as long as the variance is reliable. y^2 / z is the effective
-// number of samples behind the variance: about 1 if one outlier causes nearly all of it, and the full count if all
-// deviations from the mean are equally large.
+// For noise at edges: returns the sample count that the neighbors' pilot statistics require, from `pilot_samples`
+// samples each. Doubles the count until the mean squared error is small enough, as long as the variance is reliable.
+// y^2 / z is the effective number of samples behind the variance: about 1 if one outlier causes nearly all of it, and
+// the full count if all deviations from the mean are equally large.
 fn samples_wanted(pilot_sum: vec4f, pilot_samples: u32, squared_error: f32, max_samples: u32) -> u32 {
     if !(pilot_sum.w > 0.0) | !(squared_error > 0.0) {
         return max_samples;
