@@ -33,14 +33,17 @@ fn check(description: &Description, shaders: &Shaders) -> Result<(), String> {
     if !cpu.sums.iter().all(|sum| sum.is_finite()) {
         return Err("a pixel is NaN or infinite".into());
     }
-    for mode in [RenderMode::Baked, RenderMode::Buffers] {
-        let differing_count = differing(&render_with(&packed, mode, shaders), &cpu);
-        if differing_count > 0 {
-            return Err(format!(
-                "{differing_count} of {} pixels differ, {mode:?}",
-                cpu.sums.len()
-            ));
-        }
+    // One of the modes, because kernels take long to compile.
+    let mode = match description.render.seed.is_multiple_of(2) {
+        true => RenderMode::Baked,
+        false => RenderMode::Buffers,
+    };
+    let differing_count = differing(&render_with(&packed, mode, shaders), &cpu);
+    if differing_count > 0 {
+        return Err(format!(
+            "{differing_count} of {} pixels differ, {mode:?}",
+            cpu.sums.len()
+        ));
     }
     // First hits are compared only in some scenes, because they need another kernel.
     if description.render.seed.is_multiple_of(4) {
@@ -92,12 +95,12 @@ fn random_scenes_are_bit_identical_on_gpu_and_cpu() {
     let cases = std::env::var(CASES).ok();
     let count = cases
         .as_deref()
-        .map_or(12, |n| n.parse().expect("WGRAY_TEST_CASES is a number"));
+        .map_or(16, |n| n.parse().expect("WGRAY_TEST_CASES is a number"));
     if let Some((description, reason)) = find_failing(count, 300, cases.is_none(), sources::shaders()) {
         let path = save(&description, "failing-scene.toml");
         panic!("{reason}: wgray render {}", path.display());
     }
-    println!("{count} random scenes, baked and with buffers: all pixels are bit-identical");
+    println!("{count} random scenes, baked or with buffers: all pixels are bit-identical");
 }
 
 /// The scenes have so many samples that some drivers would terminate the loops of a dispatch.

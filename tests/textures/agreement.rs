@@ -161,14 +161,17 @@ fn images_agree_on_gpu_and_cpu() {
         samples_per_dispatch: Some(1),
         rows_per_dispatch: Some(3),
     };
-    for (name, scene) in scenes(folder.path()) {
+    for (i, (name, scene)) in scenes(folder.path()).into_iter().enumerate() {
         let expected = reference(&scene);
         let colors: BTreeSet<_> = expected.means().map(|pixel| pixel.map(f32::to_bits)).collect();
         assert!(colors.len() > 100, "{name}: the image is almost constant");
-        for (mode, work_split) in [
-            (RenderMode::Baked, WorkSplit::default()),
+        let modes = [
             (RenderMode::Buffers, small_dispatches),
-        ] {
+            (RenderMode::Baked, WorkSplit::default()),
+        ];
+        // Every other combination of filter and wrapping as constants, because kernels take long to compile.
+        let is_combination = name.contains(' ');
+        for (mode, work_split) in modes.into_iter().take(2 - usize::from(is_combination && i % 2 == 1)) {
             let found = film(&mut *backend(&scene, mode), &scene, whole(&scene), &work_split);
             let problem = compare(mode, &scene, &found, &expected);
             assert!(problem.is_ok(), "{name}, {mode:?}: {}", problem.unwrap_err());

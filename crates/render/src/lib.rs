@@ -16,3 +16,13 @@ pub mod noise;
 pub mod output;
 pub mod pack;
 pub mod records;
+
+/// Returns the number of cases for a test: without optimization a tenth, because the test would take long.
+#[cfg(test)]
+const fn cases(optimized: usize) -> usize {
+    if cfg!(debug_assertions) {
+        optimized / 10
+    } else {
+        optimized
+    }
+}

@@ -4,6 +4,7 @@ use glam::Vec3;
 
 use super::binary::{Binary, Inner};
 use super::{Aabb, BUILD_MAX_DEPTH, MAX_LEAF_SIZE, Node, Tree, build};
+use crate::cases;
 
 /// Numbers from 0 to 1.
 struct Random(u64);
@@ -165,7 +166,7 @@ fn equal_boxes_give_valid_shallow_bvhs() {
     for extent in [0.0, 1.0, 1e30] {
         assert!(check_builds(&vec![box_around(Vec3::splat(0.3), Vec3::splat(extent)); 3000]) <= 12);
     }
-    let boxes = vec![box_around(Vec3::NEG_ONE, Vec3::ONE); 1_000_000];
+    let boxes = vec![box_around(Vec3::NEG_ONE, Vec3::ONE); cases(1_000_000)];
     check(&build(&boxes, 4), &boxes, 4);
 }
 
@@ -181,7 +182,7 @@ fn boxes_in_geometric_progression_give_valid_bvhs() {
         };
         for (extent, offset) in [(0.0, 0.0), (0.0, 0.25), (0.0, 1.0), (1e-30, 0.0), (1.0, 0.0)] {
             check_builds(&boxes(extent, offset));
-            let repeated: Vec<Aabb> = (0..50).flat_map(|_| boxes(extent, offset)).collect();
+            let repeated: Vec<Aabb> = (0..cases(50)).flat_map(|_| boxes(extent, offset)).collect();
             check_builds(&repeated);
         }
     }
@@ -210,7 +211,7 @@ fn the_depth_is_limited() {
     assert_eq!(levels(BUILD_MAX_DEPTH), BUILD_MAX_DEPTH);
     assert_eq!(levels(8), 8);
     check_builds(&boxes);
-    let many: Vec<Aabb> = (0..1000).flat_map(|_| boxes.iter().copied()).collect();
+    let many: Vec<Aabb> = (0..cases(1000)).flat_map(|_| boxes.iter().copied()).collect();
     assert_eq!(binary_levels(&Binary::build(&many, 18, 4).inner), 18);
     check(&build(&many, 1), &many, 1);
 }

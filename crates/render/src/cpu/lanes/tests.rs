@@ -4,6 +4,7 @@ use fearless_simd::dispatch;
 use glam::{UVec2, UVec4, Vec2, Vec3};
 
 use super::*;
+use crate::cases;
 use crate::cpu::diffuse::{angles_at, diffuse_pdf, diffuse_sample};
 use crate::cpu::equirect::{cap_above, cell_towards, direction_in_cell};
 use crate::cpu::ggx::{ggx_albedo, ggx_albedo_along, ggx_d, ggx_g1, ggx_g2, ggx_length, ggx_pdf, ggx_sample};
@@ -321,7 +322,7 @@ fn lanes_are_bit_identical_to_scalar_results() {
 fn compare_lanes() {
     let random = &mut Random(7);
     let mut differing = 0;
-    for _ in 0..3000 {
+    for _ in 0..cases(3000) {
         let mut lanes = [(); LANES].map(|()| Arguments {
             words: [(); 4].map(|()| random.word()),
             square: [(); 2].map(|()| unit_float(random.word())),
@@ -363,7 +364,7 @@ fn compare_lanes() {
         }
     }
     assert!(
-        differing > 10_000,
+        differing > cases(10_000),
         "results that differ between neighboring lanes: {differing}"
     );
 }

@@ -11,6 +11,7 @@ use super::{
     occluded, occluded_items, trace,
 };
 use crate::bvh::{Aabb, DecodedMesh, Tree, build};
+use crate::cases;
 
 const NONE: Nearest = Nearest {
     t: f32::INFINITY,
@@ -222,7 +223,7 @@ fn random_triangles_match_brute_force() {
     let random = &mut Random(1);
     for (count, size) in [(1, 1.0), (2, 1.0), (9, 0.8), (300, 0.1), (2000, 0.05), (500, 0.5)] {
         let scene = soup(random, count, size);
-        let rays = 400_000 / (count + 100);
+        let rays = cases(400_000) / (count + 100);
         let outcomes = compare(&scene, random, rays, |random| (random.vector() * 1.5, random.vector()));
         assert!(
             outcomes.hits > 5 && outcomes.misses > 5 && outcomes.occluded > 50 && outcomes.unoccluded > 50,
@@ -351,7 +352,7 @@ fn huge_and_tiny_scenes_match_brute_force() {
         let triangles: Vec<[u32; 3]> = scene.triangles.iter().map(|t| [t[0], t[1], t[2]]).collect();
         let scene = Scene::new(&corners, &triangles, 4);
         for length in [1.0, 1e-20, 1e20] {
-            compare(&scene, random, 60, |random| {
+            compare(&scene, random, cases(60), |random| {
                 (random.vector() * scale, random.vector() * length)
             });
         }

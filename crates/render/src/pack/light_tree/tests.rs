@@ -5,6 +5,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 use glam::{DVec3, Vec3, Vec4};
 
 use super::*;
+use crate::cases;
 use crate::cpu::light_tree::{light_child, light_importances, light_shares};
 
 /// A linear congruential generator, 0 to 1.
@@ -170,7 +171,7 @@ fn probabilities(nodes: &[LightNode], count: usize, p: Vec3, n: Vec3) -> Vec<f64
 #[test]
 fn parallel_and_serial_builds_give_the_same_nodes() {
     let mut random = Random(5);
-    for count in [0, 1, 2, 5, 16, 17, 300, 5000] {
+    for count in [0, 1, 2, 5, 16, 17, 300, cases(5000)] {
         let emitters: Vec<TreeEmitter> = (0..count).map(|i| random.emitter(i, i % 3 == 0)).collect();
         let serial = build_with(&emitters, usize::MAX);
         for parallel in [1, 40, MIN_PARALLEL_EMITTERS] {
