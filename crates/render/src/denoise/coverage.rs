@@ -1,11 +1,11 @@
 //! Coverage of pixels at the edges of surfaces. A pixel at an edge mixes a surface with the background. If the background
 //! has no noise, its light is separated, so that the surface's color and features equal those inside of the edge.
 
-use std::ops::Range;
-
 use glam::Vec3;
 use rayon::prelude::*;
 
+use super::bright::bright_pixels;
+use super::window::window;
 use crate::film::{Film, Layer, mean};
 
 /// Larger components of colors are treated like infinity, because their squares would overflow.
@@ -19,6 +19,8 @@ const MAX_BACKGROUND_ERROR: f32 = 0.01;
 pub enum Coverage {
     /// The color cannot be averaged: it is not finite, or the pixel has no samples.
     Excluded,
+    /// Much brighter than the pixels around it: averaged with them, it would brighten all of them visibly.
+    Bright,
     /// Only a background without noise, which is not averaged.
     Background,
     /// Surfaces in front of such a background; the fraction that they cover.
@@ -44,7 +46,7 @@ pub fn coverages(film: &Film) -> Vec<Coverage> {
     let alone: Vec<Coverage> = (0..film.sums.len()).into_par_iter().map(alone).collect();
     let width = film.region.width() as usize;
     let partial = |i: usize| match (alone[i], film.alpha(i)) {
-        (Coverage::Full, alpha) if alpha > 0.0 && alpha < 1.0 => {
+        (Coverage::Full, alpha) if is_divisible(alpha, film.sample_count(i)) => {
             let near_background = window(i, width, alone.len(), 1).any(|j| alone[j] == Coverage::Background);
             if near_background {
                 Coverage::Partial(alpha)
@@ -54,18 +56,24 @@ pub fn coverages(film: &Film) -> Vec<Coverage> {
         }
         (coverage, _) => coverage,
     };
-    (0..alone.len()).into_par_iter().map(partial).collect()
+    let mut coverages: Vec<Coverage> = (0..alone.len()).into_par_iter().map(partial).collect();
+    for (coverage, is_bright) in coverages
+        .iter_mut()
+        .zip(bright_pixels(film, |i| alone[i] != Coverage::Excluded))
+    {
+        if is_bright {
+            *coverage = Coverage::Bright;
+        }
+    }
+    coverages
 }
 
-/// Returns the pixels of a square of 2 * `radius` + 1 pixels around pixel `i`, clipped to the image.
-pub fn window(i: usize, width: usize, count: usize, radius: usize) -> impl Iterator<Item = usize> {
-    let columns = around(i % width, width, radius);
-    around(i / width, count / width, radius).flat_map(move |y| columns.clone().map(move |x| y * width + x))
-}
-
-/// Returns the numbers from `i` - `radius` to `i` + `radius`, clipped to a size.
-pub fn around(i: usize, size: usize, radius: usize) -> Range<usize> {
-    i.saturating_sub(radius)..(i + radius + 1).min(size)
+/// Returns true if the fraction `alpha` of a pixel amounts to at least one sample, and the rest of the pixel, too. With a
+/// filter that has negative weights, the fraction may be close to 0 or 1, or outside of this range.
+fn is_divisible(alpha: f32, sample_count: u32) -> bool {
+    const ONE: f32 = 0.999; // allows for rounding
+    let samples = sample_count as f32;
+    alpha * samples > ONE && (1.0 - alpha) * samples > ONE
 }
 
 /// Returns the color of the surfaces in a pixel, and of the background behind them.
@@ -83,12 +91,15 @@ pub fn colors_of(film: &Film, i: usize, fraction: f32) -> (Vec3, Vec3) {
 ///
 /// With the fraction f of n samples that hit a surface, the sum of squared deviations from the mean over all samples is
 /// n (n - 1) `variance`. The squared deviations between hits and misses add n f (1 - f) `mean`² to those within the
-/// hits.
+/// hits. The variance of a single hit is infinite.
 pub fn surface_variance(mean: Vec3, variance: Vec3, samples: f32, fraction: f32) -> Vec3 {
     if fraction == 1.0 {
         return variance;
     }
     let hits = fraction * samples;
+    if hits < 1.5 {
+        return Vec3::INFINITY;
+    }
     let deviations = samples * ((samples - 1.0) * variance - fraction * (1.0 - fraction) * mean * mean);
     deviations.max(Vec3::ZERO) / (hits * (hits - 1.0))
 }

@@ -5,7 +5,8 @@ use std::ops::Range;
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::coverage::{Coverage, around, colors_of, coverages, surface_variance, window};
+use super::coverage::{Coverage, colors_of, coverages, surface_variance};
+use super::window::{box_means, window};
 use crate::film::{Film, Half, Layer, mean};
 use crate::records::{
     DENOISE_PATCH_RADIUS, DENOISE_RADIUS, GUIDE_ALBEDO, GUIDE_COLOR, GUIDE_COLOR_VARIANCE, GUIDE_DEPTH, GUIDE_NORMAL,
@@ -108,7 +109,7 @@ impl Guides {
     /// Multiplies filtered colors by the albedo, and adds the light that was not filtered.
     pub fn colors(&self, film: &Film, filtered: &[Vec3]) -> Vec<Vec3> {
         let color = |(i, filtered): (usize, &Vec3)| match self.coverages[i] {
-            Coverage::Excluded | Coverage::Background => Vec3::from(mean(film.sums[i])),
+            Coverage::Excluded | Coverage::Bright | Coverage::Background => Vec3::from(mean(film.sums[i])),
             Coverage::Full => *filtered * divisor(film, i, 1.0),
             Coverage::Partial(fraction) => {
                 Vec3::from(film.layer(Layer::Emission, i)) + *filtered * (fraction * divisor(film, i, fraction))
@@ -128,8 +129,8 @@ fn padded(size: usize) -> impl Iterator<Item = usize> {
     })
 }
 
-/// Continues the colors of surfaces into the background by the radius of a patch, so that the patches of pixels at the
-/// edge of a surface are similar to those inside.
+/// Continues the colors of surfaces into the background and into bright pixels by the radius of a patch, so that the
+/// patches of pixels at the edge of a surface are similar to those inside.
 fn extend_surfaces(width: usize, coverages: &[Coverage], guides: &mut [[f32; PLANES]]) {
     const VALUES: usize = COLOR_VARIANCE - COLOR + 1;
     let extended = |i: usize| {
@@ -141,7 +142,7 @@ fn extend_surfaces(width: usize, coverages: &[Coverage], guides: &mut [[f32; PLA
         (count > 0.0).then(|| (i, sum.map(|value: f32| value / count)))
     };
     let background = (0..coverages.len()).into_par_iter();
-    let background = background.filter(|i| coverages[*i] == Coverage::Background);
+    let background = background.filter(|i| matches!(coverages[*i], Coverage::Background | Coverage::Bright));
     let extensions: Vec<(usize, [f32; VALUES])> = background.filter_map(extended).collect();
     for (i, values) in extensions {
         guides[i][COLOR..COLOR + VALUES].copy_from_slice(&values);
@@ -158,7 +159,7 @@ fn guides_of(film: &Film, i: usize, coverage: Coverage) -> [f32; PLANES] {
     let fraction = match coverage {
         Coverage::Full => 1.0,
         Coverage::Partial(fraction) => fraction,
-        Coverage::Excluded | Coverage::Background => {
+        Coverage::Excluded | Coverage::Bright | Coverage::Background => {
             guides[DEPTH] = EXCLUDED_DEPTH;
             guides[DEPTH + 2] = 1.0 / EXCLUDED_DEPTH;
             return guides;
@@ -220,7 +221,7 @@ fn limit_variances(film: &Film, coverages: &[Coverage], guides: &mut [[f32; PLAN
         .map(|i| match coverages[i] {
             Coverage::Full => half_variance(film, i),
             Coverage::Partial(_) => variances[i],
-            Coverage::Excluded | Coverage::Background => 0.0,
+            Coverage::Excluded | Coverage::Bright | Coverage::Background => 0.0,
         })
         .collect();
     let (local, limits) = (
@@ -244,23 +245,4 @@ fn half_variance(film: &Film, i: usize) -> f32 {
     let difference = (even - odd) * 0.5 / divisor(film, i, 1.0);
     let variance = difference.length_squared();
     if variance.is_finite() { variance } else { 0.0 }
-}
-
-/// Returns the means of squares of 2 * `radius` + 1 pixels, clipped to the image.
-fn box_means(values: &[f32], width: usize, radius: usize) -> Vec<f32> {
-    let height = values.len() / width.max(1);
-    let row_sum = |i: usize| {
-        let row = i - i % width;
-        around(i % width, width, radius).map(|x| values[row + x]).sum()
-    };
-    let row_sums: Vec<f32> = (0..values.len()).into_par_iter().map(row_sum).collect();
-    let mean = |i: usize| {
-        let (rows, columns) = (
-            around(i / width, height, radius),
-            around(i % width, width, radius).len(),
-        );
-        let count = (rows.len() * columns) as f32;
-        rows.map(|y| row_sums[y * width + i % width]).sum::<f32>() / count
-    };
-    (0..values.len()).into_par_iter().map(mean).collect()
 }

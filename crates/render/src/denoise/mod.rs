@@ -5,11 +5,13 @@
 //!
 //! [`denoise`] has the bits of `shaders/kernels/denoise.wgsl`.
 
+mod bright;
 mod coverage;
 mod filter;
 mod guides;
 #[cfg(test)]
 mod tests;
+mod window;
 
 use glam::Vec3;
 

@@ -382,3 +382,115 @@ fn the_variance_of_the_samples_that_hit_a_surface_is_exact() {
         "one hit has no variance"
     );
 }
+
+/// With a filter that has negative weights, the covered fraction of a pixel may amount to less than a sample.
+#[test]
+fn a_small_fraction_of_a_pixel_is_not_amplified() {
+    let (mut film, _) = film_of_an_edge(|_| 4.0);
+    let edges: Vec<usize> = (0..film.sums.len())
+        .filter(|i| film.alpha(*i) > 0.0 && film.alpha(*i) < 1.0)
+        .collect();
+    for (i, fraction) in edges
+        .into_iter()
+        .zip([1e-6, 0.01, 0.06, 0.07, 0.99, 0.999_999].into_iter().cycle())
+    {
+        film.layers[Layer::Emission as usize][i].w = 16.0 * fraction;
+        film.layers[Layer::Normal as usize][i] *= fraction;
+        film.layers[Layer::Albedo as usize][i] *= fraction;
+    }
+    for (i, color) in denoise(&film).into_iter().enumerate() {
+        assert!((0.0..5.0).contains(&color.x), "pixel {i}: {color}");
+    }
+}
+
+#[test]
+fn bright_pixels_stay_and_do_not_brighten_the_pixels_around() {
+    let subject = Subject {
+        width: 31,
+        height: 31,
+        amplitude: 0.2,
+    };
+    let center = 15 * 31 + 15;
+    let film_with = |value: f32| {
+        let mut film = subject.film(WHITE, WHITE);
+        // One of the four samples is bright.
+        let excess = Vec3::splat(value);
+        film.sums[center] += excess.extend(0.0);
+        film.half_sums[center] += excess.extend(0.0);
+        film.moments[center] += (excess * excess * 0.75).extend(0.0);
+        // The edge of the bright pixel.
+        film.sums[center + 1] += (excess * 0.1).extend(0.0);
+        film.moments[center + 1] += (excess * excess * 0.0075).extend(0.0);
+        film
+    };
+    for value in [1e3, 1e6, 1e12] {
+        let film = film_with(value);
+        let (raw, denoised) = (means(&film), denoise(&film));
+        for i in [center, center + 1] {
+            assert_eq!(denoised[i], raw[i], "{value}");
+        }
+        let others = (0..denoised.len()).filter(|i| *i != center && *i != center + 1);
+        for i in others {
+            assert!(
+                (denoised[i].x - 1.0).abs() < 0.1,
+                "{value}, pixel {i}: {}",
+                denoised[i].x
+            );
+        }
+    }
+    // A moderately bright pixel is averaged.
+    let film = film_with(40.0);
+    let (raw, denoised) = (means(&film)[center].x, denoise(&film)[center].x);
+    assert!(denoised < 0.3 * raw, "{raw} before, {denoised} after");
+}
+
+/// The number in `docs/denoising.md`: a patch of the window, an extended surface, the limit of the variance, the edge of a
+/// bright pixel, and the pixels around it.
+#[test]
+fn a_crop_differs_from_the_full_image_only_near_its_border() {
+    const BORDER: u32 = 24;
+    let subject = Subject {
+        width: 70,
+        height: 68,
+        amplitude: 0.3,
+    };
+    let mut film = subject.film(|x, y| DVec3::splat(f64::from(1 + (x / 9 + y / 9) % 3)), WHITE);
+    let mut state = 5;
+    for i in 0..film.sums.len() {
+        let factor = match random(&mut state) {
+            x if x > 0.97 => 1000.0,
+            x if x > 0.94 => 10.0,
+            _ => 1.0,
+        };
+        film.sums[i] = (film.sums[i].truncate() * factor).extend(film.sums[i].w);
+        film.moments[i] = (film.moments[i].truncate() * factor * factor).extend(film.moments[i].w);
+        if random(&mut state) > 0.9 {
+            film.layers[Layer::Emission as usize][i].w = 0.0;
+            film.moments[i] = Vec4::new(0.0, 0.0, 0.0, film.moments[i].w);
+        }
+    }
+    let region = Region {
+        x0: 4,
+        y0: 3,
+        x1: 66,
+        y1: 65,
+    };
+    let [full, crop] = [denoise(&film), denoise(&film.clone().part(region))];
+    let (mut equal, mut differing) = (0, 0);
+    for y in region.y0..region.y1 {
+        for x in region.x0..region.x1 {
+            let of_crop = crop[((y - region.y0) * region.width() + x - region.x0) as usize];
+            let is_equal = of_crop == full[(y * subject.width + x) as usize];
+            let distance = (x - region.x0)
+                .min(region.x1 - 1 - x)
+                .min((y - region.y0).min(region.y1 - 1 - y));
+            if distance >= BORDER {
+                assert!(is_equal, "{x}, {y}");
+                equal += 1;
+            } else {
+                differing += usize::from(!is_equal);
+            }
+        }
+    }
+    assert!(equal > 100 && differing > 100, "{equal}, {differing}");
+}

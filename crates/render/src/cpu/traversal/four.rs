@@ -62,18 +62,17 @@ pub fn intersect<S: Simd>(
     coordinates: impl Fn(usize, usize) -> f32x4<S>,
 ) -> (u32, f32x4<S>) {
     let zero = f32x4::splat(simd, 0.0);
-    let mut corners = [[zero; 3]; 3];
-    let mut sheared = [[zero; 3]; 3];
-    for (i, (corner, sheared)) in corners.iter_mut().zip(&mut sheared).enumerate() {
-        *corner = [
-            coordinates(i, line.axes[0]),
-            coordinates(i, line.axes[1]),
-            coordinates(i, line.axes[2]),
-        ];
-        let [x, y, z] = [corner[0] - line.o[0], corner[1] - line.o[1], corner[2] - line.o[2]];
-        *sheared = [x - z * line.shear[0], y - z * line.shear[1], z];
-    }
-    let [a, b, c] = sheared;
+    // Written out, because a loop would keep the corners in memory.
+    let corners = [
+        corner(line, 0, &coordinates),
+        corner(line, 1, &coordinates),
+        corner(line, 2, &coordinates),
+    ];
+    let [a, b, c] = [
+        sheared(line, corners[0]),
+        sheared(line, corners[1]),
+        sheared(line, corners[2]),
+    ];
     let u = c[0] * b[1] - c[1] * b[0];
     let v = a[0] * c[1] - a[1] * c[0];
     let w = b[0] * a[1] - b[1] * a[0];
@@ -98,4 +97,18 @@ pub fn intersect<S: Simd>(
     let t = far.simd_lt(t).select(far, t);
     let hits = inside & determinant.simd_ne(zero) & near.simd_le(far) & far.simd_ge(zero);
     (hits.to_bitmask() as u32 & used, t)
+}
+
+/// Returns corner i of each triangle, with the axes of the line.
+#[inline(always)]
+fn corner<S: Simd>(line: &Line, i: usize, coordinates: &impl Fn(usize, usize) -> f32x4<S>) -> [f32x4<S>; 3] {
+    let [x, y, z] = line.axes;
+    [coordinates(i, x), coordinates(i, y), coordinates(i, z)]
+}
+
+/// Returns corners relative to the origin, sheared so that the direction is the last axis, but not scaled.
+#[inline(always)]
+fn sheared<S: Simd>(line: &Line, corner: [f32x4<S>; 3]) -> [f32x4<S>; 3] {
+    let [x, y, z] = [corner[0] - line.o[0], corner[1] - line.o[1], corner[2] - line.o[2]];
+    [x - z * line.shear[0], y - z * line.shear[1], z]
 }

@@ -171,7 +171,7 @@ fn probabilities(nodes: &[LightNode], count: usize, p: Vec3, n: Vec3) -> Vec<f64
 #[test]
 fn parallel_and_serial_builds_give_the_same_nodes() {
     let mut random = Random(5);
-    for count in [0, 1, 2, 5, 16, 17, 300, cases(5000)] {
+    for count in [0, 1, 2, 5, 16, 17, 300, cases(5000) as u32] {
         let emitters: Vec<TreeEmitter> = (0..count).map(|i| random.emitter(i, i % 3 == 0)).collect();
         let serial = build_with(&emitters, usize::MAX);
         for parallel in [1, 40, MIN_PARALLEL_EMITTERS] {
