@@ -12,15 +12,13 @@ use super::{Aabb, Node, Tree};
 pub const SLOTS: usize = 8;
 /// SAH cost of testing a node's boxes.
 const NODE_COST: f32 = 1.0;
-/// SAH cost of testing the items of a leaf: the CPU tests all of them at once.
-const LEAF_COST: f32 = 0.4;
-/// SAH cost of each item of a leaf.
-const ITEM_COST: f32 = 0.05;
+/// SAH cost of testing an item.
+const ITEM_COST: f32 = 0.3;
 /// Minimum number of items of a node whose children are built in parallel.
 const MIN_PARALLEL_ITEMS: usize = 1 << 14;
 
 pub fn leaf_cost(area: f32, count: usize) -> f32 {
-    area * (LEAF_COST + count as f32 * ITEM_COST)
+    area * count as f32 * ITEM_COST
 }
 
 /// Returns the costs of a binary node that occupies up to 1, 2, .. 7 slots of a wide parent, given the costs of its
