@@ -223,7 +223,7 @@ fn random_triangles_match_brute_force() {
     let random = &mut Random(1);
     for (count, size) in [(1, 1.0), (2, 1.0), (9, 0.8), (300, 0.1), (2000, 0.05), (500, 0.5)] {
         let scene = soup(random, count, size);
-        let rays = cases(400_000) / (count + 100);
+        let rays = 400_000 / (count + 100);
         let outcomes = compare(&scene, random, rays, |random| (random.vector() * 1.5, random.vector()));
         assert!(
             outcomes.hits > 5 && outcomes.misses > 5 && outcomes.occluded > 50 && outcomes.unoccluded > 50,
