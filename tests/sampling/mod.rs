@@ -1,6 +1,7 @@
 //! Sequences, reconstruction filters and adaptive sampling.
 
 mod adaptive;
+mod adaptive_paths;
 mod filters;
 mod sequences;
 mod unbiased;
