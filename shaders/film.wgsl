@@ -23,7 +23,7 @@ fn store_layers(layers: Layers, index: u32, first_layer: u32) {
 
 // Accumulators for the noise estimates of a pixel, except the moments of the radiance, which have their own list.
 struct Noise {
-    half_sum: vec4f,       // like the pixel's sum, over samples of even index
+    half_sum: vec4f,       // like the pixel's sum, over the first 2^k samples: the largest power of two below their number
     albedo_moments: vec4f, // rgb: squared deviations of the albedo
     normal_moments: vec4f, // xyz: squared deviations of the normal; w: of the depth
 }
@@ -51,7 +51,7 @@ fn store_noise(noise: Noise, index: u32, first_layer: u32) {
 
 // Adds a path with its value. `layers` and `sum` do not include the path.
 fn noise_with(noise: Noise, layers: Layers, sum: vec4f, path: PathState, value: vec4f) -> Noise {
-    let half_sum = noise.half_sum + select(value, vec4f(0.0), (path.sample & 1u) != 0u);
+    let half_sum = select(noise.half_sum, sum, countOneBits(path.sample) == 1u);
     if LAYERS == 0u {
         return Noise(half_sum, vec4f(0.0), vec4f(0.0));
     }

@@ -123,6 +123,22 @@ fn aovs_are_layers_of_an_exr() {
     }
 }
 
+/// `--adaptive` provides the error that `render.adaptive` requires.
+#[test]
+fn the_maximum_of_adaptive_sampling_can_be_defined() {
+    let folder = TestFolder::new();
+    for define in ["render.adaptive.max_samples=20", "render.adaptive={max_samples=20}"] {
+        let options = ["--pixel-pattern", "sobol", "--adaptive", "0", "-D", define];
+        let files = ["-o", "out.exr", "--stats", "stats.json"];
+        folder.run_quietly(&[&["render", "small.toml"], &options[..], &files[..]].concat());
+        let stats: serde_json::Value = serde_json::from_slice(&folder.read("stats.json")).unwrap();
+        assert_eq!(stats["most_samples"], 20, "{define}");
+    }
+    let without_error = folder.run(&["render", "small.toml", "-D", "render.adaptive.max_samples=20"]);
+    assert_eq!(without_error.code, 2, "{}", without_error.stderr);
+    assert!(without_error.stderr.contains("error"), "{}", without_error.stderr);
+}
+
 #[test]
 fn adaptive_sampling_and_its_layers_give_the_values_of_the_library() {
     let folder = TestFolder::new();

@@ -84,7 +84,7 @@ pub struct Film {
     pub pilot_sums: Vec<Vec4>,
     /// Weighted sums of each [`Layer`]. Empty unless requested.
     pub layers: [Vec<Vec4>; Layer::ALL.len()],
-    /// Like `sums`, over the samples with even index. Empty without noise estimates.
+    /// Like `sums`, over the [`Half::First`] of the samples. Empty without noise estimates.
     pub half_sums: Vec<Vec4>,
     /// rgb: summed squared deviations of the albedo from its mean. Empty unless the film has noise estimates and
     /// layers.
@@ -97,13 +97,14 @@ pub struct Film {
     pub denoised: Vec<Vec3>,
 }
 
-/// A half of a pixel's samples.
+/// A part of a pixel's samples: half of them if their number is a power of two. Such a part is as well distributed as
+/// all samples, because aligned runs of 2^k points of a Sobol' sequence are stratified. Its samples of even index are not.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Half {
-    /// The samples with even index.
-    Even,
-    /// The samples with odd index.
-    Odd,
+    /// The first 2^k samples, where 2^k is the largest power of two below their number.
+    First,
+    /// The samples after those.
+    Second,
 }
 
 impl Film {
@@ -249,10 +250,10 @@ impl Film {
 
     /// Returns the mean over a half of a pixel's samples; black if the half has no samples. Requires noise estimates.
     pub fn half_mean(&self, half: Half, pixel: usize) -> [f32; 3] {
-        let even = self.half_sums[pixel];
+        let first = self.half_sums[pixel];
         mean(match half {
-            Half::Even => even,
-            Half::Odd => self.sums[pixel] - even,
+            Half::First => first,
+            Half::Second => self.sums[pixel] - first,
         })
     }
 

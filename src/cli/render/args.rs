@@ -44,6 +44,10 @@ pub struct Args {
     #[arg(long, display_order = 5, value_name = "NAME", value_parser = name_parser(Integrator::ALL, Integrator::name), hide_possible_values = true)]
     pub integrator: Option<Integrator>,
 
+    /// Denoise the image: on or off [default: the scene's setting]
+    #[arg(long, display_order = 6, value_name = "on|off", value_parser = on_or_off(), hide_possible_values = true, num_args = 0..=1, require_equals = true, default_missing_value = "on")]
+    pub denoise: Option<bool>,
+
     /// Stop after TIME (30, 90s, 1.5m, 2h) and write the samples taken so far
     #[arg(long, display_order = 6, value_name = "TIME", value_parser = parse_duration, conflicts_with = "tile")]
     pub time_limit: Option<Duration>,
@@ -78,10 +82,6 @@ pub struct Args {
     /// Add samples where a pixel's standard error exceeds ERROR
     #[arg(long, help_heading = "Sampling", value_name = "ERROR", value_parser = parse_error)]
     pub adaptive: Option<f64>,
-
-    /// Denoise the image: on or off [default: the scene's setting]
-    #[arg(long, display_order = 6, value_name = "on|off", value_parser = on_or_off(), hide_possible_values = true, num_args = 0..=1, require_equals = true, default_missing_value = "on")]
-    pub denoise: Option<bool>,
 
     /// Limit paths to N bounces
     #[arg(long, help_heading = "Sampling", value_name = "N", value_parser = bounces)]
@@ -280,9 +280,24 @@ impl Args {
             view_transform: self.picture_options.view_transform,
             exposure: self.picture_options.exposure,
             turntable: self.turntable,
-            define: self.define.clone(),
+            define: self.defines(),
             ..Overrides::default()
         })
+    }
+}
+
+impl Args {
+    /// Returns the values of `--define`. If they set a part of `render.adaptive`, they include the error of `--adaptive`,
+    /// which that table must contain.
+    fn defines(&self) -> Vec<Define> {
+        let mut defines = self.define.clone();
+        let sets_adaptive = |define: &Define| define.to_string().starts_with("render.adaptive");
+        if let Some(error) = self.adaptive
+            && defines.iter().any(sets_adaptive)
+        {
+            defines.extend(Define::new("render.adaptive.error", &format!("{error:?}")));
+        }
+        defines
     }
 }
 

@@ -266,10 +266,10 @@ impl Run<'_> {
         if !self.moments.is_empty() {
             self.add_to_moments(x, value, &layers);
         }
-        if sample.is_multiple_of(2)
+        if sample.is_power_of_two()
             && let Some(half_sum) = self.half_sums.get_mut(x)
         {
-            *half_sum += value;
+            *half_sum = sum;
         }
         self.sums[x] = sum + value;
         self.add_layers(x, layers);

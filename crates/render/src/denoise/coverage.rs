@@ -5,13 +5,16 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::bright::bright_pixels;
-use super::window::window;
+use super::window::{box_means, window};
 use crate::film::{Film, Layer, mean};
+use crate::records::DENOISE_PATCH_RADIUS;
 
 /// Larger components of colors are treated like infinity, because their squares would overflow.
 const MAX_COLOR: f32 = 1e15;
 /// Largest standard error of a background without noise, relative to its color.
 const MAX_BACKGROUND_ERROR: f32 = 0.01;
+/// Variance of the distances of a pixel's samples, relative to the squared distance, above which they hit several surfaces.
+const EDGE_VARIANCE: f32 = 1e-4;
 
 /// The coverage of a pixel by surfaces. At a silhouette in front of a background without noise, only the light of the
 /// surface is filtered, so that pixels at the silhouette are averaged with pixels inside of it.
@@ -25,34 +28,52 @@ pub enum Coverage {
     Background,
     /// Surfaces in front of such a background; the fraction that they cover.
     Partial(f32),
-    /// Anything else; all light is averaged.
-    Full,
+    /// Surfaces, or a background with noise. The light that they emit is not averaged, because it has only the noise of
+    /// antialiasing.
+    Sharp,
+    /// Surfaces that the lens blurs. All light is averaged: a blurred emitter has noise.
+    Blurred,
+}
+
+impl Coverage {
+    /// Returns the fraction of the pixel that surfaces cover; `None` if the pixel is not averaged.
+    pub fn fraction(self) -> Option<f32> {
+        match self {
+            Coverage::Excluded | Coverage::Bright | Coverage::Background => None,
+            Coverage::Partial(fraction) => Some(fraction),
+            Coverage::Sharp | Coverage::Blurred => Some(1.0),
+        }
+    }
 }
 
 /// Returns the coverage of each pixel.
 pub fn coverages(film: &Film) -> Vec<Coverage> {
+    let width = film.region.width() as usize;
+    let edges: Vec<f32> = (0..film.sums.len())
+        .into_par_iter()
+        .map(|i| f32::from(u8::from(has_edge(film, i))))
+        .collect();
+    let edges = box_means(&edges, width, DENOISE_PATCH_RADIUS as usize);
     let alone = |i: usize| {
         let color = Vec3::from(mean(film.sums[i]));
         let variance = Vec3::from(film.variance(i)).element_sum();
         let is_known = film.sums[i].w != 0.0 && color.abs().cmple(Vec3::splat(MAX_COLOR)).all();
         match film.alpha(i) {
             _ if !is_known => Coverage::Excluded,
+            _ if edges[i] > 0.5 => Coverage::Blurred,
             0.0 if variance <= MAX_BACKGROUND_ERROR * MAX_BACKGROUND_ERROR * color.length_squared() => {
                 Coverage::Background
             }
-            _ => Coverage::Full,
+            _ => Coverage::Sharp,
         }
     };
     let alone: Vec<Coverage> = (0..film.sums.len()).into_par_iter().map(alone).collect();
-    let width = film.region.width() as usize;
     let partial = |i: usize| match (alone[i], film.alpha(i)) {
-        (Coverage::Full, alpha) if is_divisible(alpha, film.sample_count(i)) => {
-            let near_background = window(i, width, alone.len(), 1).any(|j| alone[j] == Coverage::Background);
-            if near_background {
-                Coverage::Partial(alpha)
-            } else {
-                Coverage::Full
-            }
+        (Coverage::Sharp, alpha)
+            if is_divisible(alpha, film.sample_count(i))
+                && window(i, width, alone.len(), 1).any(|j| alone[j] == Coverage::Background) =>
+        {
+            Coverage::Partial(alpha)
         }
         (coverage, _) => coverage,
     };
@@ -76,14 +97,24 @@ fn is_divisible(alpha: f32, sample_count: u32) -> bool {
     alpha * samples > ONE && (1.0 - alpha) * samples > ONE
 }
 
-/// Returns the color of the surfaces in a pixel, and of the background behind them.
-pub fn colors_of(film: &Film, i: usize, fraction: f32) -> (Vec3, Vec3) {
-    let color = Vec3::from(mean(film.sums[i]));
-    if fraction == 1.0 {
-        return (color, Vec3::ZERO);
+/// Returns true if the samples of a pixel hit surfaces at different distances.
+fn has_edge(film: &Film, i: usize) -> bool {
+    if !film.has_layers() {
+        return false;
     }
+    let (distance, variance) = (film.depth(i), film.depth_variance(i) * film.sample_count(i) as f32);
+    variance.is_finite() && variance > EDGE_VARIANCE * distance * distance
+}
+
+/// Returns the light of a pixel's surfaces that is averaged, and the light of the background behind them.
+pub fn averaged_light(film: &Film, i: usize, coverage: Coverage) -> (Vec3, Vec3) {
+    let color = Vec3::from(mean(film.sums[i]));
     let emission = Vec3::from(film.layer(Layer::Emission, i));
-    ((color - emission) / fraction, emission / (1.0 - fraction))
+    match coverage {
+        Coverage::Partial(fraction) => ((color - emission) / fraction, emission / (1.0 - fraction)),
+        Coverage::Sharp => (color - emission, Vec3::ZERO),
+        _ => (color, Vec3::ZERO),
+    }
 }
 
 /// Returns the variance of the mean over the samples that hit a surface. `variance` is that of the mean over all samples

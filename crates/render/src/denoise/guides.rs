@@ -5,7 +5,7 @@ use std::ops::Range;
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::coverage::{Coverage, colors_of, coverages, surface_variance};
+use super::coverage::{Coverage, averaged_light, coverages, surface_variance};
 use super::window::{box_means, window};
 use crate::film::{Film, Half, Layer, mean};
 use crate::records::{
@@ -27,11 +27,11 @@ const DEPTH_TOLERANCE: f32 = 0.003;
 /// Variances of features are multiplied by this factor, because estimates from a few samples are too low as often as too
 /// high.
 const FEATURE_VARIANCE_SCALE: f32 = 2.0;
-/// Variance of features above which a pixel is assumed to contain an edge.
-const EDGE_VARIANCE: f32 = 1e-4;
 /// Minimum of a pixel's variance, relative to the mean variance of the 3 x 3 pixels around it.
-const MIN_RELATIVE_VARIANCE: f32 = 0.25;
-/// Radius of the square of pixels over which the squared differences of the two halves of the samples are averaged.
+const MIN_RELATIVE_VARIANCE: f32 = 0.1;
+/// Maximum of a pixel's variance, relative to the mean squared difference of the two halves of the samples around it.
+const MAX_RELATIVE_VARIANCE: f32 = 2.0;
+/// Radius of the square of pixels over which these differences are averaged.
 const HALF_VARIANCE_RADIUS: usize = 4;
 /// Depth of pixels that are not averaged with any other pixel.
 const EXCLUDED_DEPTH: f32 = 1e15;
@@ -110,7 +110,8 @@ impl Guides {
     pub fn colors(&self, film: &Film, filtered: &[Vec3]) -> Vec<Vec3> {
         let color = |(i, filtered): (usize, &Vec3)| match self.coverages[i] {
             Coverage::Excluded | Coverage::Bright | Coverage::Background => Vec3::from(mean(film.sums[i])),
-            Coverage::Full => *filtered * divisor(film, i, 1.0),
+            Coverage::Blurred => *filtered * divisor(film, i, 1.0),
+            Coverage::Sharp => Vec3::from(film.layer(Layer::Emission, i)) + *filtered * divisor(film, i, 1.0),
             Coverage::Partial(fraction) => {
                 Vec3::from(film.layer(Layer::Emission, i)) + *filtered * (fraction * divisor(film, i, fraction))
             }
@@ -135,7 +136,7 @@ fn extend_surfaces(width: usize, coverages: &[Coverage], guides: &mut [[f32; PLA
     const VALUES: usize = COLOR_VARIANCE - COLOR + 1;
     let extended = |i: usize| {
         let around = window(i, width, coverages.len(), DENOISE_PATCH_RADIUS as usize);
-        let surfaces = around.filter(|j| matches!(coverages[*j], Coverage::Full | Coverage::Partial(_)));
+        let surfaces = around.filter(|j| coverages[*j].fraction().is_some());
         let (sum, count) = surfaces.fold(([0.0; VALUES], 0.0), |(sum, count), j| {
             (std::array::from_fn(|k| sum[k] + guides[j][COLOR + k]), count + 1.0)
         });
@@ -156,26 +157,22 @@ fn divisor(film: &Film, i: usize, fraction: f32) -> Vec3 {
 
 fn guides_of(film: &Film, i: usize, coverage: Coverage) -> [f32; PLANES] {
     let mut guides = [0.0; PLANES];
-    let fraction = match coverage {
-        Coverage::Full => 1.0,
-        Coverage::Partial(fraction) => fraction,
-        Coverage::Excluded | Coverage::Bright | Coverage::Background => {
-            guides[DEPTH] = EXCLUDED_DEPTH;
-            guides[DEPTH + 2] = 1.0 / EXCLUDED_DEPTH;
-            return guides;
-        }
+    let Some(fraction) = coverage.fraction() else {
+        guides[DEPTH] = EXCLUDED_DEPTH;
+        guides[DEPTH + 2] = 1.0 / EXCLUDED_DEPTH;
+        return guides;
     };
     let samples = film.sample_count(i) as f32;
     let of_surfaces = |mean: Vec3, variance: Vec3| surface_variance(mean, variance, samples, fraction);
     let mut set = |first: usize, values: &[f32]| guides[first..first + values.len()].copy_from_slice(values);
     let divisor = divisor(film, i, fraction);
-    let (color, behind) = colors_of(film, i, fraction);
+    let (color, behind) = averaged_light(film, i, coverage);
     let variance = of_surfaces(color - behind, Vec3::from(film.variance(i)));
-    // The variance of a single sample is unknown; a standard error of 100 % is assumed.
-    let variance = if variance.is_finite() { variance } else { color * color };
+    // The estimated variance of a mean of values of at least 0 is at most the square of the mean. The rest of an estimate
+    // is due to emission. The variance of a single sample is unknown.
+    let variance = Vec3::select(variance.cmplt(color * color), variance, color * color);
     set(COLOR, &(color / divisor).to_array());
-    let variance = (variance / (divisor * divisor)).element_sum();
-    set(COLOR_VARIANCE, &[variance * stratification(samples)]);
+    set(COLOR_VARIANCE, &[(variance / (divisor * divisor)).element_sum()]);
     if film.has_layers() {
         let normal = (NORMAL, Layer::Normal, film.normal_variance(i), NORMAL_TOLERANCE);
         let albedo = (ALBEDO, Layer::Albedo, film.albedo_variance(i), ALBEDO_TOLERANCE);
@@ -194,13 +191,6 @@ fn guides_of(film: &Film, i: usize, coverage: Coverage) -> [f32; PLANES] {
     guides
 }
 
-/// Returns the factor of a variance that was estimated as if samples were independent. The variance of stratified
-/// samples falls faster: as n^-1 to n^-1.5, depending on the scene. The mean of the exponents is assumed, from 16
-/// samples on.
-fn stratification(samples: f32) -> f32 {
-    (16.0 / samples).min(1.0).sqrt().sqrt()
-}
-
 /// Returns the variance of a feature for the denoiser; 0 if it is unknown.
 fn feature_variance(variance: f32) -> f32 {
     if variance.is_finite() {
@@ -210,39 +200,52 @@ fn feature_variance(variance: f32) -> f32 {
     }
 }
 
-/// Corrects the estimated variances of colors. The mean variance of the neighbors sets a minimum, because the few samples
-/// of a pixel may be equal by chance. At edges, the mean squared difference of the halves sets a maximum, because
-/// stratified samples have much less noise there than the independent samples that the estimate assumes.
+/// Corrects the estimated variances of colors. The estimate assumes independent samples; the difference of the halves shows
+/// how much less noise the samples have because they are stratified.
 fn limit_variances(film: &Film, coverages: &[Coverage], guides: &mut [[f32; PLANES]]) {
     let width = film.region.width() as usize;
     let variances: Vec<f32> = guides.iter().map(|guides| guides[COLOR_VARIANCE]).collect();
     let half_variances: Vec<f32> = (0..guides.len())
         .into_par_iter()
-        .map(|i| match coverages[i] {
-            Coverage::Full => half_variance(film, i),
-            Coverage::Partial(_) => variances[i],
-            Coverage::Excluded | Coverage::Bright | Coverage::Background => 0.0,
+        .map(|i| match coverages[i].fraction() {
+            Some(fraction) => half_variance(film, i, fraction).min(squared_color(&guides[i])),
+            None => 0.0,
         })
         .collect();
-    let (local, limits) = (
-        box_means(&variances, width, 1),
-        box_means(&half_variances, width, HALF_VARIANCE_RADIUS),
-    );
-    for (guides, (local, limit)) in guides.iter_mut().zip(local.into_iter().zip(limits)) {
-        let mut variance = guides[COLOR_VARIANCE].max(MIN_RELATIVE_VARIANCE * local);
-        let relative_depth_variance = guides[DEPTH + 1] / (guides[DEPTH] * guides[DEPTH]).max(f32::MIN_POSITIVE);
-        let feature_variance = guides[NORMAL + 3] + guides[ALBEDO + 3] + relative_depth_variance;
-        if feature_variance > FEATURE_VARIANCE_SCALE * EDGE_VARIANCE {
-            variance = variance.min(limit);
-        }
-        guides[COLOR_VARIANCE] = variance;
+    let local = box_means(&variances, width, 1);
+    let [wide, halves] = [&variances, &half_variances].map(|values| box_means(values, width, HALF_VARIANCE_RADIUS));
+    for (i, guides) in guides.iter_mut().enumerate() {
+        let variance = variances[i].max(MIN_RELATIVE_VARIANCE * local[i]) * stratification(halves[i], wide[i]);
+        guides[COLOR_VARIANCE] = variance.min(MAX_RELATIVE_VARIANCE * halves[i]);
     }
 }
 
-/// Returns the variance of a pixel's color, divided by the albedo, that the difference of the halves suggests.
-fn half_variance(film: &Film, i: usize) -> f32 {
-    let [even, odd] = [Half::Even, Half::Odd].map(|half| Vec3::from(film.half_mean(half, i)));
-    let difference = (even - odd) * 0.5 / divisor(film, i, 1.0);
-    let variance = difference.length_squared();
-    if variance.is_finite() { variance } else { 0.0 }
+fn squared_color(guides: &[f32; PLANES]) -> f32 {
+    Vec3::from_slice(&guides[COLOR..]).length_squared()
+}
+
+/// Returns the variance of stratified samples divided by that of independent samples, or a larger number, at most 1.
+/// `halves` is the mean of the variances that the halves suggest; `independent` is that of the estimates.
+///
+/// If the variance of n samples is proportional to n^-b, then `halves` is that of n / 2 samples less that of n samples:
+/// 2^b - 1 times the latter. The result is exact for independent samples (b = 1), and 1.8 times too large for b = 1.5.
+fn stratification(halves: f32, independent: f32) -> f32 {
+    if independent > 0.0 {
+        (halves / independent).min(1.0)
+    } else {
+        1.0
+    }
+}
+
+/// Returns the variance of the color of a pixel's surfaces, divided by their albedo, that the difference of the halves
+/// suggests. `fraction` is the part of the pixel that they cover.
+fn half_variance(film: &Film, i: usize, fraction: f32) -> f32 {
+    let [first, second] = [Half::First, Half::Second].map(|half| Vec3::from(film.half_mean(half, i)));
+    let (all, first_weight) = (film.sums[i].w, film.half_sums[i].w);
+    // 1/4 for halves of equal weights
+    let scale = first_weight * (all - first_weight) / (all * all);
+    let variance = ((first - second) / (fraction * divisor(film, i, fraction))).length_squared() * scale;
+    // Without a second sample, or with negative weights, the halves do not reveal the variance.
+    let is_known = scale > 0.0 && variance >= 0.0;
+    if is_known { variance } else { f32::INFINITY }
 }
