@@ -132,7 +132,7 @@ fn the_maximum_of_adaptive_sampling_can_be_defined() {
         let files = ["-o", "out.exr", "--stats", "stats.json"];
         folder.run_quietly(&[&["render", "small.toml"], &options[..], &files[..]].concat());
         let stats: serde_json::Value = serde_json::from_slice(&folder.read("stats.json")).unwrap();
-        assert_eq!(stats["most_samples"], 20, "{define}");
+        assert_eq!(stats["pixel_samples"], 20, "{define}");
     }
     let without_error = folder.run(&["render", "small.toml", "-D", "render.adaptive.max_samples=20"]);
     assert_eq!(without_error.code, 2, "{}", without_error.stderr);
