@@ -97,8 +97,8 @@ pub struct Film {
     pub denoised: Vec<Vec3>,
 }
 
-/// A part of a pixel's samples: half of them if their number is a power of two. Such a part is as well distributed as
-/// all samples, because aligned runs of 2^k points of a Sobol' sequence are stratified. Its samples of even index are not.
+/// A part of a pixel's samples: half of them if their number is a power of two. Aligned runs of 2^k points of a Sobol'
+/// sequence are stratified, but points of even index are not, because the order of the points is scrambled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Half {
     /// The first 2^k samples, where 2^k is the largest power of two below their number.

@@ -284,11 +284,9 @@ impl Args {
             ..Overrides::default()
         })
     }
-}
 
-impl Args {
-    /// Returns the values of `--define`. If they set a part of `render.adaptive`, they include the error of `--adaptive`,
-    /// which that table must contain.
+    /// Returns the values of `--define`. If they set keys of `render.adaptive`, the error of `--adaptive` is added, because
+    /// that table requires an error.
     fn defines(&self) -> Vec<Define> {
         let mut defines = self.define.clone();
         let sets_adaptive = |define: &Define| define.to_string().starts_with("render.adaptive");

@@ -1,5 +1,6 @@
-//! Coverage of pixels at the edges of surfaces. A pixel at an edge mixes a surface with the background. If the background
-//! has no noise, its light is separated, so that the surface's color and features equal those inside of the edge.
+//! Coverage of pixels by surfaces, which determines the light that is averaged. Emitted light is excluded if it has only
+//! the noise of antialiasing. A pixel at the edge of a surface mixes it with the background. If the background has no
+//! noise, its light is separated, so that the surface's color and features equal those inside of the edge.
 
 use glam::Vec3;
 use rayon::prelude::*;
@@ -16,8 +17,7 @@ const MAX_BACKGROUND_ERROR: f32 = 0.01;
 /// Variance of the distances of a pixel's samples, relative to the squared distance, above which they hit several surfaces.
 const EDGE_VARIANCE: f32 = 1e-4;
 
-/// The coverage of a pixel by surfaces. At a silhouette in front of a background without noise, only the light of the
-/// surface is filtered, so that pixels at the silhouette are averaged with pixels inside of it.
+/// The coverage of a pixel by surfaces, which determines the light that is averaged.
 #[derive(Clone, Copy, PartialEq)]
 pub enum Coverage {
     /// The color cannot be averaged: it is not finite, or the pixel has no samples.

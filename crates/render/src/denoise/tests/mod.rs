@@ -385,6 +385,10 @@ fn a_crop_differs_from_the_full_image_only_near_its_border() {
             film.layers[Layer::Emission as usize][i].w = 0.0;
             film.moments[i] = Vec4::new(0.0, 0.0, 0.0, film.moments[i].w);
         }
+        // Areas with edges in more or less than half of the pixels.
+        if random(&mut state) > f64::from(i as u32 % subject.width / 12 % 2) - 0.5 {
+            film.normal_moments[i].w = 100.0;
+        }
     }
     let region = Region {
         x0: 4,
