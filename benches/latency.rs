@@ -1,9 +1,10 @@
-//! Latency of the development mode: the time from a change of a scene or shader to the new image. The benchmark changes
-//! copies in a temporary folder.
+//! Latency of the development mode: the time from its start, or from a change of a scene or shader, to the new image. The
+//! benchmark changes copies in a temporary folder. A model is not changed.
 //!
 //! ```sh
 //! cargo bench --bench latency                              # scenes/cornell.toml
 //! cargo bench --bench latency -- scenes/mirror-glass.toml  # any scene that refers to no other files
+//! cargo bench --bench latency -- model.glb                 # the start with a model
 //! ```
 
 use std::fs;
@@ -30,6 +31,22 @@ type Times = [Duration; 3];
 fn main() {
     let mut arguments = std::env::args().skip(1).filter(|argument| argument != "--bench"); // cargo adds --bench
     let scene = arguments.next().unwrap_or_else(|| "scenes/cornell.toml".to_owned());
+    let header = || {
+        println!(
+            "{:<14}{:>16}{:>18}{:>22}",
+            "change", "old discarded", "first image", "every pixel sampled"
+        )
+    };
+    println!("{scene}: milliseconds, median and maximum");
+    if !scene.ends_with(".toml") {
+        header();
+        return print_times(
+            "start",
+            &(0..ROUNDS)
+                .map(|_| start(Path::new(&scene), None).1)
+                .collect::<Vec<_>>(),
+        );
+    }
     let text = fs::read_to_string(&scene).unwrap_or_else(|error| panic!("{scene}: {error}"));
     let folder = tempfile::tempdir().expect("a temporary folder");
     let file = folder.path().join("scene.toml");
@@ -40,26 +57,9 @@ fn main() {
         fs::create_dir_all(path.parent().expect("a folder")).expect("a folder");
         fs::write(path, text).expect("a copy of a shader");
     }
-    let session = Session::start(Settings {
-        sources: Sources {
-            scene: file.clone(),
-            overrides: Overrides::default(),
-            shaders: Some(shaders.clone()),
-        },
-        device: AdapterChoice::Auto,
-        out: None,
-        only_for_viewers: false,
-        editor: None,
-        report: Box::new(|_| ()),
-    })
-    .unwrap_or_else(|error| panic!("{scene}: {error}"));
-    measure(&session, || ());
-
-    println!("{scene}: milliseconds, median and maximum");
-    println!(
-        "{:<14}{:>16}{:>18}{:>22}",
-        "change", "old discarded", "first image", "every pixel sampled"
-    );
+    let (session, times) = start(&file, Some(&shaders));
+    header();
+    print_times("start", &[times]);
     // Seeds and factors differ in every run, so that no cache contains their kernels.
     let now = SystemTime::now()
         .duration_since(UNIX_EPOCH)
@@ -94,6 +94,27 @@ fn main() {
     });
 }
 
+/// Starts the development mode with built-in shaders or those of a folder. Returns the session, and the times until its
+/// first images.
+fn start(scene: &Path, shaders: Option<&Path>) -> (Session, Times) {
+    let begin = Instant::now();
+    let session = Session::start(Settings {
+        sources: Sources {
+            scene: scene.to_owned(),
+            overrides: Overrides::default(),
+            shaders: shaders.map(Path::to_owned),
+        },
+        device: AdapterChoice::Auto,
+        out: None,
+        only_for_viewers: false,
+        editor: None,
+        report: Box::new(|_| ()),
+    })
+    .unwrap_or_else(|error| panic!("{}: {error}", scene.display()));
+    let times = wait(&session, begin, None);
+    (session, times)
+}
+
 /// Replaces a file atomically, like an editor.
 fn replace(path: &Path, text: &str) {
     let mut file = NamedTempFile::new_in(path.parent().expect("a folder")).expect("a file");
@@ -110,22 +131,31 @@ fn rounds(session: &Session, name: &str, change: impl Fn(usize)) {
             times
         })
         .collect();
+    print_times(name, &times);
+}
+
+fn print_times(name: &str, times: &[Times]) {
     let cells = [0, 1, 2].map(|column| {
         let mut column: Vec<u128> = times.iter().map(|times| times[column].as_millis()).collect();
         column.sort_unstable();
-        format!("{} {:>6}", column[ROUNDS / 2], column[ROUNDS - 1])
+        format!("{} {:>6}", column[column.len() / 2], column[column.len() - 1])
     });
     println!("{name:<14}{:>16}{:>18}{:>22}", cells[0], cells[1], cells[2]);
 }
 
 /// Applies a change and waits until its image has a sample in each pixel.
 fn measure(session: &Session, change: impl FnOnce()) -> Times {
-    let frame = || session.frames.borrow().clone();
-    let revision = frame().map(|frame| frame.header.revision);
-    let start = Instant::now();
+    let revision = session.frames.borrow().as_ref().map(|frame| frame.header.revision);
+    let begin = Instant::now();
     change();
+    wait(session, begin, revision)
+}
+
+/// Waits until the image of a newer revision has a sample in each pixel. Returns the times since `begin`.
+fn wait(session: &Session, begin: Instant, revision: Option<u64>) -> Times {
+    let frame = || session.frames.borrow().clone();
     let (mut discarded, mut first) = (None, None);
-    while start.elapsed() < TIMEOUT {
+    while begin.elapsed() < TIMEOUT {
         let state = session.state.borrow().clone();
         assert!(state.problems.is_empty(), "{}", state.problems[0].message);
         assert!(
@@ -134,12 +164,12 @@ fn measure(session: &Session, change: impl FnOnce()) -> Times {
             state.notice.as_ref().map(|n| &n.text)
         );
         if state.compiling {
-            discarded.get_or_insert(start.elapsed());
+            discarded.get_or_insert(begin.elapsed());
         }
         if let Some(frame) = frame().filter(|frame| Some(frame.header.revision) > revision) {
-            let first = *first.get_or_insert(start.elapsed());
+            let first = *first.get_or_insert(begin.elapsed());
             if frame.header.sent == frame.header.finest && frame.header.samples > 0 {
-                return [discarded.unwrap_or(first), first, start.elapsed()];
+                return [discarded.unwrap_or(first), first, begin.elapsed()];
             }
         }
         std::thread::sleep(Duration::from_millis(1));

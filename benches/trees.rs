@@ -8,7 +8,7 @@ use glam::Vec3;
 use rayon::prelude::*;
 use wgray_render::bvh::{Aabb, DecodedMesh, MAX_LEAF_SIZE, Tree, build};
 use wgray_render::cpu::traversal::{
-    Directions, Level, Line, Mesh, MeshRay, MeshStack, Nearest, RaySource, Segments, closest, occluded, trace,
+    Directions, Level, Line, Mesh, MeshRay, MeshStack, Nearest, Next, RaySource, Segments, closest, occluded, trace,
 };
 
 /// An indexed triangle mesh.
@@ -221,9 +221,12 @@ struct Rays<'a> {
 
 impl<'a, S> RaySource<'a, S> for Rays<'a> {
     #[inline(always)]
-    fn next(&mut self, _simd: S, _lane: usize, traced: Option<(&Line, Nearest)>) -> Option<(&'a DecodedMesh, MeshRay)> {
+    fn next(&mut self, _simd: S, _lane: usize, traced: Option<(&Line, Nearest)>) -> Next<'a> {
         self.hits += usize::from(traced.is_some_and(|(_, found)| found != MISS));
-        Some((self.mesh, *self.rays.next()?))
+        match self.rays.next() {
+            Some(ray) => Next::Trace(self.mesh, *ray),
+            None => Next::Done,
+        }
     }
 }
 

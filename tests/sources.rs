@@ -228,6 +228,8 @@ const NUMBER_TRAITS: &[(&str, &str)] = &[
     ("Mask", "bool"),
     ("MaterialFields", "Material"),
     ("SurfaceVectors", "Surface"),
+    ("LightNodes", "LightNode"),
+    ("Children", "vec4<f32>"),
 ];
 
 /// Returns the WGSL type of a type parameter.

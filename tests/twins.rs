@@ -42,7 +42,7 @@ const SHADERS_WITHOUT_TWIN: &[(&str, &str)] = &[
 
 /// Files in crates/render/src/cpu that are not twins of a shader.
 const RUST_FILES_WITHOUT_SHADER: &[&str] = &[
-    "decoded_meshes.rs",
+    "decoded_bvhs.rs",
     "ewa.rs",
     "mod.rs",
     "renderer.rs",

@@ -7,7 +7,7 @@ use glam::{UVec2, Vec3, Vec4};
 use proptest::strategy::{Strategy as _, ValueTree as _};
 use proptest::test_runner::TestRunner;
 use wgray::scene::Integrator;
-use wgray_render::cpu::decoded_meshes::{are_decoded, decode_meshes, decode_meshes_up_to};
+use wgray_render::cpu::decoded_bvhs::{are_decoded, decode_bvhs, decode_bvhs_up_to};
 use wgray_render::cpu::integrators::path::{path_layers, path_value};
 use wgray_render::cpu::pixel::{Layers, pixel_radiance};
 use wgray_render::cpu::wavefront::{LaneHits, MaterialKind, SurfaceKind, Wavefront};
@@ -49,7 +49,7 @@ fn samples(packed: &Packed, step: u32, count: u32) -> Vec<(UVec2, u32)> {
 }
 
 fn wavefront(packed: &Packed, samples: &[(UVec2, u32)], batch_size: usize) -> Vec<PathBits> {
-    decode_meshes(packed);
+    decode_bvhs(packed);
     wavefront_with_hits(packed, samples, batch_size).0
 }
 
@@ -403,7 +403,7 @@ fn random_scenes_have_the_paths_of_the_scalar_integrator() {
         for (packed, step) in with_lanes.iter().map(|packed| (packed, 3)).chain([(&packed, 2)]) {
             let samples = samples(packed, step, 3);
             let expected = scalar(packed, &samples);
-            decode_meshes(packed);
+            decode_bvhs(packed);
             let (paths, lane_hits) = wavefront_with_hits(packed, &samples, batch_size);
             let differing = count_differing(&paths, &expected);
             assert_eq!(
@@ -439,13 +439,14 @@ fn scenes_have_the_paths_of_the_scalar_integrator() {
 }
 
 #[test]
-fn paths_do_not_depend_on_the_limit_of_triangles() {
+fn paths_do_not_depend_on_the_limit_of_decoding() {
     let packed = scene_with_many_items();
-    let triangles = packed.bvh.meshes.iter().map(|mesh| mesh.triangles.len()).sum::<usize>();
+    let triangles: usize = packed.bvh.meshes.iter().map(|mesh| mesh.triangles.len()).sum();
+    let leaves = packed.bvh.items.len() + triangles;
     let samples = samples(&packed, 2, 2);
     let expected = scalar(&packed, &samples);
-    for (limit, is_decoded) in [(triangles - 1, false), (triangles, true)] {
-        decode_meshes_up_to(&packed, limit);
+    for (limit, is_decoded) in [(leaves - 1, false), (leaves, true)] {
+        decode_bvhs_up_to(&packed, limit);
         assert_eq!(are_decoded(&packed), is_decoded);
         let (paths, _) = wavefront_with_hits(&packed, &samples, 256);
         assert_eq!(count_differing(&paths, &expected), 0);
@@ -459,7 +460,7 @@ fn changed_scenes_are_detected() {
     assert!(packed.bvh.items.len() > 70 && packed.bvh.instances.len() == 8);
     let samples = samples(&packed, 1, 2);
     let expected = scalar(&packed, &samples);
-    decode_meshes(&packed);
+    decode_bvhs(&packed);
     let (paths, lane_hits) = wavefront_with_hits(&packed, &samples, 256);
     assert_eq!(count_differing(&paths, &expected), 0);
     for surface in SurfaceKind::ALL {

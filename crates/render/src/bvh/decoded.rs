@@ -1,9 +1,10 @@
-//! A mesh and its BVH in a form for fast traversal on the CPU: boxes are decoded to floats, and the triangles of a leaf
-//! are a structure of arrays. A mesh takes about 130 bytes per triangle.
+//! BVHs in a form for fast traversal on the CPU: boxes are decoded to floats. In a mesh, the triangles of a leaf are a
+//! structure of arrays, about 130 bytes per triangle. In the BVH of a scene, the box of a leaf is that of its only item.
 
+use std::ops::Range;
 use std::sync::OnceLock;
 
-use super::Node;
+use super::{Aabb, Node};
 
 /// Bit of [`DecodedNode::children`] that is set for leaves.
 pub const LEAF: u32 = 1 << 31;
@@ -48,18 +49,30 @@ impl DecodedMesh {
     /// vertex indices and the triangle's index, in leaf order.
     pub fn new(nodes: &[Node], vertices: &[[f32; 4]], triangles: &[[u32; 4]]) -> DecodedMesh {
         let mut leaves = Vec::new();
-        let mut leaf = |first: usize, count: usize| {
-            leaves.push(DecodedLeaf::new(vertices, triangles, first, count));
-            LEAF | (leaves.len() - 1) as u32
+        let mut leaf = |items: Range<usize>, bounds: Aabb| {
+            leaves.push(DecodedLeaf::new(vertices, triangles, items.start, items.len()));
+            ((leaves.len() - 1) as u32, bounds)
         };
         let nodes = nodes.iter().map(|node| DecodedNode::new(node, &mut leaf)).collect();
         DecodedMesh { nodes, leaves }
     }
 }
 
+/// Decodes the BVH of a scene. A leaf is the index of its item, and has the box of the item. Returns no nodes if a leaf
+/// has several items.
+pub fn decode_items(nodes: &[Node], boxes: impl Fn(usize) -> Aabb) -> Vec<DecodedNode> {
+    let mut has_several = false;
+    let mut leaf = |items: Range<usize>, _: Aabb| {
+        has_several |= items.len() > 1;
+        (items.start as u32, boxes(items.start))
+    };
+    let decoded = nodes.iter().map(|node| DecodedNode::new(node, &mut leaf)).collect();
+    if has_several { Vec::new() } else { decoded }
+}
+
 impl DecodedNode {
-    /// `leaf` adds a leaf, given its first triangle and its number of triangles, and returns its entry for `children`.
-    fn new(node: &Node, leaf: &mut impl FnMut(usize, usize) -> u32) -> DecodedNode {
+    /// `leaf` returns the index and the box of a leaf, given its items and its decoded box.
+    fn new(node: &Node, leaf: &mut impl FnMut(Range<usize>, Aabb) -> (u32, Aabb)) -> DecodedNode {
         let mut decoded = DecodedNode {
             planes: [[[f32::INFINITY; 8]; 3], [[f32::NEG_INFINITY; 8]; 3]],
             children: [LEAF; 8],
@@ -67,12 +80,19 @@ impl DecodedNode {
         };
         for child in 0..8 {
             let items = node.items(child);
-            decoded.children[child] = match node.child(child) {
-                Some(index) => index,
-                None if items.is_empty() => continue,
-                None => leaf(items.start, items.len()),
+            let bounds = Aabb {
+                low: node.low(child),
+                high: node.high(child),
             };
-            let (low, high) = (node.low(child), node.high(child));
+            let (entry, Aabb { low, high }) = match node.child(child) {
+                Some(index) => (index, bounds),
+                None if items.is_empty() => continue,
+                None => {
+                    let (index, bounds) = leaf(items, bounds);
+                    (LEAF | index, bounds)
+                }
+            };
+            decoded.children[child] = entry;
             for axis in 0..3 {
                 decoded.planes[0][axis][child] = low[axis];
                 decoded.planes[1][axis][child] = high[axis];
@@ -103,31 +123,37 @@ impl DecodedLeaf {
     }
 }
 
-/// The decoded form of a mesh, if it has been decoded. It is derived from the mesh: any two are equal, and a clone, which
+/// The decoded form of a BVH, if it has been decoded. It is derived from the BVH: any two are equal, and a clone, which
 /// may be changed, has none.
-#[derive(Debug, Default)]
-pub struct DecodedOnce(OnceLock<DecodedMesh>);
+#[derive(Debug)]
+pub struct DecodedOnce<T>(OnceLock<T>);
 
-impl DecodedOnce {
+impl<T> DecodedOnce<T> {
     /// Returns the decoded form, if it exists.
-    pub fn get(&self) -> Option<&DecodedMesh> {
+    pub fn get(&self) -> Option<&T> {
         self.0.get()
     }
 
-    /// Returns the decoded form, after decoding the mesh if necessary.
-    pub fn get_or_init(&self, decode: impl FnOnce() -> DecodedMesh) -> &DecodedMesh {
+    /// Returns the decoded form, after decoding the BVH if necessary.
+    pub fn get_or_init(&self, decode: impl FnOnce() -> T) -> &T {
         self.0.get_or_init(decode)
     }
 }
 
-impl Clone for DecodedOnce {
-    fn clone(&self) -> DecodedOnce {
+impl<T> Default for DecodedOnce<T> {
+    fn default() -> DecodedOnce<T> {
+        DecodedOnce(OnceLock::new())
+    }
+}
+
+impl<T> Clone for DecodedOnce<T> {
+    fn clone(&self) -> DecodedOnce<T> {
         DecodedOnce::default()
     }
 }
 
-impl PartialEq for DecodedOnce {
-    fn eq(&self, _: &DecodedOnce) -> bool {
+impl<T> PartialEq for DecodedOnce<T> {
+    fn eq(&self, _: &DecodedOnce<T>) -> bool {
         true
     }
 }

@@ -17,7 +17,7 @@ mod wide;
 use glam::Vec3;
 
 use self::binary::Binary;
-pub use self::decoded::{DecodedLeaf, DecodedMesh, DecodedNode, DecodedOnce, LEAF};
+pub use self::decoded::{DecodedLeaf, DecodedMesh, DecodedNode, DecodedOnce, LEAF, decode_items};
 pub use self::node::Node;
 
 /// An axis-aligned bounding box, empty if low > high.

@@ -2,6 +2,7 @@
 //! [`Real`] is an `f32`, or a vector with an `f32` in each lane. Functions that are generic over these types select
 //! values instead of branching, like the WGSL functions. The result in a lane has the same bits as the `f32` result.
 
+mod children;
 mod materials;
 mod surfaces;
 mod vectors;
@@ -12,6 +13,7 @@ use fearless_simd::prelude::*;
 use fearless_simd::{f32x8, i32x8, mask32x8, u32x8};
 use glam::{UVec2, UVec4, Vec2, Vec3, Vec4};
 
+pub use self::children::{Children, LightNodes, TwoLightNodes};
 pub use self::materials::{LaneMaterials, MaterialFields, MaterialRows};
 pub use self::surfaces::SurfaceVectors;
 pub use self::vectors::{Lanes2, Lanes3};

@@ -1,57 +1,53 @@
 //! Twin of `shaders/light_tree.wgsl`.
 
-use glam::{BVec4A, Vec3, Vec4};
+use glam::Vec4;
 
-use super::math::{dot, max4};
-use crate::records::LightNode;
+use super::lanes::{Children, LightNodes};
+use super::math::max4;
 
 #[inline(always)]
-pub fn mean_above(m: Vec4, r: Vec4) -> Vec4 {
-    Vec4::select(m.abs().cmplt(r), 0.25 * (m + r) * ((m + r) / r), max4(m, Vec4::ZERO))
+pub fn mean_above<C: Children>(m: C, r: C) -> C {
+    C::select(max4(m, m.splat(0.0)), (m + r) * 0.25 * ((m + r) / r), m.abs().lt(r))
 }
 
 #[inline(always)]
-pub fn light_importances(node: &LightNode, p: Vec3, n: Vec3) -> Vec4 {
-    let x = node.x - p.x;
-    let y = node.y - p.y;
-    let z = node.z - p.z;
+pub fn light_importances<N: LightNodes>(node: &N, p: N::Vec3, n: N::Vec3) -> N::Vec4 {
+    let ([px, py, pz], [nx, ny, nz]) = (N::components(p), N::components(n));
+    let (radius, cosine) = (node.get(|node| node.radius), node.get(|node| node.cosine));
+    let intensity = node.get(|node| node.intensity);
+    let axis_x = node.get(|node| node.axis_x);
+    let axis_y = node.get(|node| node.axis_y);
+    let axis_z = node.get(|node| node.axis_z);
+    let x = node.get(|node| node.x) - px;
+    let y = node.get(|node| node.y) - py;
+    let z = node.get(|node| node.z) - pz;
+    let zero = x.splat(0.0);
     let d2 = x * x + y * y + z * z;
     let d = d2.sqrt();
-    let signed_axial = -(node.axis_x * x + node.axis_y * y + node.axis_z * z);
-    let is_two_sided = BVec4A::from(node.sides.to_array().map(|sides| sides == 2));
-    let axial = Vec4::select(is_two_sided, signed_axial.abs(), signed_axial);
-    let sine = max4(1.0 - node.cosine * node.cosine, Vec4::ZERO).sqrt();
-    let rotated = axial * node.cosine + max4(d2 - signed_axial * signed_axial, Vec4::ZERO).sqrt() * sine;
-    let emitter_height = Vec4::select(axial.cmpge(node.cosine * d), d, rotated);
-    let surface_height = if dot(n, n) == 0.0 {
-        d
-    } else {
-        x * n.x + y * n.y + z * n.z
-    };
-    let min_height = 0.03 * node.radius;
-    let mean_emitter_height = max4(mean_above(emitter_height, node.radius), min_height);
-    let mean_surface_height = max4(mean_above(surface_height, node.radius), min_height);
-    let inverse = 1.0 / max4((d2 + 0.1 * node.radius * node.radius).sqrt(), Vec4::splat(1e-15));
-    let value =
-        node.intensity * (mean_emitter_height * inverse) * (mean_surface_height * inverse) * (inverse * inverse);
-    let may_emit = (emitter_height + 1.5707964 * node.radius).cmpgt((node.edge - 1e-3) * d);
-    let may_arrive = may_emit & (surface_height + node.radius).cmpgt(-1e-3 * d) & node.intensity.cmpgt(Vec4::ZERO);
-    Vec4::select(may_arrive, max4(value, Vec4::splat(1e-36)), Vec4::ZERO)
+    let signed_axial = -(axis_x * x + axis_y * y + axis_z * z);
+    let axial = Children::select(signed_axial, signed_axial.abs(), node.is_two_sided());
+    let sine = max4(x.splat(1.0) - cosine * cosine, zero).sqrt();
+    let rotated = axial * cosine + max4(d2 - signed_axial * signed_axial, zero).sqrt() * sine;
+    let emitter_height = Children::select(rotated, d, (cosine * d).le(axial));
+    let is_any_side = (nx * nx + ny * ny + nz * nz).eq(zero);
+    let surface_height = Children::select(x * nx + y * ny + z * nz, d, is_any_side);
+    let min_height = radius * 0.03;
+    let mean_emitter_height = max4(mean_above(emitter_height, radius), min_height);
+    let mean_surface_height = max4(mean_above(surface_height, radius), min_height);
+    let inverse = x.splat(1.0) / max4((d2 + radius * 0.1 * radius).sqrt(), x.splat(1e-15));
+    let value = intensity * (mean_emitter_height * inverse) * (mean_surface_height * inverse) * (inverse * inverse);
+    let may_emit = ((node.get(|node| node.edge) - 1e-3) * d).lt(emitter_height + radius * 1.5707964);
+    let may_arrive = may_emit & (d * -1e-3).lt(surface_height + radius) & zero.lt(intensity);
+    Children::select(zero, max4(value, x.splat(1e-36)), may_arrive)
 }
 
 #[inline(always)]
-pub fn light_shares(importances: Vec4) -> Vec4 {
-    let sum = (importances.x + importances.y) + (importances.z + importances.w);
-    if sum == 0.0 {
-        return Vec4::X;
-    }
-    let is_positive = importances.cmpgt(Vec4::ZERO);
-    let clamped = Vec4::select(
-        is_positive,
-        max4(importances, Vec4::splat(sum * 0.00024414063)),
-        Vec4::ZERO,
-    );
-    clamped / ((clamped.x + clamped.y) + (clamped.z + clamped.w))
+pub fn light_shares<C: Children>(importances: C) -> C {
+    let zero = importances.splat(0.0);
+    let sum = importances.sum();
+    let clamped = C::select(zero, max4(importances, sum * 0.00024414063), zero.lt(importances));
+    let shares = clamped / clamped.sum();
+    C::select(shares, shares.first(), sum.eq(zero))
 }
 
 #[inline(always)]

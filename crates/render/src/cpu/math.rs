@@ -2,9 +2,7 @@
 
 use std::f32::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 
-use glam::Vec4;
-
-use super::lanes::{Condition, Real, Vector3, constant, select};
+use super::lanes::{Children, Condition, Real, Vector3, constant, select};
 
 #[inline(always)]
 pub fn dot<V: Vector3>(a: V, b: V) -> V::Real {
@@ -31,8 +29,8 @@ pub fn max<F: Real>(a: F, b: F) -> F {
 }
 
 #[inline(always)]
-pub fn max4(a: Vec4, b: Vec4) -> Vec4 {
-    Vec4::select(a.cmpgt(b), a, b)
+pub fn max4<C: Children>(a: C, b: C) -> C {
+    C::select(b, a, b.lt(a))
 }
 
 #[inline(always)]

@@ -10,7 +10,7 @@ pub mod bvh;
 pub mod bvh_node;
 pub mod camera;
 pub mod cylinder;
-pub mod decoded_meshes;
+pub mod decoded_bvhs;
 pub mod denoise;
 pub mod dielectric;
 pub mod differential;

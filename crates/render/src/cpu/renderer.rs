@@ -6,7 +6,7 @@ use glam::{UVec2, Vec4};
 use rayon::prelude::*;
 
 use super::adaptive::{layer_mean, pilot_add, pilot_finish, proportional_samples, samples_wanted};
-use super::decoded_meshes::decode_meshes;
+use super::decoded_bvhs::decode_bvhs;
 use super::geometry::pixel_first_hit;
 use super::integrators::path::{path_layers, path_value};
 use super::integrators::phong;
@@ -102,7 +102,7 @@ impl<P: Deref<Target = Packed>> Backend for Cpu<P> {
     fn poll(&mut self) -> Result<bool, RenderError> {
         if let (Some((tile, mut samples)), Some((film, _))) = (self.pending.take(), &mut self.film) {
             let scene: &Packed = &self.scene;
-            decode_meshes(scene);
+            decode_bvhs(scene);
             while !samples.is_empty() {
                 let end = self.rules.end_of_part(&samples);
                 add_samples(scene, film, tile, samples.start..end);

@@ -4,7 +4,7 @@ use bytemuck::cast_slice;
 use glam::{UVec4, Vec3, Vec4};
 
 use super::Node;
-use crate::bvh::DecodedOnce;
+use crate::bvh::{DecodedMesh, DecodedOnce};
 
 /// A packed mesh, in object space.
 #[derive(Clone, Debug, PartialEq)]
@@ -31,7 +31,7 @@ pub struct PackedMesh {
     /// Upper corner of the bounding box.
     pub high: Vec3,
     /// The form for traversal on the CPU.
-    pub decoded: DecodedOnce,
+    pub decoded: DecodedOnce<DecodedMesh>,
 }
 
 impl PackedMesh {

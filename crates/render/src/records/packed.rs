@@ -8,6 +8,7 @@ use glam::{DVec3, Vec4};
 use wgray_scene::Integrator;
 
 use super::*;
+use crate::bvh::{DecodedNode, DecodedOnce};
 use crate::film::FilmLayout;
 
 /// A packed scene: the records that both backends read.
@@ -56,6 +57,8 @@ pub struct PackedBvh {
     pub meshes: Vec<Arc<PackedMesh>>,
     /// A word for each triangle group of each instance: the material index, combined with the flag [`NO_SHADOW`].
     pub group_words: Vec<u32>,
+    /// The nodes in the form for traversal on the CPU.
+    pub decoded: DecodedOnce<Vec<DecodedNode>>,
 }
 
 /// The lights and emitters of a scene.
@@ -185,6 +188,7 @@ impl Packed {
             instances,
             meshes: _,
             group_words,
+            decoded: _,
         } = bvh;
         let PackedTextures {
             lookups,

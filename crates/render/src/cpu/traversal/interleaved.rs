@@ -2,10 +2,10 @@
 
 use fearless_simd::prelude::*;
 
+use super::box_ray::BoxRay;
 use super::line::maximum;
 use super::mesh_stack::MeshStack;
 use super::node::Triangles as _;
-use super::stack::BoxRay;
 use super::{Line, Nearest, remaining_t_max};
 use crate::bvh::{DecodedMesh, LEAF};
 
@@ -46,10 +46,28 @@ static NO_MESH: DecodedMesh = DecodedMesh {
     leaves: Vec::new(),
 };
 
+/// The next step of a lane.
+pub enum Next<'a> {
+    /// It traces a ray through a mesh.
+    Trace(&'a DecodedMesh, MeshRay),
+    /// It waits until the other lanes have advanced, and is then asked again.
+    Wait,
+    /// It has no more rays.
+    Done,
+}
+
+impl<'a> Next<'a> {
+    /// Traces a ray through a mesh, if it is decoded.
+    #[inline(always)]
+    pub fn trace(mesh: Option<&'a DecodedMesh>, ray: MeshRay) -> Next<'a> {
+        mesh.map_or(Next::Done, |mesh| Next::Trace(mesh, ray))
+    }
+}
+
 /// The rays of a batch.
 pub trait RaySource<'a, S> {
-    /// Stores the result of the ray that the lane has traced, if any. Returns the next ray of the lane, if any.
-    fn next(&mut self, simd: S, lane: usize, traced: Option<(&Line, Nearest)>) -> Option<(&'a DecodedMesh, MeshRay)>;
+    /// Stores the result of the ray that the lane has traced, if any. Returns what the lane does next.
+    fn next(&mut self, simd: S, lane: usize, traced: Option<(&Line, Nearest)>) -> Next<'a>;
 }
 
 /// One of the interleaved rays.
@@ -184,11 +202,12 @@ pub fn trace<'a, S: Simd, const ANY: bool>(simd: S, stacks: &mut [MeshStack; RAY
                 }
             };
             match rays.next(simd, i, traced) {
-                Some((mesh, ray)) => {
+                Next::Trace(mesh, ray) => {
                     lane.start(mesh, ray);
                     lane.prefetch_next();
                 }
-                None => {
+                Next::Wait => lane.state = LaneState::Waiting,
+                Next::Done => {
                     lane.state = LaneState::Done;
                     active -= 1;
                 }

@@ -4,8 +4,8 @@
 use fearless_simd::prelude::*;
 use fearless_simd::{f32x8, u8x32, u32x8};
 
+use super::box_ray::BoxRay;
 use super::closest::STACK;
-use super::stack::BoxRay;
 use crate::bvh::DecodedNode;
 
 /// Nodes and leaves to visit, as values of `DecodedNode::children`. Visiting a node removes an entry and adds up to 8,
@@ -41,13 +41,25 @@ static BACK_TO_FRONT: [[u8; 32]; 8] = {
 };
 
 impl MeshStack {
+    /// Removes all entries, and adds the root.
+    #[inline(always)]
+    pub fn start(&mut self) {
+        (self.near[0], self.children[0], self.depth) = (0.0, 0, 1);
+    }
+
     /// Removes entries from the top, down to the first whose distance is at most `limit`. Returns this entry.
     #[inline(always)]
     pub fn pop(&mut self, limit: f32) -> Option<u32> {
+        Some(self.pop_with_distance(limit)?.0)
+    }
+
+    /// Like [`pop`](Self::pop). Also returns the distance to the box, at least 0.
+    #[inline(always)]
+    pub fn pop_with_distance(&mut self, limit: f32) -> Option<(u32, f32)> {
         while self.depth > 0 {
             self.depth -= 1;
             if self.near[self.depth] <= limit {
-                return Some(self.children[self.depth]);
+                return Some((self.children[self.depth], self.near[self.depth]));
             }
         }
         None

@@ -7,8 +7,8 @@ use glam::{DVec3, Vec3};
 use fearless_simd::dispatch;
 
 use super::{
-    Directions, Level, Line, Mesh, MeshRay, MeshStack, Nearest, RAYS, RaySource, Segments, closest, leaves, levels,
-    occluded, occluded_items, trace,
+    Directions, Level, Line, Mesh, MeshRay, MeshStack, Nearest, Next, RAYS, RaySource, Segments, closest, leaves,
+    levels, occluded, occluded_items, trace,
 };
 use crate::bvh::{Aabb, DecodedMesh, Tree, build};
 use crate::cases;
@@ -467,15 +467,17 @@ struct Batch<'a> {
 }
 
 impl<'a, S> RaySource<'a, S> for Batch<'a> {
-    fn next(&mut self, _: S, lane: usize, traced: Option<(&Line, Nearest)>) -> Option<(&'a DecodedMesh, MeshRay)> {
+    fn next(&mut self, _: S, lane: usize, traced: Option<(&Line, Nearest)>) -> Next<'a> {
         if let Some((_, found)) = traced {
             let previous = self.found[self.traced[lane]].replace(found);
             assert_eq!(previous, None, "each ray is traced once");
         }
-        let ray = *self.rays.get(self.next)?;
+        let Some(ray) = self.rays.get(self.next) else {
+            return Next::Done;
+        };
         self.traced[lane] = self.next;
         self.next += 1;
-        Some((self.mesh, ray))
+        Next::Trace(self.mesh, *ray)
     }
 }
 

@@ -199,10 +199,10 @@ impl Batch<'_> {
                     tree_key // not used
                 },
                 tree_key,
+                sample,
                 u: decision(scene, Lanes2 { x: key[0], y: key[1] }, sample),
             };
-            let samples = &rows.sample[..hits.len()];
-            light = Some(lights.sample(simd, scene, choices, surface.ray_origin, normal_to_light, samples));
+            light = Some(lights.sample(simd, scene, choices, surface.ray_origin, normal_to_light, hits.len()));
         }
         let directions = Directions {
             throughput,

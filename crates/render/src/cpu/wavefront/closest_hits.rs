@@ -4,7 +4,7 @@ use fearless_simd::dispatch;
 use fearless_simd::prelude::*;
 
 use super::super::bvh::{FEW_ITEMS, closest_mesh_ray, closest_of_primitive, item_pad, mesh_hit};
-use super::super::decoded_meshes::decoded_mesh;
+use super::super::decoded_bvhs::decoded_mesh;
 use super::super::geometry::closest_hit;
 use super::super::integrators::path::PathState;
 use super::super::math::max;
@@ -12,16 +12,17 @@ use super::super::path::Path;
 use super::super::ray::{Hit, nearer_hit};
 use super::super::samples::LEVEL;
 use super::super::slab::{box_interval, interval_hits, slabs};
-use super::super::traversal::{Line, MeshRay, Nearest, RAYS, RaySource, trace};
+use super::super::traversal::{Line, Nearest, Next, RAYS, RaySource, trace};
+use super::items::ItemStep;
 use super::linear::RayRows;
 use super::rows::{F, LANES, Row, lane_mask, splat3};
 use super::scratch::{QueuedRay, RayLane, Scratch};
-use crate::bvh::DecodedMesh;
+use crate::bvh::DecodedNode;
 use crate::records::{INSTANCE, NO_INDEX, Packed};
 
 /// Finds the closest hit of each active path, like `closest_hit`.
 pub fn closest_hits(scene: &Packed, paths: &[PathState], active: &[u32], hits: &mut Vec<Hit>, scratch: &mut Scratch) {
-    if !scratch.has_decoded_meshes {
+    if !scratch.is_decoded {
         hits.clear();
         hits.extend(active.iter().map(|i| {
             let path = &paths[*i as usize].path;
@@ -95,6 +96,7 @@ fn closest_hits_in_lanes<S: Simd>(
     if !scratch.queue.is_empty() {
         let mut rays = Rays {
             scene,
+            nodes: scene.bvh.decoded.get().map_or(&[], Vec::as_slice),
             paths,
             active,
             hits,
@@ -108,6 +110,7 @@ fn closest_hits_in_lanes<S: Simd>(
 /// The queued rays of the active paths. A ray traverses a single instance, or the BVH of the scene item by item.
 struct Rays<'a, 'h> {
     scene: &'a Packed,
+    nodes: &'a [DecodedNode],
     paths: &'a [PathState],
     active: &'a [u32],
     hits: &'h mut [Hit],
@@ -117,7 +120,7 @@ struct Rays<'a, 'h> {
 
 impl<'a, S: Simd> RaySource<'a, S> for Rays<'a, '_> {
     #[inline(always)]
-    fn next(&mut self, simd: S, lane: usize, traced: Option<(&Line, Nearest)>) -> Option<(&'a DecodedMesh, MeshRay)> {
+    fn next(&mut self, simd: S, lane: usize, traced: Option<(&Line, Nearest)>) -> Next<'a> {
         let scene = self.scene;
         let lane = &mut self.lanes[lane];
         if let Some((line, found)) = traced
@@ -127,38 +130,39 @@ impl<'a, S: Simd> RaySource<'a, S> for Rays<'a, '_> {
             let hit = &mut self.hits[lane.position];
             *hit = nearer_hit(*hit, mesh_hit(scene, lane.instance, line, found));
         }
-        loop {
-            if lane.in_bvh {
-                let path = &self.paths[self.active[lane.position] as usize].path;
-                let hit = &mut self.hits[lane.position];
-                while let Some(i) = lane.items.next(simd, scene, hit.t) {
+        if lane.in_bvh {
+            let path = &self.paths[self.active[lane.position] as usize].path;
+            let hit = &mut self.hits[lane.position];
+            match lane.items.step::<S, true>(simd, self.nodes, hit.t) {
+                ItemStep::Found(i, near) => {
                     let item = &scene.bvh.items[i];
-                    let interval = box_interval(item.low, item.high, lane.slabs);
-                    if !interval_hits(interval, hit.t) {
-                        continue;
-                    }
                     if item.kind & 0xff == INSTANCE {
                         lane.instance = item.index;
-                        let start = max(interval.x, 0.0);
-                        let ray = closest_mesh_ray(scene, *hit, item.index, path.ray, start, path.origin_prim);
-                        return Some((decoded_mesh(scene, item.index)?, ray));
+                        let ray = closest_mesh_ray(scene, *hit, item.index, path.ray, near, path.origin_prim);
+                        return Next::trace(decoded_mesh(scene, item.index), ray);
                     }
                     let (origin_prim, inside_prim) = (path.origin_prim, path.inside_prim);
-                    *hit = closest_of_primitive(scene, *hit, item, path.ray, interval.x, origin_prim, inside_prim);
+                    *hit = closest_of_primitive(scene, *hit, item, path.ray, near, origin_prim, inside_prim);
+                    return Next::Wait;
                 }
+                ItemStep::Node => return Next::Wait,
+                ItemStep::End => {}
             }
-            let queued = self.queue.next()?;
-            lane.position = queued.position as usize;
-            lane.instance = queued.instance;
-            lane.in_bvh = queued.instance == NO_INDEX;
-            let path = &self.paths[self.active[lane.position] as usize].path;
-            if !lane.in_bvh {
-                let (hit, start) = (self.hits[lane.position], max(queued.near, 0.0));
-                let ray = closest_mesh_ray(scene, hit, lane.instance, path.ray, start, path.origin_prim);
-                return Some((decoded_mesh(scene, lane.instance)?, ray));
-            }
-            lane.slabs = slabs(path.ray.origin, path.ray.direction, item_pad(scene, path.ray.origin));
-            lane.items.start(lane.slabs);
         }
+        let Some(queued) = self.queue.next() else {
+            return Next::Done;
+        };
+        lane.position = queued.position as usize;
+        lane.instance = queued.instance;
+        lane.in_bvh = queued.instance == NO_INDEX;
+        let path = &self.paths[self.active[lane.position] as usize].path;
+        if lane.in_bvh {
+            let slabs = slabs(path.ray.origin, path.ray.direction, item_pad(scene, path.ray.origin));
+            lane.items.start(slabs);
+            return Next::Wait;
+        }
+        let (hit, start) = (self.hits[lane.position], max(queued.near, 0.0));
+        let ray = closest_mesh_ray(scene, hit, lane.instance, path.ray, start, path.origin_prim);
+        Next::trace(decoded_mesh(scene, lane.instance), ray)
     }
 }

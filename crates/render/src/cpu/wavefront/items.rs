@@ -1,28 +1,22 @@
 //! Iteration over the items of the scene's BVH along a ray, approximately front to back.
 
-use std::ops::Range;
-
-use bytemuck::cast_slice;
 use fearless_simd::Simd;
 
 use super::super::slab::Slabs;
-use super::super::traversal::{BoxRay, Stack};
-use crate::bvh::Node;
-use crate::records::Packed;
+use super::super::traversal::{BoxRay, MeshStack};
+use crate::bvh::{DecodedNode, LEAF};
 
 /// The items whose boxes a ray may hit.
 pub struct Items {
     box_ray: BoxRay,
-    stack: Stack,
-    leaf_items: Range<usize>,
+    stack: MeshStack,
 }
 
 impl Default for Items {
     fn default() -> Items {
         Items {
             box_ray: BoxRay::new([0.0; 3], [0.0; 3], [1.0; 3]),
-            stack: Stack::default(),
-            leaf_items: 0..0,
+            stack: MeshStack::default(),
         }
     }
 }
@@ -31,7 +25,6 @@ impl Items {
     /// Restarts the traversal with another ray. `slabs` contains the terms of the ray for box tests.
     #[inline(always)]
     pub fn start(&mut self, slabs: Slabs) {
-        self.leaf_items = 0..0;
         self.box_ray = BoxRay::new(
             slabs.low_origin.to_array(),
             slabs.high_origin.to_array(),
@@ -40,21 +33,27 @@ impl Items {
         self.stack.start();
     }
 
-    /// Returns the index of the next item. Skips nodes and leaves that are farther away than `limit`.
+    /// Visits the next node or leaf whose box the ray hits before `limit`.
     #[inline(always)]
-    pub fn next<S: Simd>(&mut self, simd: S, scene: &Packed, limit: f32) -> Option<usize> {
-        loop {
-            if let Some(item) = self.leaf_items.next() {
-                return Some(item);
-            }
-            let entry = self.stack.pop(limit)?;
-            if entry.count == 0 {
-                let nodes: &[Node] = cast_slice(&scene.bvh.nodes);
-                self.stack
-                    .push_children(simd, &nodes[entry.first as usize], &self.box_ray, limit);
-            } else {
-                self.leaf_items = entry.first as usize..(entry.first + entry.count) as usize;
-            }
+    pub fn step<S: Simd, const SORTED: bool>(&mut self, simd: S, nodes: &[DecodedNode], limit: f32) -> ItemStep {
+        let Some((child, near)) = self.stack.pop_with_distance(limit) else {
+            return ItemStep::End;
+        };
+        if child & LEAF != 0 {
+            return ItemStep::Found((child & !LEAF) as usize, near);
         }
+        let node = &nodes[child as usize];
+        self.stack.push_children::<S, SORTED>(simd, node, &self.box_ray, limit);
+        ItemStep::Node
     }
+}
+
+/// A step of a traversal.
+pub enum ItemStep {
+    /// The children of a node have been queued.
+    Node,
+    /// The index of an item, and the distance to its box, at least 0.
+    Found(usize, f32),
+    /// There are no more items.
+    End,
 }

@@ -7,10 +7,11 @@ use glam::{UVec2, Vec2, Vec3};
 use super::super::emitter::{LightSample, sample_emitter, select_emitter};
 use super::super::environment::EnvironmentEval;
 use super::super::lanes::{Lanes2, Real, Vector3};
-use super::super::light_choice::{EmitterSelection, light_tree_select};
+use super::super::light_choice::EmitterSelection;
 use super::super::light_sample::solid_angle_pdf;
 use super::super::math::dot;
 use super::environment::environment_samples;
+use super::light_tree::TreePoints;
 use super::rows::{F, LANES, Row, Rows3, V, get3, lane_mask, lanes_of, load3, set3, splat3, store3};
 use super::shade::IS_OPTIMIZED;
 use crate::records::{ENVIRONMENT, Light, NO_INDEX, Packed, RECTANGLE};
@@ -54,6 +55,8 @@ pub struct LightChoices<S: Simd> {
     pub emitter: Lanes2<u32x8<S>>,
     /// Key of the choices in a light tree.
     pub tree_key: Lanes2<u32x8<S>>,
+    /// Sample numbers of the paths.
+    pub sample: u32x8<S>,
     /// Point on the unit square.
     pub u: Lanes2<F<S>>,
 }
@@ -67,7 +70,7 @@ pub struct LightSamples<S: Simd> {
 }
 
 impl LightRows {
-    /// Samples a light for each of the first `count` surface points. `samples` contains the sample numbers of the paths.
+    /// Samples a light for each of the first `count` surface points.
     #[inline(always)]
     pub fn sample<S: Simd>(
         &mut self,
@@ -76,7 +79,7 @@ impl LightRows {
         choices: LightChoices<S>,
         points: V<S>,
         normals: V<S>,
-        samples: &[u32],
+        count: usize,
     ) -> LightSamples<S> {
         let zero: F<S> = SimdBase::splat(simd, 0.0);
         if let Some(light) = only_light(scene) {
@@ -91,19 +94,26 @@ impl LightRows {
         }
         let (points, normals) = (store3(points), store3(normals));
         let (bits_x, bits_y): ([u32; LANES], [u32; LANES]) = (choices.emitter.x.into(), choices.emitter.y.into());
-        let (key_x, key_y): ([u32; LANES], [u32; LANES]) = (choices.tree_key.x.into(), choices.tree_key.y.into());
+        let mut selections = std::array::from_fn(|lane| EmitterSelection {
+            emitter: select_emitter(scene, UVec2::new(bits_x[lane], bits_y[lane])),
+            density: 0.0,
+        });
+        if scene.specialization.light_tree != 0 {
+            let in_tree = (0..count).filter(|lane| selections[*lane].emitter.index == NO_INDEX);
+            let mask = in_tree.fold(0, |mask, lane| mask | 1 << lane);
+            let points = TreePoints {
+                points: &points,
+                normals: &normals,
+                key: choices.tree_key,
+                sample: choices.sample,
+            };
+            points.select(simd, scene, mask, &mut selections);
+        }
         let (u_x, u_y): (Row, Row) = (choices.u.x.into(), choices.u.y.into());
         let mut environment_lanes = 0;
-        for (lane, &sample) in samples.iter().enumerate() {
+        for lane in 0..count {
             let (p, normal) = (get3(&points, lane), get3(&normals, lane));
-            let mut selection = EmitterSelection {
-                emitter: select_emitter(scene, UVec2::new(bits_x[lane], bits_y[lane])),
-                density: 0.0,
-            };
-            if scene.specialization.light_tree != 0 {
-                let key = UVec2::new(key_x[lane], key_y[lane]);
-                selection = light_tree_select(scene, selection.emitter, p, normal, key, sample);
-            }
+            let selection = selections[lane];
             if let Some(light) = environment_light(scene, &selection) {
                 environment_lanes |= 1 << lane;
                 self.t_max[lane] = light.t_max;
@@ -114,7 +124,7 @@ impl LightRows {
         }
         if environment_lanes != 0 {
             let (to_light, evals) = environment_samples(simd, scene, &normals, choices.u, environment_lanes);
-            if environment_lanes == lane_mask(samples.len()) {
+            if environment_lanes == lane_mask(count) {
                 self.to_light = store3(to_light);
                 self.primitive = [NO_INDEX; LANES];
                 return LightSamples {

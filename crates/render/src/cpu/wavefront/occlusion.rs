@@ -5,16 +5,17 @@ use fearless_simd::prelude::*;
 use glam::UVec2;
 
 use super::super::bvh::{FEW_ITEMS, is_occluded_by_primitive_item, item_pad, shadow_mesh_ray};
-use super::super::decoded_meshes::decoded_mesh;
+use super::super::decoded_bvhs::decoded_mesh;
 use super::super::integrators::path::{PathState, is_shadow_ray_occluded};
 use super::super::samples::LEVEL;
 use super::super::slab::{box_interval, interval_hits, slabs};
-use super::super::traversal::{Line, MeshRay, Nearest, RAYS, RaySource, trace};
+use super::super::traversal::{Line, Nearest, Next, RAYS, RaySource, trace};
 use super::QueuedShadowRay;
+use super::items::ItemStep;
 use super::linear::ShadowRayRows;
 use super::rows::{LANES, Row, lane_mask, splat3};
 use super::scratch::{QueuedRay, RayLane, Scratch};
-use crate::bvh::DecodedMesh;
+use crate::bvh::DecodedNode;
 use crate::records::{CASTS_SHADOW, INSTANCE, NO_INDEX, Packed};
 
 /// Determines which shadow rays are occluded, like `is_shadow_ray_occluded`.
@@ -29,7 +30,7 @@ pub fn occluded_rays(
     occluded.clear();
     // Rays are traced one by one if they may continue through surfaces with alpha, or if the meshes are too large to be
     // decoded.
-    if scene.specialization.alpha_surfaces != 0 || !scratch.has_decoded_meshes {
+    if scene.specialization.alpha_surfaces != 0 || !scratch.is_decoded {
         occluded.extend(rays.iter().map(|QueuedShadowRay { path, ray }| {
             let i = *path as usize;
             is_shadow_ray_occluded(scene, ray, pixels[i], paths[i].sample)
@@ -69,6 +70,7 @@ fn occluded_rays_in_lanes<S: Simd>(
     if !scratch.queue.is_empty() {
         let mut rays = Rays {
             scene,
+            nodes: scene.bvh.decoded.get().map_or(&[], Vec::as_slice),
             rays,
             occluded,
             queue: scratch.queue.iter(),
@@ -142,6 +144,7 @@ fn queue_rays<S: Simd>(
 /// The queued shadow rays. A ray traverses a single instance, or the BVH of the scene item by item, up to any hit.
 struct Rays<'a, 'o> {
     scene: &'a Packed,
+    nodes: &'a [DecodedNode],
     rays: &'a [QueuedShadowRay],
     occluded: &'o mut [bool],
     queue: std::slice::Iter<'a, QueuedRay>,
@@ -150,44 +153,49 @@ struct Rays<'a, 'o> {
 
 impl<'a, S: Simd> RaySource<'a, S> for Rays<'a, '_> {
     #[inline(always)]
-    fn next(&mut self, simd: S, lane: usize, traced: Option<(&Line, Nearest)>) -> Option<(&'a DecodedMesh, MeshRay)> {
+    fn next(&mut self, simd: S, lane: usize, traced: Option<(&Line, Nearest)>) -> Next<'a> {
         let scene = self.scene;
         let lane = &mut self.lanes[lane];
         if let Some((_, found)) = traced {
             self.occluded[lane.position] |= found.slot != NO_INDEX;
         }
-        loop {
-            if lane.in_bvh && !self.occluded[lane.position] {
-                let ray = &self.rays[lane.position].ray;
-                let surface = ray.surface();
-                let (to_light, t_max) = (ray.to_light, ray.t_max);
-                while let Some(i) = lane.items.next(simd, scene, t_max) {
+        if lane.in_bvh && !self.occluded[lane.position] {
+            let ray = &self.rays[lane.position].ray;
+            let surface = ray.surface();
+            let (to_light, t_max) = (ray.to_light, ray.t_max);
+            match lane.items.step::<S, false>(simd, self.nodes, t_max) {
+                ItemStep::Found(i, _) => {
                     let item = &scene.bvh.items[i];
-                    let interval = box_interval(item.low, item.high, lane.slabs);
-                    if item.kind & CASTS_SHADOW == 0 || !interval_hits(interval, t_max) {
-                        continue;
+                    if item.kind & CASTS_SHADOW == 0 {
+                        return Next::Wait;
                     }
                     if item.kind & 0xff == INSTANCE {
                         let ray = shadow_mesh_ray(scene, item.index, &surface, to_light, t_max);
-                        return Some((decoded_mesh(scene, item.index)?, ray));
+                        return Next::trace(decoded_mesh(scene, item.index), ray);
                     }
-                    if is_occluded_by_primitive_item(scene, item, &surface, to_light, t_max, ray.target_prim) {
-                        self.occluded[lane.position] = true;
-                        break;
-                    }
+                    self.occluded[lane.position] =
+                        is_occluded_by_primitive_item(scene, item, &surface, to_light, t_max, ray.target_prim);
+                    return Next::Wait;
                 }
-            }
-            let queued = self.queue.next()?;
-            lane.position = queued.position as usize;
-            lane.in_bvh = queued.instance == NO_INDEX;
-            let ray = &self.rays[lane.position].ray;
-            if lane.in_bvh {
-                lane.slabs = slabs(ray.origin, ray.to_light, item_pad(scene, ray.origin));
-                lane.items.start(lane.slabs);
-            } else if !self.occluded[lane.position] {
-                let mesh_ray = shadow_mesh_ray(scene, queued.instance, &ray.surface(), ray.to_light, ray.t_max);
-                return Some((decoded_mesh(scene, queued.instance)?, mesh_ray));
+                ItemStep::Node => return Next::Wait,
+                ItemStep::End => {}
             }
         }
+        let Some(queued) = self.queue.next() else {
+            return Next::Done;
+        };
+        lane.position = queued.position as usize;
+        lane.in_bvh = queued.instance == NO_INDEX;
+        let ray = &self.rays[lane.position].ray;
+        if lane.in_bvh {
+            let slabs = slabs(ray.origin, ray.to_light, item_pad(scene, ray.origin));
+            lane.items.start(slabs);
+            return Next::Wait;
+        }
+        if self.occluded[lane.position] {
+            return Next::Wait;
+        }
+        let mesh_ray = shadow_mesh_ray(scene, queued.instance, &ray.surface(), ray.to_light, ray.t_max);
+        Next::trace(decoded_mesh(scene, queued.instance), mesh_ray)
     }
 }

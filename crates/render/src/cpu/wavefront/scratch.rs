@@ -1,14 +1,11 @@
 //! Memory for the traversals of a batch, reused from batch to batch.
 
-use glam::Vec3;
-
-use super::super::slab::{Slabs, slabs};
 use super::super::traversal::{MeshStack, RAYS};
 use super::items::Items;
 
 /// Stacks and states of the interleaved rays, and the queue that they are taken from.
 pub struct Scratch {
-    pub has_decoded_meshes: bool,
+    pub is_decoded: bool,
     pub stacks: [MeshStack; RAYS],
     pub lanes: [RayLane; RAYS],
     pub queue: Vec<QueuedRay>,
@@ -26,33 +23,21 @@ pub struct QueuedRay {
 }
 
 /// State of an interleaved ray: one that traverses the BVH of the scene, or a single instance.
+#[derive(Default)]
 pub struct RayLane {
     /// Position of the ray in its batch.
     pub position: usize,
     /// True if the ray traverses the BVH of the scene, false if it traverses a single instance.
     pub in_bvh: bool,
-    pub slabs: Slabs,
     pub items: Items,
     /// Index of the instance whose mesh the ray traverses.
     pub instance: u32,
 }
 
-impl Default for RayLane {
-    fn default() -> RayLane {
-        RayLane {
-            position: 0,
-            in_bvh: false,
-            slabs: slabs(Vec3::ZERO, Vec3::ONE, 0.0),
-            items: Items::default(),
-            instance: 0,
-        }
-    }
-}
-
 impl Scratch {
-    pub fn new(has_decoded_meshes: bool) -> Scratch {
+    pub fn new(is_decoded: bool) -> Scratch {
         Scratch {
-            has_decoded_meshes,
+            is_decoded,
             stacks: Default::default(),
             lanes: Default::default(),
             queue: Vec::new(),
