@@ -16,11 +16,19 @@ struct EnvironmentPoint {
     position: vec2f,
 }
 
-// An interval of a cumulative distribution.
-struct Interval {
-    index: u32,
-    width: f32,            // probability
-    position: f32,         // of the random number in the interval, 0 to 1
+// A cell of a block.
+struct BlockCell {
+    entry: u32,            // of the cell in the alias table: its offset
+    cell: u32,             // row * 65536 + column
+    position: vec2f,       // in the cell, 0 to 1
+}
+
+// The radiance at the corners of a cell.
+struct CellCorners {
+    a: vec3f,              // upper left
+    b: vec3f,              // upper right
+    c: vec3f,              // lower left
+    e: vec3f,              // lower right
 }
 
 fn environment_texel(row: u32, column: u32) -> vec3f {
@@ -32,25 +40,28 @@ fn environment_float(index: u32) -> f32 {
     return bitcast<f32>(texel_word(index));
 }
 
-// Returns the offset of a normal's distribution of block rows. The distributions of the blocks in each row follow.
-fn block_distributions(normal: vec3f) -> u32 {
+// Returns the offset of the distribution of block rows for a bin of normals. The distributions of the blocks in each row
+// follow.
+fn block_distributions(bin: u32) -> u32 {
     let rows = (environment.height >> (environment.shifts >> 8u)) + 1u;
-    return environment.blocks + rows * ENVIRONMENT_BLOCKS + normal_bin(normal) * (rows + 1u) * (ENVIRONMENT_BLOCKS + 1u);
+    return environment.blocks + rows * ENVIRONMENT_BLOCKS + bin * ((rows + 1u) * (ENVIRONMENT_BLOCKS + 1u));
 }
 
-// Finds the interval that contains u, among the 32 intervals of a cumulative distribution. Never returns an empty
-// interval. `digits` extends the 24 binary digits of u.
-fn interval_at(distribution: u32, u: f32, digits: f32) -> Interval {
+// Returns the interval that contains u, among the 32 intervals of a cumulative distribution. It is never empty.
+fn interval_at(distribution: u32, u: f32) -> u32 {
     var entry = distribution;
     entry += select(0u, 16u, u >= environment_float(entry + 16u));
     entry += select(0u, 8u, u >= environment_float(entry + 8u));
     entry += select(0u, 4u, u >= environment_float(entry + 4u));
     entry += select(0u, 2u, u >= environment_float(entry + 2u));
     entry += select(0u, 1u, u >= environment_float(entry + 1u));
-    let low = environment_float(entry);
-    let width = environment_float(entry + 1u) - low;
-    let position = ((u - low) + digits * 5.9604644775390625e-8) / width;
-    return Interval(entry - distribution, width, min(position, 0.99999994));
+    return entry - distribution;
+}
+
+// Returns the position of u in an interval of a cumulative distribution, from 0 to less than 1. `digits` extends the 24
+// binary digits of u.
+fn interval_position(low: f32, high: f32, u: f32, digits: f32) -> f32 {
+    return min(((u - low) + digits * 5.9604644775390625e-8) / (high - low), 0.99999994);
 }
 
 fn interval_width(distribution: u32, index: u32) -> f32 {
@@ -68,20 +79,33 @@ fn environment_eval(direction: vec3f, normal: vec3f) -> EnvironmentEval {
 // Returns the radiance and the pdf at a point of a cell.
 fn environment_at(cell: EnvironmentCell, normal: vec3f) -> EnvironmentEval {
     let next_column = column_after(cell.column, environment.width);
-    let a = environment_texel(cell.row, cell.column);
-    let b = environment_texel(cell.row, next_column);
-    let c = environment_texel(cell.row + 1u, cell.column);
-    let e = environment_texel(cell.row + 1u, next_column);
-    let upper = a + (b - a) * cell.x;
-    let lower = c + (e - c) * cell.x;
-    let sum = a + b + c + e;
-    let row = cell.row >> (environment.shifts >> 8u);
-    let column = cell.column >> (environment.shifts & 255u);
-    let rows = block_distributions(normal);
-    let columns = rows + (row + 1u) * (ENVIRONMENT_BLOCKS + 1u);
-    let probability = interval_width(rows, row) * interval_width(columns, column) * environment.density;
-    let inverse = environment_float(environment.blocks + row * ENVIRONMENT_BLOCKS + column);
-    return EnvironmentEval(upper + (lower - upper) * cell.y, (sum.x + sum.y + sum.z) * inverse * probability);
+    let corners = CellCorners(
+        environment_texel(cell.row, cell.column),
+        environment_texel(cell.row, next_column),
+        environment_texel(cell.row + 1u, cell.column),
+        environment_texel(cell.row + 1u, next_column),
+    );
+    let block = block_terms(block_distributions(normal_bin(normal)), cell.row, cell.column);
+    return cell_eval(corners, cell.x, cell.y, block.x, block.y);
+}
+
+// Returns the probability of the block of a cell, and the reciprocal of the block's integrated radiance.
+fn block_terms(distributions: u32, cell_row: u32, cell_column: u32) -> vec2f {
+    let row = cell_row >> (environment.shifts >> 8u);
+    let column = cell_column >> (environment.shifts & 255u);
+    let columns = distributions + (row + 1u) * (ENVIRONMENT_BLOCKS + 1u);
+    let probability = interval_width(distributions, row) * interval_width(columns, column);
+    return vec2f(probability, environment_float(environment.blocks + row * ENVIRONMENT_BLOCKS + column));
+}
+
+// Returns the radiance and the pdf at a point (x, y) of a cell, for the probability of its block and the reciprocal of
+// the block's integrated radiance.
+fn cell_eval(corners: CellCorners, x: f32, y: f32, probability: f32, inverse: f32) -> EnvironmentEval {
+    let upper = corners.a + (corners.b - corners.a) * x;
+    let lower = corners.c + (corners.e - corners.c) * x;
+    let sum = corners.a + corners.b + corners.c + corners.e;
+    let pdf = (sum.x + sum.y + sum.z) * inverse * (probability * environment.density);
+    return EnvironmentEval(upper + (lower - upper) * y, pdf);
 }
 
 // Returns the MIS-weighted radiance of a ray that leaves the scene. `pdf` is the pdf of the ray's direction, and `eval`
@@ -95,25 +119,38 @@ fn environment_mis(eval: EnvironmentEval, pdf: f32) -> vec3f {
 // alias table.
 fn environment_point(normal: vec3f, u: vec2f) -> EnvironmentPoint {
     let bits = hash4(vec4u(bitcast<u32>(u.x), bitcast<u32>(u.y), 0u, 0u));
-    let rows = block_distributions(normal);
-    let row = interval_at(rows, u.y, unit_float(bits.y));
-    let column = interval_at(rows + (row.index + 1u) * (ENVIRONMENT_BLOCKS + 1u), u.x, unit_float(bits.x));
-    let width = environment.width;
-    let height = environment.height;
+    let rows = block_distributions(normal_bin(normal));
+    let row = interval_at(rows, u.y);
+    let columns = rows + (row + 1u) * (ENVIRONMENT_BLOCKS + 1u);
+    let column = interval_at(columns, u.x);
+    let x = interval_position(environment_float(columns + column), environment_float(columns + column + 1u), u.x, unit_float(bits.x));
+    let y = interval_position(environment_float(rows + row), environment_float(rows + row + 1u), u.y, unit_float(bits.y));
+    let own = block_cell(row, column, vec2f(x, y));
+    let cell = selected_cell(own.entry, own.cell, bits.z);
+    return EnvironmentPoint(cell & 65535u, cell >> 16u, own.position);
+}
+
+// Returns the cell itself, or the alias in its entry of the table.
+fn selected_cell(entry: u32, cell: u32, bits: u32) -> u32 {
+    return select(texel_word(entry + 1u), cell, bits < texel_word(entry));
+}
+
+// Returns the cell at a position in a block, from 0 to 1.
+fn block_cell(row: u32, column: u32, position: vec2f) -> BlockCell {
     let row_shift = environment.shifts >> 8u;
     let column_shift = environment.shifts & 255u;
-    let remaining = vec2u(width - (column.index << column_shift), height + 1u - (row.index << row_shift));
-    let full = vec2u(1u << column_shift, 1u << row_shift);
-    let size = select(remaining, full, full < remaining);
-    let x = column.position * f32(size.x);
-    let y = row.position * f32(size.y);
-    let cell = vec2u(u32(x), u32(y));
-    let cell_index = (row.index << row_shift) * width + size.y * (column.index << column_shift) + cell.y * size.x + cell.x;
-    let entry = environment.cells + 2u * cell_index;
-    let own_cell = ((row.index << row_shift) + cell.y) * 65536u + (column.index << column_shift) + cell.x;
-    let selected_cell = select(texel_word(entry + 1u), own_cell, bits.z < texel_word(entry));
-    let position = vec2f(x - f32(cell.x), y - f32(cell.y));
-    return EnvironmentPoint(selected_cell & 65535u, selected_cell >> 16u, position);
+    let first_row = row << row_shift;
+    let first_column = column << column_shift;
+    // Blocks at the right and the lower edge may be smaller.
+    let columns = min(f32(environment.width - first_column), f32(1u << column_shift));
+    let rows = min(f32(environment.height + 1u - first_row), f32(1u << row_shift));
+    let x = position.x * columns;
+    let y = position.y * rows;
+    let cell_x = u32(x);
+    let cell_y = u32(y);
+    let index = first_row * environment.width + u32(rows) * first_column + cell_y * u32(columns) + cell_x;
+    let cell = (first_row + cell_y) * 65536u + first_column + cell_x;
+    return BlockCell(environment.cells + 2u * index, cell, vec2f(x - f32(cell_x), y - f32(cell_y)));
 }
 
 // Samples a direction to the map. Radiance and pdf are evaluated as for BSDF samples, so that the pdfs agree.

@@ -1,7 +1,5 @@
 //! Twin of `shaders/equirect.wgsl`.
 
-use glam::Vec3;
-
 use super::lanes::{Real, Vector2, Vector3, Word, constant, select};
 use super::math::{atan2, floor, max, min, sine};
 use crate::records::NORMAL_BINS;
@@ -51,17 +49,24 @@ pub fn cap_above<W: Word>(row: W, height: u32) -> W::Real {
     constant(2.0) * s * s
 }
 
-pub fn normal_bin(normal: Vec3) -> u32 {
-    let sum = normal.x.abs() + normal.y.abs() + normal.z.abs();
-    let x = normal.x / sum;
-    let y = normal.y / sum;
-    let folded_x = if x >= 0.0 { 1.0 - y.abs() } else { y.abs() - 1.0 };
-    let folded_y = if y >= 0.0 { 1.0 - x.abs() } else { x.abs() - 1.0 };
-    let last = (NORMAL_BINS - 1) as f32;
-    let column = (if normal.z >= 0.0 { x } else { folded_x } * 0.5 + 0.5) * last + 0.5;
-    let row = (if normal.z >= 0.0 { y } else { folded_y } * 0.5 + 0.5) * last + 0.5;
-    let bin = min(max(row, 0.0), last) as u32 * NORMAL_BINS + min(max(column, 0.0), last) as u32;
-    if sum > 0.0 { bin } else { NORMAL_BINS * NORMAL_BINS }
+#[inline(always)]
+pub fn normal_bin<V: Vector3>(normal: V) -> <V::Real as Real>::Word {
+    let sum = normal.x().abs() + normal.y().abs() + normal.z().abs();
+    let zero = sum.splat(0.0);
+    let x = normal.x() / sum;
+    let y = normal.y() / sum;
+    let folded_x = select(y.abs() - 1.0, constant(1.0) - y.abs(), x.ge(zero));
+    let folded_y = select(x.abs() - 1.0, constant(1.0) - x.abs(), y.ge(zero));
+    let last = sum.splat((NORMAL_BINS - 1) as f32);
+    let is_upper = normal.z().ge(zero);
+    let column = (select(folded_x, x, is_upper) * 0.5 + 0.5) * last + 0.5;
+    let row = (select(folded_y, y, is_upper) * 0.5 + 0.5) * last + 0.5;
+    let (row, column) = (
+        min(max(row, zero), last).to_word(),
+        min(max(column, zero), last).to_word(),
+    );
+    let bin = row.wrapping_mul(row.splat(NORMAL_BINS)).wrapping_add(column);
+    Word::select(row.splat(NORMAL_BINS * NORMAL_BINS), bin, sum.gt(zero))
 }
 
 #[inline(always)]

@@ -178,6 +178,7 @@ pub fn facet_frame(scene: &Packed, surface: Surface, material: &Material) -> Tan
     frame_around(surface.shading_normal)
 }
 
+#[inline(always)] // a call copies the material
 pub fn material_for_view(scene: &Packed, surface: &Surface, original: Material) -> Material {
     let mut material = original;
     let frame = Tangents {

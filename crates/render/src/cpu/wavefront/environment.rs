@@ -2,15 +2,18 @@
 
 use fearless_simd::prelude::*;
 use fearless_simd::{f32x8, u32x8};
-use glam::Vec2;
 
-use super::super::environment::{EnvironmentEval, environment_at, environment_mis, environment_point};
-use super::super::equirect::{EnvironmentCell, cell_towards, direction_in_cell};
+use super::super::environment::{
+    BlockCell, CellCorners, EnvironmentEval, block_cell, block_distributions, block_terms, cell_eval,
+    environment_float, environment_mis, environment_texel, interval_at, interval_position, selected_cell,
+};
+use super::super::equirect::{cell_towards, column_after, direction_in_cell, normal_bin};
 use super::super::integrators::path::{PathState, leave_scene};
 use super::super::lanes::{Lanes2, Lanes3};
 use super::super::math::{dot, normalize};
-use super::rows::{F, LANES, Row, Rows3, V, get3, lane_mask, lanes_of, load3, set3, splat3};
-use crate::records::Packed;
+use super::super::rng::{hash4, unit_float};
+use super::rows::{F, LANES, Row, Rows3, V, get3, lane_mask, lanes_of, load3, set3, splat3, store3};
+use crate::records::{ENVIRONMENT_BLOCKS, Packed};
 
 /// Values of [`EnvironmentEval`] per path.
 #[derive(Default)]
@@ -37,38 +40,65 @@ pub fn environment_samples<S: Simd>(
     scene: &Packed,
     normals: &Rows3,
     u: Lanes2<F<S>>,
-    lanes: u64,
+    mask: u64,
 ) -> (V<S>, EnvironmentRows) {
     let environment = &scene.environment;
-    let (u_x, u_y): (Row, Row) = (u.x.into(), u.y.into());
-    let (mut columns, mut rows) = ([0; LANES], [0; LANES]);
-    let (mut x, mut y) = (Row::default(), Row::default());
-    for lane in lanes_of(lanes) {
-        let point = environment_point(scene, get3(normals, lane), Vec2::new(u_x[lane], u_y[lane]));
-        (columns[lane], rows[lane]) = (point.column, point.row);
-        (x[lane], y[lane]) = (point.position.x, point.position.y);
-    }
-    let position = Lanes2 {
-        x: f32x8::simd_from(simd, x),
-        y: f32x8::simd_from(simd, y),
-    };
-    let (columns, rows) = (u32x8::simd_from(simd, columns), u32x8::simd_from(simd, rows));
-    let d: V<S> = direction_in_cell(columns, rows, position, environment.width, environment.height);
+    let bins = normal_bin(load3(simd, normals));
+    let point = environment_points(simd, scene, bins, u, mask);
+    let (columns, rows) = (point.cell & 65_535, point.cell >> 16);
+    let d: V<S> = direction_in_cell(columns, rows, point.position, environment.width, environment.height);
     let vector = |v| splat3(simd, v);
     let directions = normalize(vector(environment.x) * d.x + vector(environment.y) * d.y + vector(environment.z) * d.z);
-    let evals = environment_evals(simd, scene, directions, normals, lanes);
+    let evals = environment_evals(simd, scene, directions, bins, mask);
     (directions, evals)
 }
 
-/// Evaluates the map for the paths of the lanes of a mask, like `environment_eval`.
+/// Samples points of the map, like `environment_point`. `entry` is not set.
 #[inline(always)]
-fn environment_evals<S: Simd>(
-    simd: S,
-    scene: &Packed,
-    directions: V<S>,
-    normals: &Rows3,
-    lanes: u64,
-) -> EnvironmentRows {
+fn environment_points<S: Simd>(simd: S, scene: &Packed, bins: u32x8<S>, u: Lanes2<F<S>>, mask: u64) -> BlockCell<F<S>> {
+    let zero: u32x8<S> = SimdBase::splat(simd, 0);
+    let bits = hash4([u.x.bitcast(), u.y.bitcast(), zero, zero]);
+    let (u_x, u_y): (Row, Row) = (u.x.into(), u.y.into());
+    let distributions: [u32; LANES] = block_distributions(scene, bins).into();
+    let (mut rows, mut columns) = ([0; LANES], [0; LANES]);
+    // Lower and upper bounds of the intervals.
+    let (mut x_bounds, mut y_bounds) = ([[0.0; LANES]; 2], [[1.0; LANES]; 2]);
+    for lane in lanes_of(mask) {
+        let distribution = distributions[lane];
+        let row = interval_at(scene, distribution, u_y[lane]);
+        let row_distribution = distribution + (row + 1) * (ENVIRONMENT_BLOCKS + 1);
+        let column = interval_at(scene, row_distribution, u_x[lane]);
+        for side in 0..2 {
+            x_bounds[side][lane] = environment_float(scene, row_distribution + column + side as u32);
+            y_bounds[side][lane] = environment_float(scene, distribution + row + side as u32);
+        }
+        (rows[lane], columns[lane]) = (row, column);
+    }
+    let number = |row: Row| f32x8::simd_from(simd, row);
+    let position = |bounds: [Row; 2], u, bits| {
+        let [low, high] = bounds.map(number);
+        interval_position(low, high, u, unit_float(bits))
+    };
+    let position = Lanes2 {
+        x: position(x_bounds, u.x, bits[0]),
+        y: position(y_bounds, u.y, bits[1]),
+    };
+    let (rows, columns) = (u32x8::simd_from(simd, rows), u32x8::simd_from(simd, columns));
+    let own = block_cell(scene, rows, columns, position);
+    let entries: [u32; LANES] = own.entry.into();
+    let (mut cells, bits): ([u32; LANES], [u32; LANES]) = (own.cell.into(), bits[2].into());
+    for lane in lanes_of(mask) {
+        cells[lane] = selected_cell(scene, entries[lane], cells[lane], bits[lane]);
+    }
+    BlockCell {
+        cell: u32x8::simd_from(simd, cells),
+        ..own
+    }
+}
+
+/// Evaluates the map for the paths of the lanes of a mask, like `environment_eval`. `bins` are those of the normals.
+#[inline(always)]
+fn environment_evals<S: Simd>(simd: S, scene: &Packed, directions: V<S>, bins: u32x8<S>, mask: u64) -> EnvironmentRows {
     let environment = &scene.environment;
     let axis = |v| dot(splat3(simd, v), directions);
     let d = Lanes3 {
@@ -76,22 +106,29 @@ fn environment_evals<S: Simd>(
         y: axis(environment.y),
         z: axis(environment.z),
     };
-    let cells = cell_towards(d, environment.width, environment.height);
-    let (columns, rows): ([u32; LANES], [u32; LANES]) = (cells.column.into(), cells.row.into());
-    let (x, y): (Row, Row) = (cells.x.into(), cells.y.into());
-    let mut evals = EnvironmentRows::default();
-    for lane in lanes_of(lanes) {
-        let cell = EnvironmentCell {
-            column: columns[lane],
-            row: rows[lane],
-            x: x[lane],
-            y: y[lane],
-        };
-        let eval = environment_at(scene, cell, get3(normals, lane));
-        set3(&mut evals.radiance, lane, eval.radiance);
-        evals.pdf[lane] = eval.pdf;
+    let cell = cell_towards(d, environment.width, environment.height);
+    let (columns, rows): ([u32; LANES], [u32; LANES]) = (cell.column.into(), cell.row.into());
+    let distributions: [u32; LANES] = block_distributions(scene, bins).into();
+    let mut corners = [Rows3::default(); 4];
+    let (mut probability, mut inverse) = (Row::default(), Row::default());
+    for lane in lanes_of(mask) {
+        let (row, column) = (rows[lane], columns[lane]);
+        let next_column = column_after(column, environment.width);
+        set3(&mut corners[0], lane, environment_texel(scene, row, column));
+        set3(&mut corners[1], lane, environment_texel(scene, row, next_column));
+        set3(&mut corners[2], lane, environment_texel(scene, row + 1, column));
+        set3(&mut corners[3], lane, environment_texel(scene, row + 1, next_column));
+        let block = block_terms(scene, distributions[lane], row, column);
+        (probability[lane], inverse[lane]) = (block.x, block.y);
     }
-    evals
+    let [a, b, c, e] = corners.each_ref().map(|corner| load3(simd, corner));
+    let number = |row| f32x8::simd_from(simd, row);
+    let corners = CellCorners { a, b, c, e };
+    let eval = cell_eval(scene, corners, cell.x, cell.y, number(probability), number(inverse));
+    EnvironmentRows {
+        radiance: store3(eval.radiance),
+        pdf: eval.pdf.into(),
+    }
 }
 
 /// Ends paths whose rays hit nothing, like the scalar `shade`. The scene has an environment map.
@@ -104,7 +141,8 @@ pub fn leave_to_environment<S: Simd>(simd: S, scene: &Packed, paths: &mut [PathS
             set3(&mut directions, lane, state.path.ray.direction);
             set3(&mut normals, lane, state.prev_normal);
         }
-        let evals = environment_evals(simd, scene, load3(simd, &directions), &normals, lane_mask(missed.len()));
+        let bins = normal_bin(load3(simd, &normals));
+        let evals = environment_evals(simd, scene, load3(simd, &directions), bins, lane_mask(missed.len()));
         for (lane, &path) in missed.iter().enumerate() {
             let state = &mut paths[path as usize];
             let light = environment_mis(evals.eval(lane), state.pdf);
