@@ -39,13 +39,9 @@ fn main() {
     };
     println!("{scene}: milliseconds, median and maximum");
     if !scene.ends_with(".toml") {
+        let times: Vec<Times> = (0..ROUNDS).map(|_| start(Path::new(&scene), None).1).collect();
         header();
-        return print_times(
-            "start",
-            &(0..ROUNDS)
-                .map(|_| start(Path::new(&scene), None).1)
-                .collect::<Vec<_>>(),
-        );
+        return print_times("start", &times);
     }
     let text = fs::read_to_string(&scene).unwrap_or_else(|error| panic!("{scene}: {error}"));
     let folder = tempfile::tempdir().expect("a temporary folder");

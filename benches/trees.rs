@@ -8,7 +8,7 @@ use glam::Vec3;
 use rayon::prelude::*;
 use wgray_render::bvh::{Aabb, DecodedMesh, MAX_LEAF_SIZE, Tree, build};
 use wgray_render::cpu::traversal::{
-    Directions, Level, Line, Mesh, MeshRay, MeshStack, Nearest, Next, RaySource, Segments, closest, occluded, trace,
+    Directions, Level, Line, Mesh, MeshRay, Nearest, Next, NodeStack, RaySource, Segments, closest, occluded, trace,
 };
 
 /// An indexed triangle mesh.
@@ -245,7 +245,7 @@ fn bounced_rays(criterion: &mut Criterion) {
             .map(|ray| closest(level, &view.mesh(), &ray.line, 0.0, ray.skip, MISS));
         found.filter(|found| *found != MISS).count()
     };
-    let mut stacks: [MeshStack; 8] = Default::default();
+    let mut stacks: [NodeStack; 8] = Default::default();
     let mut interleaved = || {
         let mut source = Rays {
             mesh: &view.decoded,

@@ -1,7 +1,7 @@
 //! Tests that each lane of a shared function has the bits of the `f32` version, with every instruction set.
 
 use fearless_simd::dispatch;
-use glam::{UVec2, UVec4, Vec2, Vec3};
+use glam::{UVec2, UVec4, Vec2, Vec3, Vec4};
 
 use super::*;
 use crate::cases;
@@ -9,6 +9,7 @@ use crate::cpu::diffuse::{angles_at, diffuse_pdf, diffuse_sample};
 use crate::cpu::equirect::{cap_above, cell_towards, direction_in_cell};
 use crate::cpu::ggx::{ggx_albedo, ggx_albedo_along, ggx_d, ggx_g1, ggx_g2, ggx_length, ggx_pdf, ggx_sample};
 use crate::cpu::light_sample::{power_heuristic, solid_angle_pdf};
+use crate::cpu::light_tree::{light_importances, light_shares};
 use crate::cpu::lobe::{
     facet_alpha, facet_eval, facet_loss, facet_pdf, facet_weight, half_vector, vector_from_lobe, vector_to_lobe,
 };
@@ -29,7 +30,7 @@ use crate::cpu::specular::{fresnel, reflected_direction, refracted_cosine, refra
 use crate::cpu::surface::largest;
 use crate::cpu::traversal::levels;
 use crate::cpu::warp::{cap_sample, disk_sample, frame_around, hemisphere_sample, triangle_sample, vector_around};
-use crate::records::{LOBE_ANISOTROPY, LOBE_COAT, LOBE_SHEEN, LOBE_SPECULAR, LOBE_TRANSMISSION};
+use crate::records::{LOBE_ANISOTROPY, LOBE_COAT, LOBE_SHEEN, LOBE_SPECULAR, LOBE_TRANSMISSION, LightNode};
 
 const LANES: usize = 8;
 
@@ -378,4 +379,74 @@ fn scalar_functions_accept_glam_vectors() {
         sobol_bits(0u32, <u32 as Word>::UVec2::new(0, 0))
     );
     assert_ne!(hash4(UVec4::ZERO), UVec4::ZERO);
+}
+
+impl Random {
+    fn vec4(&mut self) -> Vec4 {
+        Vec4::from_array([(); 4].map(|()| self.number()))
+    }
+
+    fn vec3(&mut self) -> Vec3 {
+        Vec3::from_array([(); 3].map(|()| self.number()))
+    }
+
+    fn light_node(&mut self) -> LightNode {
+        LightNode {
+            x: self.vec4(),
+            y: self.vec4(),
+            z: self.vec4(),
+            radius: self.vec4().abs(),
+            axis_x: self.vec4(),
+            axis_y: self.vec4(),
+            axis_z: self.vec4(),
+            cosine: self.vec4(),
+            intensity: self.vec4(),
+            edge: self.vec4(),
+            sides: UVec4::from_array([(); 4].map(|()| 1 + self.word() % 2)),
+            ..bytemuck::Zeroable::zeroed()
+        }
+    }
+}
+
+#[test]
+fn two_light_nodes_have_the_bits_of_single_nodes() {
+    let random = &mut Random(1);
+    let (mut positive, mut without_light, mut differing) = (0, 0, 0);
+    for i in 0..4000 {
+        let nodes = [random.light_node(), random.light_node()];
+        let points = [random.vec3(), random.vec3()];
+        let normals = [random.vec3(), if i % 4 == 0 { Vec3::ZERO } else { random.vec3() }];
+        let single = [0, 1].map(|i| {
+            let importances = light_importances(&nodes[i], points[i], normals[i]);
+            (importances, light_shares(importances))
+        });
+        let both = |values: [Vec4; 2]| -> [f32; LANES] { std::array::from_fn(|i| values[i / 4].to_array()[i % 4]) };
+        let importances = both(single.map(|(importances, _)| importances));
+        let shares = both(single.map(|(_, shares)| shares));
+        for level in levels() {
+            let found: [[f32; LANES]; 2] = dispatch!(level, simd => {
+                let rows = |vectors: [Vec3; 2]| {
+                    let row = |axis: usize| {
+                        f32x8::simd_from(simd, std::array::from_fn(|i| vectors[i / 4].to_array()[axis]))
+                    };
+                    Lanes3 { x: row(0), y: row(1), z: row(2) }
+                };
+                let two = TwoLightNodes { simd, nodes: [&nodes[0], &nodes[1]] };
+                let importances = light_importances(&two, rows(points), rows(normals));
+                [importances.into(), light_shares(importances).into()]
+            });
+            assert_eq!(found[0].map(bits), importances.map(bits), "{level:?}");
+            assert_eq!(found[1].map(bits), shares.map(bits), "{level:?}");
+        }
+        positive += importances.iter().filter(|x| **x > 0.0).count();
+        without_light += importances
+            .chunks(4)
+            .filter(|node| node.iter().all(|x| *x == 0.0))
+            .count();
+        differing += usize::from(importances[..4] != importances[4..]);
+    }
+    assert!(
+        positive > 2000 && without_light > 200 && differing > 2000,
+        "{positive} positive importances, {without_light} nodes without light, {differing} pairs that differ"
+    );
 }

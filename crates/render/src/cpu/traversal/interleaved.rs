@@ -4,8 +4,8 @@ use fearless_simd::prelude::*;
 
 use super::box_ray::BoxRay;
 use super::line::maximum;
-use super::mesh_stack::MeshStack;
 use super::node::Triangles as _;
+use super::node_stack::NodeStack;
 use super::{Line, Nearest, remaining_t_max};
 use crate::bvh::{DecodedMesh, LEAF};
 
@@ -79,7 +79,7 @@ struct Lane<'a, 's> {
     limit: f32,
     /// The node or leaf to visit, as in [`DecodedNode::children`](crate::bvh::DecodedNode::children).
     next: u32,
-    stack: &'s mut MeshStack,
+    stack: &'s mut NodeStack,
     state: LaneState,
 }
 
@@ -171,7 +171,7 @@ fn prefetch<T>(items: &[T], index: usize) {
 /// Traces the rays of a batch: to the closest hit, like [`closest`](super::closest), or if `ANY` is true, to any hit
 /// nearer than `best.t`, like [`any`](super::any). The stacks must be empty, and are empty again at the end.
 #[inline(always)]
-pub fn trace<'a, S: Simd, const ANY: bool>(simd: S, stacks: &mut [MeshStack; RAYS], rays: &mut impl RaySource<'a, S>) {
+pub fn trace<'a, S: Simd, const ANY: bool>(simd: S, stacks: &mut [NodeStack; RAYS], rays: &mut impl RaySource<'a, S>) {
     let mut lanes = stacks.each_mut().map(
         #[inline(always)]
         |stack| Lane {

@@ -17,8 +17,8 @@ mod closest;
 mod four;
 mod interleaved;
 mod line;
-mod mesh_stack;
 mod node;
+mod node_stack;
 mod occluded;
 
 use std::ops::Range;
@@ -30,7 +30,7 @@ use glam::Vec3;
 pub use self::box_ray::BoxRay;
 pub use self::interleaved::{MeshRay, Next, RAYS, RaySource, trace};
 pub use self::line::Line;
-pub use self::mesh_stack::MeshStack;
+pub use self::node_stack::NodeStack;
 use crate::bvh::{Aabb, DecodedMesh, Node};
 
 /// The BVH of a mesh, and its triangles.

@@ -7,7 +7,7 @@ use glam::{DVec3, Vec3};
 use fearless_simd::dispatch;
 
 use super::{
-    Directions, Level, Line, Mesh, MeshRay, MeshStack, Nearest, Next, RAYS, RaySource, Segments, closest, leaves,
+    Directions, Level, Line, Mesh, MeshRay, Nearest, Next, NodeStack, RAYS, RaySource, Segments, closest, leaves,
     levels, occluded, occluded_items, trace,
 };
 use crate::bvh::{Aabb, DecodedMesh, Tree, build};
@@ -484,7 +484,7 @@ impl<'a, S> RaySource<'a, S> for Batch<'a> {
 #[test]
 fn batches_have_the_hits_of_brute_force() {
     let random = &mut Random(10);
-    let mut stacks: [MeshStack; RAYS] = Default::default();
+    let mut stacks: [NodeStack; RAYS] = Default::default();
     let (mut hits, mut misses) = (0, 0);
     for (count, size) in [(1, 1.0), (9, 0.8), (300, 0.1), (2000, 0.05), (500, 0.5)] {
         let scene = soup(random, count, size);

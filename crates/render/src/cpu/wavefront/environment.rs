@@ -53,7 +53,7 @@ pub fn environment_samples<S: Simd>(
     (directions, evals)
 }
 
-/// Samples points of the map, like `environment_point`. `entry` is not set.
+/// Samples points of the map, like `environment_point`. `entry` is that of the cell before the choice of its alias.
 #[inline(always)]
 fn environment_points<S: Simd>(simd: S, scene: &Packed, bins: u32x8<S>, u: Lanes2<F<S>>, mask: u64) -> BlockCell<F<S>> {
     let zero: u32x8<S> = SimdBase::splat(simd, 0);
@@ -62,7 +62,7 @@ fn environment_points<S: Simd>(simd: S, scene: &Packed, bins: u32x8<S>, u: Lanes
     let distributions: [u32; LANES] = block_distributions(scene, bins).into();
     let (mut rows, mut columns) = ([0; LANES], [0; LANES]);
     // Lower and upper bounds of the intervals.
-    let (mut x_bounds, mut y_bounds) = ([[0.0; LANES]; 2], [[1.0; LANES]; 2]);
+    let (mut x_bounds, mut y_bounds) = ([[0.0; LANES]; 2], [[0.0; LANES]; 2]);
     for lane in lanes_of(mask) {
         let distribution = distributions[lane];
         let row = interval_at(scene, distribution, u_y[lane]);

@@ -3,20 +3,20 @@
 use fearless_simd::Simd;
 
 use super::super::slab::Slabs;
-use super::super::traversal::{BoxRay, MeshStack};
+use super::super::traversal::{BoxRay, NodeStack};
 use crate::bvh::{DecodedNode, LEAF};
 
 /// The items whose boxes a ray may hit.
 pub struct Items {
     box_ray: BoxRay,
-    stack: MeshStack,
+    stack: NodeStack,
 }
 
 impl Default for Items {
     fn default() -> Items {
         Items {
             box_ray: BoxRay::new([0.0; 3], [0.0; 3], [1.0; 3]),
-            stack: MeshStack::default(),
+            stack: NodeStack::default(),
         }
     }
 }

@@ -1,12 +1,12 @@
 //! Memory for the traversals of a batch, reused from batch to batch.
 
-use super::super::traversal::{MeshStack, RAYS};
+use super::super::traversal::{NodeStack, RAYS};
 use super::items::Items;
 
 /// Stacks and states of the interleaved rays, and the queue that they are taken from.
 pub struct Scratch {
     pub is_decoded: bool,
-    pub stacks: [MeshStack; RAYS],
+    pub stacks: [NodeStack; RAYS],
     pub lanes: [RayLane; RAYS],
     pub queue: Vec<QueuedRay>,
 }

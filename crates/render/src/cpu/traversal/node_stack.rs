@@ -1,4 +1,4 @@
-//! The stack of a ray in a batch: nodes and leaves of a mesh. For closest hits, they are approximately in order of
+//! The stack of a ray in a batch: nodes and leaves of a decoded BVH. For closest hits, they are approximately in order of
 //! distance, with the nearest on top.
 
 use fearless_simd::prelude::*;
@@ -11,15 +11,15 @@ use crate::bvh::DecodedNode;
 /// Nodes and leaves to visit, as values of `DecodedNode::children`. Visiting a node removes an entry and adds up to 8,
 /// so that there are at most `STACK` entries. The arrays have 8 spare elements, because 8 are written at a time.
 #[derive(Clone, Debug)]
-pub struct MeshStack {
+pub struct NodeStack {
     near: Box<[f32; STACK + 8]>,
     children: Box<[u32; STACK + 8]>,
     depth: usize,
 }
 
-impl Default for MeshStack {
-    fn default() -> MeshStack {
-        MeshStack {
+impl Default for NodeStack {
+    fn default() -> NodeStack {
+        NodeStack {
             near: Box::new([0.0; STACK + 8]),
             children: Box::new([0; STACK + 8]),
             depth: 0,
@@ -40,7 +40,7 @@ static BACK_TO_FRONT: [[u8; 32]; 8] = {
     table
 };
 
-impl MeshStack {
+impl NodeStack {
     /// Removes all entries, and adds the root.
     #[inline(always)]
     pub fn start(&mut self) {
