@@ -381,51 +381,6 @@ fn all_kinds_of_materials_fit_into_the_stack_of_a_thread() {
     }
 }
 
-#[cfg(not(feature = "formats"))]
-#[test]
-fn without_the_feature_formats_files_are_rejected() {
-    use wgray::image::Format;
-
-    let folder = tempfile::tempdir().unwrap();
-    let picture = wgray::render(&scene(), &cpu_options()).unwrap();
-    for (format, name) in [(Format::Exr, "OpenEXR"), (Format::WebP, "WebP")] {
-        let rule = format!("{name} files need the cargo feature \"formats\"");
-        let path = folder.path().join(format!("a.{}", format.name()));
-        let error = picture.save(&path).unwrap_err();
-        assert!(matches!(error, Error::Render(RenderError::Output(_))), "{error:?}");
-        assert_eq!(error.to_string(), format!("{}: {rule}", path.display()));
-        let in_memory = std::io::Cursor::new(Vec::new());
-        let error = picture
-            .write_to(in_memory, format, &SaveOptions::default())
-            .unwrap_err();
-        assert_eq!(error.to_string(), rule);
-    }
-    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
-    let path = folder.path().join("a.exr");
-    let error = read_exr(&path).unwrap_err();
-    assert_eq!(error.kind(), std::io::ErrorKind::Unsupported);
-    assert_eq!(
-        error.to_string(),
-        format!("{}: OpenEXR files need the cargo feature \"formats\"", path.display())
-    );
-
-    let description = description()
-        .with_texture("a", ImageTextureDescription::new("a.image"))
-        .with_material("red", PhongDescription::new(ColorDescription::texture("a")));
-    for (bytes, name) in [
-        (&b"\x76\x2f\x31\x01"[..], "EXR"),
-        (b"RIFF\0\0\0\0WEBP", "WebP"),
-        (b"\xabKTX 20\xbb\r\n\x1a\n", "KTX2"),
-    ] {
-        std::fs::write(folder.path().join("a.image"), bytes).unwrap();
-        let error = description.validate_with(&Assets::beside(folder.path())).unwrap_err();
-        assert_eq!(
-            error.to_string(),
-            format!("textures.a.file: \"a.image\" cannot be decoded: {name} files need the cargo feature \"formats\"")
-        );
-    }
-}
-
 #[cfg(not(feature = "gpu"))]
 #[test]
 fn without_the_feature_gpu_only_the_cpu_exists() {

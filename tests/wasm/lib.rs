@@ -4,21 +4,29 @@
 //! pixels of a native build with the same file.
 
 use std::cell::RefCell;
+use std::io::Cursor;
 use std::mem::ManuallyDrop;
+use std::path::Path;
 use std::pin::Pin;
 use std::task::{Context as TaskContext, Poll, Waker};
 
+use wgray::image::{Format, SaveOptions, read_exr};
 use wgray::scene::{LoadOptions, MemoryFiles, SceneFormat};
 use wgray::{CancelToken, Context, Device, Error, Options, Picture, Scene, Session};
 
-fn load(scene: &str) -> Result<Scene, Error> {
-    let files = MemoryFiles::new()
+const SCENE: &str = include_str!("scene.toml");
+
+fn files() -> MemoryFiles {
+    MemoryFiles::new()
         .with("meshes/knot.obj", &include_bytes!("../../scenes/meshes/knot.obj")[..])
         .with(
             "textures/grid.png",
             &include_bytes!("../../scenes/textures/grid.png")[..],
-        );
-    let options = LoadOptions::new().with_source(files);
+        )
+}
+
+fn load(scene: &str) -> Result<Scene, Error> {
+    let options = LoadOptions::new().with_source(files());
     Ok(Scene::from_slice(scene.as_bytes(), SceneFormat::Toml, &options)?)
 }
 
@@ -64,8 +72,13 @@ pub unsafe extern "C" fn render(text: *mut u8, len: usize) -> *const u32 {
 
 /// Returns the address of the number of values, followed by the values.
 fn result(pixels: Vec<f32>) -> *const u32 {
-    let mut result = vec![pixels.len() as u32];
-    result.extend(pixels.into_iter().map(f32::to_bits));
+    words(pixels.into_iter().map(f32::to_bits))
+}
+
+/// Returns the address of the number of words, followed by the words.
+fn words(words: impl ExactSizeIterator<Item = u32>) -> *const u32 {
+    let mut result = vec![words.len() as u32];
+    result.extend(words);
     ManuallyDrop::new(result).as_ptr()
 }
 
@@ -110,6 +123,39 @@ pub extern "C" fn poll_render() -> *const u32 {
     })
 }
 
+/// Returns the address of the messages for formats that need the cargo feature `formats`, one per line: the number of
+/// words, followed by the text, padded with spaces.
+///
+/// # Panics
+///
+/// If a format is accepted.
+#[unsafe(no_mangle)]
+pub extern "C" fn errors_without_formats() -> *const u32 {
+    let picture = wgray::render(&load(SCENE).expect("a valid scene"), &options()).expect("an image");
+    let mut errors = Vec::new();
+    for format in [Format::Exr, Format::WebP] {
+        let saved = picture.write_to(Cursor::new(Vec::new()), format, &SaveOptions::default());
+        errors.push(saved.expect_err("an error").to_string());
+    }
+    errors.push(read_exr(Path::new("a.exr")).expect_err("an error").to_string());
+    let text = SCENE.replace("grid.png", "a.image");
+    for bytes in [
+        &b"\x76\x2f\x31\x01"[..],
+        b"RIFF\0\0\0\0WEBP",
+        b"\xabKTX 20\xbb\r\n\x1a\n",
+    ] {
+        let options = LoadOptions::new().with_source(files().with("textures/a.image", bytes));
+        let scene = Scene::from_slice(text.as_bytes(), SceneFormat::Toml, &options);
+        errors.push(scene.expect_err("an error").to_string());
+    }
+    let mut text = errors.join("\n").into_bytes();
+    text.resize(text.len().next_multiple_of(4), b' ');
+    words(
+        text.chunks_exact(4)
+            .map(|word| u32::from_le_bytes(word.try_into().expect("four bytes"))),
+    )
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -117,11 +163,7 @@ mod tests {
     /// Compares the pixels with `pixels.f32`. If `WGRAY_TEST_RECORD` is set, writes this file first.
     #[test]
     fn a_native_build_renders_the_recorded_pixels() {
-        let bytes: Vec<u8> = pixels(include_str!("scene.toml"))
-            .unwrap()
-            .into_iter()
-            .flat_map(f32::to_le_bytes)
-            .collect();
+        let bytes: Vec<u8> = pixels(SCENE).unwrap().into_iter().flat_map(f32::to_le_bytes).collect();
         let file = concat!(env!("CARGO_MANIFEST_DIR"), "/pixels.f32");
         if std::env::var_os("WGRAY_TEST_RECORD").is_some() {
             std::fs::write(file, &bytes).unwrap();

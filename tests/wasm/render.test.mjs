@@ -35,14 +35,14 @@ function instantiate(text) {
     return { exports, scene: [address, bytes.length] };
 }
 
-function pixelsAt({ memory }, result) {
+function bytesAt({ memory }, result) {
     const [count] = new Uint32Array(memory.buffer, result, 1);
     return Buffer.from(memory.buffer.slice(result + 4, result + 4 + 4 * count));
 }
 
 function render(text) {
     const { exports, scene } = instantiate(text);
-    return pixelsAt(exports, exports.render(...scene));
+    return bytesAt(exports, exports.render(...scene));
 }
 
 // Renders with `Session::render_async`. Returns the pixels and the number of times that other tasks could run.
@@ -52,7 +52,7 @@ async function renderAsync(text) {
     for (let pauses = 0; ; pauses++) {
         const result = exports.poll_render();
         if (result !== 0) {
-            return { pixels: pixelsAt(exports, result), pauses };
+            return { pixels: bytesAt(exports, result), pauses };
         }
         await new Promise((resolve) => setTimeout(resolve));
     }
@@ -77,4 +77,17 @@ test("an asynchronous render yields to other tasks and has the same pixels", asy
     const { pixels, pauses } = await renderAsync(text);
     assert.ok(pauses > 2, `${pauses} pauses`);
     assert.ok(pixels.equals(render(text)));
+});
+
+test("without the feature formats, its files are rejected", () => {
+    const { exports } = new WebAssembly.Instance(module, imports);
+    const errors = bytesAt(exports, exports.errors_without_formats()).toString().trimEnd().split("\n");
+    const rule = (name) => `${name} files need the cargo feature "formats"`;
+    const texture = (name) => `scene.toml:19: textures.grid.file: "textures/a.image" cannot be decoded: ${rule(name)}`;
+    assert.deepEqual(errors, [
+        rule("OpenEXR"),
+        rule("WebP"),
+        `a.exr: ${rule("OpenEXR")}`,
+        ...["EXR", "WebP", "KTX2"].map(texture),
+    ]);
 });

@@ -19,6 +19,7 @@ pub fn reject(path: &Path) -> io::Result<()> {
     }
 }
 
+#[cfg_attr(not(unix), expect(dead_code))]
 enum Kind {
     Device,
     Pipe,

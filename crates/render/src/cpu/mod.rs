@@ -27,6 +27,8 @@ pub mod footprint;
 pub mod geometry;
 pub mod ggx;
 pub mod integrators;
+// WebAssembly has no wavefront, which uses the types.
+#[cfg_attr(target_arch = "wasm32", expect(dead_code, unused_imports))]
 pub(crate) mod lanes;
 pub mod lens;
 pub mod light;

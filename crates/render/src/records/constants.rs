@@ -239,6 +239,8 @@ constants! {
     pub const DENOISE_PATCH_RADIUS: u32 = 2;
     /// Squared difference of colors at which the denoiser's weight falls to about 1/e, in units of their variance.
     pub const DENOISE_COLOR_SCALE: f32 = 1.1;
+    /// Largest variance that the denoiser attributes to another pixel, relative to the variance of the pixel itself.
+    pub const DENOISE_MAX_VARIANCE_RATIO: f32 = 12.0;
     /// Smallest variance, against division by zero.
     pub const DENOISE_MIN_VARIANCE: f32 = 1e-20;
 

@@ -3,6 +3,7 @@
 
 use std::ops::AddAssign;
 
+#[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
 use fearless_simd::Simd as _;
 use glam::{UVec2, Vec3};
 
