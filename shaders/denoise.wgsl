@@ -4,9 +4,8 @@
 // Returns the distance of two pixels' colors, in units of their variance: about 0 if the difference is noise. `squared`
 // is the squared difference, `p` and `q` are the variances of the means of the pixels. A pixel with little noise limits
 // the variance of q, which would otherwise explain any difference.
-fn color_distance(squared: f32, p: f32, q: f32) -> f32 {
-    let variance = p + min(q, DENOISE_MAX_VARIANCE_RATIO * p);
-    return (squared - noise_of(p, q)) / (DENOISE_COLOR_SCALE * variance + DENOISE_MIN_VARIANCE);
+fn color_distance(squared: f32, p: f32, q: f32, limit: f32) -> f32 {
+    return (squared - noise_of(p, q)) / (DENOISE_COLOR_SCALE * (p + min(q, limit)) + DENOISE_MIN_VARIANCE);
 }
 
 // Returns the distance of two pixels' features. `scale` is 1 / (tolerated squared difference).

@@ -436,7 +436,7 @@ probes! {
     standalone_prim(prim_id: UVec2) -> u32;
     nearer_hit(a: Hit, b: Hit) -> Hit;
     with_positive_zeros(v: Vec3) -> Vec3;
-    color_distance(squared: f32, p: f32, q: f32) -> f32;
+    color_distance(squared: f32, p: f32, q: f32, limit: f32) -> f32;
     feature_distance(squared: f32, p: f32, q: f32, scale: f32) -> f32;
     noise_of(p: f32, q: f32) -> f32;
     denoise_weight(distance: f32) -> f32;

@@ -41,7 +41,8 @@ fn patch_distance(p: u32, q: u32) -> f32 {
             let offset = y * params.stride + x;
             let i = p - corner + offset;
             let j = q - corner + offset;
-            row_sum += color_distance(squared_difference(GUIDE_COLOR, i, j), guide(GUIDE_COLOR_VARIANCE, i), guide(GUIDE_COLOR_VARIANCE, j));
+            let variances = vec2f(guide(GUIDE_COLOR_VARIANCE, i), guide(GUIDE_COLOR_VARIANCE, j));
+            row_sum += color_distance(squared_difference(GUIDE_COLOR, i, j), variances.x, variances.y, guide(GUIDE_VARIANCE_LIMIT, i));
         }
         sum += row_sum;
     }

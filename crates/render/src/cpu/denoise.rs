@@ -2,12 +2,11 @@
 
 use super::lanes::{Real, constant};
 use super::math::{max, min};
-use crate::records::{DENOISE_COLOR_SCALE, DENOISE_MAX_VARIANCE_RATIO, DENOISE_MIN_VARIANCE};
+use crate::records::{DENOISE_COLOR_SCALE, DENOISE_MIN_VARIANCE};
 
 #[inline(always)]
-pub fn color_distance<F: Real>(squared: F, p: F, q: F) -> F {
-    let variance = p + min(q, constant(DENOISE_MAX_VARIANCE_RATIO) * p);
-    (squared - noise_of(p, q)) / (constant(DENOISE_COLOR_SCALE) * variance + DENOISE_MIN_VARIANCE)
+pub fn color_distance<F: Real>(squared: F, p: F, q: F, limit: F) -> F {
+    (squared - noise_of(p, q)) / (constant(DENOISE_COLOR_SCALE) * (p + min(q, limit)) + DENOISE_MIN_VARIANCE)
 }
 
 #[inline(always)]

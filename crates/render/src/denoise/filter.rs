@@ -13,6 +13,7 @@ use crate::cpu::math::{dot, max};
 use crate::cpu::samples::LEVEL;
 use crate::records::{
     DENOISE_PATCH_RADIUS, DENOISE_RADIUS, GUIDE_ALBEDO, GUIDE_COLOR, GUIDE_COLOR_VARIANCE, GUIDE_DEPTH, GUIDE_NORMAL,
+    GUIDE_VARIANCE_LIMIT,
 };
 
 const LANES: usize = 8;
@@ -129,6 +130,7 @@ impl Tile {
                     planes.squared(GUIDE_COLOR),
                     planes.p(GUIDE_COLOR_VARIANCE),
                     planes.q(GUIDE_COLOR_VARIANCE),
+                    planes.p(GUIDE_VARIANCE_LIMIT),
                 );
                 distance.store_slice(&mut self.distances[x..x + LANES]);
             }

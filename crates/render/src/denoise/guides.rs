@@ -10,7 +10,7 @@ use super::window::{box_means, window};
 use crate::film::{Film, Half, Layer, mean};
 use crate::records::{
     DENOISE_PATCH_RADIUS, DENOISE_RADIUS, GUIDE_ALBEDO, GUIDE_COLOR, GUIDE_COLOR_VARIANCE, GUIDE_DEPTH, GUIDE_NORMAL,
-    GUIDE_PLANES,
+    GUIDE_PLANES, GUIDE_VARIANCE_LIMIT,
 };
 
 /// Pixels around the image that the window and its patches reach.
@@ -28,9 +28,13 @@ const DEPTH_TOLERANCE: f32 = 0.003;
 /// high.
 const FEATURE_VARIANCE_SCALE: f32 = 2.0;
 /// Minimum of a pixel's variance, relative to the mean variance of the 3 x 3 pixels around it.
-const MIN_RELATIVE_VARIANCE: f32 = 0.2;
+const MIN_RELATIVE_VARIANCE: f32 = 0.1;
 /// Maximum of a pixel's variance, relative to the mean squared difference of the two halves of the samples around it.
 const MAX_RELATIVE_VARIANCE: f32 = 2.0;
+/// Largest variance that is attributed to other pixels, relative to that of a pixel with at least `RELIABLE_SAMPLES`.
+const MAX_VARIANCE_RATIO: f32 = 12.0;
+const RELIABLE_SAMPLES: u32 = 64;
+const UNLIMITED_VARIANCE: f32 = 1e30;
 /// Radius of the square of pixels over which these differences are averaged.
 const HALF_VARIANCE_RADIUS: usize = 4;
 /// Depth of pixels that are not averaged with any other pixel.
@@ -38,6 +42,7 @@ const EXCLUDED_DEPTH: f32 = 1e15;
 
 const COLOR: usize = GUIDE_COLOR as usize;
 const COLOR_VARIANCE: usize = GUIDE_COLOR_VARIANCE as usize;
+const VARIANCE_LIMIT: usize = GUIDE_VARIANCE_LIMIT as usize;
 const NORMAL: usize = GUIDE_NORMAL as usize;
 const ALBEDO: usize = GUIDE_ALBEDO as usize;
 const DEPTH: usize = GUIDE_DEPTH as usize;
@@ -133,7 +138,7 @@ fn padded(size: usize) -> impl Iterator<Item = usize> {
 /// Continues the colors of surfaces into the background and into bright pixels by the radius of a patch, so that the
 /// patches of pixels at the edge of a surface are similar to those inside.
 fn extend_surfaces(width: usize, coverages: &[Coverage], guides: &mut [[f32; PLANES]]) {
-    const VALUES: usize = COLOR_VARIANCE - COLOR + 1;
+    const VALUES: usize = VARIANCE_LIMIT - COLOR + 1;
     let extended = |i: usize| {
         let around = window(i, width, coverages.len(), DENOISE_PATCH_RADIUS as usize);
         let surfaces = around.filter(|j| coverages[*j].fraction().is_some());
@@ -217,6 +222,17 @@ fn limit_variances(film: &Film, coverages: &[Coverage], guides: &mut [[f32; PLAN
     for (i, guides) in guides.iter_mut().enumerate() {
         let variance = variances[i].max(MIN_RELATIVE_VARIANCE * local[i]) * stratification(halves[i], wide[i]);
         guides[COLOR_VARIANCE] = variance.min(MAX_RELATIVE_VARIANCE * halves[i]);
+        guides[VARIANCE_LIMIT] = variance_limit(guides[COLOR_VARIANCE], film.sample_count(i));
+    }
+}
+
+/// Returns the largest variance that is attributed to other pixels than one with this variance. Few samples may have
+/// missed a light: then the pixel is black, and its variance is 0.
+fn variance_limit(variance: f32, samples: u32) -> f32 {
+    if samples < RELIABLE_SAMPLES {
+        UNLIMITED_VARIANCE
+    } else {
+        MAX_VARIANCE_RATIO * variance
     }
 }
 

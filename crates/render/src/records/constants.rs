@@ -239,8 +239,6 @@ constants! {
     pub const DENOISE_PATCH_RADIUS: u32 = 2;
     /// Squared difference of colors at which the denoiser's weight falls to about 1/e, in units of their variance.
     pub const DENOISE_COLOR_SCALE: f32 = 1.1;
-    /// Largest variance that the denoiser attributes to another pixel, relative to the variance of the pixel itself.
-    pub const DENOISE_MAX_VARIANCE_RATIO: f32 = 12.0;
     /// Smallest variance, against division by zero.
     pub const DENOISE_MIN_VARIANCE: f32 = 1e-20;
 
@@ -248,13 +246,15 @@ constants! {
     pub const GUIDE_COLOR: u32 = 0;
     /// Plane of the summed variances of the color's components.
     pub const GUIDE_COLOR_VARIANCE: u32 = 3;
+    /// Plane of the largest variance that is attributed to other pixels.
+    pub const GUIDE_VARIANCE_LIMIT: u32 = 4;
     /// First plane of the denoiser's normal: three planes, the summed variances, and the scale, which is 1 / (tolerated
     /// squared difference).
-    pub const GUIDE_NORMAL: u32 = 4;
+    pub const GUIDE_NORMAL: u32 = 5;
     /// First plane of the denoiser's albedo, like [`GUIDE_NORMAL`].
-    pub const GUIDE_ALBEDO: u32 = 9;
+    pub const GUIDE_ALBEDO: u32 = 10;
     /// First plane of the denoiser's depth: depth, variance and scale.
-    pub const GUIDE_DEPTH: u32 = 14;
+    pub const GUIDE_DEPTH: u32 = 15;
     /// Number of planes.
-    pub const GUIDE_PLANES: u32 = 17;
+    pub const GUIDE_PLANES: u32 = 18;
 }
