@@ -31,12 +31,12 @@ const FEATURE_VARIANCE_SCALE: f32 = 2.0;
 const MIN_RELATIVE_VARIANCE: f32 = 0.1;
 /// Maximum of a pixel's variance, relative to the mean squared difference of the two halves of the samples around it.
 const MAX_RELATIVE_VARIANCE: f32 = 2.0;
+/// Radius of the square of pixels over which these differences are averaged.
+const HALF_VARIANCE_RADIUS: usize = 4;
 /// Largest variance that is attributed to other pixels, relative to that of a pixel with at least `RELIABLE_SAMPLES`.
 const MAX_VARIANCE_RATIO: f32 = 12.0;
 const RELIABLE_SAMPLES: u32 = 64;
 const UNLIMITED_VARIANCE: f32 = 1e30;
-/// Radius of the square of pixels over which these differences are averaged.
-const HALF_VARIANCE_RADIUS: usize = 4;
 /// Depth of pixels that are not averaged with any other pixel.
 const EXCLUDED_DEPTH: f32 = 1e15;
 
@@ -48,7 +48,7 @@ const ALBEDO: usize = GUIDE_ALBEDO as usize;
 const DEPTH: usize = GUIDE_DEPTH as usize;
 const PLANES: usize = GUIDE_PLANES as usize;
 
-/// Bytes per pixel of the guides, while they are computed.
+/// Bytes per pixel of the guides, without their margins, while they are computed.
 pub const GUIDE_BYTES: u64 = (2 * PLANES * size_of::<f32>() + size_of::<Coverage>()) as u64;
 
 /// Planes of floats, each with a margin that mirrors the image.
@@ -135,8 +135,8 @@ fn padded(size: usize) -> impl Iterator<Item = usize> {
     })
 }
 
-/// Continues the colors of surfaces into the background and into bright pixels by the radius of a patch, so that the
-/// patches of pixels at the edge of a surface are similar to those inside.
+/// Continues the colors of surfaces into the background and into other pixels that are not averaged by the radius of a
+/// patch, so that the patches of pixels at the edge of a surface are similar to those inside.
 fn extend_surfaces(width: usize, coverages: &[Coverage], guides: &mut [[f32; PLANES]]) {
     const VALUES: usize = VARIANCE_LIMIT - COLOR + 1;
     let extended = |i: usize| {
@@ -147,9 +147,9 @@ fn extend_surfaces(width: usize, coverages: &[Coverage], guides: &mut [[f32; PLA
         });
         (count > 0.0).then(|| (i, sum.map(|value: f32| value / count)))
     };
-    let background = (0..coverages.len()).into_par_iter();
-    let background = background.filter(|i| matches!(coverages[*i], Coverage::Background | Coverage::Bright));
-    let extensions: Vec<(usize, [f32; VALUES])> = background.filter_map(extended).collect();
+    let others = (0..coverages.len()).into_par_iter();
+    let others = others.filter(|i| coverages[*i].fraction().is_none());
+    let extensions: Vec<(usize, [f32; VALUES])> = others.filter_map(extended).collect();
     for (i, values) in extensions {
         guides[i][COLOR..COLOR + VALUES].copy_from_slice(&values);
     }
@@ -192,6 +192,8 @@ fn guides_of(film: &Film, i: usize, coverage: Coverage) -> [f32; PLANES] {
         let variance = feature_variance(variance.x);
         let tolerance = variance.max(DEPTH_TOLERANCE * depth * depth);
         set(DEPTH, &[depth, variance, 1.0 / tolerance.max(f32::MIN_POSITIVE)]);
+    } else {
+        guides[DEPTH + 2] = 1.0; // all depths are 0 except those of excluded pixels
     }
     guides
 }

@@ -27,6 +27,9 @@ use wgray_image::Region;
 /// Returns the denoised colors of a film with noise estimates, in row-major order, top row first. Without layers, only
 /// colors guide the denoiser. Pixels that are not finite, or without samples, keep their color.
 pub fn denoise(film: &Film) -> Vec<Vec3> {
+    if film.sums.is_empty() {
+        return Vec::new();
+    }
     let guides = Guides::of(film);
     guides.colors(film, &filter::filter(&guides))
 }

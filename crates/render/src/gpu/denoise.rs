@@ -33,13 +33,16 @@ pub fn denoise(device: &Device, film: &Film, exact: Option<Rounding>) -> Result<
 
 /// Like [`denoise`], as a future that does not block in browsers.
 pub async fn denoise_async(device: &Device, film: &Film, exact: Option<Rounding>) -> Result<Vec<Vec3>, RenderError> {
+    if film.sums.is_empty() {
+        return Ok(Vec::new());
+    }
     let guides = Guides::of(film);
     let source = Shaders::built_in().compose_alone(&DENOISE);
     let layout = layout_of(device, BINDINGS);
     let layouts = [layout];
     let pipeline = pipeline(device, &layouts, &DENOISE, &source, &Specialization::default(), exact)?;
     let mut filtered = Vec::with_capacity(film.sums.len());
-    let rows = (MAX_PIXELS / guides.width.max(1)).max(1);
+    let rows = (MAX_PIXELS / guides.width).max(1);
     for start in (0..guides.height).step_by(rows) {
         let rows = start..(start + rows).min(guides.height);
         let planes = guides.rows(rows.clone());

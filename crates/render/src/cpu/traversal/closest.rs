@@ -4,6 +4,7 @@ use arrayvec::ArrayVec;
 use fearless_simd::f32x8;
 use fearless_simd::prelude::*;
 
+use super::box_ray::BoxRay;
 use super::line::maximum;
 use super::node::{TriangleBvh, Triangles, WideNode};
 use super::{Line, Nearest, remaining_t_max};
@@ -98,18 +99,11 @@ pub fn leaves<S: Simd, N: WideNode>(
     mut limit: f32,
     mut visit: impl FnMut(N::Leaf, f32) -> f32,
 ) {
-    // For each axis: near side (0: lower, 1: upper), origins for near and far sides, and reciprocal of the direction.
-    let mut near_side_index = [0; 3];
-    let mut origins = [[0.0; 3]; 2];
-    let mut inverse = [0.0; 3];
-    for i in 0..3 {
-        let k = line.axes[i];
-        let negative = line.inverse[i] < 0.0;
-        near_side_index[k] = usize::from(negative);
-        origins[near_side_index[k]][k] = line.o_low[i];
-        origins[1 - near_side_index[k]][k] = line.o_high[i];
-        inverse[k] = line.inverse[i];
-    }
+    let BoxRay {
+        near_side_index,
+        origins,
+        inverse,
+    } = BoxRay::of(line);
     // Distances and indices of nodes. The children of a node are sorted, with the nearest on top.
     let mut stack: ArrayVec<(f32, u32), STACK> = ArrayVec::new();
     stack.push((f32::NEG_INFINITY, 0));

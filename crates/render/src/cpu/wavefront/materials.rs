@@ -65,7 +65,7 @@ pub struct Directions<S: Simd> {
     pub random: F<S>,
 }
 
-/// Light result at the hits.
+/// Reflected light and next rays at the hits.
 pub struct ScatterResult<S: Simd> {
     /// Reflection of the light samples, like the scalar `reflection`.
     pub reflections: Option<Reflections<S>>,
@@ -119,7 +119,7 @@ impl<S: Simd> Diffuse<S> {
     }
 }
 
-/// Opaque `principled` materials.
+/// `principled` materials.
 pub struct Principled<S: Simd> {
     mixture: PrincipledLobes<F<S>>,
     frame: Tangents<V<S>>,

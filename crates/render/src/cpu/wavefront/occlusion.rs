@@ -13,7 +13,7 @@ use super::super::traversal::{Line, Nearest, Next, RAYS, RaySource, trace};
 use super::QueuedShadowRay;
 use super::items::ItemStep;
 use super::linear::ShadowRayRows;
-use super::rows::{LANES, Row, lane_mask, splat3};
+use super::rows::{LANES, lane_mask, splat3};
 use super::scratch::{QueuedRay, RayLane, Scratch};
 use crate::bvh::DecodedNode;
 use crate::records::{CASTS_SHADOW, INSTANCE, NO_INDEX, Packed};
@@ -94,17 +94,17 @@ fn queue_rays<S: Simd>(
     queue: &mut Vec<QueuedRay>,
 ) -> u64 {
     let mut unoccluded = !already_occluded & lane_mask(rays.len());
-    let mut push = |lane: usize, instance, near| {
+    let mut push = |lane: usize, instance| {
         queue.push(QueuedRay {
             position: (first + lane) as u32,
             instance,
-            near,
+            near: 0.0,
         });
     };
     if scene.bvh.items.len() > FEW_ITEMS {
         for lane in 0..rays.len() {
             if unoccluded >> lane & 1 == 1 {
-                push(lane, NO_INDEX, 0.0);
+                push(lane, NO_INDEX);
             }
         }
         return 0;
@@ -118,13 +118,12 @@ fn queue_rays<S: Simd>(
         }
         let interval = box_interval(splat3(simd, item.low), splat3(simd, item.high), slabs);
         let mut lanes = interval_hits(interval, t_max).to_bitmask() & unoccluded;
-        let near: Row = interval.x.into();
         while lanes != 0 {
             let lane = lanes.trailing_zeros() as usize;
             lanes &= lanes - 1;
             let ray = &rays[lane].ray;
             if item.kind & 0xff == INSTANCE {
-                push(lane, item.index, near[lane]);
+                push(lane, item.index);
             } else if is_occluded_by_primitive_item(
                 scene,
                 item,

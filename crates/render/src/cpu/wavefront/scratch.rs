@@ -18,7 +18,7 @@ pub struct QueuedRay {
     pub position: u32,
     /// Index of the instance; [`NO_INDEX`](crate::records::NO_INDEX) for the BVH of the scene.
     pub instance: u32,
-    /// Distance to the box of the instance; 0 for the BVH of the scene.
+    /// Distance to the box of the instance; 0 for the BVH of the scene, and for shadow rays.
     pub near: f32,
 }
 

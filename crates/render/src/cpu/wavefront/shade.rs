@@ -1,4 +1,4 @@
-//! The stage that shades the hits of a batch of paths. Hits on most opaque surfaces are sorted into queues and shaded in
+//! The stage that shades the hits of a batch of paths. Hits on most surfaces are sorted into queues and shaded in
 //! SIMD lanes, with the bits of the scalar function [`shade`]. That function shades all other hits.
 
 use std::ops::AddAssign;

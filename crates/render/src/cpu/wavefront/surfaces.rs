@@ -31,7 +31,7 @@ pub struct LaneSurfaces<S: Simd> {
     pub side: F<S>,
     /// [`None`] if tangents follow from the shading normal.
     pub tangents: Option<Tangents<V<S>>>,
-    /// [`None`] if no hit is on a mesh.
+    /// [`None`] if no hit is on a mesh. Other primitives may have any values.
     pub triangle: Option<LaneTriangles<S>>,
     /// True where the material transmits light. [`None`] if none does.
     pub transmits: Option<mask32x8<S>>,

@@ -145,6 +145,57 @@ fn pixels_that_are_not_finite_stay_and_do_not_spread() {
     }
 }
 
+/// With a single sample and without layers, as for `phong`, the variance of a pixel explains the difference from black.
+#[test]
+fn excluded_pixels_are_not_averaged_without_layers() {
+    let film_layout = FilmLayout {
+        noise: true,
+        ..FilmLayout::default()
+    };
+    let mut film = Film::of(Region::whole(30, 20), film_layout);
+    for i in 0..film.sums.len() {
+        film.sums[i] = Vec4::new(0.5, 0.5, 0.5, 1.0);
+        film.moments[i].w = 1.0;
+    }
+    film.sums[310] = Vec4::ZERO;
+    film.sums[315].x = f32::NAN;
+    for (i, color) in denoise(&film).iter().enumerate() {
+        assert!(
+            [310, 315].contains(&i) || (*color - 0.5).abs().max_element() < 1e-6,
+            "{i}: {color}"
+        );
+    }
+}
+
+/// The patches around a pixel that is not finite are like those of other pixels.
+#[test]
+fn noise_around_pixels_that_are_not_finite_falls() {
+    let subject = Subject {
+        width: 40,
+        height: 40,
+        amplitude: 0.02,
+    };
+    let color = |_, _| DVec3::splat(0.5);
+    let mut film = subject.film(color, WHITE);
+    for i in (0..film.sums.len()).filter(|i| i % 40 == 20 && i / 40 % 8 == 4) {
+        film.sums[i].x = f32::NAN;
+    }
+    let [before, after] = [means(&film), denoise(&film)].map(|colors| {
+        let sides = [18..20, 21..23].map(|columns| subject.error(&colors, color, columns));
+        sides.iter().sum::<f64>()
+    });
+    assert!(after < before / 20.0, "{before} before, {after} after");
+}
+
+#[test]
+fn a_film_without_pixels_has_no_colors() {
+    let film_layout = FilmLayout {
+        noise: true,
+        ..FilmLayout::default()
+    };
+    assert!(denoise(&Film::of(Region::whole(0, 0), film_layout)).is_empty());
+}
+
 /// The method in f64, from the definitions: every pixel, window and patch on its own, without planes, tiles and lanes.
 /// `guides` returns plane `k` of a pixel, mirrored at the borders.
 fn definition(guides: &Guides, x: i32, y: i32) -> DVec3 {
