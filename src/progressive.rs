@@ -6,7 +6,7 @@ use std::time::Duration;
 use wgray_render::backend::Backend;
 use wgray_render::denoise::denoise;
 use wgray_render::film::{Film, FilmLayout};
-use wgray_render::job::{Bands, Flow, NoCheckpoint, Order, WorkSplit};
+use wgray_render::job::{Bands, Flow, NoCheckpoint, Order, PassEnds, WorkSplit};
 use wgray_render::noise::{Noise, NoiseMeter, is_decision};
 use wgray_scene::Problem;
 
@@ -86,7 +86,7 @@ impl<'s> ProgressiveRender<'s> {
         drop(empty(setup.layout.region, film_layout)?);
         Ok(ProgressiveRender {
             open,
-            bands: bands.in_passes_of(STEP_DURATION, film_layout)?,
+            bands: bands.in_passes_to(PassEnds::After(STEP_DURATION), film_layout)?,
             setup,
             film_layout,
         })

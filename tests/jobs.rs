@@ -12,8 +12,9 @@ use wgray_render::cpu::Cpu;
 use wgray_render::film::Film;
 use wgray_render::job::checkpoint::{Checkpoint, CheckpointError, CheckpointOptions};
 use wgray_render::job::{
-    Bands, CheckpointStore, FilmPiece, Flow, Identity, NoCheckpoint, Order, StoredPiece, Tile, WorkSplit,
+    Bands, CheckpointStore, FilmPiece, Flow, Identity, NoCheckpoint, Order, PassEnds, StoredPiece, Tile, WorkSplit,
 };
+use wgray_render::noise::next_decision;
 use wgray_render::records::Packed;
 
 use crate::contract::{bits, subjects};
@@ -299,6 +300,49 @@ fn the_last_pass_is_a_complete_image() {
                     assert!(passes.contains(&samples), "{passes:?}");
                 }
             }
+        }
+    }
+}
+
+/// Passes to given numbers of samples end nowhere else, even if they are interrupted.
+#[test]
+fn passes_end_where_the_noise_decides() {
+    let mut scene = scenes::scene("cornell.toml");
+    (scene.image.width, scene.image.height) = (20, 10);
+    scene.render.pixel_samples.count = 49;
+    let packed = scenes::packed(&scene);
+    for split in splits() {
+        for order in [Order::Rows, Order::Pixels] {
+            let mut cpu = Cpu::new(&packed);
+            let max_pixels = cpu.largest_film();
+            let bands = Bands::new(whole(&packed), 49, &split, order, max_pixels, NoCheckpoint);
+            let bands = bands.in_passes_to(PassEnds::At(next_decision), packed.film_layout());
+            let mut bands = bands.expect("memory");
+            let (mut dispatches, mut ends, mut interrupted) = (0, Vec::new(), 0);
+            let mut watch = |_: &mut dyn Backend, _: Region, _: f64| {
+                dispatches += 1;
+                Ok(Flow::from(dispatches % 3 != 0))
+            };
+            while bands.uniform_samples() != Some(49) {
+                match bands.next_pass(&mut cpu, &mut watch, &mut || {}) {
+                    Ok(_) => assert!(bands.uniform_samples().is_some(), "{split:?}, {order:?}"),
+                    Err(RenderError::Cancelled) => interrupted += 1,
+                    Err(error) => panic!("{error}"),
+                }
+                let Some(samples) = bands.uniform_samples() else {
+                    continue;
+                };
+                ends.push(samples);
+                let mut found = Film::of(whole(&packed), packed.film_layout());
+                bands.films(&mut |film| found.copy_rows(&film));
+                let expected = film_of_samples(&packed, samples);
+                assert!(
+                    bits(&found) == bits(&expected),
+                    "{split:?}, {order:?}, {samples} samples"
+                );
+            }
+            assert_eq!(ends, [16, 32, 49], "{split:?}, {order:?}");
+            assert!(interrupted > 0, "{split:?}, {order:?}");
         }
     }
 }

@@ -6,6 +6,8 @@ use crate::film::{Film, mean};
 const LUMINANCE: [f64; 3] = [0.2126, 0.7152, 0.0722];
 /// Displayed value below which errors are no longer relative, because they are hard to see.
 const MIN_VALUE: f64 = 0.01;
+/// Samples per pixel before the first decision.
+const MIN_SAMPLES: u32 = 16;
 
 /// The noise of an image. The noise of a pixel is the standard error of its mean luminance, divided by the luminance,
 /// but at least by 0.01. Both are multiplied by the exposure. Channels count as fully correlated, and samples as
@@ -21,8 +23,12 @@ pub struct Noise {
 /// Returns true if a render may end after this number of samples per pixel because its noise is low: after 16, 32, 64,
 /// ... samples, at which the Sobol' points of a pixel are spread best, so that the decision does not depend on timing.
 pub fn is_decision(samples: u32) -> bool {
-    const MIN_SAMPLES: u32 = 16;
     samples >= MIN_SAMPLES && samples.is_power_of_two()
+}
+
+/// Returns the next number of samples per pixel at which a render may end.
+pub fn next_decision(samples: u32) -> u32 {
+    (samples + 1).next_power_of_two().max(MIN_SAMPLES)
 }
 
 /// Returns the estimated number of samples per pixel at which the noise falls below a limit. The noise is inversely
@@ -96,6 +102,16 @@ fn pixel(film: &Film, pixel: usize, factor: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn decisions_follow_each_other() {
+        let decisions: Vec<u32> = (0..=65_536).filter(|&samples| is_decision(samples)).collect();
+        assert_eq!(decisions[..3], [16, 32, 64]);
+        for samples in 0..65_536 {
+            let next = decisions.iter().find(|&&decision| decision > samples);
+            assert_eq!(Some(&next_decision(samples)), next, "{samples}");
+        }
+    }
 
     #[test]
     fn quantiles_are_ranks() {

@@ -10,7 +10,7 @@ use wgray_image::Region;
 use wgray_render::backend::Backend;
 use wgray_render::denoise;
 use wgray_render::film::Film;
-use wgray_render::job::{self, Bands, CheckpointStore, FinishedBand, Flow, Order, PartHeader, WorkSplit};
+use wgray_render::job::{self, Bands, CheckpointStore, FinishedBand, Flow, Order, PartHeader, PassEnds, WorkSplit};
 use wgray_render::noise::{self, Noise, NoiseMeter};
 use wgray_render::records::FirstHit;
 
@@ -150,23 +150,22 @@ fn bands<'a>(
 ) -> Result<Bands<&'a mut dyn CheckpointStore>, RenderError> {
     let film_layout = plan.scene.film_layout();
     let split = WorkSplit::of(film_layout);
-    let order = match plan.deadline.is_some() || plan.noise.is_some() || has_previews {
+    let has_deadline = plan.deadline.is_some();
+    let order = match has_deadline || has_previews {
         true => Order::Pixels,
         false => Order::Rows,
     };
     let bands = Bands::new(plan.region(), plan.samples, &split, order, largest_film, store);
-    if has_previews {
-        bands.in_passes(film_layout)
-    } else if plan.noise.is_some() {
-        bands.in_passes_of(PASS_DURATION, film_layout)
-    } else if plan.deadline.is_some() {
-        bands.as_a_whole(film_layout)
-    } else {
-        Ok(bands)
+    match plan.noise {
+        _ if has_previews => bands.in_passes(film_layout),
+        Some(_) if has_deadline => bands.in_passes_to(PassEnds::After(PASS_DURATION), film_layout),
+        Some(_) => bands.in_passes_to(PassEnds::At(noise::next_decision), film_layout),
+        None if has_deadline => bands.as_a_whole(film_layout),
+        None => Ok(bands),
     }
 }
 
-/// Target duration of a pass with a noise limit.
+/// Target duration of a pass with a noise limit and a time limit.
 const PASS_DURATION: Duration = Duration::from_secs(1);
 
 /// Shows the progress, and ends a render after a signal or at the deadline.

@@ -72,8 +72,8 @@ impl<P: DerefMut<Target = Packed>> Cpu<P> {
     }
 }
 
-/// Maximum number of pixels in the row segment of a task.
-const MAX_RUN: usize = 32;
+/// Number of pixels in the row segment of a task, unless their samples do not fill a batch.
+const MIN_RUN: usize = 32;
 
 impl<P: Deref<Target = Packed>> Backend for Cpu<P> {
     fn begin(&mut self, region: Region) -> Result<(), RenderError> {
@@ -163,7 +163,8 @@ fn add_samples(scene: &Packed, film: &mut Film, tile: Region, samples: Range<u32
         true => (&[][..], &mut pilot_sums[..]),
         false => (&pilot_sums[..], &mut [][..]),
     };
-    let runs = |records| runs(region, records, tile).into_iter();
+    let run_length = MIN_RUN.max(MAX_PATHS / samples.len());
+    let runs = |records| runs(region, records, tile, run_length).into_iter();
     let sums = runs(sums);
     let mut segments: Vec<Run> = sums
         .map(|(first, sums)| Run {
@@ -338,14 +339,14 @@ fn deviation(mean_before: Vec4, mean_after: Vec4, value: Vec4, weight: f32) -> V
 }
 
 /// Splits the records of a tile into row segments, each paired with the position of its first pixel. `region` is the
-/// region of the film.
-fn runs(region: Region, records: &mut [Vec4], tile: Region) -> Vec<(UVec2, &mut [Vec4])> {
+/// region of the film, `length` the number of pixels of a segment.
+fn runs(region: Region, records: &mut [Vec4], tile: Region, length: usize) -> Vec<(UVec2, &mut [Vec4])> {
     let rows = records.chunks_mut(region.width() as usize).enumerate();
     let rows = rows.skip((tile.y0 - region.y0) as usize).take(tile.height() as usize);
     let columns = (tile.x0 - region.x0) as usize..(tile.x1 - region.x0) as usize;
     rows.flat_map(|(y, row)| {
-        let runs = row[columns.clone()].chunks_mut(MAX_RUN).enumerate();
-        runs.map(move |(i, run)| (UVec2::new(tile.x0 + (i * MAX_RUN) as u32, region.y0 + y as u32), run))
+        let runs = row[columns.clone()].chunks_mut(length).enumerate();
+        runs.map(move |(i, run)| (UVec2::new(tile.x0 + (i * length) as u32, region.y0 + y as u32), run))
     })
     .collect()
 }

@@ -33,6 +33,8 @@ const MIN_RELATIVE_VARIANCE: f32 = 0.1;
 const MAX_RELATIVE_VARIANCE: f32 = 2.0;
 /// Radius of the square of pixels over which these differences are averaged.
 const HALF_VARIANCE_RADIUS: usize = 4;
+/// Fewest samples whose halves show how fast the variance falls.
+const MIN_STRATIFIED_SAMPLES: u32 = 16;
 /// Largest variance that is attributed to other pixels, relative to that of a pixel with at least `RELIABLE_SAMPLES`.
 const MAX_VARIANCE_RATIO: f32 = 12.0;
 const RELIABLE_SAMPLES: u32 = 64;
@@ -222,9 +224,10 @@ fn limit_variances(film: &Film, coverages: &[Coverage], guides: &mut [[f32; PLAN
     let local = box_means(&variances, width, 1);
     let [wide, halves] = [&variances, &half_variances].map(|values| box_means(values, width, HALF_VARIANCE_RADIUS));
     for (i, guides) in guides.iter_mut().enumerate() {
-        let variance = variances[i].max(MIN_RELATIVE_VARIANCE * local[i]) * stratification(halves[i], wide[i]);
+        let samples = film.sample_count(i);
+        let variance = variances[i].max(MIN_RELATIVE_VARIANCE * local[i]) * stratification(halves[i], wide[i], samples);
         guides[COLOR_VARIANCE] = variance.min(MAX_RELATIVE_VARIANCE * halves[i]);
-        guides[VARIANCE_LIMIT] = variance_limit(guides[COLOR_VARIANCE], film.sample_count(i));
+        guides[VARIANCE_LIMIT] = variance_limit(guides[COLOR_VARIANCE], samples);
     }
 }
 
@@ -247,11 +250,17 @@ fn squared_color(guides: &[f32; PLANES]) -> f32 {
 ///
 /// If the variance of n samples is proportional to n^-b, then `halves` is that of n / 2 samples less that of n samples,
 /// 2^b - 1 times the latter, and `halves / independent` is (2^b - 1) n^(1-b). The result is exact for b = 1 (independent
-/// samples), and for b = 1.5 and 64 samples. It is 1.2 times too large for b = 1.5 and 16 samples.
-pub fn stratification(halves: f32, independent: f32) -> f32 {
+/// samples), and for b = 1.5 and 64 samples. It is 1.2 times too large for b = 1.5 and 16 samples. With few samples the
+/// ratio hardly depends on b, so that a correction beyond it would only follow the noise of the ratio.
+pub fn stratification(halves: f32, independent: f32, samples: u32) -> f32 {
     if independent > 0.0 {
         let ratio = (halves / independent).min(1.0);
-        ratio * (0.4 + 0.6 * ratio)
+        ratio
+            * if samples < MIN_STRATIFIED_SAMPLES {
+                1.0
+            } else {
+                0.4 + 0.6 * ratio
+            }
     } else {
         1.0
     }

@@ -45,8 +45,7 @@ pub struct Bands<S> {
     joint_rendering_ended: Option<bool>,
     /// Samples per pixel at the end of the current pass, if the bands are rendered in passes ([`Bands::in_passes`]).
     pass_end: Option<u32>,
-    /// Target duration of a pass.
-    pass_duration: Duration,
+    pass_ends: PassEnds,
     /// True to keep the films of the last complete pass ([`Bands::output_last_pass`]).
     keeps_last_pass: bool,
     steps: Steps,
@@ -121,6 +120,15 @@ enum Outcome {
     TimeIsUp,
 }
 
+/// Rule for the end of a pass.
+#[derive(Clone, Copy)]
+pub enum PassEnds {
+    /// After about this duration, and at every power of two.
+    After(Duration),
+    /// At the number of samples per pixel that the function returns for the number at the start.
+    At(fn(u32) -> u32),
+}
+
 /// Target duration of a pass, at the end of which the films are copied.
 const PASS_DURATION: Duration = Duration::from_secs(1);
 
@@ -153,7 +161,7 @@ impl<S: CheckpointStore> Bands<S> {
             samples,
             joint_rendering_ended: None,
             pass_end: None,
-            pass_duration: PASS_DURATION,
+            pass_ends: PassEnds::After(PASS_DURATION),
             keeps_last_pass: false,
             steps: Steps::new(split, DISPATCH_DURATION, order),
             finished_samples: 0.0,
@@ -187,15 +195,15 @@ impl<S: CheckpointStore> Bands<S> {
         Ok(bands)
     }
 
-    /// Like [`Bands::as_a_whole`], for [`Bands::next_pass`] with passes of about this duration.
+    /// Like [`Bands::as_a_whole`], for [`Bands::next_pass`] with another rule for the ends of passes.
     ///
     /// # Errors
     ///
     /// [`RenderError::Memory`] if the films do not fit.
-    pub fn in_passes_of(self, pass_duration: Duration, film_layout: FilmLayout) -> Result<Bands<S>, RenderError> {
+    pub fn in_passes_to(self, pass_ends: PassEnds, film_layout: FilmLayout) -> Result<Bands<S>, RenderError> {
         let mut bands = self.as_a_whole(film_layout)?;
         bands.pass_end = Some(0);
-        bands.pass_duration = pass_duration;
+        bands.pass_ends = pass_ends;
         Ok(bands)
     }
 
@@ -373,14 +381,17 @@ impl<S: CheckpointStore> Bands<S> {
     }
 
     /// Returns the samples per pixel at the end of a pass that starts with `samples`. A pass is long enough to amortize
-    /// the copies of films, and every power of two ends a pass.
+    /// the copies of films.
     fn end_of_pass(&self, samples: u32) -> u32 {
-        let count = match self.bands.len() {
-            1 => (self.steps.speed().unwrap_or(0.0) * self.pass_duration.as_secs_f64() / self.pixels() as f64) as u32,
-            _ => samples / 4,
+        let end = match (self.pass_ends, self.bands.len()) {
+            (PassEnds::At(end), _) => end(samples),
+            (PassEnds::After(duration), 1) => {
+                let speed = self.steps.speed().unwrap_or(0.0);
+                timed_end(samples, (speed * duration.as_secs_f64() / self.pixels() as f64) as u32)
+            }
+            (PassEnds::After(_), _) => timed_end(samples, samples / 4),
         };
-        let power = (samples + 1).next_power_of_two();
-        samples.saturating_add(count.max(1)).min(power).min(self.samples)
+        end.min(self.samples)
     }
 
     /// Returns the rendered (not loaded) fraction of the samples in finished bands: 0 to 1.
@@ -606,6 +617,12 @@ impl Band {
     fn sample_total(&self, max: u32) -> f64 {
         self.region.pixels() as f64 * f64::from(self.samples(max))
     }
+}
+
+/// Returns the end of a pass of `count` samples, or the next power of two.
+fn timed_end(samples: u32, count: u32) -> u32 {
+    let power = (samples + 1).next_power_of_two();
+    samples.saturating_add(count.max(1)).min(power)
 }
 
 /// Checks that memory is available, by an allocation that is freed at once. A later failure would abort the program.

@@ -19,7 +19,7 @@ use crate::film::{Film, FilmLayout};
 use crate::records::FirstHit;
 use wgray_image::Region;
 
-pub use bands::{Bands, FinishedBand, Flow, Watch, check_memory};
+pub use bands::{Bands, FinishedBand, Flow, PassEnds, Watch, check_memory};
 pub use identity::{Identity, hash_of_scene};
 pub use part::{PartError, PartHeader, Parts, Tile, read_part, write_part};
 pub use piece::{CheckpointStore, FilmPiece, INTERVAL, NoCheckpoint, StoredPiece};

@@ -245,8 +245,10 @@ impl Steps {
         } else {
             self.samples
         };
-        let end = end.min(self.target).max(first);
-        self.reached.pass = first..first + count.min(end - first);
+        let remainder = end.min(self.target).saturating_sub(first);
+        // Dispatches of about the same size, instead of a small one at the end.
+        let count = remainder.div_ceil(remainder.div_ceil(count).max(1));
+        self.reached.pass = first..first + count;
         let region = self.region_of_pass();
         self.reached.next = [region.x0, region.y0];
     }
