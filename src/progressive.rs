@@ -22,7 +22,7 @@ use wgray_image::Region;
 const STEP_DURATION: Duration = Duration::from_millis(250);
 
 /// Maximum number of samples per pixel.
-const MAX_SAMPLES: u32 = 65_536;
+pub(crate) const MAX_SAMPLES: u32 = 65_536;
 
 /// The result of a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -42,6 +42,7 @@ const SHADERS_WITHOUT_TWIN: &[(&str, &str)] = &[
 
 /// Files in crates/render/src/cpu that are not twins of a shader.
 const RUST_FILES_WITHOUT_SHADER: &[&str] = &[
+    "bits.rs",
     "decoded_bvhs.rs",
     "ewa.rs",
     "mod.rs",

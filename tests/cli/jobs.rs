@@ -537,6 +537,19 @@ fn full_and_read_only_file_systems_are_reported() {
         "{}",
         full.stderr
     );
+    // After a signal, the note does not claim that the latest progress is saved.
+    let interrupted = run(
+        "size=600k",
+        &format!("timeout -s INT 2 {render} --spp 65536 --checkpoint disk/c --checkpoint-interval 0 -o out.png"),
+    );
+    assert!(
+        interrupted.stderr.contains("progress could not be saved")
+            && interrupted
+                .stderr
+                .contains("note: the latest progress is not saved in disk/c; --resume "),
+        "{}",
+        interrupted.stderr
+    );
     let tiny = run("size=4k", &checkpointed);
     assert!(
         tiny.stdout.starts_with("0\n") || tiny.stdout.starts_with("8\n"),

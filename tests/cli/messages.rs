@@ -84,6 +84,10 @@ mod unix {
                 assert_eq!((result.code, result.stderr.as_str()), (code, ""), "{line}");
             }
         }
+        let statistics = "$0 render small.toml --spp 1 --device cpu -q -o a.png --stats -";
+        let line = format!("{{ {statistics}; echo $? > code; }} | true; exit $(cat code)");
+        let result = sh(&folder, &line);
+        assert_eq!((result.code, result.stderr.as_str()), (0, ""), "{line}");
         folder.write("bad.toml", "");
         let result = sh(
             &folder,

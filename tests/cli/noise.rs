@@ -136,6 +136,66 @@ fn render_resumed(folder: &TestFolder, checkpoint: &[&str]) -> u64 {
     stats(folder)["min_samples"].as_u64().expect("the samples")
 }
 
+/// A time limit ends a render within a pass: the metadata and statistics are those of the image, not of the last pass.
+#[test]
+fn a_time_limit_reports_the_samples_and_the_noise_of_the_image() {
+    let folder = folder();
+    for preview in [&[][..], &["--preview"]] {
+        let limits = ["--noise", "0.00001", "--spp", "65536", "--time-limit", "0.7"];
+        let outputs = ["--device", "cpu", "-o", "a.exr", "--stats", "stats.json"];
+        let result = folder.run(&[&OPTIONS[..], &limits, &outputs, preview].concat());
+        let stats = stats(&folder);
+        let samples = &stats["min_samples"];
+        let note = format!("note: time limit reached: every pixel has at least {samples} of 65536 samples\n");
+        assert!(result.code == 0 && result.stderr.ends_with(&note), "{}", result.stderr);
+        assert_eq!(stats["fraction_rendered"].as_f64(), Some(1.0), "{stats}");
+        let metadata = wgray::image::read_metadata(&folder.path("a.exr")).expect("metadata");
+        let noise = metadata.get("noise").expect("the noise");
+        assert!(
+            noise.starts_with(&format!("{samples} of 65536 samples, ")),
+            "{noise}, {stats}"
+        );
+        std::fs::remove_file(folder.path("a.exr")).expect("a file");
+    }
+    // The noise may be below the limit where it does not decide.
+    let limits = ["--noise", "1", "--time-limit", "0", "--stats", "stats.json"];
+    let checkpoint = ["--device", "cpu", "--checkpoint", "c", "--resume", "-o", "a.exr"];
+    let mut noise = Vec::new();
+    for _ in 0..4 {
+        let result = folder.run(&[&OPTIONS[..], &limits, &checkpoint].concat());
+        assert!(
+            result.code == 0 && result.stderr.starts_with("note: time limit reached: "),
+            "{}",
+            result.stderr
+        );
+        noise.push(stats(&folder)["noise"].as_f64());
+    }
+    assert!(noise[3].is_some_and(|noise| noise < 1.0), "{noise:?}");
+}
+
+/// The maximum number of samples does not change how much textures are filtered.
+#[test]
+fn the_maximum_does_not_change_the_filters_of_textures() {
+    let folder = TestFolder::new();
+    let scene = super::project_scene("textures.toml");
+    let render = |file: &str, samples: &[&str]| {
+        let options = [
+            "--integrator",
+            "path",
+            "--pixel-pattern",
+            "sobol",
+            "--size",
+            "20x15",
+            "-q",
+        ];
+        let outputs = ["--noise", "0.2", "--device", "cpu", "-o", file];
+        folder.run_quietly(&[&["render", &scene], &options[..], &outputs, samples].concat());
+    };
+    render("default.exr", &[]);
+    render("fewer.exr", &["--spp", "1024"]);
+    assert_eq!(folder.run(&["diff", "default.exr", "fewer.exr"]).code, 0);
+}
+
 #[test]
 fn black_images_and_single_pixels_have_a_noise() {
     let folder = folder();

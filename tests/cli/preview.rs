@@ -194,6 +194,31 @@ fn a_signal_leaves_the_last_complete_pass() {
 }
 
 #[test]
+fn a_signal_reports_the_noise_of_the_last_complete_pass() {
+    let folder = TestFolder::new();
+    let noise = ["--noise", "0.00001", "--pixel-pattern", "sobol", "--device", "cpu"];
+    let child = start(
+        &folder,
+        &[&noise[..], &["-o", "out.exr", "--stats", "stats.json"]].concat(),
+    );
+    wait_for(&folder, "out.exr");
+    send("-INT", &child);
+    let result = wait_for_end(child);
+    assert_eq!(result.code, 130, "{}", result.stderr);
+    let (samples, _) = partial(&folder.path("out.exr")).expect("a partial file");
+    let metadata = read_metadata(&folder.path("out.exr")).expect("metadata");
+    let text = metadata.get("noise").expect("the noise");
+    assert!(text.starts_with(&format!("{samples} of 65536 samples, ")), "{text}");
+    let stats: serde_json::Value = serde_json::from_slice(&folder.read("stats.json")).expect("JSON");
+    let is_known = stats["noise"].as_f64().is_some();
+    assert_eq!(is_known, samples > 1, "{stats}"); // a single sample has no variance
+    let [summary] = &result.summary[..] else {
+        panic!("{:?}", result.summary)
+    };
+    assert!(summary.contains("noise "), "{summary}");
+}
+
+#[test]
 fn a_second_signal_ends_at_once() {
     let folder = TestFolder::new();
     let child = start(&folder, &["-o", "out.exr", "--device", "cpu"]);

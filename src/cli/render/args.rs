@@ -268,7 +268,7 @@ impl Args {
     pub fn overrides(&self) -> Overrides {
         self.options.add_to(Overrides {
             size: self.size,
-            pixel_samples: self.pixel_samples,
+            pixel_samples: self.scene_samples(),
             light_samples: self.light_samples,
             seed: self.seed,
             denoise: self.denoise,
@@ -283,6 +283,14 @@ impl Args {
             define: self.defines(),
             ..Overrides::default()
         })
+    }
+
+    /// Returns the samples per pixel that override the scene. With a noise limit, `--spp` is the maximum, and the scene's
+    /// number still determines the filter width of textures; but patterns that cannot be combined with the limit require
+    /// square numbers.
+    fn scene_samples(&self) -> Option<u32> {
+        let overrides_scene = self.noise.is_none() || self.pixel_pattern.is_some_and(Pattern::needs_square);
+        self.pixel_samples.filter(|_| overrides_scene)
     }
 
     /// Returns the values of `--define`. If they set keys of `render.adaptive`, the error of `--adaptive` is added, because

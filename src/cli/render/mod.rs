@@ -8,6 +8,7 @@ mod work;
 
 use crate::scene::Note;
 use std::collections::BTreeMap;
+use std::io;
 use std::process::ExitCode;
 use std::time::Instant;
 
@@ -218,10 +219,15 @@ fn render_image(
     let totals = totals.map_err(|error| interrupted(error.into(), stop));
     if totals.as_ref().is_err_and(|error| error.is::<Interrupted>()) {
         let note = match &checkpoint {
-            Some(checkpoint) => format!(
-                "progress is saved in {}; --resume continues",
-                checkpoint.name().display()
-            ),
+            Some(checkpoint) => {
+                let name = checkpoint.name().display();
+                match checkpoint.is_current() {
+                    true => format!("progress is saved in {name}; --resume continues"),
+                    false => {
+                        format!("the latest progress is not saved in {name}; --resume continues what was saved before")
+                    }
+                }
+            }
             None if plan.preview => "the samples taken so far were not written".to_owned(),
             None => "no image was written; --preview saves the image so far, --checkpoint FILE saves the progress"
                 .to_owned(),
@@ -236,14 +242,14 @@ fn render_image(
         true => (image_names, files, "render done"),
         false => (totals.partial.clone(), totals.partial.clone(), "render interrupted"),
     };
-    let is_converged = stats.noise.zip(plan.noise).is_some_and(|(noise, limit)| noise < limit);
+    let is_below = stats.noise.zip(plan.noise).is_some_and(|(noise, limit)| noise < limit);
     if stats.partial {
         let note = format!("interrupted: the image has {requested} of {all} samples per pixel");
         plan.log.log(Level::Note, &note);
-    } else if requested < all && !is_converged {
+    } else if requested < all && !totals.is_converged {
         let note = format!("time limit reached: every pixel has at least {requested} of {all} samples");
         plan.log.log(Level::Note, &note);
-    } else if let (Some(noise), Some(limit), false) = (stats.noise, plan.noise, is_converged) {
+    } else if let (Some(noise), Some(limit), false) = (stats.noise, plan.noise, is_below) {
         let note = format!(
             "the noise, {}, is not below {limit} after the maximum of {all} samples per pixel",
             significant(noise)
@@ -258,7 +264,10 @@ fn render_image(
         false => plan.log.log(Level::Info, &summary(&image_names, &stats, requested)),
     }
     if let Some(file) = outputs.stats {
-        stats.write(file).map_err(RenderError::Output)?;
+        match stats.write(file) {
+            Err(error) if error.kind() == io::ErrorKind::BrokenPipe => {} // the reader of the statistics has ended
+            result => result.map_err(RenderError::Output)?,
+        }
     }
     match stop.signal().filter(|_| !totals.partial.is_empty()) {
         Some(signal) => Err(Interrupted(signal).into()),

@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 use crate::error::RenderError;
 use crate::image::{Aov, Layout};
 use crate::options::Options;
+use crate::progressive::MAX_SAMPLES;
 use crate::renderer::{FaultHandler, Recovery, Renderer};
 use crate::scene::{Scene, ViewSettings};
 use crate::session::Session;
@@ -81,6 +82,10 @@ impl<'a> Plan<'a> {
                 "--noise: cannot be combined with adaptive sampling, whose pixels have different numbers of samples";
             return Err(Usage(rule.to_owned()).into());
         }
+        let max_samples = args.pixel_samples.unwrap_or(MAX_NOISE_SAMPLES);
+        if !(1..=MAX_SAMPLES).contains(&max_samples) {
+            return Err(Usage(format!("--spp: {max_samples} must be from 1 to {MAX_SAMPLES}")).into());
+        }
         let mut options = args.rendering();
         options.aovs = options.layers(scene);
         let image_region = options.region(scene).map_err(|problem| option_error(&problem))?;
@@ -97,7 +102,7 @@ impl<'a> Plan<'a> {
             tile,
             options,
             samples: match args.noise {
-                Some(_) => args.pixel_samples.unwrap_or(MAX_NOISE_SAMPLES),
+                Some(_) => max_samples,
                 None => packed.sampling.pixel_samples,
             },
             noise: args.noise,

@@ -35,8 +35,10 @@ pub struct RenderTotals {
     pub min_samples: u32,
     /// Requested samples per pixel: fewer than in the scene if the time limit was reached or the image is partial.
     pub requested_samples: u32,
-    /// The noise of the complete image, if it has a limit.
+    /// The noise of the image, if it has a limit.
     pub noise: Option<Noise>,
+    /// True if the noise ended the render.
+    pub is_converged: bool,
     /// After a signal, the files that contain the last complete pass.
     pub partial: Vec<String>,
 }
@@ -236,6 +238,7 @@ fn render_passes(
             watcher.set_noise(samples, noise.percentile_95, limit);
             if noise.percentile_95 < limit {
                 totals.noise = Some(noise);
+                totals.is_converged = true;
                 bands.end_passes();
                 return Ok(());
             }
@@ -351,14 +354,25 @@ fn save_pass(
     layout: &Layout,
 ) -> Result<Option<RenderTotals>, RenderError> {
     let (samples, all) = (bands.completed_samples(), plan.samples);
-    let metadata = (plan.metadata).partial(renderer.info(), plan.picture_options.reproducible, (samples, all));
-    let options = plan.picture_options.save_options(metadata);
     let mut totals = RenderTotals {
         fraction_rendered: 1.0,
         ..RenderTotals::new(all)
     };
     let targets = previews.start(samples, plan.log).map_err(RenderError::Output);
     let saved = targets.and_then(|targets| {
+        let mut metadata = plan.metadata.clone();
+        if plan.noise.is_some() && !targets.is_empty() {
+            let mut meter = NoiseMeter::new(plan.view.exposure);
+            bands.output_last_pass(&mut |band| {
+                meter.add(&band.film);
+                Ok(())
+            })?;
+            let noise = meter.noise();
+            metadata.add_noise(&noise, (samples, all));
+            totals.noise = Some(noise);
+        }
+        let metadata = metadata.partial(renderer.info(), plan.picture_options.reproducible, (samples, all));
+        let options = plan.picture_options.save_options(metadata);
         let files = targets.iter().flat_map(|target| &target.files);
         totals.partial = files.map(|file| file.name().to_owned()).collect();
         if !targets.is_empty() {

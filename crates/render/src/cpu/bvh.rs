@@ -5,6 +5,7 @@ use std::rc::Rc;
 use bytemuck::cast_slice;
 use glam::{UVec2, Vec2, Vec3, Vec4Swizzles as _};
 
+use super::bits::bits_of;
 use super::geometry::triangle_casts;
 use super::lanes::{Vector3, constant};
 use super::light::{LightSegments, segments_to_light};
@@ -206,14 +207,6 @@ struct Rays<'a> {
     samples: Rc<Samples>,
 }
 
-fn bits_of(mut bits: u32) -> impl Iterator<Item = u32> {
-    std::iter::from_fn(move || {
-        let i = bits.trailing_zeros();
-        bits &= bits.checked_sub(1)?;
-        Some(i)
-    })
-}
-
 /// Returns the mask of the block's samples that an item occludes or that are set in `already_occluded`.
 pub fn occluded_by_bvh(
     scene: &Packed,
@@ -325,7 +318,7 @@ fn occluded_by_groups(
             let [v0, v1, v2] = corners(mesh, slot);
             let mut occluded = 0;
             for sample in bits_of(box_hits) {
-                let d = segments.directions.get(sample as usize);
+                let d = segments.directions.get(sample);
                 let s = slabs(segments.o, d, segments.pad);
                 let found = triangle_crossing(v0, v1, v2, segments.o, shear_of(d), s);
                 if found.is_hit & (found.t > 0.0) & (found.t < segments.t_max) {

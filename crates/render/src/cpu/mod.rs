@@ -6,6 +6,7 @@
 
 pub mod adaptive;
 pub mod alpha;
+pub mod bits;
 pub mod bvh;
 pub mod bvh_node;
 pub mod camera;

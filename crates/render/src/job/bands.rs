@@ -49,8 +49,10 @@ pub struct Bands<S> {
     /// True to keep the films of the last complete pass ([`Bands::output_last_pass`]).
     keeps_last_pass: bool,
     steps: Steps,
-    /// Samples over all pixels of the finished bands.
+    /// Samples over all pixels of the finished bands, as if none had ended early.
     finished_samples: f64,
+    /// Samples over all pixels that were requested of the finished bands until they ended.
+    requested_rays: f64,
     /// Samples over all pixels of the region.
     total_samples: f64,
     /// End and duration of the last checkpoint.
@@ -73,28 +75,20 @@ pub struct FinishedBand {
 
 impl FinishedBand {
     fn of(piece: FilmPiece) -> FinishedBand {
-        let FilmPiece { region, reached, film } = piece;
-        let film = film.part(region);
-        let SampleProgress { pass, next: [x, y] } = reached;
-        let (rows, columns) = (
-            u64::from(y.saturating_sub(region.y0)),
-            u64::from(x.saturating_sub(region.x0)),
-        );
-        let ahead = (rows * u64::from(region.width()) + columns).min(region.pixels());
+        let requested_rays = piece.requested_rays();
+        let requested_samples = piece.reached.pass.start;
+        let film = piece.film.part(piece.region);
         let (camera_rays, min_samples) = match film.film_layout().adaptive {
             true => (
                 film.sample_counts().map(u64::from).sum(),
                 film.sample_counts().min().unwrap_or(0),
             ),
-            false => (
-                region.pixels() * u64::from(pass.start) + ahead * pass.len() as u64,
-                pass.start,
-            ),
+            false => (requested_rays, requested_samples),
         };
         FinishedBand {
             film,
             min_samples,
-            requested_samples: pass.start,
+            requested_samples,
             camera_rays,
         }
     }
@@ -165,6 +159,7 @@ impl<S: CheckpointStore> Bands<S> {
             keeps_last_pass: false,
             steps: Steps::new(split, DISPATCH_DURATION, order),
             finished_samples: 0.0,
+            requested_rays: 0.0,
             total_samples: region.pixels() as f64 * f64::from(samples),
             last_checkpoint: (Instant::now(), Duration::ZERO),
             rendered_samples: 0.0,
@@ -311,11 +306,13 @@ impl<S: CheckpointStore> Bands<S> {
             return Ok(None);
         };
         self.finished_samples += band.region.pixels() as f64 * f64::from(self.samples);
-        match band.state {
-            State::InMemory(piece) => Ok(Some(FinishedBand::of(piece))),
-            State::Stored(stored) => Ok(Some(FinishedBand::of(self.store.load(stored.number)?))),
-            State::New => Err(RenderError::NoFilm), // not possible: `render_band` has created a piece
-        }
+        let piece = match band.state {
+            State::InMemory(piece) => piece,
+            State::Stored(stored) => self.store.load(stored.number)?,
+            State::New => return Err(RenderError::NoFilm), // not possible: `render_band` has created a piece
+        };
+        self.requested_rays += piece.requested_rays() as f64;
+        Ok(Some(FinishedBand::of(piece)))
     }
 
     /// Renders another pass over all bands, adding one or more samples per pixel. Returns the number of samples of
@@ -342,12 +339,11 @@ impl<S: CheckpointStore> Bands<S> {
         self.pass_end = Some(end);
         if self.render_all(end, backend, watch, on_progress)? == Outcome::TimeIsUp {
             self.joint_rendering_ended = Some(true);
-            return Ok(None);
         }
         for band in &mut self.bands {
             band.last_pass = None;
         }
-        Ok(Some(self.completed_samples()))
+        Ok((self.joint_rendering_ended == Some(false)).then(|| self.completed_samples()))
     }
 
     /// Returns the samples per pixel that were requested up to the end of the last complete pass. With adaptive sampling,
@@ -394,10 +390,10 @@ impl<S: CheckpointStore> Bands<S> {
         end.min(self.samples)
     }
 
-    /// Returns the rendered (not loaded) fraction of the samples in finished bands: 0 to 1.
+    /// Returns the fraction of the samples of finished bands that were rendered, not loaded: 0 to 1.
     pub fn fraction_rendered(&self) -> f64 {
-        if self.finished_samples > 0.0 {
-            (self.rendered_samples / self.finished_samples).min(1.0)
+        if self.requested_rays > 0.0 {
+            (self.rendered_samples / self.requested_rays).min(1.0)
         } else {
             0.0
         }

@@ -1,7 +1,7 @@
 //! Checkpoints: a file that receives finished pieces of an image and, at intervals, the unfinished piece, so that an
 //! interrupted job can be resumed. One process writes the file at a time; others wait.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, File, TryLockError};
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
@@ -84,7 +84,9 @@ pub struct Checkpoint<'a> {
     report: Box<dyn FnMut(&str) + 'a>,
     /// Minimum length of the file at which rewriting is tried again after a failure.
     retry_length: u64,
-    /// True for each problem that was already reported: a failed write (0), a lost file (1).
+    /// First rows of pieces whose latest state could not be written.
+    unsaved: BTreeSet<u32>,
+    /// True for each problem that was already reported: [`WRITE_FAILED`], [`LOST`].
     reported: [bool; 2],
 }
 
@@ -94,6 +96,10 @@ const MAX_REPLACED_BYTES: u64 = 64 << 20;
 const RETRY_INTERVAL: Duration = Duration::from_millis(50);
 /// Number of failed attempts after which the wait is reported.
 const QUIET_RETRIES: u32 = 20;
+
+/// Indices of problems.
+const WRITE_FAILED: usize = 0;
+const LOST: usize = 1;
 
 impl<'a> Checkpoint<'a> {
     /// Creates a job's checkpoint, or resumes it once no other process writes it.
@@ -154,6 +160,7 @@ impl<'a> Checkpoint<'a> {
                                 interval,
                                 report,
                                 retry_length: 0,
+                                unsaved: BTreeSet::new(),
                                 reported: [false; 2],
                             });
                         }
@@ -194,6 +201,11 @@ impl<'a> Checkpoint<'a> {
             }
             return Checkpoint::continue_from(name, path, file, header, film_layout, interval, report);
         }
+    }
+
+    /// Returns true if the latest state of every piece is in the file.
+    pub fn is_current(&self) -> bool {
+        self.unsaved.is_empty() && !self.reported[LOST]
     }
 
     /// Returns the path of the checkpoint as in messages.
@@ -255,6 +267,7 @@ impl<'a> Checkpoint<'a> {
             interval,
             report,
             retry_length: 0,
+            unsaved: BTreeSet::new(),
             reported: [false; 2],
         })
     }
@@ -331,7 +344,7 @@ impl<'a> Checkpoint<'a> {
             return Ok(());
         }
         self.report_once(
-            1,
+            LOST,
             "was changed or replaced by another program; this render can no longer be resumed from it",
         );
         Ok(())
@@ -348,7 +361,10 @@ impl<'a> Checkpoint<'a> {
         if let Err(error) = result {
             // Readers drop an incomplete piece, but the piece takes space.
             let _ = self.file.set_len(self.end);
-            self.report_once(0, &format!("progress could not be saved: {error}; rendering continues"));
+            self.report_once(
+                WRITE_FAILED,
+                &format!("progress could not be saved: {error}; rendering continues"),
+            );
         }
     }
 }
@@ -379,6 +395,10 @@ impl CheckpointStore for Checkpoint<'_> {
 
     fn keep(&mut self, piece: &FilmPiece) {
         let result = self.append(piece);
+        match result {
+            Ok(()) => self.unsaved.remove(&piece.region.y0),
+            Err(_) => self.unsaved.insert(piece.region.y0),
+        };
         self.report_failure(result);
     }
 

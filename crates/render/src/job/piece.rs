@@ -18,6 +18,20 @@ pub struct FilmPiece {
     pub film: Film,
 }
 
+impl FilmPiece {
+    /// Returns the number of samples over all pixels so far; with adaptive sampling, as if no pixel skipped samples.
+    pub fn requested_rays(&self) -> u64 {
+        let region = self.region;
+        let SampleProgress { pass, next: [x, y] } = &self.reached;
+        let (rows, columns) = (
+            u64::from(y.saturating_sub(region.y0)),
+            u64::from(x.saturating_sub(region.x0)),
+        );
+        let ahead = (rows * u64::from(region.width()) + columns).min(region.pixels());
+        region.pixels() * u64::from(pass.start) + ahead * pass.len() as u64
+    }
+}
+
 /// Description of a piece in a store.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct StoredPiece {

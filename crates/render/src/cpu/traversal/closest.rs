@@ -4,6 +4,7 @@ use arrayvec::ArrayVec;
 use fearless_simd::f32x8;
 use fearless_simd::prelude::*;
 
+use super::super::bits::bits_of;
 use super::box_ray::BoxRay;
 use super::line::maximum;
 use super::node::{TriangleBvh, Triangles, WideNode};
@@ -82,10 +83,8 @@ fn for_each_hit<S: Simd>(
     mut visit: impl FnMut(f32, u32, u32),
 ) {
     let Some(triangles) = triangles else { return };
-    let (mut hits, t) = triangles.intersect(simd, line);
-    while hits != 0 {
-        let i = hits.trailing_zeros() as usize;
-        hits &= hits - 1;
+    let (hits, t) = triangles.intersect(simd, line);
+    for i in bits_of(hits) {
         visit(t[i], triangles.index(i), triangles.slot(i));
     }
 }
@@ -120,17 +119,11 @@ pub fn leaves<S: Simd, N: WideNode>(
         }
         let hits = (near.simd_le(far) & far.simd_ge(f32x8::splat(simd, 0.0))).to_bitmask() as u32;
         let inner = node.inner();
-        let mut leaves = hits & !inner;
-        while leaves != 0 {
-            let slot = leaves.trailing_zeros() as usize;
-            leaves &= leaves - 1;
+        for slot in bits_of(hits & !inner) {
             limit = visit(node.leaf(slot), limit);
         }
         let first = stack.len();
-        let mut inner_hits = hits & inner;
-        while inner_hits != 0 {
-            let slot = inner_hits.trailing_zeros() as usize;
-            inner_hits &= inner_hits - 1;
+        for slot in bits_of(hits & inner) {
             let child = (near[slot], node.node(slot));
             let mut i = stack.len();
             stack.push(child);

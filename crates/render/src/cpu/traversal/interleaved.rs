@@ -2,6 +2,7 @@
 
 use fearless_simd::prelude::*;
 
+use super::super::bits::bits_of;
 use super::box_ray::BoxRay;
 use super::line::maximum;
 use super::node::Triangles as _;
@@ -119,10 +120,8 @@ impl<'a> Lane<'a, '_> {
         }
         let MeshRay { line, start, skip, .. } = &self.ray;
         let leaf = &self.mesh.leaves[(self.next & !LEAF) as usize];
-        let (mut hits, t) = leaf.intersect(simd, line);
-        while hits != 0 {
-            let i = hits.trailing_zeros() as usize;
-            hits &= hits - 1;
+        let (hits, t) = leaf.intersect(simd, line);
+        for i in bits_of(hits) {
             let (t, triangle, slot) = (t[i], leaf.triangles[i], leaf.first + i as u32);
             if ANY {
                 if t > 0.0 && t < self.best.t && triangle != *skip {

@@ -4,6 +4,7 @@ use arrayvec::ArrayVec;
 use fearless_simd::f32x8;
 use fearless_simd::prelude::*;
 
+use super::super::bits::bits_of;
 use super::closest::STACK;
 use super::line::{MIN_COMPONENT, axes_from, in_order, maximum, minimum};
 use super::node::{TriangleBvh, Triangles as _, WideNode};
@@ -113,18 +114,6 @@ pub fn items<S: Simd>(
                 }
             }
             occluded
-        },
-    )
-}
-
-#[inline(always)]
-fn bits_of(mut bits: u32) -> impl Iterator<Item = usize> {
-    std::iter::from_fn(
-        #[inline(always)]
-        move || {
-            let i = bits.trailing_zeros();
-            bits &= bits.checked_sub(1)?;
-            Some(i as usize)
         },
     )
 }

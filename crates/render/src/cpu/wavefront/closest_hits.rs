@@ -15,7 +15,7 @@ use super::super::slab::{box_interval, interval_hits, slabs};
 use super::super::traversal::{Line, Nearest, Next, RAYS, RaySource, trace};
 use super::items::ItemStep;
 use super::linear::RayRows;
-use super::rows::{F, LANES, Row, lane_mask, splat3};
+use super::rows::{F, LANES, Row, lane_mask, lanes_of, splat3};
 use super::scratch::{QueuedRay, RayLane, Scratch};
 use crate::bvh::DecodedNode;
 use crate::records::{INSTANCE, NO_INDEX, Packed};
@@ -57,11 +57,9 @@ fn closest_hits_in_lanes<S: Simd>(
             for item in &scene.bvh.items {
                 let interval = box_interval(splat3(simd, item.low), splat3(simd, item.high), slabs);
                 let is_hit = interval_hits(interval, F::simd_from(simd, found.t));
-                let mut lanes = is_hit.to_bitmask() & lane_mask(active.len());
+                let lanes = is_hit.to_bitmask() & lane_mask(active.len());
                 let near: Row = interval.x.into();
-                while lanes != 0 {
-                    let lane = lanes.trailing_zeros() as usize;
-                    lanes &= lanes - 1;
+                for lane in lanes_of(lanes) {
                     if item.kind & 0xff == INSTANCE {
                         scratch.queue.push(QueuedRay {
                             position: (first + lane) as u32,

@@ -17,7 +17,10 @@ use super::shade::IS_OPTIMIZED;
 use crate::records::{ENVIRONMENT, Light, NO_INDEX, Packed, RECTANGLE};
 
 /// One light sample per path.
-pub struct LightRows {
+pub struct LightRows<'a> {
+    scene: &'a Packed,
+    /// The only light, if it can be sampled in lanes: all of its samples have the same `t_max` and `primitive`.
+    only_light: Option<&'a Light>,
     pub to_light: Rows3,
     radiance: Rows3,
     pdf: Row,
@@ -26,10 +29,12 @@ pub struct LightRows {
     pub primitive: [u32; LANES],
 }
 
-impl LightRows {
-    /// Creates the rows. `light` is the only light, if any: all of its samples have the same `t_max` and `primitive`.
-    pub fn new(light: Option<&Light>) -> LightRows {
+impl<'a> LightRows<'a> {
+    pub fn new(scene: &'a Packed) -> LightRows<'a> {
+        let light = only_light(scene);
         LightRows {
+            scene,
+            only_light: light,
             to_light: Default::default(),
             radiance: Default::default(),
             pdf: Default::default(),
@@ -69,20 +74,20 @@ pub struct LightSamples<S: Simd> {
     pub is_delta: mask32x8<S>,
 }
 
-impl LightRows {
+impl LightRows<'_> {
     /// Samples a light for each of the first `count` surface points.
     #[inline(always)]
     pub fn sample<S: Simd>(
         &mut self,
         simd: S,
-        scene: &Packed,
         choices: LightChoices<S>,
         points: V<S>,
         normals: V<S>,
         count: usize,
     ) -> LightSamples<S> {
+        let scene = self.scene;
         let zero: F<S> = SimdBase::splat(simd, 0.0);
-        if let Some(light) = only_light(scene) {
+        if let Some(light) = self.only_light {
             let (to_light, radiance, pdf) = rectangle_samples(simd, light, points, choices.u);
             self.to_light = store3(to_light);
             return LightSamples {
@@ -158,7 +163,7 @@ impl LightRows {
 }
 
 /// Returns the only light of the scene, if it can be sampled in lanes.
-pub fn only_light(scene: &Packed) -> Option<&Light> {
+fn only_light(scene: &Packed) -> Option<&Light> {
     let s = &scene.specialization;
     let [emitter] = scene.lighting.emitters[..] else {
         return None;

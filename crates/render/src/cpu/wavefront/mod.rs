@@ -5,6 +5,7 @@
 
 mod batch;
 mod begin;
+mod bounce;
 mod closest_hits;
 mod culling;
 mod environment;

@@ -13,7 +13,7 @@ use super::super::traversal::{Line, Nearest, Next, RAYS, RaySource, trace};
 use super::QueuedShadowRay;
 use super::items::ItemStep;
 use super::linear::ShadowRayRows;
-use super::rows::{LANES, lane_mask, splat3};
+use super::rows::{LANES, lane_mask, lanes_of, splat3};
 use super::scratch::{QueuedRay, RayLane, Scratch};
 use crate::bvh::DecodedNode;
 use crate::records::{CASTS_SHADOW, INSTANCE, NO_INDEX, Packed};
@@ -117,10 +117,8 @@ fn queue_rays<S: Simd>(
             continue;
         }
         let interval = box_interval(splat3(simd, item.low), splat3(simd, item.high), slabs);
-        let mut lanes = interval_hits(interval, t_max).to_bitmask() & unoccluded;
-        while lanes != 0 {
-            let lane = lanes.trailing_zeros() as usize;
-            lanes &= lanes - 1;
+        let lanes = interval_hits(interval, t_max).to_bitmask() & unoccluded;
+        for lane in lanes_of(lanes) {
             let ray = &rays[lane].ray;
             if item.kind & 0xff == INSTANCE {
                 push(lane, item.index);

@@ -4,6 +4,7 @@ use fearless_simd::f32x8;
 use fearless_simd::prelude::*;
 use glam::Vec3;
 
+use super::super::bits::bits_of;
 use super::super::lanes::Lanes3;
 
 /// Number of paths or rays processed at a time.
@@ -60,7 +61,7 @@ pub fn splat3<S: Simd>(simd: S, v: Vec3) -> V<S> {
 /// Returns the numbers of the lanes of a mask.
 #[inline(always)]
 pub fn lanes_of(mask: u64) -> impl Iterator<Item = usize> {
-    (0..LANES).filter(move |lane| mask >> lane & 1 != 0)
+    bits_of(mask as u32)
 }
 
 /// Returns the mask of the first `count` lanes.

@@ -60,6 +60,15 @@ impl MaterialKind {
         MaterialKind::Smooth(SmoothKind::Thin),
     ];
 
+    /// Returns the kind of a material without roughness; [`None`] for other materials.
+    #[inline(always)]
+    pub fn smooth(self) -> Option<SmoothKind> {
+        match self {
+            MaterialKind::Smooth(kind) if IS_OPTIMIZED => Some(kind),
+            _ => None,
+        }
+    }
+
     /// Returns the position in [`MaterialKind::ALL`].
     fn index(self) -> usize {
         match self {
