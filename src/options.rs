@@ -20,8 +20,8 @@ pub struct Options {
     /// The layers to render in addition to the radiance. Duplicates are ignored.
     pub aovs: Vec<Aov>,
     /// Keep noise estimates in the film, for the noise of the image and for
-    /// [`run_until_noise`](crate::ProgressiveRender::run_until_noise). Renders take up to 3 % longer on the CPU, and up to
-    /// 14 % on software Vulkan.
+    /// [`run_until_noise`](crate::ProgressiveRender::run_until_noise). Renders take 2 to 3 % longer on the CPU, and up
+    /// to 10 % on software Vulkan.
     pub noise: bool,
     /// Round quotients and square roots correctly in software, because results of GPUs may be wrong by one unit in the
     /// last place. Requires Vulkan; has no effect on the CPU.

@@ -243,15 +243,10 @@ struct Run<'a> {
     half_sums: &'a mut [Vec4],
     /// Moments of albedo and normal.
     layer_moments: [&'a mut [Vec4]; 2],
-    /// Means of the pixel with the last sample.
-    means: Option<(usize, Means)>,
-}
-
-/// Means over the samples of a pixel so far: of radiance, albedo and normal.
-#[derive(Clone, Copy, Default)]
-struct Means {
-    color: Vec4,
-    layers: [Vec4; 2],
+    /// The pixel of the last sample, and its means so far: of radiance, and of albedo and normal.
+    measured_pixel: Option<usize>,
+    color_mean: Vec4,
+    layer_means: [Vec4; 2],
 }
 
 /// Layers with moments.
@@ -278,34 +273,31 @@ impl Run<'_> {
 
     /// Adds a sample to the moments, before it is added to the sums. Gives the bits of `moments_with` and
     /// `layer_moments_with`, but computes each mean once: the mean after a sample is the mean before the next one.
+    #[inline(always)]
     fn add_to_moments(&mut self, x: usize, value: Vec4, layers: &Layers) {
-        let has_layer_moments = !self.layer_moments[0].is_empty();
+        let is_first = self.measured_pixel != Some(x);
+        self.measured_pixel = Some(x);
         let (sum, weight) = (self.sums[x], value.w);
-        let layer_sums = MEASURED.map(|layer| match has_layer_moments {
-            true => self.layers[layer as usize][x],
-            false => Vec4::ZERO,
-        });
-        let means_of = |sum: Vec4, layer_sums: [Vec4; 2]| Means {
-            color: layer_mean(sum, sum.w),
-            layers: match has_layer_moments {
-                true => layer_sums.map(|layer_sum| layer_mean(layer_sum, sum.w)),
-                false => [Vec4::ZERO; 2],
-            },
+        let weight_after = sum.w + weight;
+        let before = if is_first {
+            layer_mean(sum, sum.w)
+        } else {
+            self.color_mean
         };
-        let before = match self.means {
-            Some((pixel, means)) if pixel == x => means,
-            _ => means_of(sum, layer_sums),
-        };
-        let values = [layers.albedo, layers.normal];
-        let after = means_of(sum + value, [layer_sums[0] + values[0], layer_sums[1] + values[1]]);
-        self.moments[x] += deviation(before.color, after.color, value, weight).with_w(1.0);
-        if has_layer_moments {
-            let means = before.layers.into_iter().zip(after.layers);
-            for ((moments, (before, after)), value) in self.layer_moments.iter_mut().zip(means).zip(values) {
-                moments[x] += deviation(before, after, value, weight);
-            }
+        self.color_mean = layer_mean(sum + value, weight_after);
+        self.moments[x] += deviation(before, self.color_mean, value, weight).with_w(1.0);
+        for (i, moments) in self.layer_moments.iter_mut().enumerate() {
+            let Some(moments) = moments.get_mut(x) else { return };
+            let layer_sum = self.layers[MEASURED[i] as usize][x];
+            let value = [layers.albedo, layers.normal][i];
+            let before = if is_first {
+                layer_mean(layer_sum, sum.w)
+            } else {
+                self.layer_means[i]
+            };
+            self.layer_means[i] = layer_mean(layer_sum + value, weight_after);
+            *moments += deviation(before, self.layer_means[i], value, weight);
         }
-        self.means = Some((x, after));
     }
 
     fn finish_pilot(&mut self) {
