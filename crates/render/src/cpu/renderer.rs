@@ -72,7 +72,7 @@ impl<P: DerefMut<Target = Packed>> Cpu<P> {
     }
 }
 
-/// Number of pixels in the row segment of a task, unless their samples do not fill a batch.
+/// Minimum number of pixels in the row segment of a task; more if their samples do not fill a batch.
 const MIN_RUN: usize = 32;
 
 impl<P: Deref<Target = Packed>> Backend for Cpu<P> {

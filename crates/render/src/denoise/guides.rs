@@ -255,12 +255,10 @@ fn squared_color(guides: &[f32; PLANES]) -> f32 {
 pub fn stratification(halves: f32, independent: f32, samples: u32) -> f32 {
     if independent > 0.0 {
         let ratio = (halves / independent).min(1.0);
-        ratio
-            * if samples < MIN_STRATIFIED_SAMPLES {
-                1.0
-            } else {
-                0.4 + 0.6 * ratio
-            }
+        match samples < MIN_STRATIFIED_SAMPLES {
+            true => ratio,
+            false => ratio * (0.4 + 0.6 * ratio),
+        }
     } else {
         1.0
     }
