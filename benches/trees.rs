@@ -8,7 +8,8 @@ use glam::Vec3;
 use rayon::prelude::*;
 use wgray_render::bvh::{Aabb, DecodedMesh, MAX_LEAF_SIZE, Tree, build};
 use wgray_render::cpu::traversal::{
-    Directions, Level, Line, Mesh, MeshRay, Nearest, Next, NodeStack, RaySource, Segments, closest, occluded, trace,
+    Directions, Level, Line, Mesh, MeshRay, Nearest, Next, NodeStack, RAYS, RaySource, Segments, Traced, closest,
+    occluded, trace,
 };
 
 /// An indexed triangle mesh.
@@ -174,12 +175,8 @@ impl View {
         let (z, angle) = (1.0 - 2.0 * random(1), std::f32::consts::TAU * random(2));
         let r = (1.0 - z * z).sqrt();
         let on_sphere = Vec3::new(r * angle.cos(), r * angle.sin(), z);
-        Some(MeshRay {
-            line: Line::new(EYE + ray_direction * hit.t + normal * 1e-4, normal + on_sphere, PAD),
-            start: 0.0,
-            skip: hit.triangle,
-            best: MISS,
-        })
+        let origin = EYE + ray_direction * hit.t + normal * 1e-4;
+        Some(MeshRay::new(origin, normal + on_sphere, PAD, 0.0, hit.triangle, MISS))
     }
 
     /// Returns the mask of occluded samples; `None` if the light is behind the surface or the ray misses.
@@ -221,8 +218,8 @@ struct Rays<'a> {
 
 impl<'a, S> RaySource<'a, S> for Rays<'a> {
     #[inline(always)]
-    fn next(&mut self, _simd: S, _lane: usize, traced: Option<(&Line, Nearest)>) -> Next<'a> {
-        self.hits += usize::from(traced.is_some_and(|(_, found)| found != MISS));
+    fn next(&mut self, _simd: S, _lane: usize, traced: Option<Traced>) -> Next<'a> {
+        self.hits += usize::from(traced.is_some_and(|traced| traced.best != MISS));
         match self.rays.next() {
             Some(ray) => Next::Trace(self.mesh, *ray),
             None => Next::Done,
@@ -245,7 +242,7 @@ fn bounced_rays(criterion: &mut Criterion) {
             .map(|ray| closest(level, &view.mesh(), &ray.line, 0.0, ray.skip, MISS));
         found.filter(|found| *found != MISS).count()
     };
-    let mut stacks: [NodeStack; 8] = Default::default();
+    let mut stacks: [NodeStack; RAYS] = Default::default();
     let mut interleaved = || {
         let mut source = Rays {
             mesh: &view.decoded,

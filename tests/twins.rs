@@ -46,6 +46,7 @@ const RUST_FILES_WITHOUT_SHADER: &[&str] = &[
     "decoded_bvhs.rs",
     "ewa.rs",
     "mod.rs",
+    "prefetch.rs",
     "renderer.rs",
     "integrators",
     "lanes",

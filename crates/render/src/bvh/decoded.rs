@@ -4,6 +4,7 @@
 use std::ops::Range;
 use std::sync::OnceLock;
 
+use super::huge_pages::vec_in_huge_pages;
 use super::{Aabb, Node};
 
 /// Bit of [`DecodedNode::children`] that is set for leaves.
@@ -48,13 +49,18 @@ impl DecodedMesh {
     /// Decodes a BVH over triangles. `vertices` are positions, each followed by an unused word; `triangles` are three
     /// vertex indices and the triangle's index, in leaf order.
     pub fn new(nodes: &[Node], vertices: &[[f32; 4]], triangles: &[[u32; 4]]) -> DecodedMesh {
-        let mut leaves = Vec::new();
+        let leaf_count = |node: &Node| node.leaves.iter().filter(|leaf| **leaf != 0).count();
+        let mut leaves = vec_in_huge_pages(nodes.iter().map(leaf_count).sum());
         let mut leaf = |items: Range<usize>, bounds: Aabb| {
             leaves.push(DecodedLeaf::new(vertices, triangles, items.start, items.len()));
             ((leaves.len() - 1) as u32, bounds)
         };
-        let nodes = nodes.iter().map(|node| DecodedNode::new(node, &mut leaf)).collect();
-        DecodedMesh { nodes, leaves }
+        let mut decoded_nodes = vec_in_huge_pages(nodes.len());
+        decoded_nodes.extend(nodes.iter().map(|node| DecodedNode::new(node, &mut leaf)));
+        DecodedMesh {
+            nodes: decoded_nodes,
+            leaves,
+        }
     }
 }
 

@@ -11,6 +11,7 @@
 
 mod binary;
 mod decoded;
+mod huge_pages;
 mod node;
 mod wide;
 

@@ -111,12 +111,20 @@ fn closest_of_mesh(scene: &Packed, before: Hit, instance_index: u32, ray: Ray, s
         start,
         skip,
         best,
+        ..
     } = closest_mesh_ray(scene, before, instance_index, ray, start, origin_prim);
-    let found = traversal::closest(*LEVEL, &instance_mesh(scene, instance_index), &line, start, skip, best);
+    let mesh = instance_mesh(scene, instance_index);
+    let found = traversal::closest(*LEVEL, &mesh, &line, start, skip, best);
     if found.slot == NO_INDEX {
         return before;
     }
-    mesh_hit(scene, instance_index, &line, found)
+    let [a, b, c, _] = mesh.triangles[found.slot as usize];
+    let vertices = [
+        &mesh.vertices[a as usize],
+        &mesh.vertices[b as usize],
+        &mesh.vertices[c as usize],
+    ];
+    mesh_hit(instance_index, found, line.barycentric(vertices))
 }
 
 /// Returns a ray in the object space of an instance, from `start` on, that searches for hits closer than `before`.
@@ -143,12 +151,8 @@ pub fn closest_mesh_ray(
         },
         slot: NO_INDEX,
     };
-    MeshRay {
-        line: Line::new(origin, direction, mesh_pad(i, origin)),
-        start,
-        skip: excluded_triangle(origin_prim, instance_index),
-        best,
-    }
+    let skip = excluded_triangle(origin_prim, instance_index);
+    MeshRay::new(origin, direction, mesh_pad(i, origin), start, skip, best)
 }
 
 fn instance_mesh(scene: &Packed, instance_index: u32) -> traversal::Mesh<'_> {
@@ -157,20 +161,13 @@ fn instance_mesh(scene: &Packed, instance_index: u32) -> traversal::Mesh<'_> {
 
 /// Returns the hit that a ray of [`closest_mesh_ray`] has found.
 #[inline(always)]
-pub fn mesh_hit(scene: &Packed, instance_index: u32, line: &Line, found: Nearest) -> Hit {
-    let mesh = instance_mesh(scene, instance_index);
-    let [a, b, c, _] = mesh.triangles[found.slot as usize];
-    let vertices = [
-        &mesh.vertices[a as usize],
-        &mesh.vertices[b as usize],
-        &mesh.vertices[c as usize],
-    ];
+pub fn mesh_hit(instance_index: u32, found: Nearest, barycentric: [f32; 2]) -> Hit {
     Hit {
         t: found.t,
         instance: instance_index + 1,
         primitive: found.triangle,
         slot: found.slot,
-        barycentric: Vec2::from_array(line.barycentric(vertices)),
+        barycentric: Vec2::from_array(barycentric),
     }
 }
 
@@ -396,14 +393,12 @@ pub fn is_occluded_by_primitive_item(
 pub fn shadow_mesh_ray(scene: &Packed, instance_index: u32, surface: &Surface, to_light: Vec3, t_max: f32) -> MeshRay {
     let i = &scene.bvh.instances[instance_index as usize];
     let origin = point_to_mesh(i, surface.ray_origin);
-    MeshRay {
-        line: Line::new(origin, vector_to_mesh(i, to_light), mesh_pad(i, origin)),
-        start: 0.0,
-        skip: excluded_triangle(surface.exclude_front, instance_index),
-        best: Nearest {
-            t: t_max,
-            triangle: NO_INDEX,
-            slot: NO_INDEX,
-        },
-    }
+    let direction = vector_to_mesh(i, to_light);
+    let skip = excluded_triangle(surface.exclude_front, instance_index);
+    let best = Nearest {
+        t: t_max,
+        triangle: NO_INDEX,
+        slot: NO_INDEX,
+    };
+    MeshRay::new(origin, direction, mesh_pad(i, origin), 0.0, skip, best)
 }

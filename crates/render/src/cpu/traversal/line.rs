@@ -2,6 +2,8 @@
 
 use glam::Vec3;
 
+use super::box_ray::BoxRay;
+
 /// Minimum magnitude of direction components in box tests, so that reciprocals are finite.
 pub const MIN_COMPONENT: f32 = f32::from_bits((127 - 100) << 23);
 
@@ -52,21 +54,30 @@ impl Line {
     /// Creates a ray from `o` along `d`, which may have any length. Box tests enlarge boxes by `pad`.
     #[inline(always)]
     pub fn new(o: Vec3, d: Vec3, pad: f32) -> Line {
+        Line::with_box_ray(o, d, pad).0
+    }
+
+    /// Creates a ray like [`new`](Self::new), also in the form for tests of single boxes.
+    #[inline(always)]
+    pub fn with_box_ray(o: Vec3, d: Vec3, pad: f32) -> (Line, BoxRay) {
         let axes = axes(d);
+        let low = [o.x + pad, o.y + pad, o.z + pad];
+        let high = [o.x - pad, o.y - pad, o.z - pad];
+        let inverse = [
+            1.0 / away_from_zero(d.x),
+            1.0 / away_from_zero(d.y),
+            1.0 / away_from_zero(d.z),
+        ];
         let d = in_order(d.as_ref(), axes);
-        let o = in_order(o.as_ref(), axes);
-        Line {
+        let line = Line {
             axes,
-            o,
-            o_low: [o[0] + pad, o[1] + pad, o[2] + pad],
-            o_high: [o[0] - pad, o[1] - pad, o[2] - pad],
-            inverse: [
-                1.0 / away_from_zero(d[0]),
-                1.0 / away_from_zero(d[1]),
-                1.0 / away_from_zero(d[2]),
-            ],
+            o: in_order(o.as_ref(), axes),
+            o_low: in_order(&low, axes),
+            o_high: in_order(&high, axes),
+            inverse: in_order(&inverse, axes),
             shear: [d[0] / d[2], d[1] / d[2], 1.0 / d[2]],
-        }
+        };
+        (line, BoxRay::new(low, high, inverse))
     }
 
     /// Returns the ray's interval inside a box, whose coordinates are permuted by `self.axes`.
@@ -90,7 +101,7 @@ impl Line {
 
     /// Returns the barycentric coordinates of the second and the third vertex where the ray hits the triangle.
     #[inline(always)]
-    pub fn barycentric(&self, vertices: [&[f32; 4]; 3]) -> [f32; 2] {
+    pub fn barycentric<const N: usize>(&self, vertices: [&[f32; N]; 3]) -> [f32; 2] {
         let [a, b, c] = [
             self.sheared(in_order(vertices[0], self.axes)),
             self.sheared(in_order(vertices[1], self.axes)),

@@ -28,7 +28,7 @@ use fearless_simd::dispatch;
 use glam::Vec3;
 
 pub use self::box_ray::BoxRay;
-pub use self::interleaved::{MeshRay, Next, RAYS, RaySource, trace};
+pub use self::interleaved::{MeshRay, Next, RAYS, RaySource, Traced, trace};
 pub use self::line::Line;
 pub use self::node_stack::NodeStack;
 use crate::bvh::{Aabb, DecodedMesh, Node};

@@ -47,6 +47,12 @@ impl NodeStack {
         (self.near[0], self.children[0], self.depth) = (0.0, 0, 1);
     }
 
+    /// Removes all entries.
+    #[inline(always)]
+    pub fn clear(&mut self) {
+        self.depth = 0;
+    }
+
     /// Removes entries from the top, down to the first whose distance is at most `limit`. Returns this entry.
     #[inline(always)]
     pub fn pop(&mut self, limit: f32) -> Option<u32> {

@@ -7,8 +7,8 @@ use glam::{DVec3, Vec3};
 use fearless_simd::dispatch;
 
 use super::{
-    Directions, Level, Line, Mesh, MeshRay, Nearest, Next, NodeStack, RAYS, RaySource, Segments, closest, leaves,
-    levels, occluded, occluded_items, trace,
+    Directions, Level, Line, Mesh, MeshRay, Nearest, Next, NodeStack, RAYS, RaySource, Segments, Traced, closest,
+    leaves, levels, occluded, occluded_items, trace,
 };
 use crate::bvh::{Aabb, DecodedMesh, Tree, build};
 use crate::cases;
@@ -467,9 +467,9 @@ struct Batch<'a> {
 }
 
 impl<'a, S> RaySource<'a, S> for Batch<'a> {
-    fn next(&mut self, _: S, lane: usize, traced: Option<(&Line, Nearest)>) -> Next<'a> {
-        if let Some((_, found)) = traced {
-            let previous = self.found[self.traced[lane]].replace(found);
+    fn next(&mut self, _: S, lane: usize, traced: Option<Traced>) -> Next<'a> {
+        if let Some(traced) = traced {
+            let previous = self.found[self.traced[lane]].replace(traced.best);
             assert_eq!(previous, None, "each ray is traced once");
         }
         let Some(ray) = self.rays.get(self.next) else {
@@ -494,15 +494,13 @@ fn batches_have_the_hits_of_brute_force() {
                 .map(|i| {
                     let axis = Vec3::AXES[random.below(3)];
                     let direction = [random.vector(), random.vector(), axis, -axis][random.below(4)];
-                    MeshRay {
-                        line: Line::new(random.vector() * 1.5, direction, [0.0, 1e-6, 1e-3][i % 3]),
-                        start: 0.0,
-                        skip: [u32::MAX, random.below(count) as u32][i % 2],
-                        best: Nearest {
-                            t: [1e30, random.number().abs()][random.below(2)],
-                            ..NONE
-                        },
-                    }
+                    let origin = random.vector() * 1.5;
+                    let skip = [u32::MAX, random.below(count) as u32][i % 2];
+                    let best = Nearest {
+                        t: [1e30, random.number().abs()][random.below(2)],
+                        ..NONE
+                    };
+                    MeshRay::new(origin, direction, [0.0, 1e-6, 1e-3][i % 3], 0.0, skip, best)
                 })
                 .collect();
             for level in levels() {

@@ -9,10 +9,11 @@ use super::super::geometry::closest_hit;
 use super::super::integrators::path::PathState;
 use super::super::math::max;
 use super::super::path::Path;
+use super::super::prefetch::prefetch_triangle;
 use super::super::ray::{Hit, nearer_hit};
 use super::super::samples::LEVEL;
 use super::super::slab::{box_interval, interval_hits, slabs};
-use super::super::traversal::{Line, Nearest, Next, RAYS, RaySource, trace};
+use super::super::traversal::{Next, RAYS, RaySource, Traced, trace};
 use super::items::ItemStep;
 use super::linear::RayRows;
 use super::rows::{F, LANES, Row, lane_mask, lanes_of, splat3};
@@ -118,15 +119,17 @@ struct Rays<'a, 'h> {
 
 impl<'a, S: Simd> RaySource<'a, S> for Rays<'a, '_> {
     #[inline(always)]
-    fn next(&mut self, simd: S, lane: usize, traced: Option<(&Line, Nearest)>) -> Next<'a> {
+    fn next(&mut self, simd: S, lane: usize, traced: Option<Traced>) -> Next<'a> {
         let scene = self.scene;
         let lane = &mut self.lanes[lane];
-        if let Some((line, found)) = traced
-            && found.slot != NO_INDEX
+        if let Some(traced) = traced
+            && traced.best.slot != NO_INDEX
         {
             // Another lane may have traced the ray through another instance.
             let hit = &mut self.hits[lane.position];
-            *hit = nearer_hit(*hit, mesh_hit(scene, lane.instance, line, found));
+            *hit = nearer_hit(*hit, mesh_hit(lane.instance, traced.best, traced.barycentric()));
+            let mesh = scene.bvh.instances[lane.instance as usize].mesh;
+            prefetch_triangle(&scene.bvh.meshes[mesh as usize], traced.best.slot);
         }
         if lane.in_bvh {
             let path = &self.paths[self.active[lane.position] as usize].path;

@@ -9,7 +9,7 @@ use super::super::decoded_bvhs::decoded_mesh;
 use super::super::integrators::path::{PathState, is_shadow_ray_occluded};
 use super::super::samples::LEVEL;
 use super::super::slab::{box_interval, interval_hits, slabs};
-use super::super::traversal::{Line, Nearest, Next, RAYS, RaySource, trace};
+use super::super::traversal::{Next, RAYS, RaySource, Traced, trace};
 use super::QueuedShadowRay;
 use super::items::ItemStep;
 use super::linear::ShadowRayRows;
@@ -150,11 +150,11 @@ struct Rays<'a, 'o> {
 
 impl<'a, S: Simd> RaySource<'a, S> for Rays<'a, '_> {
     #[inline(always)]
-    fn next(&mut self, simd: S, lane: usize, traced: Option<(&Line, Nearest)>) -> Next<'a> {
+    fn next(&mut self, simd: S, lane: usize, traced: Option<Traced>) -> Next<'a> {
         let scene = self.scene;
         let lane = &mut self.lanes[lane];
-        if let Some((_, found)) = traced {
-            self.occluded[lane.position] |= found.slot != NO_INDEX;
+        if let Some(traced) = traced {
+            self.occluded[lane.position] |= traced.best.slot != NO_INDEX;
         }
         if lane.in_bvh && !self.occluded[lane.position] {
             let ray = &self.rays[lane.position].ray;

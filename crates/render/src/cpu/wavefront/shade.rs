@@ -10,6 +10,7 @@ use glam::{UVec2, Vec3};
 use super::super::geometry::{group_word, instance_of, is_on_mesh};
 use super::super::integrators::path::{PathState, shade};
 use super::super::lobe::is_polished;
+use super::super::prefetch::prefetch_vertices;
 use super::super::primitive::is_solid;
 use super::super::ray::Hit;
 use super::super::samples::LEVEL;
@@ -154,6 +155,9 @@ pub fn shade_hits(
             if state.path.depth >= scene.specialization.bounces {
                 state.ended = true;
                 continue;
+            }
+            if is_on_mesh(hit) {
+                prefetch_vertices(scene, hit);
             }
             let queue = &mut queues.hits[material_kind.index()][surface_kind as usize];
             queue.push(QueuedHit { path, material, hit });
