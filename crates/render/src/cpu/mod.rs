@@ -49,7 +49,7 @@ pub mod path;
 pub mod phong;
 pub mod pixel;
 pub mod plane;
-mod prefetch;
+pub mod prefetch;
 pub mod primitive;
 pub mod principled;
 pub mod procedural;
