@@ -1,7 +1,6 @@
 //! Memory in huge pages, for which a processor needs fewer address translations.
 
-/// Smallest size in bytes for which huge pages are requested: that of a huge page on x86-64, and on AArch64 with pages
-/// of 4 KiB.
+/// Size of a huge page on x86-64, in bytes. Huge pages are requested for vectors that are at least as large.
 #[cfg(target_os = "linux")]
 const MIN_SIZE: usize = 2 << 20;
 

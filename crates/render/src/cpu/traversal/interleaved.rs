@@ -97,7 +97,8 @@ pub struct Traced<'r> {
 }
 
 impl Traced<'_> {
-    /// Returns the barycentric coordinates of the second and the third vertex at the hit. The ray must have a hit.
+    /// Returns the barycentric coordinates of the second and the third vertex at the closest hit. The ray must have one;
+    /// `trace` does not store the leaf of any other hit.
     #[inline(always)]
     pub fn barycentric(&self) -> [f32; 2] {
         // The leaf is still in the cache, unlike the mesh's vertices.
@@ -240,8 +241,8 @@ impl Turn {
 /// Traces the rays of a batch: to the closest hit, like [`closest`](super::closest), or if `ANY` is true, to any hit
 /// nearer than `best.t`, like [`any`](super::any). The stacks must be empty, and are empty again at the end.
 ///
-/// In turn, all rays at nodes, all rays at leaves, and all rays at their ends advance by one step, because a branch for
-/// each ray would often be mispredicted.
+/// In each turn, first all rays at nodes visit their node, then all rays at leaves visit their leaf, then rays that have
+/// ended are replaced. A branch for each ray would often be mispredicted.
 #[inline(always)]
 pub fn trace<'a, S: Simd, const ANY: bool>(simd: S, stacks: &mut [NodeStack; RAYS], rays: &mut impl RaySource<'a, S>) {
     let mut lanes = stacks.each_mut().map(
