@@ -188,7 +188,7 @@ fn read_json(text: &str, defines: &mut Defines) -> Result<Course, ReadFault> {
     }
     let mut deserializer = serde_json::Deserializer::from_str(text);
     let value: Value = serde_path_to_error::deserialize(&mut deserializer).map_err(|error| {
-        let key = KeyPath(parse::segments(error.path()));
+        let key = KeyPath(segments(error.path()));
         ReadFault::Text(error.into_inner(), key)
     })?;
     let end = deserializer.end();
@@ -215,6 +215,16 @@ fn read_json(text: &str, defines: &mut Defines) -> Result<Course, ReadFault> {
         Problem { message, ..problem }
     };
     parse::read_for(table, Integrator::Path).map_err(|problems| ReadFault::Values(problems.map(in_json_terms)))
+}
+
+fn segments(path: &serde_path_to_error::Path) -> Vec<Segment> {
+    use serde_path_to_error::Segment as PathSegment;
+    let segments = path.iter().filter_map(|segment| match segment {
+        PathSegment::Map { key } => Some(Segment::Key(key.clone())),
+        PathSegment::Seq { index } => Some(Segment::Index(*index)),
+        PathSegment::Enum { .. } | PathSegment::Unknown => None,
+    });
+    segments.collect()
 }
 
 /// Validates the values that the conversion to +Z up changes, so that errors show the numbers of the file.

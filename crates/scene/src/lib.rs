@@ -43,6 +43,7 @@ mod spline;
 mod studio;
 mod suggest;
 pub mod texture;
+mod tree;
 mod turntable;
 mod validate;
 mod visibility;

@@ -2,9 +2,7 @@
 
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
-use toml::Table;
 
-use super::tables::ReadError;
 use super::tagged::{Tagged, tagged};
 use super::{ColorDescription, NormalMapDescription, PrincipledDescription, ValueDescription};
 use crate::description::kinds::*;

@@ -17,7 +17,6 @@ mod mesh;
 mod principled;
 mod render;
 mod shape;
-pub(crate) mod tables;
 pub(super) mod tagged;
 #[cfg(feature = "schema")]
 pub(crate) mod tagged_schema;

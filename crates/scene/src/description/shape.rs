@@ -2,11 +2,9 @@
 
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
-use toml::Table;
 
 use super::gltf::GltfDescription;
 use super::mesh::MeshDescription;
-use super::tables::ReadError;
 use super::tagged::{Tagged, tagged};
 use crate::description::kinds::*;
 

@@ -2,7 +2,7 @@
 
 use toml::Table;
 
-use super::tables::ReadError;
+use crate::tree::ReadError;
 
 /// An enum whose variant is selected by the key `type`.
 pub(crate) trait Tagged: Sized {
@@ -38,9 +38,10 @@ macro_rules! tagged {
         impl Tagged for $name {
             const TYPES: &'static [&'static str] = &[$($tag),+];
 
-            fn read(tag: &str, body: Table) -> Option<Result<Self, ReadError>> {
+            fn read(tag: &str, body: toml::Table) -> Option<Result<Self, crate::tree::ReadError>> {
+                let body = toml::Value::Table(body);
                 match tag {
-                    $($tag => Some(crate::description::tables::read(body).map(Self::$variant)),)+
+                    $($tag => Some(crate::tree::read(body).map(Self::$variant)),)+
                     _ => None,
                 }
             }

@@ -6,9 +6,7 @@ use glam::DVec3;
 use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer, StrDeserializer};
 use serde::de::{Deserializer, MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Serialize};
-use toml::Table;
 
-use super::tables::ReadError;
 use super::tagged::{Tagged, tagged};
 use crate::description::kinds::*;
 use crate::{Channel, Encoding, TextureFilter, Wrap};

@@ -4,6 +4,8 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use crate::ErrorPlace;
+use crate::key_path::Segment;
+use crate::tree::{Fault, ReadError};
 
 /// An error of a glTF file. Messages begin with the location: `a.gltf: accessors[3]: count 9, element size 12, stride
 /// 12 and offset 0 exceed the 96 bytes of bufferViews[1]`.
@@ -170,42 +172,25 @@ fn elide(text: String) -> String {
     format!("{start}...{end}")
 }
 
-/// Rewrites a `serde_json` type error in terms of JSON.
-pub(super) fn json_message(message: &dyn std::fmt::Display) -> String {
-    let message = message.to_string();
-    if let Some((name, _)) = message
-        .strip_prefix("missing field `")
-        .and_then(|rest| rest.split_once('`'))
-    {
-        return format!("{} is required", quoted(name));
+/// Returns the key path of an error in the value at `key`.
+pub(super) fn key_within(key: &str, error: &ReadError) -> String {
+    match error.key.0.first() {
+        None => key.to_owned(),
+        Some(Segment::Key(_)) => format!("{key}.{}", error.key),
+        Some(Segment::Index(_)) => format!("{key}{}", error.key),
     }
-    let prefixes = ["invalid type: ", "invalid value: ", "invalid length "];
-    let Some((prefix, rest)) = prefixes
-        .iter()
-        .find_map(|prefix| Some((*prefix, message.strip_prefix(prefix)?)))
-    else {
-        return message.replace('`', "\"");
-    };
-    // The quoted value may contain the separator.
-    let Some((found, expected)) = rest.rsplit_once(", expected ") else {
-        return rest.replace('`', "\"");
-    };
-    let found = match found {
-        "map" => "an object".to_owned(),
-        "sequence" => "a list".to_owned(),
-        "null" | "unit value" => "null".to_owned(),
-        "1" if prefix == "invalid length " => "a list of 1 value".to_owned(),
-        count if prefix == "invalid length " => format!("a list of {count} values"),
-        _ => match (found.strip_prefix("string "), found.split_once('`')) {
-            // `serde_json` has quoted the text.
-            (Some(text), _) if text.chars().count() <= 60 => text.to_owned(),
-            (Some(text), _) => quoted(text.trim_matches('"')),
-            (None, Some((_, number))) => number.trim_end_matches('`').to_owned(),
-            (None, None) => found.to_owned(),
-        },
+}
+
+/// Returns the message of an error in terms of JSON.
+pub(super) fn json_message(error: ReadError) -> String {
+    let (found, expected) = match error.fault {
+        Fault::UnknownKey(_) => return "unknown key".to_owned(),
+        Fault::MissingKey(key) => return format!("{} is required", quoted(key)),
+        Fault::Other(message) => return message.replace('`', "\""),
+        Fault::Mismatch { found, expected } => (found, expected),
     };
     let digits: String = expected.chars().filter(char::is_ascii_digit).collect();
-    let expected = match expected {
+    let expected = match &*expected {
         "f32" | "f64" => "a number".to_owned(),
         "u8" | "u16" | "u32" | "u64" | "usize" => "a non-negative integer".to_owned(),
         "a boolean" => "true or false".to_owned(),
@@ -239,6 +224,7 @@ mod tests {
     use serde_json::json;
 
     use super::json_message;
+    use crate::tree;
 
     #[test]
     fn type_errors_are_reported_in_terms_of_json() {
@@ -284,17 +270,18 @@ mod tests {
         ] {
             let mut invalid = valid.clone();
             invalid[key] = value;
-            let error = serde_json::from_value::<View>(invalid).unwrap_err();
-            assert_eq!(json_message(&error), expected, "{error}");
+            let error = tree::read::<View>(invalid).unwrap_err();
+            assert_eq!(error.key.to_string().split('[').next(), Some(key));
+            assert_eq!(json_message(error), expected);
         }
         for (value, expected) in [
-            (json!([1, 2, 3]), "expected a string, found 1"),
-            (json!([]), "expected an object, found a list of 0 values"),
+            (json!([1, 2, 3]), "expected an object, found a list"),
+            (json!([]), "expected an object, found a list"),
             (json!("x"), "expected an object, found \"x\""),
             (json!({}), "\"name\" is required"),
         ] {
-            let error = serde_json::from_value::<View>(value).unwrap_err();
-            assert!(json_message(&error).starts_with(expected), "{error}");
+            let message = json_message(tree::read::<View>(value).unwrap_err());
+            assert!(message.starts_with(expected), "{message}");
         }
     }
 }

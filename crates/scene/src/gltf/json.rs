@@ -6,6 +6,7 @@ use gltf_json::{Path, Root};
 use serde_json::{Map, Number, Value};
 
 use crate::content::binary_format;
+use crate::tree;
 
 use super::error::{GltfFault, Location, json_message, quoted};
 
@@ -79,10 +80,7 @@ pub(super) fn root(text: &[u8], notes: &mut Vec<String>) -> Result<Root, GltfFau
     check_version(top)?;
     normalize(&mut value, None).map_err(|(key, rule)| GltfFault::key(key.trim_start_matches('.'), rule))?;
     repair(&mut value, notes);
-    let root: Root = serde_path_to_error::deserialize(value).map_err(|error| {
-        let key = error.path().to_string();
-        GltfFault::key(key, json_message(error.inner()))
-    })?;
+    let root: Root = tree::read(value).map_err(|error| GltfFault::key(error.key.to_string(), json_message(error)))?;
     check(&root)?;
     Ok(root)
 }

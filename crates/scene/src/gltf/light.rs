@@ -8,7 +8,8 @@ use serde::Deserialize;
 
 use super::UPRIGHT;
 use super::document::Document;
-use super::error::{GltfError, json_message};
+use super::error::{GltfError, json_message, key_within};
+use crate::tree;
 use crate::{DirectionalLightDescription, LightDescription, PointLightDescription, SpotLightDescription};
 
 const MAX_INTENSITY: f64 = 1e6;
@@ -72,7 +73,8 @@ impl Document {
             return Err(self.fault(format!("nodes[{node}].extensions.{NAME}.light"), rule));
         };
         let location = format!("extensions.{NAME}.lights[{light_index}]");
-        let light = Light::deserialize(light).map_err(|error| self.fault(&location, json_message(&error)))?;
+        let light: Light = tree::read(light.clone())
+            .map_err(|error| self.fault(key_within(&location, &error), json_message(error)))?;
         if light.range.is_some() {
             note(
                 notes,

@@ -6,7 +6,8 @@ use serde::Deserialize;
 use serde_json::{Map, Value};
 
 use super::document::Document;
-use super::error::{GltfError, json_message};
+use super::error::{GltfError, json_message, key_within};
+use crate::tree;
 use crate::{Encoding, ImageTextureDescription, TextureFilter, Wrap};
 
 /// Limits of texture transforms: a scale whose magnitude is below the first value is replaced by this value; scales and
@@ -67,13 +68,9 @@ impl Slot {
         let transform = match extensions.and_then(|all| all.get("KHR_texture_transform")) {
             None => Transform::default(),
             Some(transform) => {
-                let parsed = Transform::deserialize(transform);
-                parsed.map_err(|error| {
-                    document.fault(
-                        format!("{location}.extensions.KHR_texture_transform"),
-                        json_message(&error),
-                    )
-                })?
+                let key = format!("{location}.extensions.KHR_texture_transform");
+                tree::read(transform.clone())
+                    .map_err(|error| document.fault(key_within(&key, &error), json_message(error)))?
             }
         };
         let count = document.json.textures.len();
@@ -97,7 +94,8 @@ impl Slot {
 
     /// Creates the slot of a texture reference from an extension; also returns the `scale` of a normal map.
     pub fn of_value(document: &Document, location: &str, value: &Value) -> Result<(Slot, f64), GltfError> {
-        let info = TextureInfo::deserialize(value).map_err(|error| document.fault(location, json_message(&error)))?;
+        let info: TextureInfo = tree::read(value.clone())
+            .map_err(|error| document.fault(key_within(location, &error), json_message(error)))?;
         let slot = Slot::new(document, location, (info.index, info.tex_coord), Some(&info.extensions))?;
         Ok((slot, info.scale.unwrap_or(1.0)))
     }

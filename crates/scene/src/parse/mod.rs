@@ -17,7 +17,6 @@ use toml::{Table, Value};
 use self::parts::{Kind, MAX_PART_BYTES, Parts, SyntaxFault};
 use self::table::{Read, read, read_tagged, remove, tagged};
 use super::defines::Defines;
-use super::description::tables;
 use super::description::{
     CameraDescription, CameraKeyDescription, CameraPathDescription, Description, ImageDescription, InstanceDescription,
     LightDescription, MaterialDescription, MeshFileDescription, PerspectiveDescription, RenderDescription,
@@ -26,11 +25,12 @@ use super::description::{
 use super::error::SceneError;
 use super::key_path::Segment;
 use super::problem::{At, Collector, Problem, Problems, both};
+use super::tree::{self, Fault};
 
 pub use change::{Pieces, Places};
 pub use location::{invalid, line_of_path};
 pub use syntax::{NOT_UTF8, encoding, syntax_error};
-pub use table::{read_for, segments};
+pub use table::read_for;
 
 impl Description {
     /// Returns the description with the defines applied.
@@ -177,8 +177,8 @@ fn with_section(problem: Problem) -> Problem {
 fn has_key<T: DeserializeOwned>(name: &str) -> bool {
     let table = Table::from_iter([(name.to_owned(), Value::from(0))]);
     // Unknown keys are reported before missing keys and wrong types.
-    let error = tables::read::<T>(table).err();
-    !error.is_some_and(|error| error.inner().message().starts_with("unknown field"))
+    let error = tree::read::<T>(Value::Table(table)).err();
+    !error.is_some_and(|error| matches!(error.fault, Fault::UnknownKey(_)))
 }
 
 /// Parses a camera. A missing value is taken from the first key of the path that sets the value.

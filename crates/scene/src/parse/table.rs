@@ -4,12 +4,12 @@ use serde::de::DeserializeOwned;
 use toml::{Table, Value};
 
 use crate::Integrator;
-use crate::description::tables::{self, ReadError};
 use crate::description::tagged::Tagged;
 use crate::key_path::{KeyPath, Segment, cut, list, listed};
 use crate::limits::{BLADES, MAX_COUNT, MAX_DEPTH, UV_SETS};
 use crate::problem::{At, Problem, Problems};
 use crate::suggest;
+use crate::tree::{self, Fault, ReadError};
 
 pub(super) type Read<T> = Result<T, Problems>;
 
@@ -25,7 +25,7 @@ pub(super) fn read<T: DeserializeOwned>(table: Table) -> Read<T> {
 
 /// Parses a table. The ranges in messages depend on the integrator.
 pub fn read_for<T: DeserializeOwned>(table: Table, integrator: Integrator) -> Read<T> {
-    read_keys(table, false, integrator, tables::read)
+    read_keys(table, false, integrator, |table| tree::read(Value::Table(table)))
 }
 
 pub(super) fn read_tagged<T: Tagged>(mut table: Table, default: Option<&str>) -> Read<T> {
@@ -68,7 +68,6 @@ fn read_keys<T>(
                 error
             }
         };
-        let error = list_names(error, &table, |table| read(table).err());
         let problem = explain(error, &table, is_tagged, integrator);
         let path = problem.key.0.clone();
         let is_missing = find(&table, &path).is_none();
@@ -128,113 +127,69 @@ fn show(value: &Value) -> String {
     cut(&value.to_string().replace('\n', " ")).into_owned()
 }
 
-/// Adds the allowed names to an error. serde lists names only if the value is a string, so the value is replaced by a
-/// string.
-fn list_names(error: ReadError, table: &Table, read: impl Fn(Table) -> Option<ReadError>) -> ReadError {
-    if !error.inner().message().ends_with(NAMES_EXPECTED) {
-        return error;
-    }
-    let mut with_text = Value::Table(table.clone());
-    let mut value = Some(&mut with_text);
-    for segment in segments(error.path()) {
-        value = match segment {
-            Segment::Key(key) => value.and_then(|value| value.get_mut(key)),
-            Segment::Index(index) => value.and_then(|value| value.get_mut(index)),
-        };
-    }
-    if let Some(value) = value {
-        *value = Value::from("?");
-    }
-    let listing = match with_text {
-        Value::Table(table) => read(table),
-        _ => None,
-    };
-    let has_same_path = |listing: &ReadError| listing.path().to_string() == error.path().to_string();
-    listing.filter(has_same_path).unwrap_or(error)
-}
-
-/// End of serde's message about a value that must name a variant.
-const NAMES_EXPECTED: &str = ", expected string only";
-
 /// Converts serde's error about `table`. If `is_tagged` is true, the key `type` of the table was removed.
 fn explain(error: ReadError, table: &Table, is_tagged: bool, integrator: Integrator) -> Problem {
-    let mut path = segments(error.path());
+    let ReadError {
+        key: KeyPath(mut path),
+        fault,
+    } = error;
     let value = find(table, &path);
-    let message = error.inner().message();
-    // serde provides the name and the rule only as text.
-    let quoted = |text: &str| {
-        text.split('`')
-            .skip(1)
-            .step_by(2)
-            .map(str::to_owned)
-            .collect::<Vec<_>>()
-    };
-    let is_unknown_key = message.starts_with("unknown field");
-    let message = if is_unknown_key {
-        // The first quoted name is the unknown key.
-        let names = quoted(message).into_iter().skip(1);
-        let type_key = (is_tagged && path.len() == 1).then(|| "type".to_owned());
-        let names: Vec<String> = type_key.into_iter().chain(names).collect();
-        let hint = match path.last() {
-            Some(Segment::Key(unknown)) => suggest::hint(unknown, names.iter().map(String::as_str)),
-            _ => String::new(),
-        };
-        match hint.is_empty() {
-            true => format!("unknown key; expected one of {}", listed(names, MAX_KEYS)),
-            false => format!("unknown key{hint}"),
-        }
-    } else if message.starts_with("missing field") {
-        let name = quoted(message).into_iter().next().unwrap_or_default();
-        if path.is_empty() && ["image", "camera"].contains(&name.as_str()) {
-            return Problem::new(format!("the scene has no [{name}] table"));
-        }
-        path.push(Segment::Key(name));
-        let mut problem = Problem::predicate("is missing");
-        problem.key = KeyPath(path);
-        return problem;
-    } else if let (Some((_, expected)), Some(value)) = (message.rsplit_once(", expected "), value) {
-        let rule = match expected {
-            "f64" => "a number",
-            "a boolean" => "true or false",
-            "u32" => &integer_rule(path.last(), integrator),
-            "a sequence of 3 f64 values" => "a list of 3 numbers",
-            "an array of length 2" => "a list of 2 numbers",
-            "an array of length 3" => "a list of 3 points",
-            "an array of length 4"
-                if ["matrix", "factor"]
-                    .iter()
-                    .any(|key| path.contains(&Segment::from(*key))) =>
-            {
-                "a list of 4 numbers"
+    let is_unknown_key = matches!(fault, Fault::UnknownKey(_));
+    let message = match (fault, value) {
+        (Fault::UnknownKey(keys), _) => {
+            let type_key = (is_tagged && path.len() == 1).then_some("type");
+            let keys = || type_key.into_iter().chain(keys.iter().copied());
+            let hint = match path.last() {
+                Some(Segment::Key(unknown)) => suggest::hint(unknown, keys()),
+                _ => String::new(),
+            };
+            match hint.is_empty() {
+                true => format!("unknown key; expected one of {}", listed(keys(), MAX_KEYS)),
+                false => format!("unknown key{hint}"),
             }
-            "an array of length 4" => "a list of 4 points",
-            "fewer elements in array" => "a list with fewer elements",
-            "a map" => "a table",
-            table if table.starts_with("struct ") => "a table",
-            "a sequence" => "a list of tables, each under its own [[header]]",
-            other => &other.replace('`', "\""),
-        };
-        format!("{} must be {rule}", show(value))
-    } else if let (true, Some(value)) = (message.starts_with("must be"), value) {
-        format!("{} {message}", show(value))
-    } else {
-        message.to_owned()
+        }
+        (Fault::MissingKey(key), _) => {
+            if path.is_empty() && ["image", "camera"].contains(&key) {
+                return Problem::new(format!("the scene has no [{key}] table"));
+            }
+            path.push(Segment::from(key));
+            let mut problem = Problem::predicate("is missing");
+            problem.key = KeyPath(path);
+            return problem;
+        }
+        (Fault::Mismatch { expected, .. }, Some(value)) => {
+            let rule = match &*expected {
+                "f64" => "a number",
+                "a boolean" => "true or false",
+                "u32" => &integer_rule(path.last(), integrator),
+                "a sequence of 3 f64 values" => "a list of 3 numbers",
+                "an array of length 2" => "a list of 2 numbers",
+                "an array of length 3" => "a list of 3 points",
+                "an array of length 4"
+                    if ["matrix", "factor"]
+                        .iter()
+                        .any(|key| path.contains(&Segment::from(*key))) =>
+                {
+                    "a list of 4 numbers"
+                }
+                "an array of length 4" => "a list of 4 points",
+                "fewer elements in array" => "a list with fewer elements",
+                "a map" => "a table",
+                table if table.starts_with("struct ") => "a table",
+                "a sequence" => "a list of tables, each under its own [[header]]",
+                other => other,
+            };
+            format!("{} must be {rule}", show(value))
+        }
+        (Fault::Other(message), Some(value)) if message.starts_with("must be") => format!("{} {message}", show(value)),
+        (Fault::Other(message), _) => message,
+        (fault @ Fault::Mismatch { .. }, None) => ReadError::from(fault).to_string(),
     };
     Problem {
         key: KeyPath(path),
         is_unknown_key,
         ..Problem::new(message)
     }
-}
-
-pub fn segments(path: &serde_path_to_error::Path) -> Vec<Segment> {
-    use serde_path_to_error::Segment as PathSegment;
-    let segments = path.iter().filter_map(|segment| match segment {
-        PathSegment::Map { key } => Some(Segment::Key(key.clone())),
-        PathSegment::Seq { index } => Some(Segment::Index(*index)),
-        PathSegment::Enum { .. } | PathSegment::Unknown => None,
-    });
-    segments.collect()
 }
 
 /// Returns the rule for an integer key, without limits that depend on other keys.

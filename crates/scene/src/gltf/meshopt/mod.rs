@@ -12,7 +12,8 @@ use serde::Deserialize;
 use serde_json::{Map, Value};
 
 use self::filter::Filter;
-use super::error::{GltfFault, json_message, quoted};
+use super::error::{GltfFault, json_message, key_within, quoted};
+use crate::tree;
 
 /// Names of the extensions, in order of precedence.
 const NAMES: [&str; 2] = ["KHR_meshopt_compression", "EXT_meshopt_compression"];
@@ -61,8 +62,8 @@ pub(super) fn parse_compression(
         return Ok(None);
     };
     let key = format!("{key}.extensions.{name}");
-    let extension: MeshoptExtension = serde_path_to_error::deserialize(extension)
-        .map_err(|error| GltfFault::key(format!("{key}.{}", error.path()), json_message(error.inner())))?;
+    let extension: MeshoptExtension =
+        tree::read(extension.clone()).map_err(|error| GltfFault::key(key_within(&key, &error), json_message(error)))?;
     let fault = |field: &str, value: &dyn std::fmt::Display, rule: &str| {
         Err(GltfFault::key(format!("{key}.{field}"), format!("{value} {rule}")))
     };
