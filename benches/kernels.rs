@@ -9,18 +9,18 @@ use wgray::scene::{Overrides, Scene};
 use wgray_image::Region;
 use wgray_render::backend::Backend;
 use wgray_render::cpu::Cpu;
-use wgray_render::cpu::ellipsoid::intersect_ellipsoid;
-use wgray_render::cpu::light::segments_to_light;
-use wgray_render::cpu::phong::{Lobes, phong_block};
-use wgray_render::cpu::ray::Ray;
-use wgray_render::cpu::rectangle::intersect_rectangle;
-use wgray_render::cpu::shadow::{SampleBlock, light_frustum, may_block, occlusion_mask};
-use wgray_render::cpu::surface::surface_at;
-use wgray_render::cpu::triangle::intersect_triangle;
 use wgray_render::gpu::{self, AdapterChoice, Gpu, Options, compose::Shaders};
 use wgray_render::job::{self, WorkSplit};
 use wgray_render::pack::pack;
-use wgray_render::records::{ELLIPSOID, GRID, INFINITE_T, Packed, RECTANGLE, TRIANGLE};
+use wgray_trace::cpu::ellipsoid::intersect_ellipsoid;
+use wgray_trace::cpu::light::segments_to_light;
+use wgray_trace::cpu::phong::{Lobes, phong_block};
+use wgray_trace::cpu::ray::Ray;
+use wgray_trace::cpu::rectangle::intersect_rectangle;
+use wgray_trace::cpu::shadow::{SampleBlock, light_frustum, may_block, occlusion_mask};
+use wgray_trace::cpu::surface::surface_at;
+use wgray_trace::cpu::triangle::intersect_triangle;
+use wgray_trace::records::{ELLIPSOID, GRID, INFINITE_T, Packed, RECTANGLE, TRIANGLE};
 
 fn scene(path: &str, size: u32) -> Packed {
     let overrides = Overrides {

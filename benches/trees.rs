@@ -6,8 +6,8 @@ use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use fearless_simd::dispatch;
 use glam::Vec3;
 use rayon::prelude::*;
-use wgray_render::bvh::{Aabb, DecodedMesh, MAX_LEAF_SIZE, Tree, build};
-use wgray_render::cpu::traversal::{
+use wgray_trace::bvh::{Aabb, DecodedMesh, MAX_LEAF_SIZE, Tree, build};
+use wgray_trace::cpu::traversal::{
     Directions, Level, Line, Mesh, MeshRay, Nearest, Next, NodeStack, RAYS, RaySource, Segments, Traced, closest,
     occluded, trace,
 };

@@ -13,8 +13,8 @@
 use std::time::Duration;
 
 use wgray_image::Region;
-use wgray_render::records::Packed;
 use wgray_scene::Integrator;
+use wgray_trace::records::Packed;
 
 use crate::context::Context;
 use crate::options::Options;

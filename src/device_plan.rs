@@ -2,7 +2,7 @@
 
 #[cfg(feature = "gpu")]
 use wgray_render::gpu;
-use wgray_render::records::Packed;
+use wgray_trace::records::Packed;
 
 use crate::context::Context;
 use crate::device::{Device, DeviceInfo};

@@ -157,12 +157,12 @@ pub use render::{Progressive, render, render_progressive};
 pub use scene::{Camera, Description, Overrides, Scene};
 pub use session::Session;
 pub use wgray_image::Region;
-pub use wgray_render::film;
 #[cfg(feature = "gpu")]
 pub use wgray_render::gpu::{GpuInfo, adapters};
 pub use wgray_render::noise::Noise;
 pub use wgray_scene as scene;
 pub use wgray_scene::mesh;
+pub use wgray_trace::film;
 
 /// Earlier name of [`Progressive`].
 #[deprecated(since = "0.2.0", note = "use `Progressive`")]

@@ -5,12 +5,12 @@ use std::sync::Arc;
 use wgray_render::backend::Backend;
 use wgray_render::cpu::Cpu;
 use wgray_render::denoise::denoise;
-use wgray_render::film::Film;
 #[cfg(feature = "gpu")]
 use wgray_render::gpu::{self, Gpu, Rounding, compose::Shaders};
-use wgray_render::records::Packed;
 #[cfg(feature = "gpu")]
 use wgray_scene::Problem;
+use wgray_trace::film::Film;
+use wgray_trace::records::Packed;
 
 use crate::context::Context;
 use crate::device::{Device, DeviceInfo};

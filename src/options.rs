@@ -1,11 +1,11 @@
 //! The options of a render.
 
 use wgray_image::Region;
-use wgray_render::film::FilmLayout;
 use wgray_render::output::{Aov, AovSource};
 use wgray_render::pack::pack;
-use wgray_render::records::Packed;
 use wgray_scene::{Problem, Scene};
+use wgray_trace::film::FilmLayout;
+use wgray_trace::records::Packed;
 
 use crate::device::Device;
 

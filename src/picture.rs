@@ -7,10 +7,10 @@ use crate::device::DeviceInfo;
 use crate::error::{Error, RenderError};
 use crate::image::{self, Aov, Band, Format, Layout, Output, Pending, Pixels, SaveOptions, Target};
 use wgray_image::Region;
-use wgray_render::film::Film;
 use wgray_render::noise::{Noise, NoiseMeter};
 use wgray_render::output::channels_of;
-use wgray_render::records::FirstHit;
+use wgray_trace::film::Film;
+use wgray_trace::records::FirstHit;
 
 /// A rendered image, or a region of one: linear radiance and additional layers (AOVs).
 #[derive(Clone, Debug, PartialEq)]

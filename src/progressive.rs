@@ -5,10 +5,10 @@ use std::time::Duration;
 
 use wgray_render::backend::Backend;
 use wgray_render::denoise::denoise;
-use wgray_render::film::{Film, FilmLayout};
 use wgray_render::job::{Bands, Flow, NoCheckpoint, Order, PassEnds, WorkSplit};
 use wgray_render::noise::{Noise, NoiseMeter, is_decision};
 use wgray_scene::Problem;
+use wgray_trace::film::{Film, FilmLayout};
 
 use crate::cancel::CancelToken;
 use crate::error::{Error, RenderError};

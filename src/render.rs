@@ -14,10 +14,10 @@ use crate::renderer::{OpenScene, Renderer, warnings};
 use wgray_image::Region;
 use wgray_render::backend::Backend;
 use wgray_render::denoise::{self, denoise};
-use wgray_render::film::{Film, FilmLayout};
 use wgray_render::job::{self, Bands, Flow, NoCheckpoint, Order, WorkSplit};
-use wgray_render::records::{FirstHit, Packed};
 use wgray_scene::Scene;
+use wgray_trace::film::{Film, FilmLayout};
+use wgray_trace::records::{FirstHit, Packed};
 
 /// Renders a scene. The image takes 16 bytes of memory per pixel, 80 more if it has alpha or layers that are averaged
 /// over samples, 32 or 64 more with noise estimates, without or with such layers, and 64 more with layers of first hits,

@@ -8,8 +8,8 @@ use tracing::warn;
 use wgray_image::panic_guard::catch_panic;
 use wgray_render::backend::Backend;
 use wgray_render::clock::Instant;
-use wgray_render::film::{Film, FilmLayout};
-use wgray_render::records::Packed;
+use wgray_trace::film::{Film, FilmLayout};
+use wgray_trace::records::Packed;
 
 use crate::context::Context;
 use crate::device::{Device, DeviceInfo};

@@ -8,8 +8,8 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::time::Duration;
 
 use wgray_render::pack::{self, PackedShading};
-use wgray_render::records::Packed;
 use wgray_scene::{Camera, Scene};
+use wgray_trace::records::Packed;
 
 use crate::cancel::CancelToken;
 use crate::context::Context;

@@ -2,7 +2,7 @@
 
 use glam::{DVec2, DVec3};
 use wgray::scene::{Description, Pattern, SamplesDescription};
-use wgray_render::records::{FirstHit, NO_INDEX};
+use wgray_trace::records::{FirstHit, NO_INDEX};
 
 use crate::oracle::{Flaw, Intersection, Oracle};
 use crate::pictures::{both, first_hits, means, render};

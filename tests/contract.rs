@@ -8,8 +8,8 @@ use wgray::scene::{AdaptiveDescription, Description};
 use wgray_image::Region;
 use wgray_render::backend::Backend;
 use wgray_render::cpu::Cpu;
-use wgray_render::film::Film;
-use wgray_render::records::{FirstHit, Packed};
+use wgray_trace::film::Film;
+use wgray_trace::records::{FirstHit, Packed};
 
 use crate::pictures::{backend, exact_modes};
 use crate::{patterns, scenes};

@@ -8,7 +8,7 @@ use std::process::Command;
 use wgray::scene::Scene;
 use wgray_render::gpu::{Forms, check_kernels};
 use wgray_render::pack::pack;
-use wgray_render::records::Packed;
+use wgray_trace::records::Packed;
 
 use crate::sources;
 

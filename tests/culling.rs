@@ -3,9 +3,9 @@
 use glam::{UVec2, Vec3};
 use proptest::strategy::{Strategy, ValueTree};
 use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
-use wgray_render::cpu::ray::vector_to_local;
-use wgray_render::cpu::shadow::{SampleBlock, light_frustum, may_block, occlusion_mask};
-use wgray_render::records::{ENVIRONMENT, Packed, RANDOM, Sphere};
+use wgray_trace::cpu::ray::vector_to_local;
+use wgray_trace::cpu::shadow::{SampleBlock, light_frustum, may_block, occlusion_mask};
+use wgray_trace::records::{ENVIRONMENT, Packed, RANDOM, Sphere};
 
 use crate::random::Random;
 use crate::random_scenes::any_scene;

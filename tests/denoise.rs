@@ -6,8 +6,8 @@ use wgray::scene::{Overrides, Scene};
 use wgray::{Aov, CancelToken, ChannelValues, Context, Device, Options, Pixels, Session};
 use wgray_image::Region;
 use wgray_render::denoise::denoise;
-use wgray_render::film::FilmLayout;
 use wgray_render::gpu::{self, Rounding};
+use wgray_trace::film::FilmLayout;
 
 use crate::adapter;
 use crate::layers::{SCENE, scene_with};

@@ -4,10 +4,10 @@
 
 use glam::DVec3;
 use wgray::scene::Description;
-use wgray_render::cpu::camera::camera_ray;
-use wgray_render::cpu::geometry::closest_hit;
-use wgray_render::cpu::surface::surface_at;
-use wgray_render::records::{NO_INDEX, NO_PRIMITIVE};
+use wgray_trace::cpu::camera::camera_ray;
+use wgray_trace::cpu::geometry::closest_hit;
+use wgray_trace::cpu::surface::surface_at;
+use wgray_trace::records::{NO_INDEX, NO_PRIMITIVE};
 
 use crate::oracle::{Flaw, Oracle};
 use crate::pictures::{differing, exact_modes, means, reference, render};

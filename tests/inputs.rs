@@ -5,22 +5,22 @@
 
 use bytemuck::Zeroable as _;
 use glam::{DMat3, DVec2, DVec3, UVec2, UVec4, Vec2, Vec3, Vec4};
-use wgray_render::bvh::{Aabb, build};
-use wgray_render::cpu::differential::{Derivative, Differential, HitDifferential};
-use wgray_render::cpu::diffuse::Angles;
-use wgray_render::cpu::footprint::Footprint;
-use wgray_render::cpu::light::LightSegments;
-use wgray_render::cpu::mesh::{HitPrimitive, face_primitive, shear_of};
-use wgray_render::cpu::path::Path;
-use wgray_render::cpu::phong::Lobes;
-use wgray_render::cpu::primitive::Tangents;
-use wgray_render::cpu::principled::{PrincipledLobes, principled_mixture};
-use wgray_render::cpu::ray::{Hit, Ray};
-use wgray_render::cpu::shadow::{SampleBlock, light_frustum};
-use wgray_render::cpu::slab::{ray_interval, slabs};
-use wgray_render::cpu::surface::Surface;
 use wgray_render::gpu::naga::{Handle, Module, ScalarKind, Type};
-use wgray_render::records::{
+use wgray_trace::bvh::{Aabb, build};
+use wgray_trace::cpu::differential::{Derivative, Differential, HitDifferential};
+use wgray_trace::cpu::diffuse::Angles;
+use wgray_trace::cpu::footprint::Footprint;
+use wgray_trace::cpu::light::LightSegments;
+use wgray_trace::cpu::mesh::{HitPrimitive, face_primitive, shear_of};
+use wgray_trace::cpu::path::Path;
+use wgray_trace::cpu::phong::Lobes;
+use wgray_trace::cpu::primitive::Tangents;
+use wgray_trace::cpu::principled::{PrincipledLobes, principled_mixture};
+use wgray_trace::cpu::ray::{Hit, Ray};
+use wgray_trace::cpu::shadow::{SampleBlock, light_frustum};
+use wgray_trace::cpu::slab::{ray_interval, slabs};
+use wgray_trace::cpu::surface::Surface;
+use wgray_trace::records::{
     BOX_PAD, CYLINDER, Camera, DISK, ELLIPSOID, INFINITE_T, Instance, KINDS, Light, LightNode, MIN_SHEEN_ROUGHNESS,
     Material, NO_INDEX, NO_PRIMITIVE, Node, PRIMITIVE_KINDS, Primitive, RECTANGLE, SMALLEST_ALPHA, Sphere, TRIANGLE,
     Texture,
@@ -128,7 +128,7 @@ struct Face {
     barycentric: DVec2,
     origin: DVec3,
     direction: DVec3,
-    /// The rays of a [`RayInterval`](wgray_render::cpu::slab::RayInterval) have directions within `direction_spread` of
+    /// The rays of a [`RayInterval`](wgray_trace::cpu::slab::RayInterval) have directions within `direction_spread` of
     /// `direction`, per component.
     direction_spread: DVec3,
 }

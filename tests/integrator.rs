@@ -3,15 +3,15 @@
 //! random ray near the normal leaves the scene.
 
 use glam::{UVec2, Vec3, Vec4};
-use wgray_render::cpu::camera::camera_ray;
-use wgray_render::cpu::geometry::{closest_hit, fetch_hit_primitive, material_of, occluded_samples, surface_of};
-use wgray_render::cpu::light::{segment, segments_to_light};
-use wgray_render::cpu::math::{dot, normalize};
-use wgray_render::cpu::ray::Ray;
-use wgray_render::cpu::rng::unit_float;
-use wgray_render::cpu::sampling::{decision_bits, sample_key, sample_square};
-use wgray_render::cpu::shadow::SampleBlock;
-use wgray_render::records::{NO_INDEX, NO_PRIMITIVE, Packed, RANDOM};
+use wgray_trace::cpu::camera::camera_ray;
+use wgray_trace::cpu::geometry::{closest_hit, fetch_hit_primitive, material_of, occluded_samples, surface_of};
+use wgray_trace::cpu::light::{segment, segments_to_light};
+use wgray_trace::cpu::math::{dot, normalize};
+use wgray_trace::cpu::ray::Ray;
+use wgray_trace::cpu::rng::unit_float;
+use wgray_trace::cpu::sampling::{decision_bits, sample_key, sample_square};
+use wgray_trace::cpu::shadow::SampleBlock;
+use wgray_trace::records::{NO_INDEX, NO_PRIMITIVE, Packed, RANDOM};
 
 use crate::pictures::{RenderMode, differing, exact_modes, reference, render_with};
 use crate::{scenes, sources};

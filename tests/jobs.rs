@@ -9,13 +9,13 @@ use wgray::error::RenderError;
 use wgray_image::Region;
 use wgray_render::backend::Backend;
 use wgray_render::cpu::Cpu;
-use wgray_render::film::Film;
 use wgray_render::job::checkpoint::{Checkpoint, CheckpointError, CheckpointOptions};
 use wgray_render::job::{
     Bands, CheckpointStore, FilmPiece, Flow, Identity, NoCheckpoint, Order, PassEnds, StoredPiece, Tile, WorkSplit,
 };
 use wgray_render::noise::next_decision;
-use wgray_render::records::Packed;
+use wgray_trace::film::Film;
+use wgray_trace::records::Packed;
 
 use crate::contract::{bits, subjects};
 use crate::pictures::{self, RenderMode, whole};

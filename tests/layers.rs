@@ -4,10 +4,10 @@ use glam::{Vec3, Vec4};
 use wgray::scene::ViewSettings;
 use wgray::{Aov, ChannelValues, Description, Device, Options, Picture};
 use wgray_image::Region;
-use wgray_render::film::{Film, FilmLayout, Layer};
 use wgray_render::gpu::{Gpu, Options as GpuOptions};
 use wgray_render::job::WorkSplit;
-use wgray_render::records::Packed;
+use wgray_trace::film::{Film, FilmLayout, Layer};
+use wgray_trace::records::Packed;
 
 use crate::pictures::{RenderMode, backend, crop, differing, exact_modes, film, first_hits, reference, render, whole};
 use crate::scenes::parse;
@@ -359,7 +359,7 @@ fn alpha_is_the_fraction_of_samples_that_hit() {
             // Colors are premultiplied; the environment is invisible.
             let color = Vec3::new(0.5, 0.25, 4.0) * coverage;
             assert_eq!(
-                Vec3::from(wgray_render::film::mean(film.sums[i])),
+                Vec3::from(wgray_trace::film::mean(film.sums[i])),
                 color,
                 "{center:?}, pixel {i}"
             );

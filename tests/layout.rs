@@ -1,9 +1,9 @@
-//! Records, constants and overrides of `crates/render/src/records/`, compared with the WGSL that naga parses.
+//! Records, constants and overrides of `crates/trace/src/records/`, compared with the WGSL that naga parses.
 
 use wgray_render::gpu::compose::{KERNELS, Source, built_in};
 use wgray_render::gpu::naga::proc::Layouter;
 use wgray_render::gpu::naga::{Expression, Literal, Module, TypeInner};
-use wgray_render::records::{
+use wgray_trace::records::{
     BvhItem, Camera, Counts, DenoiseParams, DispatchParams, Emitter, Environment, FirstHit, Instance, Light, LightNode,
     Lookup, Material, Node, Primitive, Record, Specialization, Sphere, Texture,
 };
@@ -68,7 +68,7 @@ fn records_have_the_same_layout_in_wgsl_and_rust() {
         name_and_size::<DispatchParams>(),
         name_and_size::<DenoiseParams>(),
     ];
-    let declared = wgray_render::records::declarations().matches("struct ").count();
+    let declared = wgray_trace::records::declarations().matches("struct ").count();
     assert_eq!(records.len(), declared, "some records are not compared");
     for record in records {
         assert_eq!(layout_problems(&module, record), Vec::<String>::new());
@@ -107,11 +107,11 @@ fn constants_match_in_wgsl_and_rust() {
     assert_eq!(value("INFINITE_T"), f32::MAX.to_bits());
     assert_eq!(
         value("EFFECTIVE_SAMPLES_PER_MULTIPLE"),
-        wgray_render::records::EFFECTIVE_SAMPLES_PER_MULTIPLE.to_bits()
+        wgray_trace::records::EFFECTIVE_SAMPLES_PER_MULTIPLE.to_bits()
     );
     assert_eq!(value("NO_INDEX"), u32::MAX);
-    assert_eq!(value("PLANE"), wgray_render::records::PLANE);
-    assert_eq!(value("FOR_NORMAL"), wgray_render::records::FOR_NORMAL);
+    assert_eq!(value("PLANE"), wgray_trace::records::PLANE);
+    assert_eq!(value("FOR_NORMAL"), wgray_trace::records::FOR_NORMAL);
 }
 
 #[test]

@@ -2,10 +2,10 @@
 
 use glam::{Vec2, Vec3};
 use wgray::Scene;
-use wgray_render::cpu::camera::camera_ray;
-use wgray_render::cpu::lens::{lens_ray, lens_sample};
-use wgray_render::cpu::sequence::sobol_sample;
-use wgray_render::records::Packed;
+use wgray_trace::cpu::camera::camera_ray;
+use wgray_trace::cpu::lens::{lens_ray, lens_sample};
+use wgray_trace::cpu::sequence::sobol_sample;
+use wgray_trace::records::Packed;
 
 use crate::pictures::{both, differing, exact_modes, means, render};
 use crate::scenes::{self, parse};
@@ -214,7 +214,7 @@ fn lens_samples_are_stratified_and_independent_of_pixel_samples() {
         let mut lens_counts = [0; 4];
         for sample in 0..16 {
             let pixel = glam::UVec2::new(pixel, 9);
-            let ray = wgray_render::cpu::pixel::camera_sample(&packed, pixel, sample).ray;
+            let ray = wgray_trace::cpu::pixel::camera_sample(&packed, pixel, sample).ray;
             let lens = ray.origin / packed.camera.lens_u.length();
             let image_point =
                 (ray.direction / ray.direction.y + ray.origin * packed.camera.inverse_focus) * pixels_per_unit() as f32;

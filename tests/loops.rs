@@ -3,10 +3,10 @@
 
 use wgray::error::RenderError;
 use wgray::scene::{AdaptiveDescription, Description, Pattern, PlaneDescription, ShapeDescription, SphereDescription};
-use wgray_render::film::Film;
 use wgray_render::gpu::compose::Shaders;
 use wgray_render::job::{self, WorkSplit};
-use wgray_render::records::Packed;
+use wgray_trace::film::Film;
+use wgray_trace::records::Packed;
 
 use crate::pictures::{RenderMode, backend_with, differing, exact_modes, reference, render, whole};
 use crate::sources::{self, edited, edited_shaders, with};

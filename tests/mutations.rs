@@ -40,7 +40,7 @@ fn every_mutation_is_applicable() {
     let table = fs::read_to_string(sources::path("scripts/mutation/twins.toml")).unwrap();
     let read = |name: &str| {
         let path = match name.strip_suffix(".rust") {
-            Some(twin) => format!("crates/render/src/cpu/{twin}.rs"),
+            Some(twin) => format!("crates/trace/src/cpu/{twin}.rs"),
             None => format!("shaders/{name}"),
         };
         fs::read_to_string(sources::path(&path)).unwrap()

@@ -3,8 +3,8 @@
 
 use std::fmt;
 
-use wgray_render::film::Film;
-use wgray_render::records::Packed;
+use wgray_trace::film::Film;
+use wgray_trace::records::Packed;
 
 /// Maximum error of a pixel, relative to the largest channel of the pixel, because procedural patterns subtract nearly
 /// equal integrals in dark channels.

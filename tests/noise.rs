@@ -4,10 +4,10 @@ use glam::{DVec4, UVec2, Vec3, Vec4};
 use wgray::scene::{Overrides, Scene};
 use wgray::{Aov, CancelToken, ChannelValues, Context, Device, Options, Picture, Session, Status};
 use wgray_image::Region;
-use wgray_render::cpu::pixel::pixel_radiance;
-use wgray_render::film::{Film, FilmLayout, Half, Layer};
 use wgray_render::job::WorkSplit;
-use wgray_render::records::Packed;
+use wgray_trace::cpu::pixel::pixel_radiance;
+use wgray_trace::film::{Film, FilmLayout, Half, Layer};
+use wgray_trace::records::Packed;
 
 use crate::layers::{ADAPTIVE, SCENE, scene_with};
 use crate::pictures::{backend, crop, differing, exact_modes, film, reference, render, whole};

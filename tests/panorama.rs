@@ -3,9 +3,9 @@
 use glam::{DVec3, Vec2, Vec3};
 use wgray::Scene;
 use wgray_image::Region;
-use wgray_render::cpu::panorama::{panorama_differential, panorama_ray};
 use wgray_render::job::WorkSplit;
-use wgray_render::records::{NO_INDEX, Packed};
+use wgray_trace::cpu::panorama::{panorama_differential, panorama_ray};
+use wgray_trace::records::{NO_INDEX, Packed};
 
 use crate::pictures::{backend, both, crop, differing, film, first_hits, means, render};
 use crate::scenes::parse;

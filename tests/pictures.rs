@@ -4,11 +4,11 @@ use glam::Vec4;
 use wgray_image::Region;
 use wgray_render::backend::Backend;
 use wgray_render::cpu::Cpu;
-use wgray_render::film::Film;
 use wgray_render::gpu::compose::Shaders;
 use wgray_render::gpu::{Gpu, Options, Rounding};
 use wgray_render::job::WorkSplit;
-use wgray_render::records::{FirstHit, Packed};
+use wgray_trace::film::Film;
+use wgray_trace::records::{FirstHit, Packed};
 
 use crate::{adapter, sources};
 

@@ -1,25 +1,25 @@
 //! Values as 32-bit words for kernels: one word per scalar, in field order.
 
 use glam::{IVec2, UVec2, UVec3, UVec4, Vec2, Vec3, Vec4};
-use wgray_render::cpu::dielectric::DielectricSample;
-use wgray_render::cpu::differential::{Derivative, Differential, HitDifferential};
-use wgray_render::cpu::diffuse::Angles;
-use wgray_render::cpu::equirect::EnvironmentCell;
-use wgray_render::cpu::footprint::{Ellipse, Footprint};
-use wgray_render::cpu::light::LightSegments;
-use wgray_render::cpu::light_sample::{CylinderPart, CylinderPoint};
-use wgray_render::cpu::lobe::LobeSample;
-use wgray_render::cpu::mesh::{Crossing, HitPrimitive, Shear};
-use wgray_render::cpu::modified_phong::PhongFactors;
-use wgray_render::cpu::path::{Path, SpecularSplit};
-use wgray_render::cpu::phong::Lobes;
-use wgray_render::cpu::primitive::Tangents;
-use wgray_render::cpu::principled::PrincipledLobes;
-use wgray_render::cpu::ray::{Hit, Ray};
-use wgray_render::cpu::shadow::{SampleBlock, ShadowFrustum};
-use wgray_render::cpu::slab::{RayInterval, Slabs};
-use wgray_render::cpu::surface::Surface;
-use wgray_render::records::{
+use wgray_trace::cpu::dielectric::DielectricSample;
+use wgray_trace::cpu::differential::{Derivative, Differential, HitDifferential};
+use wgray_trace::cpu::diffuse::Angles;
+use wgray_trace::cpu::equirect::EnvironmentCell;
+use wgray_trace::cpu::footprint::{Ellipse, Footprint};
+use wgray_trace::cpu::light::LightSegments;
+use wgray_trace::cpu::light_sample::{CylinderPart, CylinderPoint};
+use wgray_trace::cpu::lobe::LobeSample;
+use wgray_trace::cpu::mesh::{Crossing, HitPrimitive, Shear};
+use wgray_trace::cpu::modified_phong::PhongFactors;
+use wgray_trace::cpu::path::{Path, SpecularSplit};
+use wgray_trace::cpu::phong::Lobes;
+use wgray_trace::cpu::primitive::Tangents;
+use wgray_trace::cpu::principled::PrincipledLobes;
+use wgray_trace::cpu::ray::{Hit, Ray};
+use wgray_trace::cpu::shadow::{SampleBlock, ShadowFrustum};
+use wgray_trace::cpu::slab::{RayInterval, Slabs};
+use wgray_trace::cpu::surface::Surface;
+use wgray_trace::records::{
     Camera, Environment, FirstHit, Instance, Light, LightNode, Material, Node, Primitive, Sphere, Texture,
 };
 
@@ -81,7 +81,7 @@ pod![
     Instance
 ];
 
-/// Records of `crates/render/src/cpu/`. If a field is missing here, the code does not compile.
+/// Records of `crates/trace/src/cpu/`. If a field is missing here, the code does not compile.
 macro_rules! records {
     ($($ty:ident { $($field:ident),* $(,)? })*) => {$(
         impl ProbeWords for $ty {

@@ -1,125 +1,125 @@
 //! Compares every shared function on GPU and CPU, bit for bit, for thousands of inputs.
 
 use glam::{UVec2, UVec3, UVec4, Vec2, Vec3, Vec4};
-use wgray_render::cpu::adaptive::{
+use wgray_render::gpu::Device;
+use wgray_render::gpu::naga::ScalarKind;
+use wgray_trace::cpu::adaptive::{
     display_slope_squared, display_variance, layer_mean, layer_moments_with, mean_of, moments_with, pilot_add,
     pilot_finish, proportional_samples, samples_wanted, squared_deviation, variance_of_mean,
 };
-use wgray_render::cpu::bvh_node::{
+use wgray_trace::cpu::bvh_node::{
     children_hit, children_in_interval, far_side, four_hit, four_in_interval, hit_bits, in_order, larger, leaf_items,
     octant_of, smaller, step_length, steps,
 };
-use wgray_render::cpu::camera::{camera_derivative, camera_differential, camera_ray, image_plane_offset};
-use wgray_render::cpu::cylinder::{
+use wgray_trace::cpu::camera::{camera_derivative, camera_differential, camera_ray, image_plane_offset};
+use wgray_trace::cpu::cylinder::{
     cap_side, cylinder_bitangent, cylinder_gradient, cylinder_gradient_derivative, cylinder_height, cylinder_interval,
     cylinder_levels, cylinder_occludes, cylinder_tangent, cylinder_uv, cylinder_uv_derivative, intersect_cylinder,
     is_on_cap,
 };
-use wgray_render::cpu::denoise::{color_distance, denoise_weight, feature_distance, noise_of};
-use wgray_render::cpu::dielectric::{DielectricSample, dielectric_sample, eta_of, refracts_inwards, transmittance};
-use wgray_render::cpu::differential::{
+use wgray_trace::cpu::denoise::{color_distance, denoise_weight, feature_distance, noise_of};
+use wgray_trace::cpu::dielectric::{DielectricSample, dielectric_sample, eta_of, refracts_inwards, transmittance};
+use wgray_trace::cpu::differential::{
     Derivative, Differential, HitDifferential, normal_derivative, primitive_hit_differential, reflected_derivative,
     reflected_differential, refracted_derivative, refracted_differential, transferred,
 };
-use wgray_render::cpu::diffuse::{
+use wgray_trace::cpu::diffuse::{
     Angles, albedo_growth, angles_at, diffuse_eval, diffuse_pdf, diffuse_sample, rough_diffuse_eval,
 };
-use wgray_render::cpu::disk::{disk_occludes, intersect_disk};
-use wgray_render::cpu::ellipsoid::{
+use wgray_trace::cpu::disk::{disk_occludes, intersect_disk};
+use wgray_trace::cpu::ellipsoid::{
     ellipsoid_discriminant, ellipsoid_level, ellipsoid_occludes, intersect_ellipsoid, longitude,
 };
-use wgray_render::cpu::equirect::{
+use wgray_trace::cpu::equirect::{
     EnvironmentCell, cap_above, cell_towards, column_after, direction_in_cell, normal_bin,
 };
-use wgray_render::cpu::filter::{filter_bin, filter_offset};
-use wgray_render::cpu::footprint::{
+use wgray_trace::cpu::filter::{filter_bin, filter_offset};
+use wgray_trace::cpu::footprint::{
     Ellipse, Footprint, footprint_ellipse, surface_footprint, texture_footprint, wrap_u, wrap_v,
 };
-use wgray_render::cpu::ggx::{
+use wgray_trace::cpu::ggx::{
     ggx_albedo, ggx_albedo_along, ggx_albedo_fit, ggx_d, ggx_g1, ggx_g2, ggx_length, ggx_pdf, ggx_sample,
 };
-use wgray_render::cpu::lens::{circle_point, lens_ray, lens_sample, polygon_sample};
-use wgray_render::cpu::light::{LightSegments, segment, segments_to_light, segments_to_local, spot_falloff};
-use wgray_render::cpu::light_sample::{
+use wgray_trace::cpu::lens::{circle_point, lens_ray, lens_sample, polygon_sample};
+use wgray_trace::cpu::light::{LightSegments, segment, segments_to_light, segments_to_local, spot_falloff};
+use wgray_trace::cpu::light_sample::{
     CylinderPart, CylinderPoint, cylinder_height_ratio, cylinder_part, cylinder_sample, cylinder_share, ellipsoid_area,
     ellipsoid_cap, ellipsoid_pdf, ellipsoid_sample, power_heuristic, solid_angle_pdf, uniform_below,
 };
-use wgray_render::cpu::light_tree::{light_child, light_importances, light_shares, mean_above};
-use wgray_render::cpu::lobe::{
+use wgray_trace::cpu::light_tree::{light_child, light_importances, light_shares, mean_above};
+use wgray_trace::cpu::lobe::{
     LobeSample, aniso_table_position, direction_turn, facet_alpha, facet_eval, facet_loss, facet_pdf, facet_weight,
     half_vector, is_polished, lobe_frame, plain_alpha, vector_from_lobe, vector_to_lobe,
 };
-use wgray_render::cpu::math::{
+use wgray_trace::cpu::math::{
     atan2, cross, dot, exp2, floor, log2, max, max4, min, normalize, positive_zero, power, power_whole, sine,
 };
-use wgray_render::cpu::mesh::{
+use wgray_trace::cpu::mesh::{
     Crossing, HitPrimitive, Shear, color_between, face_direction_allowed, face_first_hit, face_footprint, face_frame,
     face_hit_differential, face_normal, face_normal_derivative, face_primitive, face_surface, face_tangents,
     face_terminator_offset, face_uv, face_uv_derivative, flipped_to, highest, lift, lowest, mesh_pad, normal_from_mesh,
     permuted, point_to_mesh, shear_of, sheared, standalone_hit_primitive, triangle_crossing, vector_from_mesh,
     vector_to_mesh,
 };
-use wgray_render::cpu::metal::{conductor_fresnel, metal_eval, metal_factor, metal_fresnel, metal_pdf, metal_sample};
-use wgray_render::cpu::modified_phong::{
+use wgray_trace::cpu::metal::{conductor_fresnel, metal_eval, metal_factor, metal_fresnel, metal_pdf, metal_sample};
+use wgray_trace::cpu::modified_phong::{
     PhongFactors, modified_phong_eval, modified_phong_pdf, modified_phong_sample, phong_factors, phong_lobe,
 };
-use wgray_render::cpu::normal_map::mapped_normal;
-use wgray_render::cpu::panorama::{panorama_angles, panorama_differential, panorama_ray};
-use wgray_render::cpu::path::{
+use wgray_trace::cpu::normal_map::mapped_normal;
+use wgray_trace::cpu::panorama::{panorama_angles, panorama_differential, panorama_ray};
+use wgray_trace::cpu::path::{
     Path, SpecularSplit, glass_path, is_specular, is_usable, mirrored_path, pass_through_path, reflected_path,
     refracted_path, usable_normal,
 };
-use wgray_render::cpu::phong::{Lobes, is_lit, phong_block, phong_lobes, phong_power, unlit_mask};
-use wgray_render::cpu::plane::{intersect_plane, plane_occludes};
-use wgray_render::cpu::primitive::{
+use wgray_trace::cpu::phong::{Lobes, is_lit, phong_block, phong_lobes, phong_power, unlit_mask};
+use wgray_trace::cpu::plane::{intersect_plane, plane_occludes};
+use wgray_trace::cpu::primitive::{
     Tangents, intersect, is_centered, is_solid, local_tangents, occludes, primitive_gradient, primitive_height,
     primitive_normal, primitive_uv, solid_gradient, solid_gradient_derivative, solid_levels, uv_derivative,
 };
-use wgray_render::cpu::principled::{
+use wgray_trace::cpu::principled::{
     PrincipledLobes, bounded_color, coat_eval, evaluated_sample, facets_eval, glass_eval, glass_fresnel, glass_pdf,
     glass_probability, half_between, is_flat, luminance, mirrored_pdf, principled_direction, principled_eval,
     principled_mixture, principled_pdf, principled_sample, refracting_density, refracting_half, schlick, sheen_albedo,
     sheen_lobe, sheen_probability, to_frame_around, transmits_straight,
 };
-use wgray_render::cpu::procedural::{
+use wgray_trace::cpu::procedural::{
     edge_integral, far_product, nearest_step, phase, procedural_share, product_integral, sine_ratio, wave_integral,
     wave_integral_2, wave_mean, wave_value, widened_edge,
 };
-use wgray_render::cpu::ray::{
+use wgray_trace::cpu::ray::{
     Hit, Ray, closer, crosses_plane, nearer_hit, no_hit, plane_distance, point_to_local, scaled_crossing,
     standalone_prim, vector_to_local, vector_to_world,
 };
-use wgray_render::cpu::rectangle::{intersect_rectangle, rectangle_occludes};
-use wgray_render::cpu::rng::{hash4, unit_float};
-use wgray_render::cpu::rough_dielectric::{
+use wgray_trace::cpu::rectangle::{intersect_rectangle, rectangle_occludes};
+use wgray_trace::cpu::rng::{hash4, unit_float};
+use wgray_trace::cpu::rough_dielectric::{
     dielectric_gain, refracting_normal, rough_dielectric_eval, rough_dielectric_pdf, rough_dielectric_sample,
 };
-use wgray_render::cpu::sampling::{
+use wgray_trace::cpu::sampling::{
     decision_bits, grid_sample, jittered_sample, random_sample, rotated_grid_sample, sample_key, sample_square, wrap,
 };
-use wgray_render::cpu::sequence::{
+use wgray_trace::cpu::sequence::{
     halton_sample, radical_inverse_3, scramble, shuffled_index, sobol_bits, sobol_reversed, sobol_sample,
 };
-use wgray_render::cpu::shadow::{
+use wgray_trace::cpu::shadow::{
     SampleBlock, ShadowFrustum, block_sample, light_frustum, may_block, occludes_segment, occlusion_mask,
 };
-use wgray_render::cpu::slab::{
+use wgray_trace::cpu::slab::{
     RayInterval, Slabs, box_interval, interval_hits, inverse_of, ray_interval, ray_interval_box, slabs,
 };
-use wgray_render::cpu::solid::{interval_occludes, levels_on_surface, nearest_end};
-use wgray_render::cpu::specular::{fresnel, reflected_direction, refracted_cosine, refracted_direction};
-use wgray_render::cpu::surface::{Surface, first_hit, largest, surface_at, with_coordinates, with_positive_zeros};
-use wgray_render::cpu::texel::{
+use wgray_trace::cpu::solid::{interval_occludes, levels_on_surface, nearest_end};
+use wgray_trace::cpu::specular::{fresnel, reflected_direction, refracted_cosine, refracted_direction};
+use wgray_trace::cpu::surface::{Surface, first_hit, largest, surface_at, with_coordinates, with_positive_zeros};
+use wgray_trace::cpu::texel::{
     gaussian_weight, level_size, near_coordinate, srgb_to_linear, unpacked_color, wrapped_index,
 };
-use wgray_render::cpu::thin::{thin_eval, thin_pdf, thin_reflectance, thin_sample, to_upper_side};
-use wgray_render::cpu::triangle::{intersect_triangle, triangle_occludes};
-use wgray_render::cpu::warp::{
+use wgray_trace::cpu::thin::{thin_eval, thin_pdf, thin_reflectance, thin_sample, to_upper_side};
+use wgray_trace::cpu::triangle::{intersect_triangle, triangle_occludes};
+use wgray_trace::cpu::warp::{
     cap_sample, disk_sample, frame_around, hemisphere_sample, triangle_sample, vector_around,
 };
-use wgray_render::gpu::Device;
-use wgray_render::gpu::naga::ScalarKind;
-use wgray_render::records::{
+use wgray_trace::records::{
     Camera, FirstHit, Instance, Light, LightNode, Material, NO_INDEX, Node, Primitive, Sphere, Texture,
 };
 

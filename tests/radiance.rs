@@ -1,7 +1,7 @@
 //! Images with closed-form radiance.
 
-use wgray_render::film::Film;
-use wgray_render::records::Packed;
+use wgray_trace::film::Film;
+use wgray_trace::records::Packed;
 
 use crate::pictures::{both, render};
 use crate::scenes::parse;

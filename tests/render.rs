@@ -7,9 +7,9 @@ use rayon::prelude::*;
 use wgray::scene::{Description, Integrator, Pattern};
 use wgray_image::Region;
 use wgray_render::backend::Backend;
-use wgray_render::film::Film;
 use wgray_render::job::WorkSplit;
-use wgray_render::records::{FirstHit, Packed};
+use wgray_trace::film::Film;
+use wgray_trace::records::{FirstHit, Packed};
 
 use crate::adapter::{self, KNOWN_DIFFERENCES, allowed, bit_exact, judge};
 use crate::nearly::{FilmDifference, MAX_OUTLIER_FRACTION};

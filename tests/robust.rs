@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 use wgray::scene::{CameraDescription, Description, LightDescription, ShapeDescription};
-use wgray_render::film::Film;
+use wgray_trace::film::Film;
 
 use crate::oracle::{Flaw, Oracle};
 use crate::pictures::reference;

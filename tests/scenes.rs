@@ -4,7 +4,7 @@ use std::fs;
 
 use wgray::scene::{Assets, Description};
 use wgray_render::pack::pack;
-use wgray_render::records::Packed;
+use wgray_trace::records::Packed;
 
 use crate::sources;
 

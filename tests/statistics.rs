@@ -3,7 +3,7 @@
 
 use glam::Vec2;
 use wgray::scene::Pattern;
-use wgray_render::records::Packed;
+use wgray_trace::records::Packed;
 
 use crate::kernel::functions;
 use crate::pictures::{means, reference};

@@ -10,9 +10,10 @@ use syn::{Attribute, File, Item, ItemMacro, ItemMod, ItemUse, Macro, UseTree, Vi
 use crate::sources;
 
 /// Folders of the checked modules, each with the path of its parent module.
-const FOLDERS: [(&str, &[&str]); 6] = [
+const FOLDERS: [(&str, &[&str]); 7] = [
     ("crates/image/src", &[]),
     ("crates/scene/src", &[]),
+    ("crates/trace/src", &[]),
     ("crates/render/src", &[]),
     ("crates/dev/src", &[]),
     ("src", &[]),

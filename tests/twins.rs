@@ -7,7 +7,7 @@ use wgray::scene::Integrator;
 use wgray_render::gpu::compose::{KERNELS, Kernel, RENDER, SHARED, Source, built_in};
 use wgray_render::gpu::spirv::instructions;
 use wgray_render::gpu::{FloatControls, Rounding, bake, check};
-use wgray_render::records::Packed;
+use wgray_trace::records::Packed;
 
 use crate::scenes;
 use crate::sources::{self, Signature, differences, parse, rust_functions, rust_records, shared_source};
@@ -40,14 +40,14 @@ const SHADERS_WITHOUT_TWIN: &[(&str, &str)] = &[
     ),
 ];
 
-/// Files in crates/render/src/cpu that are not twins of a shader.
+/// Files in crates/trace/src/cpu that are not twins of a shader.
 const RUST_FILES_WITHOUT_SHADER: &[&str] = &[
+    "accumulate.rs",
     "bits.rs",
     "decoded_bvhs.rs",
     "ewa.rs",
     "mod.rs",
     "prefetch.rs",
-    "renderer.rs",
     "integrators",
     "lanes",
     "lanes.rs",
@@ -181,7 +181,7 @@ fn is_shared(file: &str) -> bool {
 }
 
 fn twin_of(file: &str) -> syn::File {
-    sources::rust(&format!("crates/render/src/cpu/{}", file.replace(".wgsl", ".rs")))
+    sources::rust(&format!("crates/trace/src/cpu/{}", file.replace(".wgsl", ".rs")))
 }
 
 #[test]
@@ -212,7 +212,7 @@ fn functions_and_records_match() {
 fn a_changed_twin_is_detected() {
     let shared = shared_source();
     let edited_twin = |file: &str, from: &str, to: &str| {
-        let text = std::fs::read_to_string(sources::path(&format!("crates/render/src/cpu/{file}"))).expect("a twin");
+        let text = std::fs::read_to_string(sources::path(&format!("crates/trace/src/cpu/{file}"))).expect("a twin");
         assert!(text.contains(from), "{file}: '{from}' not found");
         syn::parse_file(&text.replacen(from, to, 1)).expect("still Rust")
     };
@@ -292,7 +292,7 @@ fn generic_signatures_have_wgsl_types() {
 
 #[test]
 fn every_rust_file_has_a_shader() {
-    for entry in std::fs::read_dir(sources::path("crates/render/src/cpu")).expect("the twins") {
+    for entry in std::fs::read_dir(sources::path("crates/trace/src/cpu")).expect("the twins") {
         let name = entry
             .expect("an entry")
             .file_name()
@@ -302,7 +302,7 @@ fn every_rust_file_has_a_shader() {
         let twin = built_in().any(|(file, _)| file == wgsl);
         assert!(
             twin || RUST_FILES_WITHOUT_SHADER.contains(&name.as_str()),
-            "crates/render/src/cpu/{name} is not the twin of a shader"
+            "crates/trace/src/cpu/{name} is not the twin of a shader"
         );
     }
 }

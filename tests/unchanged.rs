@@ -8,9 +8,9 @@ use std::path::PathBuf;
 
 use bytemuck::cast_slice;
 use wgray::scene::{Description, GltfChoice, Integrator, Overrides, Scene};
-use wgray_render::film::Film;
 use wgray_render::pack::pack;
-use wgray_render::records::{FirstHit, Packed};
+use wgray_trace::film::Film;
+use wgray_trace::records::{FirstHit, Packed};
 
 use crate::pictures::{RenderMode, first_hits, reference};
 use crate::random_scenes::any_scene;

@@ -7,11 +7,11 @@ use glam::{UVec2, Vec3, Vec4};
 use proptest::strategy::{Strategy as _, ValueTree as _};
 use proptest::test_runner::TestRunner;
 use wgray::scene::Integrator;
-use wgray_render::cpu::decoded_bvhs::{are_decoded, decode_bvhs, decode_bvhs_up_to};
-use wgray_render::cpu::integrators::path::{path_layers, path_value};
-use wgray_render::cpu::pixel::{Layers, pixel_radiance};
-use wgray_render::cpu::wavefront::{LaneHits, MaterialKind, SurfaceKind, Wavefront};
-use wgray_render::records::{
+use wgray_trace::cpu::decoded_bvhs::{are_decoded, decode_bvhs, decode_bvhs_up_to};
+use wgray_trace::cpu::integrators::path::{path_layers, path_value};
+use wgray_trace::cpu::pixel::{Layers, pixel_radiance};
+use wgray_trace::cpu::wavefront::{LaneHits, MaterialKind, SurfaceKind, Wavefront};
+use wgray_trace::records::{
     CULL_BACKFACE, CULL_BOTH_FACES, DIFFUSE, EMITTER, ENERGY_SIZE, GLASS, LOBE_ANISOTROPY, LOBE_COAT, LOBE_SHEEN,
     LOBE_SPECULAR, LOBE_TRANSMISSION, METAL, MIRROR, Material, NO_COLORS, NO_INDEX, OPAQUE, PRINCIPLED, Packed, RANDOM,
     ROUGH_GLASS, SOBOL, THIN,

@@ -48,7 +48,7 @@ fn encode_part(header: &Value, pieces: &[[u32; 14]], data: &[u8]) -> Vec<u8> {
 }
 
 /// Size of a first hit in bytes.
-const FIRST_HIT_BYTES: u64 = size_of::<wgray_render::records::FirstHit>() as u64;
+const FIRST_HIT_BYTES: u64 = size_of::<wgray_trace::records::FirstHit>() as u64;
 
 fuzz_target!(|bytes: &[u8]| {
     let mut choices = Choices(bytes);

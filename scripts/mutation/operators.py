@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Tests all mutations that cargo-mutants generates for crates/render/src/cpu, one at a time.
+"""Tests all mutations that cargo-mutants generates for crates/trace/src/cpu, one at a time.
 
 cargo-mutants would compile the project once per mutation, two thousand times. This script uses cargo-mutants only to
 list the mutations. It compiles all mutations into one binary, in which an environment variable selects one mutation.
@@ -64,7 +64,7 @@ class Mutation:
 
 def all_mutations():
     out = subprocess.run(
-        ["cargo", "mutants", "--list", "--json", "--file", "crates/render/src/cpu/**/*.rs"], cwd=ROOT, stdout=subprocess.PIPE, check=True
+        ["cargo", "mutants", "--list", "--json", "--file", "crates/trace/src/cpu/**/*.rs"], cwd=ROOT, stdout=subprocess.PIPE, check=True
     ).stdout
     text = {path: (ROOT / path).read_text() for path in {entry["file"] for entry in json.loads(out)}}
     return [Mutation(number, entry, text[entry["file"]]) for number, entry in enumerate(json.loads(out), 1)]

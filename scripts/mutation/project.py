@@ -52,7 +52,7 @@ def copy(folder):
             shutil.copytree(ROOT / name, folder / name)
         else:
             shutil.copy2(ROOT / name, folder / name)
-    lib = folder / "crates/render/src/lib.rs"
+    lib = folder / "crates/trace/src/lib.rs"
     lib.write_text(lib.read_text() + SWITCH)
 
 
@@ -66,14 +66,14 @@ def cargo(folder, *arguments):
 
 
 def build(folder):
-    """Builds the test binaries of a copy: `lib` from crates/render, and `main` from tests/main.rs."""
-    code, messages = cargo(folder, "test", "--release", "--no-run", "-p", "wgray", "-p", "wgray-render", "--lib", "--test", "main")
+    """Builds the test binaries of a copy: `lib` from crates/trace, and `main` from tests/main.rs."""
+    code, messages = cargo(folder, "test", "--release", "--no-run", "-p", "wgray", "-p", "wgray-trace", "--lib", "--test", "main")
     if code != 0:
         raise SystemExit("the copy of the project does not compile")
     binaries = {}
     for message in messages:
         if message.get("executable") and message.get("profile", {}).get("test"):
-            name = {"wgray_render": "lib"}.get(message["target"]["name"], message["target"]["name"])
+            name = {"wgray_trace": "lib"}.get(message["target"]["name"], message["target"]["name"])
             # cargo uses the same path for the binaries of all copies.
             binaries[name] = shutil.copy2(message["executable"], folder / f"tests-{name}")
     return binaries

@@ -55,7 +55,7 @@ def make_twins(all_mutations, folder):
     """Writes a copy of the project, with the twins' mutations. The number in WGRAY_MUTANT selects a mutation."""
     copy(folder)
     for file in sorted({m.file for m in all_mutations}):
-        path = folder / f"crates/render/src/cpu/{file}.rs"
+        path = folder / f"crates/trace/src/cpu/{file}.rs"
         text = path.read_text()
         in_file = [m for m in all_mutations if m.file == file]
         spans = sorted(((locate(text, m.rust[0], path), m) for m in in_file), key=lambda s: s[0], reverse=True)
@@ -95,7 +95,7 @@ def main():
     all_mutations = mutations()
     for m in all_mutations:
         locate((ROOT / f"shaders/{m.file}.wgsl").read_text(), m.wgsl[0], f"shaders/{m.file}.wgsl")
-        locate((ROOT / f"crates/render/src/cpu/{m.file}.rs").read_text(), m.rust[0], f"crates/render/src/cpu/{m.file}.rs")
+        locate((ROOT / f"crates/trace/src/cpu/{m.file}.rs").read_text(), m.rust[0], f"crates/trace/src/cpu/{m.file}.rs")
     if arguments.list:
         print("\n".join(map(str, all_mutations)))
         return 0

@@ -11,7 +11,7 @@ use wgray_image::sanitize::escape_control;
 #[cfg(feature = "gpu")]
 use wgray_render::gpu::{Forms, check_kernels, compose::Shaders};
 use wgray_render::pack::pack;
-use wgray_render::records::Packed;
+use wgray_trace::records::Packed;
 
 use super::log::{self, Level};
 use super::scene_options::SceneOptions;

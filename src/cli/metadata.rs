@@ -8,7 +8,7 @@ use crate::image::{Metadata, is_complete, read_metadata};
 use crate::scene::Scene;
 use wgray_render::job::hash_of_scene;
 use wgray_render::noise::Noise;
-use wgray_render::records::Packed;
+use wgray_trace::records::Packed;
 
 use super::numbers::significant;
 

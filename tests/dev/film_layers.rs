@@ -8,7 +8,7 @@ use wgray_image::Region;
 use wgray_render::backend::Backend as _;
 use wgray_render::cpu::Cpu;
 use wgray_render::denoise::denoise;
-use wgray_render::film::{Film, Layer};
+use wgray_trace::film::{Film, Layer};
 
 use super::running::{Files, KERNEL, RADIANCE, SCENE, TestSession};
 

@@ -11,12 +11,12 @@ use wgray::image::Pixels;
 use wgray::scene::{Overrides, Scene};
 use wgray_dev::{Content, Diagnostic, Frame, Listener, Session, Settings, Sources, State};
 use wgray_image::Region;
-use wgray_render::film::{Film, mean};
 use wgray_render::gpu::compose::{Shaders, built_in};
 use wgray_render::gpu::{AdapterChoice, Gpu, Options, choose};
 use wgray_render::job::{self, WorkSplit};
 use wgray_render::pack::pack;
-use wgray_render::records::Packed;
+use wgray_trace::film::{Film, mean};
+use wgray_trace::records::Packed;
 
 /// Timeout of all waits, long enough for a busy machine.
 pub const TIMEOUT: Duration = Duration::from_secs(40);

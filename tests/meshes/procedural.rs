@@ -8,7 +8,7 @@ use std::path::Path;
 use glam::DVec3;
 use wgray::scene::{Assets, Description};
 use wgray_render::pack::pack;
-use wgray_render::records::Packed;
+use wgray_trace::records::Packed;
 
 use crate::random::Random;
 

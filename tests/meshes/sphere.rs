@@ -1,8 +1,8 @@
 //! A sphere of 80,000 triangles: hits and shadows lie between its circumscribed and inscribed spheres.
 
 use glam::DVec3;
-use wgray_render::cpu::camera::camera_ray;
-use wgray_render::records::Packed;
+use wgray_trace::cpu::camera::camera_ray;
+use wgray_trace::records::Packed;
 
 use super::procedural::{TriangleMesh, scene};
 use crate::pictures::{RenderMode, first_hits, reference, render};

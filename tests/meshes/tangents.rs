@@ -4,14 +4,14 @@ use std::collections::HashMap;
 use std::f64::consts::TAU;
 
 use glam::{DMat3, DVec3, Vec2, Vec3};
-use wgray_render::cpu::differential::HitDifferential;
-use wgray_render::cpu::geometry::{fetch_hit_primitive, material_of, surface_of};
-use wgray_render::cpu::mesh::{HitPrimitive, face_frame, face_tangents, face_uv};
-use wgray_render::cpu::normal_map::mapped_normal;
-use wgray_render::cpu::primitive::Tangents;
-use wgray_render::cpu::ray::{Hit, Ray};
-use wgray_render::cpu::texture::evaluate_material;
-use wgray_render::records::{NO_INDEX, Packed};
+use wgray_trace::cpu::differential::HitDifferential;
+use wgray_trace::cpu::geometry::{fetch_hit_primitive, material_of, surface_of};
+use wgray_trace::cpu::mesh::{HitPrimitive, face_frame, face_tangents, face_uv};
+use wgray_trace::cpu::normal_map::mapped_normal;
+use wgray_trace::cpu::primitive::Tangents;
+use wgray_trace::cpu::ray::{Hit, Ray};
+use wgray_trace::cpu::texture::evaluate_material;
+use wgray_trace::records::{NO_INDEX, Packed};
 
 use super::procedural::{SCENE_START, Sheet, scene};
 use crate::pictures::reference;
@@ -145,7 +145,7 @@ fn normals(packed: &Packed, slot: usize, b: Vec2) -> [Vec3; 2] {
     let material = material_of(packed, &prim);
     let found = evaluate_material(packed, &prim, hit, material, surface, HitDifferential::default(), 1).normal;
     let Tangents { u, v } = face_tangents(&prim);
-    let triangle_surface = wgray_render::cpu::surface::Surface {
+    let triangle_surface = wgray_trace::cpu::surface::Surface {
         du: u,
         dv: v,
         ..surface

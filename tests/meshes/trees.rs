@@ -6,17 +6,17 @@ use std::sync::Arc;
 use glam::{UVec2, Vec3, Vec4Swizzles as _};
 use proptest::strategy::{Strategy as _, ValueTree as _};
 use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
-use wgray_render::bvh::{self, Aabb, DecodedOnce};
-use wgray_render::cpu::geometry::{closest_hit, occluded_samples};
-use wgray_render::cpu::light::{segment, segments_to_light};
-use wgray_render::cpu::linear_primitives::{closest_primitive, occluded_by_primitives};
-use wgray_render::cpu::mesh::{highest, lowest, mesh_pad, point_to_mesh, shear_of, triangle_crossing, vector_to_mesh};
-use wgray_render::cpu::primitive::intersect;
-use wgray_render::cpu::ray::{Hit, Ray, nearer_hit, no_hit, standalone_prim};
-use wgray_render::cpu::shadow::{SampleBlock, block_sample, occlusion_mask};
-use wgray_render::cpu::slab::{box_interval, interval_hits, slabs};
-use wgray_render::cpu::surface::{Surface, largest};
-use wgray_render::records::{
+use wgray_trace::bvh::{self, Aabb, DecodedOnce};
+use wgray_trace::cpu::geometry::{closest_hit, occluded_samples};
+use wgray_trace::cpu::light::{segment, segments_to_light};
+use wgray_trace::cpu::linear_primitives::{closest_primitive, occluded_by_primitives};
+use wgray_trace::cpu::mesh::{highest, lowest, mesh_pad, point_to_mesh, shear_of, triangle_crossing, vector_to_mesh};
+use wgray_trace::cpu::primitive::intersect;
+use wgray_trace::cpu::ray::{Hit, Ray, nearer_hit, no_hit, standalone_prim};
+use wgray_trace::cpu::shadow::{SampleBlock, block_sample, occlusion_mask};
+use wgray_trace::cpu::slab::{box_interval, interval_hits, slabs};
+use wgray_trace::cpu::surface::{Surface, largest};
+use wgray_trace::records::{
     BvhItem, CASTS_SHADOW, INFINITE_T, INSTANCE, Instance, Light, NO_INDEX, NO_PRIMITIVE, NO_SHADOW, Packed, RANDOM,
     SAMPLE_BLOCK,
 };
@@ -106,7 +106,7 @@ fn brute_force_occlusion(scene: &Packed, surface: &Surface, light: &Light, block
                 let instance = &scene.bvh.instances[item.index as usize];
                 let mesh_origin = point_to_mesh(instance, origin);
                 let [towards, u, v] = [segments.towards, segments.u, segments.v].map(|v| vector_to_mesh(instance, v));
-                let direction = segment(wgray_render::cpu::light::LightSegments { towards, u, v }, point);
+                let direction = segment(wgray_trace::cpu::light::LightSegments { towards, u, v }, point);
                 let s = slabs(mesh_origin, direction, mesh_pad(instance, mesh_origin));
                 let mesh = &scene.bvh.meshes[instance.mesh as usize];
                 mesh.triangles.iter().enumerate().any(|(slot, triangle)| {

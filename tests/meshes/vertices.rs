@@ -8,7 +8,7 @@ use glam::{Vec2, Vec4};
 use wgray::mesh::Mesh;
 use wgray::scene::{Assets, Description, Geometry};
 use wgray_render::pack::pack;
-use wgray_render::records::Packed;
+use wgray_trace::records::Packed;
 
 use super::load;
 use crate::pictures::{RenderMode, both, differing, exact_modes, first_hits, means, reference, render};

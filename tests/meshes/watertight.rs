@@ -2,11 +2,11 @@
 
 use glam::{DMat3, DVec3, UVec2, Vec3, Vec4Swizzles as _};
 use rayon::prelude::*;
-use wgray_render::cpu::geometry::{closest_hit, occluded_samples};
-use wgray_render::cpu::ray::Ray;
-use wgray_render::cpu::shadow::SampleBlock;
-use wgray_render::cpu::surface::Surface;
-use wgray_render::records::{CASTS_SHADOW, GRID, INFINITE_T, Instance, Light, NO_INDEX, NO_PRIMITIVE, Packed};
+use wgray_trace::cpu::geometry::{closest_hit, occluded_samples};
+use wgray_trace::cpu::ray::Ray;
+use wgray_trace::cpu::shadow::SampleBlock;
+use wgray_trace::cpu::surface::Surface;
+use wgray_trace::records::{CASTS_SHADOW, GRID, INFINITE_T, Instance, Light, NO_INDEX, NO_PRIMITIVE, Packed};
 
 use super::procedural::{SCENE_START, TriangleMesh, scene};
 use crate::random::Random;

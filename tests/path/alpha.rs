@@ -2,7 +2,7 @@
 
 use wgray::scene::{Assets, Description};
 use wgray_render::pack::pack;
-use wgray_render::records::Packed;
+use wgray_trace::records::Packed;
 
 use super::{mean, scene};
 use crate::pictures::{both, differing, exact_modes, first_hits, means, reference, render};

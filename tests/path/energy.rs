@@ -4,18 +4,18 @@
 use std::f64::consts::TAU;
 
 use glam::{DVec3, Vec2, Vec3};
-use wgray_render::cpu::energy::principled_energy;
-use wgray_render::cpu::lobe::facet_alpha;
-use wgray_render::cpu::metal::metal_eval;
-use wgray_render::cpu::principled::{
+use wgray_trace::cpu::energy::principled_energy;
+use wgray_trace::cpu::lobe::facet_alpha;
+use wgray_trace::cpu::metal::metal_eval;
+use wgray_trace::cpu::principled::{
     PrincipledLobes, principled_eval, principled_mixture, principled_pdf, principled_sample,
 };
-use wgray_render::cpu::rough_dielectric::{rough_dielectric_eval, rough_dielectric_pdf};
-use wgray_render::cpu::scattering::material_for_view;
-use wgray_render::cpu::sequence::sobol_sample;
-use wgray_render::cpu::surface::Surface;
-use wgray_render::cpu::thin::{thin_eval, thin_pdf};
-use wgray_render::records::{METAL, Material, NO_PRIMITIVE, Packed, ROUGH_GLASS};
+use wgray_trace::cpu::rough_dielectric::{rough_dielectric_eval, rough_dielectric_pdf};
+use wgray_trace::cpu::scattering::material_for_view;
+use wgray_trace::cpu::sequence::sobol_sample;
+use wgray_trace::cpu::surface::Surface;
+use wgray_trace::cpu::thin::{thin_eval, thin_pdf};
+use wgray_trace::records::{METAL, Material, NO_PRIMITIVE, Packed, ROUGH_GLASS};
 
 use crate::pictures::{both, render};
 

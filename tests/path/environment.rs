@@ -6,10 +6,10 @@ use std::sync::Arc;
 
 use glam::{DVec3, UVec2, Vec3};
 use wgray::scene::{Assets, Description, Image, Texels};
-use wgray_render::cpu::environment::{environment_eval, sample_environment};
-use wgray_render::cpu::sequence::sobol_sample;
 use wgray_render::pack::pack;
-use wgray_render::records::{ENVIRONMENT, Packed};
+use wgray_trace::cpu::environment::{environment_eval, sample_environment};
+use wgray_trace::cpu::sequence::sobol_sample;
+use wgray_trace::records::{ENVIRONMENT, Packed};
 
 use super::mean;
 use crate::pictures::{RenderMode, both, differing, exact_modes, render, render_with};
@@ -390,7 +390,7 @@ fn an_invisible_map_emits_and_is_reflected() {
                 render(&with_environment(&keys, Some(&white), (16, 4), ball), mode)
             };
             let (shown, hidden) = (picture(true), picture(false));
-            let pixel = |film: &wgray_render::film::Film, i: usize| film.means().nth(i).unwrap_or_default();
+            let pixel = |film: &wgray_trace::film::Film, i: usize| film.means().nth(i).unwrap_or_default();
             assert_eq!(pixel(&shown, 0), [1.0; 3], "{environment}, {mode:?}");
             assert_eq!(pixel(&hidden, 0), [0.0; 3], "{environment}, {mode:?}");
             let center = 8 * 16 + 8;
@@ -591,7 +591,7 @@ fn an_unoccluded_wall_has_little_noise() {
 
 #[test]
 fn directions_in_a_cell_map_back_to_the_cell() {
-    use wgray_render::cpu::equirect::{cell_towards, direction_in_cell};
+    use wgray_trace::cpu::equirect::{cell_towards, direction_in_cell};
     for (width, height) in [(1, 1), (2, 1), (3, 2), (16, 8), (8192, 4096)] {
         for column in [0, width / 3, width / 2, width - 1] {
             for row in [0, 1, height / 3, height / 2, height - 1, height] {

@@ -1,8 +1,8 @@
 //! Camera-invisible emitters: only camera rays pass through them.
 
 use glam::UVec2;
-use wgray_render::cpu::geometry::pixel_first_hit;
-use wgray_render::records::{NO_INDEX, Packed};
+use wgray_trace::cpu::geometry::pixel_first_hit;
+use wgray_trace::records::{NO_INDEX, Packed};
 
 use crate::pictures::{both, differing, exact_modes, means, reference, render};
 use crate::scenes;

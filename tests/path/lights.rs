@@ -3,8 +3,8 @@
 use std::fmt::Write as _;
 
 use glam::UVec2;
-use wgray_render::cpu::emitter::select_emitter;
-use wgray_render::cpu::rng::hash4;
+use wgray_trace::cpu::emitter::select_emitter;
+use wgray_trace::cpu::rng::hash4;
 
 use super::{mean, scene};
 use crate::pictures::{both, means, reference, render};

@@ -4,10 +4,10 @@ use std::fmt::Write as _;
 
 use glam::{UVec2, UVec4, Vec3};
 use wgray::scene::{Description, PointLightDescription};
-use wgray_render::cpu::light_choice::{light_tree_pdf, light_tree_select};
-use wgray_render::cpu::ray::Hit;
-use wgray_render::cpu::rng::hash4;
-use wgray_render::records::{NO_INDEX, Packed};
+use wgray_trace::cpu::light_choice::{light_tree_pdf, light_tree_select};
+use wgray_trace::cpu::ray::Hit;
+use wgray_trace::cpu::rng::hash4;
+use wgray_trace::records::{NO_INDEX, Packed};
 
 use super::{mean, scene};
 use crate::pictures::{both, differing, exact_modes, reference, render};

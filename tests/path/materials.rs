@@ -5,14 +5,14 @@ use std::f64::consts::{PI, TAU};
 
 use bytemuck::Zeroable;
 use glam::{DVec3, Vec2, Vec3};
-use wgray_render::cpu::diffuse::{angles_at, diffuse_eval, diffuse_pdf, diffuse_sample, rough_diffuse_eval};
-use wgray_render::cpu::lobe::{LobeSample, facet_alpha, facet_loss};
-use wgray_render::cpu::metal::{metal_eval, metal_pdf, metal_sample};
-use wgray_render::cpu::modified_phong::{modified_phong_eval, modified_phong_pdf, modified_phong_sample};
-use wgray_render::cpu::rough_dielectric::{rough_dielectric_eval, rough_dielectric_pdf, rough_dielectric_sample};
-use wgray_render::cpu::sequence::sobol_sample;
-use wgray_render::cpu::thin::{thin_eval, thin_pdf, thin_sample};
-use wgray_render::records::{DIFFUSE, METAL, Material, PHONG, ROUGH_GLASS, THIN};
+use wgray_trace::cpu::diffuse::{angles_at, diffuse_eval, diffuse_pdf, diffuse_sample, rough_diffuse_eval};
+use wgray_trace::cpu::lobe::{LobeSample, facet_alpha, facet_loss};
+use wgray_trace::cpu::metal::{metal_eval, metal_pdf, metal_sample};
+use wgray_trace::cpu::modified_phong::{modified_phong_eval, modified_phong_pdf, modified_phong_sample};
+use wgray_trace::cpu::rough_dielectric::{rough_dielectric_eval, rough_dielectric_pdf, rough_dielectric_sample};
+use wgray_trace::cpu::sequence::sobol_sample;
+use wgray_trace::cpu::thin::{thin_eval, thin_pdf, thin_sample};
+use wgray_trace::records::{DIFFUSE, METAL, Material, PHONG, ROUGH_GLASS, THIN};
 
 struct Bsdf {
     name: String,
@@ -335,8 +335,8 @@ fn chi_squares(bsdf: &Bsdf, wo: Vec3) -> [(f64, f64); 2] {
     let mut counts = vec![0.0; RINGS * SPOKES];
     for i in 0..SAMPLES {
         // Independent samples, because low-discrepancy sequences are too even.
-        let bits = wgray_render::cpu::rng::hash4(glam::UVec4::new(i, 7, 11, 13));
-        let [a, b, c] = [bits.x, bits.y, bits.z].map(wgray_render::cpu::rng::unit_float);
+        let bits = wgray_trace::cpu::rng::hash4(glam::UVec4::new(i, 7, 11, 13));
+        let [a, b, c] = [bits.x, bits.y, bits.z].map(wgray_trace::cpu::rng::unit_float);
         let Some(wi) = bsdf.sample(wo, Vec2::new(a, b), c) else {
             continue;
         };

@@ -14,7 +14,7 @@ mod principled;
 mod spots;
 mod strategies;
 
-use wgray_render::records::Packed;
+use wgray_trace::records::Packed;
 
 use crate::scenes;
 
@@ -27,7 +27,7 @@ pub fn scene(samples: u32, depth: u32, text: &str) -> Packed {
 }
 
 /// Returns the mean of the pixels of a film, per channel.
-pub fn mean(film: &wgray_render::film::Film) -> [f64; 3] {
+pub fn mean(film: &wgray_trace::film::Film) -> [f64; 3] {
     let count = film.sums.len() as f64;
     let sum = film.means().fold([0.0; 3], |sum: [f64; 3], mean| {
         [0, 1, 2].map(|i| sum[i] + f64::from(mean[i]))

@@ -5,13 +5,13 @@ use std::f64::consts::{PI, TAU};
 
 use bytemuck::Zeroable;
 use glam::{DVec3, UVec2, UVec4, Vec2, Vec3};
-use wgray_render::cpu::diffuse::{angles_at, diffuse_eval};
-use wgray_render::cpu::principled::{
+use wgray_trace::cpu::diffuse::{angles_at, diffuse_eval};
+use wgray_trace::cpu::principled::{
     PrincipledLobes, principled_eval, principled_mixture, principled_pdf, principled_sample,
 };
-use wgray_render::cpu::rng::{hash4, unit_float};
-use wgray_render::cpu::sequence::sobol_sample;
-use wgray_render::records::{DIFFUSE, Material, PRINCIPLED};
+use wgray_trace::cpu::rng::{hash4, unit_float};
+use wgray_trace::cpu::sequence::sobol_sample;
+use wgray_trace::records::{DIFFUSE, Material, PRINCIPLED};
 
 /// The mask of all lobes.
 const ALL_LOBES: u32 = 31;
@@ -417,7 +417,7 @@ fn smooth_lobes_are_deltas_and_all_values_are_finite() {
     }
 }
 
-fn sphere_scene(keys: &str, textures: &str) -> wgray_render::records::Packed {
+fn sphere_scene(keys: &str, textures: &str) -> wgray_trace::records::Packed {
     super::scene(
         16,
         4,

@@ -1,6 +1,6 @@
 //! Spot lights, compared with closed-form values.
 
-use wgray_render::records::Packed;
+use wgray_trace::records::Packed;
 
 use super::mean;
 use crate::pictures::{both, means, render};

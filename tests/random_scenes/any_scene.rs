@@ -14,7 +14,7 @@ use proptest::prelude::*;
 use proptest::sample::select;
 use wgray::scene::*;
 use wgray_render::pack::pack;
-use wgray_render::records::Packed;
+use wgray_trace::records::Packed;
 
 use self::files::ENVIRONMENT_MAPS;
 pub use self::files::folder;

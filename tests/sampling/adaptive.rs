@@ -3,12 +3,12 @@
 use glam::{DVec3, UVec2, Vec4};
 use wgray::scene::{AdaptiveDescription, Overrides, Pattern, PixelFilterDescription, PixelFilterKind, Scene};
 use wgray_image::Region;
-use wgray_render::cpu::adaptive::{
+use wgray_render::job::WorkSplit;
+use wgray_trace::cpu::adaptive::{
     display_slope_squared, display_variance, moments_with, samples_wanted, variance_of_mean,
 };
-use wgray_render::cpu::pixel::pixel_radiance;
-use wgray_render::job::WorkSplit;
-use wgray_render::records::Packed;
+use wgray_trace::cpu::pixel::pixel_radiance;
+use wgray_trace::records::Packed;
 
 use super::cornell;
 use crate::pictures::{backend, crop, differing, exact_modes, film, reference, render, whole};

@@ -4,11 +4,11 @@
 use glam::{DVec3, UVec2, Vec4};
 use wgray::scene::{AdaptiveDescription, Description, Pattern};
 use wgray_image::Region;
-use wgray_render::cpu::adaptive::proportional_samples;
-use wgray_render::cpu::pixel::pixel_radiance;
-use wgray_render::film::Film;
 use wgray_render::job::WorkSplit;
-use wgray_render::records::Packed;
+use wgray_trace::cpu::adaptive::proportional_samples;
+use wgray_trace::cpu::pixel::pixel_radiance;
+use wgray_trace::film::Film;
+use wgray_trace::records::Packed;
 
 use super::adaptive::EXTENSIBLE;
 use crate::patterns;

@@ -2,11 +2,11 @@
 
 use glam::Vec4;
 use wgray::scene::{Pattern, PixelFilterDescription, PixelFilterKind};
-use wgray_render::cpu::pixel::filtered;
-use wgray_render::cpu::sequence::sobol_sample;
-use wgray_render::film::mean;
 use wgray_render::pack::filter::{kernel_value, table};
-use wgray_render::records::{FILTER_TABLE_SIZE, Packed};
+use wgray_trace::cpu::pixel::filtered;
+use wgray_trace::cpu::sequence::sobol_sample;
+use wgray_trace::film::mean;
+use wgray_trace::records::{FILTER_TABLE_SIZE, Packed};
 
 use super::cornell;
 use crate::pictures::{RenderMode, differing, exact_modes, render};

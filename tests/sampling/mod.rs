@@ -7,7 +7,7 @@ mod sequences;
 mod unbiased;
 
 use wgray::scene::{Description, Pattern};
-use wgray_render::records::Packed;
+use wgray_trace::records::Packed;
 
 use crate::{patterns, scenes};
 

@@ -1,9 +1,9 @@
 //! Sample sequences: published values, stratification, discrepancy, independence.
 
 use glam::{UVec2, Vec2};
-use wgray_render::cpu::sampling::{sample_key, sample_square};
-use wgray_render::cpu::sequence::{halton_sample, radical_inverse_3, shuffled_index, sobol_reversed, sobol_sample};
-use wgray_render::records::{GRID, HALTON, JITTERED, RANDOM, ROTATED_GRID, SOBOL};
+use wgray_trace::cpu::sampling::{sample_key, sample_square};
+use wgray_trace::cpu::sequence::{halton_sample, radical_inverse_3, shuffled_index, sobol_reversed, sobol_sample};
+use wgray_trace::records::{GRID, HALTON, JITTERED, RANDOM, ROTATED_GRID, SOBOL};
 
 /// The first 32 points of the two-dimensional Sobol' sequence, multiplied by 32. Source: scipy 1.17.1,
 /// `qmc.Sobol(2, scramble=False)`, with the direction numbers of Joe and Kuo (2008).

@@ -3,8 +3,8 @@
 
 use std::fmt::Write;
 
-use wgray_render::film::{Film, mean};
-use wgray_render::records::Packed;
+use wgray_trace::film::{Film, mean};
+use wgray_trace::records::Packed;
 
 use crate::pictures::reference;
 use crate::scenes;
@@ -113,7 +113,7 @@ tangent = [1, 0, 0]
 color = [0.9, 0.9, 0.9]
 ";
     let mut packed = scene(24, 16.0, sampling, content);
-    packed.specialization.light_pattern = wgray_render::records::SOBOL;
+    packed.specialization.light_pattern = wgray_trace::records::SOBOL;
     (packed.specialization.light_side, packed.specialization.light_samples) = (1, 1);
     packed.environment.light_weight = 1.0;
     packed.environment.ambient = glam::Vec3::splat(0.1);

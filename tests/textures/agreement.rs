@@ -5,7 +5,7 @@ use std::path::Path;
 
 use wgray_render::gpu::{Device, Gpu, Options, Rounding};
 use wgray_render::job::WorkSplit;
-use wgray_render::records::Packed;
+use wgray_trace::records::Packed;
 
 use super::{cpu_picture, scene, write_exr, write_png};
 use crate::meshes::procedural::Sheet;

@@ -3,17 +3,17 @@
 use std::path::Path as File;
 
 use glam::{DMat3, DVec2, DVec3, UVec2, Vec2, Vec3};
-use wgray_render::cpu::camera::{camera_differential, camera_ray};
-use wgray_render::cpu::differential::{HitDifferential, reflected_derivative};
-use wgray_render::cpu::footprint::surface_footprint;
-use wgray_render::cpu::geometry::{
+use wgray_trace::cpu::camera::{camera_differential, camera_ray};
+use wgray_trace::cpu::differential::{HitDifferential, reflected_derivative};
+use wgray_trace::cpu::footprint::surface_footprint;
+use wgray_trace::cpu::geometry::{
     closest_hit, fetch_hit_primitive, footprint_of, hit_differential, material_of, surface_of,
 };
-use wgray_render::cpu::integrators::phong::scatter;
-use wgray_render::cpu::path::Path;
-use wgray_render::cpu::path::is_specular;
-use wgray_render::cpu::surface::{Surface, with_coordinates};
-use wgray_render::records::{NO_INDEX, NO_PRIMITIVE, Packed, Primitive};
+use wgray_trace::cpu::integrators::phong::scatter;
+use wgray_trace::cpu::path::Path;
+use wgray_trace::cpu::path::is_specular;
+use wgray_trace::cpu::surface::{Surface, with_coordinates};
+use wgray_trace::records::{NO_INDEX, NO_PRIMITIVE, Packed, Primitive};
 
 use super::scene;
 use crate::meshes::procedural::Sheet;
@@ -87,7 +87,7 @@ impl Exact<'_> {
             1.0 - pixel.y * 2.0 / f64::from(camera.height),
         );
         let offset = right * x + up * y;
-        if camera.projection == wgray_render::records::ORTHOGRAPHIC {
+        if camera.projection == wgray_trace::records::ORTHOGRAPHIC {
             return (camera.position.as_dvec3() + offset, forward);
         }
         (camera.position.as_dvec3(), (forward + offset).normalize())
@@ -238,7 +238,7 @@ fn texture_differentials_on_an_ellipsoid_match_adjacent_rays() {
             let Some((q, surface, hit_diff, _)) = first_nonspecular_hit(&scene, pixel) else {
                 continue;
             };
-            if q.kind != wgray_render::records::ELLIPSOID {
+            if q.kind != wgray_trace::records::ELLIPSOID {
                 continue;
             }
             let found = surface_footprint(&q, surface, hit_diff.x.position, hit_diff.y.position);

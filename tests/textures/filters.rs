@@ -4,10 +4,10 @@ use std::f64::consts::TAU;
 use std::path::Path;
 
 use glam::{DMat2, DVec2, DVec3, Vec2, Vec3};
-use wgray_render::cpu::footprint::{Footprint, footprint_ellipse, texture_footprint};
-use wgray_render::cpu::texel::{near_coordinate, srgb_to_linear, wrapped_index};
-use wgray_render::cpu::texture::{ewa_color, texture_color};
-use wgray_render::records::{CLAMP, MIRRORED, Packed, REPEAT};
+use wgray_trace::cpu::footprint::{Footprint, footprint_ellipse, texture_footprint};
+use wgray_trace::cpu::texel::{near_coordinate, srgb_to_linear, wrapped_index};
+use wgray_trace::cpu::texture::{ewa_color, texture_color};
+use wgray_trace::records::{CLAMP, MIRRORED, Packed, REPEAT};
 
 use super::{scene, write_exr, write_png};
 use crate::random::Random;

@@ -16,7 +16,7 @@ use std::path::Path;
 
 use wgray::scene::{Assets, Description};
 use wgray_render::pack::pack;
-use wgray_render::records::Packed;
+use wgray_trace::records::Packed;
 
 use crate::pictures::reference;
 

@@ -1,14 +1,14 @@
 //! Normal maps: directions of the mapped normals.
 
 use glam::Vec3;
-use wgray_render::cpu::differential::HitDifferential;
-use wgray_render::cpu::geometry::{fetch_hit_primitive, material_of, surface_of};
-use wgray_render::cpu::path::usable_normal;
-use wgray_render::cpu::phong::phong_lobes;
-use wgray_render::cpu::ray::{Hit, Ray, no_hit};
-use wgray_render::cpu::surface::surface_at;
-use wgray_render::cpu::texture::evaluate_material;
-use wgray_render::records::Packed;
+use wgray_trace::cpu::differential::HitDifferential;
+use wgray_trace::cpu::geometry::{fetch_hit_primitive, material_of, surface_of};
+use wgray_trace::cpu::path::usable_normal;
+use wgray_trace::cpu::phong::phong_lobes;
+use wgray_trace::cpu::ray::{Hit, Ray, no_hit};
+use wgray_trace::cpu::surface::surface_at;
+use wgray_trace::cpu::texture::evaluate_material;
+use wgray_trace::records::Packed;
 
 use super::{scene, write_exr};
 use crate::random::Random;

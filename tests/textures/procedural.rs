@@ -4,10 +4,10 @@ use std::f64::consts::TAU;
 use std::path::Path;
 
 use glam::{DVec2, Vec2};
-use wgray_render::cpu::footprint::Footprint;
-use wgray_render::cpu::procedural::procedural_share;
-use wgray_render::cpu::texture::texture_color;
-use wgray_render::records::{CHECKER, LINES};
+use wgray_trace::cpu::footprint::Footprint;
+use wgray_trace::cpu::procedural::procedural_share;
+use wgray_trace::cpu::texture::texture_color;
+use wgray_trace::records::{CHECKER, LINES};
 
 use super::filters::textured;
 use crate::random::Random;

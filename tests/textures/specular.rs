@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use glam::UVec4;
-use wgray_render::cpu::specular::{fresnel, refracted_cosine};
-use wgray_render::records::{ELLIPSOID, Packed};
+use wgray_trace::cpu::specular::{fresnel, refracted_cosine};
+use wgray_trace::records::{ELLIPSOID, Packed};
 
 use super::{cpu_picture, scene};
 

@@ -13,7 +13,7 @@ use wgray_render::error::{RenderError, ShaderErrors};
 use wgray_render::gpu::compose::Shaders;
 use wgray_render::gpu::sliders::sliders;
 use wgray_render::gpu::{AdapterChoice, Device, Forms, Gpu, Options, check_kernels, choose};
-use wgray_render::records::Packed;
+use wgray_trace::records::Packed;
 
 pub struct Request {
     /// Copied to the result, so that outdated results can be recognized.

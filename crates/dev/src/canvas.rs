@@ -8,11 +8,11 @@ use wgray_image::{Pixels, Region};
 use wgray_render::backend::Backend;
 use wgray_render::cpu::Cpu;
 use wgray_render::error::RenderError;
-use wgray_render::film::Film;
 use wgray_render::gpu::{Dispatch, Gpu};
 use wgray_render::job::{Order, Steps, WorkSplit};
 use wgray_render::output::Aov;
-use wgray_render::records::{Camera, FirstHit, Packed};
+use wgray_trace::film::Film;
+use wgray_trace::records::{Camera, FirstHit, Packed};
 
 use super::engine::Engine;
 use super::film_layer::FilmLayer;
@@ -392,7 +392,7 @@ impl Canvas {
 
     fn hits_so_far(&self, aov: Aov) -> Content {
         let miss = FirstHit {
-            shape: wgray_render::records::NO_INDEX,
+            shape: wgray_trace::records::NO_INDEX,
             ..bytemuck::Zeroable::zeroed()
         };
         let mut hits = self.hits.clone();

@@ -276,7 +276,7 @@ mod tests {
         );
         // Generated code has no file that can be opened.
         let generated = Diagnostic::shader(
-            &error("crates/render/src/records/layout.rs:3:10"),
+            &error("crates/trace/src/records/layout.rs:3:10"),
             &shaders,
             Some(Path::new("/s")),
         );

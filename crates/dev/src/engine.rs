@@ -5,9 +5,9 @@ use wgray_render::backend::Backend;
 use wgray_render::cpu::Cpu;
 use wgray_render::denoise::denoise;
 use wgray_render::error::RenderError;
-use wgray_render::film::Film;
 use wgray_render::gpu::{Dispatch, Gpu};
-use wgray_render::records::{Camera, Packed};
+use wgray_trace::film::Film;
+use wgray_trace::records::{Camera, Packed};
 
 /// A scene on the device that renders it.
 pub enum Engine {

@@ -6,8 +6,8 @@ use rayon::prelude::*;
 use super::display_settings::DisplaySettings;
 use super::pixel_values::{bits, bytes, film_values, numbers};
 use wgray_image::{Pixels, to_8_bits};
-use wgray_render::film::{Film, Layer};
 use wgray_render::output::Aov;
+use wgray_trace::film::{Film, Layer};
 
 /// A film layer, as written by `wgray render --aov`.
 #[derive(Clone, Debug, PartialEq)]
@@ -119,7 +119,7 @@ mod tests {
 
     use super::*;
     use wgray_image::Region;
-    use wgray_render::film::FilmLayout;
+    use wgray_trace::film::FilmLayout;
 
     fn film() -> Film {
         let film_layout = FilmLayout {

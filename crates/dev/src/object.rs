@@ -9,9 +9,9 @@ use toml::{Table, Value};
 
 use super::edit::{Layout, line_end, line_start};
 use super::source::{Loaded, Sources};
-use wgray_render::cpu::geometry::pixel_first_hit;
-use wgray_render::records::{Camera, NO_INDEX, Packed};
 use wgray_scene::{Description, Field, KeyPath, Names, Pieces, Segment, ShapeDescription, fields};
+use wgray_trace::cpu::geometry::pixel_first_hit;
+use wgray_trace::records::{Camera, NO_INDEX, Packed};
 
 /// Maximum number of displayed lines per table.
 const MAX_LINES: usize = 40;

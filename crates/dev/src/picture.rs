@@ -11,8 +11,8 @@ use super::histogram::Histogram;
 use super::pixel_values::{ScaledImage, bits, bytes, numbers};
 use wgray_image::{Pixels, difference};
 use wgray_render::output::{self as image, Aov, AovSource};
-use wgray_render::records::{FirstHit, NO_INDEX};
 use wgray_scene::Integrator;
+use wgray_trace::records::{FirstHit, NO_INDEX};
 
 /// The view that is selected on the page.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]

@@ -3,7 +3,7 @@
 use glam::Vec3;
 use rayon::prelude::*;
 use wgray_image::Pixels;
-use wgray_render::film::{Film, mean};
+use wgray_trace::film::{Film, mean};
 
 /// Returns the mean colors of a film. Rows without samples show `coarser`, a film of lower resolution.
 pub fn means(film: &Film, coarser: Option<&Film>, has_samples: &(dyn Fn(u32) -> bool + Sync)) -> Pixels {

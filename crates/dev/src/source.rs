@@ -11,11 +11,11 @@ use super::picture::View;
 use wgray_render::gpu::compose::{self, Shaders};
 use wgray_render::output::AovSource;
 use wgray_render::pack::{self, PackedShading, pack_with};
-use wgray_render::records::{Packed, Specialization};
 use wgray_scene::{
     CameraDescription, Description, Integrator, Overrides, PendingScene, Pieces, Places, Scene, folder_of, is_gltf,
     is_json_scene, is_mesh, is_model, read_bytes, read_text,
 };
+use wgray_trace::records::{Packed, Specialization};
 
 /// The locations of the files of a session, and the overrides.
 #[derive(Clone, Debug)]

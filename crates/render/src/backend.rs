@@ -3,9 +3,10 @@
 use std::ops::Range;
 
 use crate::error::RenderError;
-use crate::film::{Film, FilmLayout, Layer};
-use crate::records::{EDGE_NEIGHBOR_RADIUS, FirstHit, Packed, SMOOTH_NEIGHBOR_RADIUS};
 use wgray_image::Region;
+use wgray_trace::cpu::accumulate::neighbor_radius;
+use wgray_trace::film::{Film, FilmLayout, Layer};
+use wgray_trace::records::{FirstHit, Packed};
 
 /// A scene on a device, with at most one film at a time.
 ///
@@ -91,15 +92,6 @@ pub trait Backend {
     /// Returns the region that the film of `region` must cover: `region`, and with adaptive sampling also its
     /// neighbors, which affect the sample counts of its pixels.
     fn around(&self, region: Region) -> Region;
-}
-
-/// Returns the maximum distance of the neighbors whose pilot samples determine a pixel's sample count under adaptive
-/// sampling.
-pub(crate) fn neighbor_radius(has_smooth_noise: bool) -> u32 {
-    match has_smooth_noise {
-        true => SMOOTH_NEIGHBOR_RADIUS,
-        false => EDGE_NEIGHBOR_RADIUS,
-    }
 }
 
 /// Argument checks and scene-derived limits shared by all backends.

@@ -1,21 +1,18 @@
-//! The renderer of wgray. Scenes are packed into plain records, from which the CPU renderer and the WGSL kernels
-//! compute the same bits.
+//! The renderer of wgray. Scenes are packed into plain records, from which the CPU backend and the WGSL kernels compute
+//! the same bits.
 
 pub mod backend;
-pub mod bvh;
 pub mod clock;
 pub mod cpu;
 pub mod denoise;
 pub mod error;
 pub mod excerpt;
-pub mod film;
 #[cfg(feature = "gpu")]
 pub mod gpu;
 pub mod job;
 pub mod noise;
 pub mod output;
 pub mod pack;
-pub mod records;
 
 /// Returns the number of cases for a test: without optimization a tenth, because the test would take long.
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! The noise of an image: standard errors of its pixels, relative to their displayed values.
 
-use crate::film::{Film, mean};
+use wgray_trace::film::{Film, mean};
 
 /// Weights of red, green and blue in the luminance: Rec. 709.
 const LUMINANCE: [f64; 3] = [0.2126, 0.7152, 0.0722];

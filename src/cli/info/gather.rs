@@ -12,7 +12,7 @@ use serde::Serialize;
 use wgray_image::Region;
 use wgray_render::denoise;
 use wgray_render::job::{WorkSplit, bands};
-use wgray_render::records::Packed;
+use wgray_trace::records::Packed;
 
 use super::kernel::features;
 

@@ -1,6 +1,6 @@
 //! Names of the optional features of a kernel.
 
-use wgray_render::records::{BACKGROUND, LOBE_ANISOTROPY, LOBES, Packed, Specialization};
+use wgray_trace::records::{BACKGROUND, LOBE_ANISOTROPY, LOBES, Packed, Specialization};
 
 /// Returns each kernel feature, and whether the scene uses the feature.
 pub fn features(packed: &Packed) -> Vec<(&'static str, bool)> {

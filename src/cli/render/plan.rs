@@ -16,7 +16,7 @@ use tracing::info;
 use wgray_image::Region;
 use wgray_render::job::checkpoint::{Checkpoint, CheckpointError, CheckpointOptions};
 use wgray_render::job::{self, Identity, PartHeader, Tile};
-use wgray_render::records::Packed;
+use wgray_trace::records::Packed;
 
 use super::args::Args;
 use super::once_log::OnceLog;

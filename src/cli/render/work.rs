@@ -9,10 +9,10 @@ use crate::renderer::Renderer;
 use wgray_image::Region;
 use wgray_render::backend::Backend;
 use wgray_render::denoise;
-use wgray_render::film::Film;
 use wgray_render::job::{self, Bands, CheckpointStore, FinishedBand, Flow, Order, PartHeader, PassEnds, WorkSplit};
 use wgray_render::noise::{self, Noise, NoiseMeter};
-use wgray_render::records::FirstHit;
+use wgray_trace::film::Film;
+use wgray_trace::records::FirstHit;
 
 use super::plan::Plan;
 use super::preview::Previews;

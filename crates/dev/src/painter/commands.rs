@@ -10,7 +10,7 @@ use crate::messages::{Command, Notice};
 use crate::picture::View;
 use crate::source::{KernelChoice, Loaded};
 use wgray_render::pack::pack_camera;
-use wgray_render::records::{Camera, Packed};
+use wgray_trace::records::{Camera, Packed};
 
 impl Painter {
     pub(super) fn execute(&mut self, command: Command) {

@@ -9,8 +9,8 @@ use crate::camera::{Move, Viewpoint, dollied, framed, moved, with_viewpoint};
 use wgray_image::Region;
 use wgray_render::backend::Backend as _;
 use wgray_render::cpu::Cpu;
-use wgray_render::records::NO_INDEX;
 use wgray_scene::{Bounds, CameraDescription, Geometry, Light, Scene};
+use wgray_trace::records::NO_INDEX;
 
 /// Maximum number of steps in the history.
 const MAX_STEPS: usize = 256;

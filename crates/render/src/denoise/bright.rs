@@ -4,8 +4,8 @@
 use glam::Vec3;
 
 use super::window::{box_means, window};
-use crate::film::{Film, mean};
-use crate::records::{DENOISE_PATCH_RADIUS, DENOISE_RADIUS};
+use wgray_trace::film::{Film, mean};
+use wgray_trace::records::{DENOISE_PATCH_RADIUS, DENOISE_RADIUS};
 
 /// A pixel is bright from this binary logarithm of its ratio to the geometric mean of the pixels around it. With lower
 /// values, some fireflies would stay; with higher values, visible emitters and highlights would brighten the pixels around

@@ -7,8 +7,8 @@ use rayon::prelude::*;
 
 use super::bright::bright_pixels;
 use super::window::{box_means, window};
-use crate::film::{Film, Layer, mean};
-use crate::records::DENOISE_PATCH_RADIUS;
+use wgray_trace::film::{Film, Layer, mean};
+use wgray_trace::records::DENOISE_PATCH_RADIUS;
 
 /// Larger components of colors are treated like infinity, because their squares would overflow.
 const MAX_COLOR: f32 = 1e15;

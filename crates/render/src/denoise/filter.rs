@@ -7,11 +7,11 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::guides::{Guides, MARGIN};
-use crate::cpu::denoise::{color_distance, denoise_weight, feature_distance};
-use crate::cpu::lanes::Lanes3;
-use crate::cpu::math::{dot, max};
-use crate::cpu::samples::LEVEL;
-use crate::records::{
+use wgray_trace::cpu::denoise::{color_distance, denoise_weight, feature_distance};
+use wgray_trace::cpu::lanes::Lanes3;
+use wgray_trace::cpu::math::{dot, max};
+use wgray_trace::cpu::samples::LEVEL;
+use wgray_trace::records::{
     DENOISE_PATCH_RADIUS, DENOISE_RADIUS, GUIDE_ALBEDO, GUIDE_COLOR, GUIDE_COLOR_VARIANCE, GUIDE_DEPTH, GUIDE_NORMAL,
     GUIDE_VARIANCE_LIMIT,
 };

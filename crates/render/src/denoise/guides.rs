@@ -7,8 +7,8 @@ use rayon::prelude::*;
 
 use super::coverage::{Coverage, averaged_light, coverages, surface_variance};
 use super::window::{box_means, window};
-use crate::film::{Film, Half, Layer, mean};
-use crate::records::{
+use wgray_trace::film::{Film, Half, Layer, mean};
+use wgray_trace::records::{
     DENOISE_PATCH_RADIUS, DENOISE_RADIUS, GUIDE_ALBEDO, GUIDE_COLOR, GUIDE_COLOR_VARIANCE, GUIDE_DEPTH, GUIDE_NORMAL,
     GUIDE_PLANES, GUIDE_VARIANCE_LIMIT,
 };

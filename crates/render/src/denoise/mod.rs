@@ -16,13 +16,13 @@ mod window;
 use glam::Vec3;
 
 use crate::error::RenderError;
-use crate::film::{Film, FilmLayout};
 use crate::job::check_memory;
 use crate::output::Sink;
-use crate::records::FirstHit;
 use guides::GUIDE_BYTES;
 pub use guides::Guides;
 use wgray_image::Region;
+use wgray_trace::film::{Film, FilmLayout};
+use wgray_trace::records::FirstHit;
 
 /// Returns the denoised colors of a film with noise estimates, in row-major order, top row first. Without layers, only
 /// colors guide the denoiser. Pixels that are not finite, or without samples, keep their color.

@@ -8,7 +8,7 @@ use bytemuck::cast_slice;
 use glam::UVec4;
 
 use crate::pack::MAX_LINEAR_PRIMITIVES;
-use crate::records::{
+use wgray_trace::records::{
     BvhItem, Emitter, Field as _, Instance, Light, LightNode, Lookup, Material, Node, Packed, Record, SAMPLE_BLOCK,
     Texture,
 };

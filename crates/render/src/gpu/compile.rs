@@ -14,7 +14,7 @@ use super::prune::prune;
 use super::rounding::{Rounding, round_in_software};
 use super::spirv;
 use crate::error::ShaderError;
-use crate::records::Specialization;
+use wgray_trace::records::Specialization;
 
 /// A kernel accepted by naga.
 pub struct ValidKernel {

@@ -7,8 +7,6 @@ use std::{fs, io, path::Path};
 use super::bake::{bvh_loaders, record_loaders};
 use super::dispatch;
 use super::functions::is_same_code;
-use crate::records;
-use crate::records::Specialization;
 use wgray_image::blocking_path;
 use wgray_scene::Integrator;
 use wgray_shaders::{
@@ -16,6 +14,8 @@ use wgray_shaders::{
     SAMPLES, TEXELS,
 };
 pub use wgray_shaders::{File, SHARED, built_in};
+use wgray_trace::records;
+use wgray_trace::records::Specialization;
 
 /// File with division and square roots in software.
 pub const ROUNDING: &str = "rounding.wgsl";
@@ -132,10 +132,10 @@ impl Shaders {
     pub fn shared(&self) -> Source {
         let mut source = Source::default();
         source.append(
-            "crates/render/src/records/constants.rs",
+            "crates/trace/src/records/constants.rs",
             &records::constant_declarations(),
         );
-        source.append("crates/render/src/records/layout.rs", &records::declarations());
+        source.append("crates/trace/src/records/layout.rs", &records::declarations());
         self.append(&mut source, SHARED);
         source
     }
@@ -146,7 +146,7 @@ impl Shaders {
         self.append(&mut source, ROUNDING_FILES);
         source.extend(&self.shared());
         source.append(
-            "crates/render/src/records/specialization.rs",
+            "crates/trace/src/records/specialization.rs",
             &Specialization::declarations(),
         );
         for files in kernel.files {

@@ -9,8 +9,8 @@ use super::pipeline::{WORKGROUP, bind_group, layout_of, pipeline};
 use super::rounding::Rounding;
 use crate::denoise::Guides;
 use crate::error::RenderError;
-use crate::film::Film;
-use crate::records::{DenoiseParams, Specialization};
+use wgray_trace::film::Film;
+use wgray_trace::records::{DenoiseParams, Specialization};
 
 /// Types of the bindings in `shaders/kernels/denoise.wgsl`.
 const BINDINGS: [BufferBindingType; 3] = [

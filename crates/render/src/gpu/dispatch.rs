@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use crate::records::{PRIMITIVE_KINDS, PrimitiveForm};
+use wgray_trace::records::{PRIMITIVE_KINDS, PrimitiveForm};
 
 /// Returns WGSL loops over the primitives outside of the BVH, sorted by kind. Baked scenes have straight-line code
 /// instead.

@@ -4,7 +4,7 @@ use super::adapter::GpuInfo;
 use super::bake::bake_if_small;
 use super::compose::{ADAPTIVE, RENDER, Shaders};
 use super::scene::bytes_of_scene;
-use crate::records::Packed;
+use wgray_trace::records::Packed;
 
 /// The kernel of a scene and its memory use.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -8,8 +8,8 @@ use super::rounding::Rounding;
 use super::sliders::{Slider, with_buffer};
 use super::texels::TexelParts;
 use crate::error::RenderError;
-use crate::records::{Packed, Specialization};
 use wgray_scene::Integrator;
+use wgray_trace::records::{Packed, Specialization};
 
 /// Compilation options of kernels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

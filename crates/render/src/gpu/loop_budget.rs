@@ -1,6 +1,6 @@
 //! Number of samples per dispatch for which software Vulkan truncates no loop.
 
-use crate::records::{MAX_PATH_LEAVES, Packed, SAMPLE_BLOCK};
+use wgray_trace::records::{MAX_PATH_LEAVES, Packed, SAMPLE_BLOCK};
 
 /// Number of iterations, summed over all loops of an invocation, after which Mesa 22.3's llvmpipe ends every loop. An
 /// iteration counts if any lane executes the iteration.
@@ -86,8 +86,8 @@ fn iterations_of_sample(packed: &Packed, baked: bool) -> f64 {
 mod tests {
     use super::*;
     use crate::pack::pack;
-    use crate::records::Specialization;
     use wgray_scene::Scene;
+    use wgray_trace::records::Specialization;
 
     fn scene(spheres: usize, lights: usize) -> Packed {
         let sphere = "[[shapes]]\ntype = 'sphere'\nmaterial = 'm'\ncenter = [0, 0, 0]\nradius = 1\n";

@@ -10,7 +10,7 @@ use super::device::Device;
 use super::pipeline_cache::Key;
 use super::rounding::Rounding;
 use crate::error::RenderError;
-use crate::records::Specialization;
+use wgray_trace::records::Specialization;
 
 /// Side of a workgroup; the kernels declare the same size.
 pub const WORKGROUP: u32 = 8;

@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use super::compose::{Kernel, Source};
 use super::rounding::Rounding;
-use crate::records::Specialization;
+use wgray_trace::records::Specialization;
 
 /// Maximum number of pipelines. The least recently used pipeline is dropped first.
 const CAPACITY: usize = 32;

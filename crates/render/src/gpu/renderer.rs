@@ -23,9 +23,9 @@ use crate::backend::{Backend, FilmState, Rules};
 use crate::clock::Instant;
 use crate::denoise::denoise;
 use crate::error::RenderError;
-use crate::film::{Film, FilmLayout};
-use crate::records::{Camera, DispatchParams, FirstHit, Packed};
 use wgray_image::Region;
+use wgray_trace::film::{Film, FilmLayout};
+use wgray_trace::records::{Camera, DispatchParams, FirstHit, Packed};
 
 /// A scene on a GPU.
 pub struct Gpu {

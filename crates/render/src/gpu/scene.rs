@@ -12,7 +12,7 @@ use super::memory::MemoryUse;
 use super::pipeline::bind_group;
 use super::texels::TexelParts;
 use crate::error::RenderError;
-use crate::records::{Camera, FILTER_TABLE_SIZE, Packed};
+use wgray_trace::records::{Camera, FILTER_TABLE_SIZE, Packed};
 
 /// Returns a scene's memory on a device, in bytes.
 pub fn bytes_of_scene(packed: &Packed) -> u64 {

@@ -8,7 +8,7 @@ use super::adapter::GpuInfo;
 use super::bake::{mesh_rows_count, node_rows_count};
 use super::pipeline::{GROUPS, SCENE_GROUP, STORAGE_BUFFERS};
 use crate::error::RenderError;
-use crate::records::Packed;
+use wgray_trace::records::Packed;
 
 /// Division of texels into storage buffers. All buffers except the last have 2^shift words.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

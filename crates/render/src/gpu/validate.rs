@@ -10,7 +10,7 @@ use super::functions::functions;
 use super::interface;
 use super::rounding::Rounding;
 use crate::error::{ShaderError, ShaderErrors};
-use crate::records::Packed;
+use wgray_trace::records::Packed;
 
 /// Maximum number of errors reported per kernel.
 const MAX_ERRORS: usize = 16;

@@ -9,9 +9,9 @@ use super::{DISPATCH_DURATION, WorkSplit, bands};
 use crate::backend::Backend;
 use crate::clock::Instant;
 use crate::error::RenderError;
-use crate::film::{Film, FilmLayout};
 use wgray_image::Region;
 use wgray_image::memory::fallible;
+use wgray_trace::film::{Film, FilmLayout};
 
 /// Action after a dispatch, as decided by the caller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -14,8 +14,8 @@ use super::identity::Identity;
 use super::piece::{CheckpointStore, FilmPiece, StoredPiece};
 use super::pieces_file::{self, Entry, FORMAT, Header, Key};
 use crate::error::RenderError;
-use crate::film::FilmLayout;
 use wgray_image::Output;
+use wgray_trace::film::FilmLayout;
 
 /// Reasons why a checkpoint cannot be used.
 #[derive(Debug, Error)]

@@ -3,9 +3,9 @@
 use bytemuck::bytes_of;
 use serde::{Deserialize, Serialize};
 
-use crate::film::FilmLayout;
-use crate::records::{Packed, PackedMesh, Specialization};
 use wgray_image::Region;
+use wgray_trace::film::FilmLayout;
+use wgray_trace::records::{Packed, PackedMesh, Specialization};
 
 /// Maximum width and height of an image in pixels, and maximum number of samples per pixel. Scenes have equal limits.
 const MAX_COUNT: u32 = 65_536;

@@ -15,9 +15,9 @@ use std::time::Duration;
 
 use crate::backend::Backend;
 use crate::error::RenderError;
-use crate::film::{Film, FilmLayout};
-use crate::records::FirstHit;
 use wgray_image::Region;
+use wgray_trace::film::{Film, FilmLayout};
+use wgray_trace::records::FirstHit;
 
 pub use bands::{Bands, FinishedBand, Flow, PassEnds, Watch, check_memory};
 pub use identity::{Identity, hash_of_scene};

@@ -13,12 +13,12 @@ use super::piece::FilmPiece;
 use super::pieces_file::{self, Entry, FORMAT, Header, Key};
 use super::steps::SampleProgress;
 use crate::error::RenderError;
-use crate::film::FilmLayout;
 use crate::output::{Aov, AovSource, Band, Layout, Metadata, Sink};
 use wgray_image::Pending;
 use wgray_image::Region;
 use wgray_image::blocking_path;
 use wgray_scene::{Integrator, ViewSettings, ViewTransform};
+use wgray_trace::film::FilmLayout;
 
 /// Data for the merged image besides the films.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -411,7 +411,7 @@ mod tests {
     use std::fs;
 
     use super::*;
-    use crate::film::{Film, FilmLayout};
+    use wgray_trace::film::{Film, FilmLayout};
 
     /// Returns the error of a part of 4 x 3 pixels with a modified header and piece, or an empty text.
     fn error_of(change: impl Fn(&mut Header, &mut FilmPiece)) -> String {

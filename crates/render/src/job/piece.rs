@@ -4,8 +4,8 @@ use std::time::Duration;
 
 use super::steps::SampleProgress;
 use crate::error::RenderError;
-use crate::film::Film;
 use wgray_image::Region;
+use wgray_trace::film::Film;
 
 /// Rows of an image with the samples rendered so far. Any backend can continue a piece, and gives the same bits.
 #[derive(Clone, Debug, PartialEq)]

@@ -20,9 +20,9 @@ use super::identity::Identity;
 use super::part::PartHeader;
 use super::piece::FilmPiece;
 use super::steps::SampleProgress;
-use crate::film::{Film, FilmLayout};
-use crate::records::{FirstHit, SMOOTH_NEIGHBOR_RADIUS};
 use wgray_image::Region;
+use wgray_trace::film::{Film, FilmLayout};
+use wgray_trace::records::{FirstHit, SMOOTH_NEIGHBOR_RADIUS};
 
 /// First bytes of the file. As in PNG, a conversion of line endings or to 7-bit characters changes these bytes, so that
 /// such damage is detected.

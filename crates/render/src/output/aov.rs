@@ -6,9 +6,9 @@ use std::str::FromStr;
 use glam::Vec3;
 
 use super::{Band, Layout};
-use crate::film::Layer;
-use crate::records::{FirstHit, NO_INDEX};
 use wgray_scene::Integrator;
+use wgray_trace::film::Layer;
+use wgray_trace::records::{FirstHit, NO_INDEX};
 
 /// An output variable.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -40,7 +40,7 @@ pub enum Aov {
     Emission,
     /// Number of samples.
     SampleCount,
-    /// Variance estimated by [`Film::variance`](crate::film::Film::variance).
+    /// Variance estimated by [`Film::variance`](wgray_trace::film::Film::variance).
     Variance,
     /// Denoised color ([`denoise`](crate::denoise)). Display formats show it in place of the image.
     Denoised,

@@ -11,10 +11,10 @@ mod save_options;
 mod target;
 
 use crate::error::RenderError;
-use crate::film::Film;
-use crate::records::FirstHit;
 use wgray_image::{Pending, Pixels, Region, to_8_bits, to_16_bits};
 use wgray_scene::ViewSettings;
+use wgray_trace::film::Film;
+use wgray_trace::records::FirstHit;
 
 pub use aov::{Aov, AovSource, Channel, channels_of};
 pub use formats::exr::read_exr;

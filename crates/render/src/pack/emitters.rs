@@ -11,9 +11,9 @@ use super::{
     DIRECTIONAL, DISTANT_T_MAX, EMITTER, ENVIRONMENT, Emitter, Light, Material, NO_INDEX, NO_SHADOW, PLANE, POINT,
     Primitive, SPOT, TRIANGLE, t_max,
 };
-use crate::cpu::primitive::is_solid;
-use crate::records::{Lighting, PackedBvh};
 use wgray_scene::{Color, Scene, Texels, TextureKind};
+use wgray_trace::cpu::primitive::is_solid;
+use wgray_trace::records::{Lighting, PackedBvh};
 
 /// The emitters of a scene.
 #[derive(Default)]

@@ -7,13 +7,13 @@ use glam::{DVec2, UVec2, Vec2, Vec3};
 use rayon::prelude::*;
 
 use super::{ANISO_COLUMNS, ANISO_LINES, ENERGY_SIZE, Material, SMALLEST_ALPHA};
-use crate::cpu::ggx::{ggx_g1, ggx_sample};
-use crate::cpu::lanes::{Lanes2, Real, Vector2, Vector3, constant, select};
-use crate::cpu::lobe::{facet_alpha, facet_weight};
-use crate::cpu::math::{dot, max};
-use crate::cpu::samples::LEVEL;
-use crate::cpu::sequence::sobol_sample;
-use crate::cpu::specular::{fresnel, refracted_cosine};
+use wgray_trace::cpu::ggx::{ggx_g1, ggx_sample};
+use wgray_trace::cpu::lanes::{Lanes2, Real, Vector2, Vector3, constant, select};
+use wgray_trace::cpu::lobe::{facet_alpha, facet_weight};
+use wgray_trace::cpu::math::{dot, max};
+use wgray_trace::cpu::samples::LEVEL;
+use wgray_trace::cpu::sequence::sobol_sample;
+use wgray_trace::cpu::specular::{fresnel, refracted_cosine};
 
 /// Numbers of sampled normals per table entry, for constant and for textured roughness. The samples are Sobol' points,
 /// because few microfacets tilt enough for total internal reflection, and a grid would miss these microfacets.

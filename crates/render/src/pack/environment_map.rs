@@ -60,7 +60,7 @@ impl EnvironmentMap {
         self.0.as_ref().map(|map| map.sum)
     }
 
-    /// Returns the flags of [`Specialization::environment_flags`](crate::records::Specialization::environment_flags).
+    /// Returns the flags of [`Specialization::environment_flags`](wgray_trace::records::Specialization::environment_flags).
     pub fn bits(&self, scene: &Scene) -> u32 {
         let any = |test: fn(&scene::Environment) -> bool| scene.environment.as_ref().is_some_and(test);
         let bit = |is_set: bool, bit: u32| if is_set { bit } else { 0 };
@@ -392,7 +392,7 @@ fn write_table(mut weights: Vec<f64>, words: &mut Vec<u32>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cpu::equirect::normal_bin;
+    use wgray_trace::cpu::equirect::normal_bin;
 
     /// Returns the probabilities that an alias table encodes.
     fn probabilities(words: &[u32]) -> Vec<f64> {

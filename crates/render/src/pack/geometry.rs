@@ -6,12 +6,13 @@ use std::sync::Arc;
 use bytemuck::cast_vec;
 use glam::{DAffine3, DVec3, Vec3, Vec4};
 
+use super::mesh::packed_mesh;
 use super::primitive::bounding_box;
-use super::{BOX_PAD, BvhItem, CASTS_SHADOW, INSTANCE, Instance, NO_INDEX, NO_SHADOW, Node, Primitive, SOME_SHADOWS};
-use crate::bvh::{Aabb, build};
-use crate::records::{PackedBvh, PackedMesh};
+use super::{BOX_PAD, BvhItem, CASTS_SHADOW, INSTANCE, Instance, NO_SHADOW, Primitive, SOME_SHADOWS};
 use wgray_scene::mesh::Mesh;
 use wgray_scene::{Geometry, Scene, Shape};
+use wgray_trace::bvh::{Aabb, build};
+use wgray_trace::records::{PackedBvh, PackedMesh};
 
 /// Maximum number of bounded primitives without a BVH: a few primitives are faster without one.
 pub const MAX_LINEAR_PRIMITIVES: usize = 64;
@@ -41,7 +42,7 @@ pub fn build_bvh(
         let mesh_index = mesh_index.unwrap_or_else(|| {
             meshes.push(Arc::as_ptr(mesh));
             let with_tangents = meshes_with_tangents.contains(&Arc::as_ptr(mesh));
-            bvh.meshes.push(PackedMesh::cached(mesh, with_tangents));
+            bvh.meshes.push(packed_mesh(mesh, with_tangents));
             meshes.len() - 1
         });
         let word = |material: &usize| *material as u32 | if casts(*material) { 0 } else { NO_SHADOW };
@@ -100,76 +101,6 @@ fn meshes_with_tangents(scene: &Scene) -> HashSet<*const Mesh> {
     };
     scene.shapes.iter().filter_map(mesh).collect()
 }
-
-impl PackedBvh {
-    /// Stores in each instance the rows at which the lists of its mesh start. The nodes of meshes are at the end of the
-    /// buffer `nodes`; all other lists are in the buffer `meshes`.
-    fn set_mesh_rows(&mut self) {
-        let mut node_row = self.mesh_nodes_row();
-        let mut row = 0;
-        let first_rows: Vec<[u32; 8]> = self
-            .meshes
-            .iter()
-            .map(|mesh| {
-                let triangles = row;
-                let vertices = triangles + mesh.triangles.len() as u32;
-                let attributes = vertices + mesh.vertices.len() as u32;
-                let tangents = attributes + mesh.attributes.len() as u32;
-                let groups = tangents + TANGENT_ROWS * mesh.tangents.len() as u32;
-                let colors = groups + mesh.groups.len().div_ceil(4) as u32;
-                let more_uvs = colors + mesh.colors.len() as u32;
-                row = more_uvs + mesh.more_uvs.len() as u32;
-                let nodes = node_row;
-                node_row += NODE_ROWS * mesh.nodes.len() as u32;
-                let row_or_none = |row: u32, exists: bool| if exists { row } else { NO_INDEX };
-                [
-                    nodes,
-                    triangles,
-                    vertices,
-                    row_or_none(attributes, !mesh.attributes.is_empty()),
-                    row_or_none(tangents, !mesh.tangents.is_empty()),
-                    row_or_none(groups, !mesh.groups.is_empty()),
-                    row_or_none(colors, !mesh.colors.is_empty()),
-                    row_or_none(more_uvs, !mesh.more_uvs.is_empty()),
-                ]
-            })
-            .collect();
-        for instance in &mut self.instances {
-            let rows = first_rows[instance.mesh as usize];
-            [
-                instance.nodes,
-                instance.triangles,
-                instance.vertices,
-                instance.attributes,
-                instance.tangents,
-                instance.groups,
-                instance.colors,
-                instance.more_uvs,
-            ] = rows;
-        }
-    }
-
-    /// Returns the first rows of items, instances, group words and mesh nodes.
-    pub fn rows(&self) -> [u32; 4] {
-        let items = NODE_ROWS * self.nodes.len() as u32;
-        let instances = items + 2 * self.items.len() as u32;
-        let words = instances + INSTANCE_ROWS * self.instances.len() as u32;
-        [
-            items,
-            instances,
-            words,
-            words + self.group_words.len().div_ceil(4) as u32,
-        ]
-    }
-
-    fn mesh_nodes_row(&self) -> u32 {
-        self.rows()[3]
-    }
-}
-
-const NODE_ROWS: u32 = (size_of::<Node>() / 16) as u32;
-const TANGENT_ROWS: u32 = (size_of::<[Vec4; 2]>() / 16) as u32;
-const INSTANCE_ROWS: u32 = (size_of::<Instance>() / 16) as u32;
 
 fn item(kind: u32, index: u32, (low, high): (DVec3, DVec3)) -> BvhItem {
     // Rounded outward to f32.

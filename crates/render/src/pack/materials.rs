@@ -8,11 +8,11 @@ use glam::{DVec3, UVec2, Vec3};
 use super::energy::{TableLobes, aniso_table, energy_table};
 use super::pyramid::pyramid;
 use super::*;
-use crate::cpu::lobe::{facet_alpha, is_polished};
 use wgray_scene::{
     self as scene, self, AlphaMode, Channel, Color, Encoding, Facets, Image, Integrator, Reflection, Scene, Texels,
     TextureFilter, TextureKind, Value, VertexColors, Wrap,
 };
+use wgray_trace::cpu::lobe::{facet_alpha, is_polished};
 
 /// Packed materials, texture lookups, textures and texels.
 #[derive(Debug, Default)]

@@ -32,13 +32,11 @@ use self::materials::Appearances;
 use self::order::SortedPrimitives;
 pub use self::origin::origin;
 use self::primitive::pack_shapes;
-#[cfg(test)]
-pub(crate) use self::primitive::primitive;
 pub use self::shading::PackedShading;
 use self::specialize::Parts;
 pub use self::specialize::with_camera_features;
-use crate::records::*;
 use wgray_scene::{PixelFilter, PixelFilterKind, Scene};
+use wgray_trace::records::*;
 
 /// Minimum offset of ray origins, relative to the largest coordinate: 32 ulp, the rounding error of a surface and a
 /// neighbor (`docs/decisions/shadow-rays.md`).

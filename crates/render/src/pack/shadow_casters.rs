@@ -4,8 +4,8 @@
 use glam::DVec3;
 
 use super::{MAX_LINEAR_PRIMITIVES, Primitive};
-use crate::cpu::primitive::is_solid;
 use wgray_scene::{Geometry, Light, Reflection, Scene, Shadows};
+use wgray_trace::cpu::primitive::is_solid;
 
 /// Maximum distance at which a point counts as on a plane, relative to the coordinates, because the record of the plane
 /// is rounded.

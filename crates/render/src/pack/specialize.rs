@@ -10,9 +10,9 @@ use super::{
     MICROFACET_KINDS, Material, NO_COLORS, OPAQUE, PRINCIPLED, RANDOM, ROTATED_GRID, SOBOL, SPECULAR_KINDS, SPOT,
     Specialization,
 };
-use crate::cpu::lobe::is_polished;
-use crate::records::{LOBES, Lobe, PackedBvh};
 use wgray_scene::{self as scene, Pattern, Projection, Reflection, Samples, Scene};
+use wgray_trace::cpu::lobe::is_polished;
+use wgray_trace::records::{LOBES, Lobe, PackedBvh};
 
 /// Minimum number of pilot samples per pixel, after which adaptive sampling estimates the error.
 const MIN_PILOT_SAMPLES: u32 = 16;

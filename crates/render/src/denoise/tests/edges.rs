@@ -5,7 +5,7 @@ use wgray_image::Region;
 
 use super::super::{coverage, denoise};
 use super::{means, random};
-use crate::film::{Film, FilmLayout, Layer};
+use wgray_trace::film::{Film, FilmLayout, Layer};
 
 /// Returns the film of a noisy surface to the right of the line x = 10.3 + 0.2 y, with 16 samples per pixel, in front of
 /// `background`. Also returns the mean of each pixel with a surface without noise.

@@ -21,7 +21,7 @@ fn pixels_that_are_not_finite_stay_and_do_not_spread() {
     for (i, color) in denoised.iter().enumerate() {
         match i {
             65 | 190 | 340 | 444 | 599 => assert_eq!(color.to_array().map(f32::to_bits), {
-                crate::film::mean(film.sums[i]).map(f32::to_bits)
+                wgray_trace::film::mean(film.sums[i]).map(f32::to_bits)
             }),
             _ => assert!((*color - 0.5).abs().max_element() < 0.15, "{i}: {color}"),
         }

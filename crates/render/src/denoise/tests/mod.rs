@@ -4,7 +4,7 @@ mod excluded;
 use glam::{DVec3, Vec4};
 
 use super::*;
-use crate::film::Layer;
+use wgray_trace::film::Layer;
 
 /// A film of 4 samples per pixel whose samples are `color` of the pixel plus noise: a triangular distribution of this
 /// amplitude. Albedo, normal and depth have no noise.

@@ -18,7 +18,7 @@ use rayon::prelude::*;
 use super::super::aov::{Channel, channels_of};
 use super::super::{Band, ExrCompression, ExrType, Layout, Metadata, Pixels, SaveOptions, Sink};
 use crate::error::RenderError;
-use crate::film::mean;
+use wgray_trace::film::mean;
 
 /// Writes the radiance as R, G and B, premultiplied by alpha, alpha as A, and AOVs as further channels of the same
 /// part. The display window is the whole image, the data window is the region. Returns the number of finite values that

@@ -6,7 +6,7 @@ use glam::{DVec3, Vec3, Vec4};
 
 use super::*;
 use crate::cases;
-use crate::cpu::light_tree::{light_child, light_importances, light_shares};
+use wgray_trace::cpu::light_tree::{light_child, light_importances, light_shares};
 
 /// A linear congruential generator, 0 to 1.
 struct Random(u64);

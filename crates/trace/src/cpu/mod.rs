@@ -4,6 +4,7 @@
 //! The WGSL files document the functions.
 #![allow(missing_docs, reason = "documented in the WGSL files")]
 
+pub mod accumulate;
 pub mod adaptive;
 pub mod alpha;
 pub mod bits;
@@ -29,8 +30,7 @@ pub mod geometry;
 pub mod ggx;
 pub mod integrators;
 // WebAssembly has no wavefront, which uses the types.
-#[cfg_attr(target_arch = "wasm32", expect(dead_code, unused_imports))]
-pub(crate) mod lanes;
+pub mod lanes;
 pub mod lens;
 pub mod light;
 pub mod light_choice;
@@ -55,7 +55,6 @@ pub mod principled;
 pub mod procedural;
 pub mod ray;
 pub mod rectangle;
-mod renderer;
 pub mod rng;
 pub mod rough_dielectric;
 pub mod samples;
@@ -80,5 +79,3 @@ pub mod wavefront;
 #[cfg(target_arch = "wasm32")]
 #[path = "wavefront/scalar.rs"]
 pub mod wavefront;
-
-pub use renderer::Cpu;

@@ -20,7 +20,7 @@ mod tests {
     use glam::{DMat3, DVec3, Vec3};
 
     use super::*;
-    use crate::pack::primitive;
+    use crate::records::primitive;
     use crate::records::{INFINITE_T, PLANE};
 
     /// Returns the distance of the hit with the plane z = 1.

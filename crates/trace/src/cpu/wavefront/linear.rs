@@ -159,8 +159,8 @@ mod tests {
 
     use super::*;
     use crate::cpu::traversal::levels;
-    use crate::pack::primitive;
     use crate::records::PRIMITIVE_KINDS;
+    use crate::records::primitive;
 
     struct Random(u64);
 

@@ -28,7 +28,7 @@ mod tests {
     use glam::{DMat3, DVec3, Vec3};
 
     use super::*;
-    use crate::pack::primitive;
+    use crate::records::primitive;
     use crate::records::{INFINITE_T, RECTANGLE};
 
     /// Returns a rectangle in y = 1 with half edges (2, 0, 0) and (0, 0, 1).

@@ -38,7 +38,10 @@ impl Batch<'_> {
     #[inline(always)]
     pub fn shade_queues<S: Simd>(&mut self, simd: S, queues: &ShadingQueues) {
         let scene = self.scene;
-        leave_to_environment(simd, scene, self.paths, queues.missed());
+        simd.vectorize(
+            #[inline(always)]
+            || leave_to_environment(simd, scene, self.paths, queues.missed()),
+        );
         let epsilon = scene.environment.shadow_epsilon;
         let (mut flat, mut faces, mut evaluated) = (FlatHits::new(), FaceHits::new(), ScalarHits::default());
         let mut lights = LightRows::new(scene);
@@ -70,9 +73,18 @@ impl Batch<'_> {
                     (rows.exclude_front[lane], rows.exclude_back[lane]) = (prim_id, prim_id);
                 }
                 let surfaces = match surface_kind {
-                    SurfaceKind::Flat => flat.surfaces(simd, epsilon),
-                    SurfaceKind::Face => faces.surfaces(simd, epsilon),
-                    SurfaceKind::Evaluated => evaluated.surfaces(simd, scene.specialization.anisotropic != 0),
+                    SurfaceKind::Flat => simd.vectorize(
+                        #[inline(always)]
+                        || flat.surfaces(simd, epsilon),
+                    ),
+                    SurfaceKind::Face => simd.vectorize(
+                        #[inline(always)]
+                        || faces.surfaces(simd, epsilon),
+                    ),
+                    SurfaceKind::Evaluated => simd.vectorize(
+                        #[inline(always)]
+                        || evaluated.surfaces(simd, scene.specialization.anisotropic != 0),
+                    ),
                 };
                 self.shade(simd, hits, &rows, &mut lights, surfaces, material_kind, &mut materials);
             }
@@ -106,14 +118,20 @@ impl Batch<'_> {
     ) {
         let scene = self.scene;
         let s = &scene.specialization;
-        let random = RandomLanes::of(simd, scene, rows, material_kind);
+        let random = simd.vectorize(
+            #[inline(always)]
+            || RandomLanes::of(simd, scene, rows, material_kind),
+        );
         prepare(simd, scene, &mut surface, material_kind, materials);
         let normal_to_light = surface.lit_normal();
         let throughput = load3(simd, &rows.throughput);
         let mut light = None;
         if s.emitters != 0 && material_kind.smooth().is_none() {
             let choices = random.light_choices(scene);
-            light = Some(lights.sample(simd, choices, surface.ray_origin, normal_to_light, hits.len()));
+            light = Some(simd.vectorize(
+                #[inline(always)]
+                || lights.sample(simd, choices, surface.ray_origin, normal_to_light, hits.len()),
+            ));
         }
         let directions = Directions {
             throughput,
@@ -135,7 +153,10 @@ impl Batch<'_> {
                 shadow.move_behind(&surface, origin_behind, transmits, light.to_light, distances);
             }
         }
-        let next = NextRows::of(simd, scene, rows, &random, &result.next_rays);
+        let next = simd.vectorize(
+            #[inline(always)]
+            || NextRows::of(simd, scene, rows, &random, &result.next_rays),
+        );
         let mut albedos = Rows3::default();
         if s.layers != 0 {
             albedos = store3(throughput * albedo(simd, material_kind, materials));
@@ -297,15 +318,23 @@ fn scatter<S: Simd>(
     match material_kind {
         MaterialKind::Principled if IS_OPTIMIZED => {
             let material = materials.lanes(simd);
-            Principled::new(scene, &material, surface, &materials.energy).scatter(surface, directions)
+            simd.vectorize(
+                #[inline(always)]
+                || Principled::new(scene, &material, surface, &materials.energy).scatter(surface, directions),
+            )
         }
-        MaterialKind::Metal if IS_OPTIMIZED => {
-            Facets::metal(simd, &mut materials.rows, surface).scatter(surface, directions)
-        }
-        MaterialKind::Dielectric if IS_OPTIMIZED => {
-            Facets::dielectric(materials.lanes(simd), surface).scatter(surface, directions)
-        }
-        MaterialKind::Smooth(kind) if IS_OPTIMIZED => smooth_rays(kind, &materials.lanes(simd), surface, directions),
+        MaterialKind::Metal if IS_OPTIMIZED => simd.vectorize(
+            #[inline(always)]
+            || Facets::metal(simd, &mut materials.rows, surface).scatter(surface, directions),
+        ),
+        MaterialKind::Dielectric if IS_OPTIMIZED => simd.vectorize(
+            #[inline(always)]
+            || Facets::dielectric(materials.lanes(simd), surface).scatter(surface, directions),
+        ),
+        MaterialKind::Smooth(kind) if IS_OPTIMIZED => simd.vectorize(
+            #[inline(always)]
+            || smooth_rays(kind, &materials.lanes(simd), surface, directions),
+        ),
         _ => Diffuse::new(&materials.lanes(simd)).scatter(surface, directions),
     }
 }

@@ -1,151 +1,25 @@
-//! CPU backend: evaluates the kernels' twins on a thread pool.
+//! Adds samples to a film: row segments of a tile are rendered in parallel.
 
-use std::ops::{Deref, DerefMut, Range};
+use std::ops::Range;
 
 use glam::{UVec2, Vec4};
 use rayon::prelude::*;
+use wgray_image::Region;
+use wgray_scene::Integrator;
 
 use super::adaptive::{layer_mean, pilot_add, pilot_finish, proportional_samples, samples_wanted};
-use super::decoded_bvhs::decode_bvhs;
-use super::geometry::pixel_first_hit;
 use super::integrators::path::{path_layers, path_value};
 use super::integrators::phong;
 use super::pixel::Layers;
 use super::wavefront::{MAX_PATHS, Wavefront};
-use crate::backend::{Backend, FilmState, Rules, neighbor_radius};
-use crate::error::RenderError;
 use crate::film::{Film, Layer};
-use crate::records::{Camera, FirstHit, JITTERED, Packed};
-use wgray_image::Region;
-use wgray_scene::Integrator;
-
-/// A scene's CPU backend. Dispatches run in [`Backend::poll`] or [`Backend::wait`], on the current rayon pool.
-pub struct Cpu<P> {
-    scene: P,
-    rules: Rules,
-    film: Option<(Film, FilmState)>,
-    pending: Option<(Region, Range<u32>)>,
-}
-
-impl<P: Deref<Target = Packed>> Cpu<P> {
-    /// Renders a scene, given by a reference or an `Arc`.
-    pub fn new(scene: P) -> Cpu<P> {
-        Cpu {
-            rules: Rules::of(&scene),
-            scene,
-            film: None,
-            pending: None,
-        }
-    }
-
-    pub fn scene(&self) -> &P {
-        &self.scene
-    }
-
-    pub fn into_scene(self) -> P {
-        self.scene
-    }
-
-    /// Edits the scene and discards the film.
-    pub fn edit_scene(&mut self, edit: impl FnOnce(&mut P)) {
-        edit(&mut self.scene);
-        (self.rules, self.film, self.pending) = (Rules::of(&self.scene), None, None);
-    }
-
-    pub fn into_film(self) -> Option<Film> {
-        self.film.map(|(film, _)| film)
-    }
-
-    fn check_idle(&self) -> Result<(), RenderError> {
-        match self.pending {
-            Some(_) => Err(RenderError::Pending),
-            None => Ok(()),
-        }
-    }
-}
-
-impl<P: DerefMut<Target = Packed>> Cpu<P> {
-    /// Changes the camera and discards the film.
-    pub fn set_camera(&mut self, camera: &Camera) {
-        self.scene.camera = *camera;
-        (self.rules, self.film, self.pending) = (Rules::of(&self.scene), None, None);
-    }
-}
+use crate::records::{EDGE_NEIGHBOR_RADIUS, JITTERED, Packed, SMOOTH_NEIGHBOR_RADIUS};
 
 /// Minimum number of pixels in the row segment of a task; more if their samples do not fill a batch.
 const MIN_RUN: usize = 32;
 
-impl<P: Deref<Target = Packed>> Backend for Cpu<P> {
-    fn begin(&mut self, region: Region) -> Result<(), RenderError> {
-        self.check_idle()?;
-        let state = self.rules.begin(region)?;
-        self.film = Some((self.rules.empty_film(region), state));
-        Ok(())
-    }
-
-    fn resume(&mut self, film: Film) -> Result<(), RenderError> {
-        self.check_idle()?;
-        let state = self.rules.resume(&film)?;
-        self.film = Some((film, state));
-        Ok(())
-    }
-
-    fn submit(&mut self, tile: Region, samples: Range<u32>) -> Result<(), RenderError> {
-        self.check_idle()?;
-        let (_, state) = self.film.as_mut().ok_or(RenderError::NoFilm)?;
-        if self.rules.call(state, tile, &samples)? {
-            self.pending = Some((tile, samples));
-        }
-        Ok(())
-    }
-
-    fn poll(&mut self) -> Result<bool, RenderError> {
-        if let (Some((tile, mut samples)), Some((film, _))) = (self.pending.take(), &mut self.film) {
-            let scene: &Packed = &self.scene;
-            decode_bvhs(scene);
-            while !samples.is_empty() {
-                let end = self.rules.end_of_part(&samples);
-                add_samples(scene, film, tile, samples.start..end);
-                samples.start = end;
-            }
-        }
-        Ok(true)
-    }
-
-    fn wait(&mut self) -> Result<(), RenderError> {
-        self.poll().map(|_| ())
-    }
-
-    fn film(&mut self) -> Result<Film, RenderError> {
-        self.check_idle()?;
-        let (film, _) = self.film.as_ref().ok_or(RenderError::NoFilm)?;
-        Ok(film.clone())
-    }
-
-    fn first_hits(&mut self, region: Region) -> Result<Vec<FirstHit>, RenderError> {
-        self.check_idle()?;
-        self.rules.in_picture(region)?;
-        let scene: &Packed = &self.scene;
-        let rows = (region.y0..region.y1).into_par_iter();
-        let pixels = rows.flat_map_iter(|y| (region.x0..region.x1).map(move |x| UVec2::new(x, y)));
-        Ok(pixels.map(|pixel| pixel_first_hit(scene, pixel)).collect())
-    }
-
-    fn unskippable_samples(&self) -> u32 {
-        self.rules.unskippable_samples()
-    }
-
-    fn around(&self, region: Region) -> Region {
-        self.rules.around(region)
-    }
-
-    fn largest_film(&self) -> u64 {
-        u64::MAX
-    }
-}
-
 /// Adds samples to a tile. With adaptive sampling, the samples are either pilot samples or further samples.
-fn add_samples(scene: &Packed, film: &mut Film, tile: Region, samples: Range<u32>) {
+pub fn add_samples(scene: &Packed, film: &mut Film, tile: Region, samples: Range<u32>) {
     let Film {
         region,
         sums,
@@ -381,4 +255,13 @@ fn neighbor_pilot_sum(pilot_sums: &[Vec4], region: Region, pixel: UVec2, radius:
         }
     }
     sum
+}
+
+/// Returns the maximum distance of the neighbors whose pilot samples determine a pixel's sample count under adaptive
+/// sampling.
+pub fn neighbor_radius(has_smooth_noise: bool) -> u32 {
+    match has_smooth_noise {
+        true => SMOOTH_NEIGHBOR_RADIUS,
+        false => EDGE_NEIGHBOR_RADIUS,
+    }
 }

@@ -151,8 +151,8 @@ mod tests {
     use crate::cpu::math::normalize;
     use crate::cpu::primitive::{primitive_normal, solid_levels};
     use crate::cpu::ray::point_to_local;
-    use crate::pack::primitive;
     use crate::records::CYLINDER;
+    use crate::records::primitive;
 
     fn cylinder(center: DVec3, radius: f64, height: f64) -> Primitive {
         let axes = DMat3::from_diagonal(DVec3::new(radius, radius, height / 2.0));

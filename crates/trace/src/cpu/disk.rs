@@ -26,7 +26,7 @@ mod tests {
     use glam::{DMat3, DVec3, Vec3};
 
     use super::*;
-    use crate::pack::primitive;
+    use crate::records::primitive;
     use crate::records::{DISK, INFINITE_T};
 
     /// Returns the distance from (x, y, 5) down to a disk of radius 2 around (1, 1, 3).

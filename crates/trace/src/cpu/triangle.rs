@@ -29,7 +29,7 @@ mod tests {
 
     use super::*;
     use crate::cpu::primitive::primitive_normal;
-    use crate::pack::primitive;
+    use crate::records::primitive;
     use crate::records::{INFINITE_T, TRIANGLE};
 
     const CORNERS: [DVec3; 3] = [

@@ -44,7 +44,7 @@ pub struct Packed {
 }
 
 /// The BVH over all mesh instances and, if a scene has more than
-/// [`MAX_LINEAR_PRIMITIVES`](crate::pack::MAX_LINEAR_PRIMITIVES), the bounded primitives.
+/// `MAX_LINEAR_PRIMITIVES` of `wgray_render::pack`, the bounded primitives.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PackedBvh {
     /// Nodes of this BVH.

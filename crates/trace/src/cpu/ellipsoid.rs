@@ -72,7 +72,7 @@ mod tests {
     use crate::cpu::math::normalize;
     use crate::cpu::primitive::primitive_normal;
     use crate::cpu::ray::point_to_local;
-    use crate::pack::primitive;
+    use crate::records::primitive;
     use crate::records::{ELLIPSOID, INFINITE_T};
 
     fn ellipsoid(center: DVec3, axes: DMat3) -> Primitive {
