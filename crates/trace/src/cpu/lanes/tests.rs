@@ -43,7 +43,7 @@ struct Arguments<W: Word> {
     numbers: [W::Real; 9],
 }
 
-/// Calls all functions, and appends the name and the result of each call to `reals` or `words`.
+/// Calls all other functions, and appends the name and the result of each call to `reals` or `words`.
 #[inline(always)]
 fn append_results<W, K>(a: Arguments<W>, reals: &mut Vec<(&'static str, W::Real)>, words: &mut Vec<(&'static str, W)>)
 where
@@ -92,9 +92,6 @@ where
     ] {
         reals.extend([(name, v.x()), (name, v.y()), (name, v.z())]);
     }
-    append_facet_results(a.numbers, u, |name, results| {
-        reals.extend(results.iter().map(|&x| (name, x)))
-    });
     let (width, height) = (37, 18);
     let cell = cell_towards(unit, width, height);
     reals.extend([("cell_towards x", cell.x), ("cell_towards y", cell.y)]);
@@ -117,6 +114,16 @@ where
     ]);
     words.extend(hash4(K::from_words([i, j, k, l])).words().map(|word| ("hash4", word)));
 }
+
+/// Combinations of lobes of `principled`.
+const LOBES: [u32; 6] = [
+    0,
+    LOBE_SPECULAR,
+    LOBE_SPECULAR | LOBE_COAT,
+    LOBE_TRANSMISSION,
+    LOBE_SHEEN,
+    LOBE_SPECULAR | LOBE_TRANSMISSION | LOBE_COAT | LOBE_SHEEN | LOBE_ANISOTROPY,
+];
 
 /// A material and a surface with arbitrary parameters.
 #[derive(Clone, Copy)]
@@ -152,6 +159,14 @@ parameters! {
     diffuse 0 specular 3 sheen 6 tint 1 eta 2 k 5
 }
 
+impl<F: Real> Parameters<F> {
+    /// Returns a normal, and directions to the previous vertex and to a light.
+    #[inline(always)]
+    fn directions(&self) -> [F::Vec3; 3] {
+        [self.diffuse(), self.specular(), self.sheen()].map(normalize)
+    }
+}
+
 impl<F: Real> SurfaceVectors for Parameters<F> {
     type Real = F;
 
@@ -168,18 +183,12 @@ impl<F: Real> SurfaceVectors for Parameters<F> {
     }
 }
 
-/// Calls the functions of microfacets and of `principled` materials. `append` gets the name and the results of each
-/// call.
+/// Calls the functions of microfacets. `append` gets the name and the results of each call.
 #[inline(always)]
 fn append_facet_results<F: Real>(n: [F; 9], u: F::Vec2, mut append: impl FnMut(&'static str, &[F])) {
     let parameters = Parameters(n);
     let alpha: F::Vec2 = Vector2::new(n[1].abs(), n[4].abs());
-    let unit = |v: F::Vec3| normalize(v);
-    let (normal, wo, wi) = (
-        unit(parameters.diffuse()),
-        unit(parameters.specular()),
-        unit(parameters.sheen()),
-    );
+    let [normal, wo, wi] = parameters.directions();
     for (name, x) in [
         ("ggx_d", ggx_d(alpha, normal)),
         ("ggx_length", ggx_length(alpha, wo)),
@@ -235,32 +244,29 @@ fn append_facet_results<F: Real>(n: [F; 9], u: F::Vec2, mut append: impl FnMut(&
     ] {
         append(name, &[v.x(), v.y(), v.z()]);
     }
-    let all = LOBE_SPECULAR | LOBE_TRANSMISSION | LOBE_COAT | LOBE_SHEEN | LOBE_ANISOTROPY;
-    for lobes in [
-        0,
-        LOBE_SPECULAR,
-        LOBE_SPECULAR | LOBE_COAT,
-        LOBE_TRANSMISSION,
-        LOBE_SHEEN,
-        all,
+}
+
+/// Calls the functions of `principled` materials with these lobes.
+#[inline(always)]
+fn append_principled_results<F: Real>(n: [F; 9], u: F::Vec2, lobes: u32, mut append: impl FnMut(&'static str, &[F])) {
+    let parameters = Parameters(n);
+    let [normal, wo, wi] = parameters.directions();
+    let m = principled_mixture(&parameters, wo, n[0].lt(n[3]), normal, lobes, parameters.diffuse());
+    append_lobes(&m, &mut append);
+    let direction = principled_direction(&m, wo, u, n[8].abs(), lobes);
+    let sample = evaluated_sample(direction, parameters.tint(), n[7]);
+    for (name, v) in [
+        ("principled_eval", principled_eval(&m, wo, wi, lobes)),
+        ("glass_eval", glass_eval(&m, wo, wi)),
+        ("principled_direction", direction.wi),
+        ("principled_direction weight", direction.weight),
+        ("evaluated_sample weight", sample.weight),
     ] {
-        let m = principled_mixture(&parameters, wo, n[0].lt(n[3]), normal, lobes, parameters.diffuse());
-        append_lobes(&m, &mut append);
-        let direction = principled_direction(&m, wo, u, n[8].abs(), lobes);
-        let sample = evaluated_sample(direction, parameters.tint(), n[7]);
-        for (name, v) in [
-            ("principled_eval", principled_eval(&m, wo, wi, lobes)),
-            ("glass_eval", glass_eval(&m, wo, wi)),
-            ("principled_direction", direction.wi),
-            ("principled_direction weight", direction.weight),
-            ("evaluated_sample weight", sample.weight),
-        ] {
-            append(name, &[v.x(), v.y(), v.z()]);
-        }
-        append("principled_pdf", &[principled_pdf(&m, wo, wi, lobes)]);
-        append("glass_pdf", &[glass_pdf(&m, wo, wi)]);
-        append("principled_direction pdf", &[direction.pdf, direction.eta, sample.pdf]);
+        append(name, &[v.x(), v.y(), v.z()]);
     }
+    append("principled_pdf", &[principled_pdf(&m, wo, wi, lobes)]);
+    append("glass_pdf", &[glass_pdf(&m, wo, wi)]);
+    append("principled_direction pdf", &[direction.pdf, direction.eta, sample.pdf]);
 }
 
 #[inline(always)]
@@ -334,6 +340,12 @@ fn compare_lanes() {
         let expected = lanes.map(|arguments| {
             let (mut reals, mut words) = (Vec::new(), Vec::new());
             append_results(arguments, &mut reals, &mut words);
+            let (numbers, u) = (arguments.numbers, Vec2::from_array(arguments.square));
+            let mut append = |name, results: &[f32]| reals.extend(results.iter().map(|&x| (name, x)));
+            append_facet_results(numbers, u, &mut append);
+            for lobes in LOBES {
+                append_principled_results(numbers, u, lobes, &mut append);
+            }
             (reals, words)
         });
         for level in levels() {
@@ -347,6 +359,19 @@ fn compare_lanes() {
                 };
                 let (mut reals, mut words) = (Vec::new(), Vec::new());
                 append_results(arguments, &mut reals, &mut words);
+                let (numbers, u) = (arguments.numbers, Lanes2 { x: arguments.square[0], y: arguments.square[1] });
+                let mut append = |name, results: &[f32x8<_>]| reals.extend(results.iter().map(|&x| (name, x)));
+                // Separate functions, because the compile time of a long function is not linear.
+                simd.vectorize(
+                    #[inline(always)]
+                    || append_facet_results(numbers, u, &mut append),
+                );
+                for lobes in LOBES {
+                    simd.vectorize(
+                        #[inline(always)]
+                        || append_principled_results(numbers, u, lobes, &mut append),
+                    );
+                }
                 assert_eq!((reals.len(), words.len()), (expected[0].0.len(), expected[0].1.len()));
                 for (i, (name, x)) in reals.iter().enumerate() {
                     let x: [f32; LANES] = (*x).into();
