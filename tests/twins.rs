@@ -106,6 +106,11 @@ const ONE_SIDED: &[(&str, &str, &str)] = &[
         "only in Rust: the part of `radiance` after the closest hit of the camera ray",
     ),
     (
+        "phong.wgsl",
+        "add_visible",
+        "only in Rust: `phong_block` for directions that are computed once for several functions",
+    ),
+    (
         "pixel.wgsl",
         "pixel_radiance",
         "only in Rust: WGSL kernels loop over the samples",

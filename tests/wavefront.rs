@@ -196,7 +196,9 @@ fn make_metal(material: &mut Material, variant: usize) {
 /// For each feature, the number of scenes with this feature in which hits are shaded in lanes.
 #[derive(Debug, Default)]
 struct LaneCoverage {
-    camera: usize,
+    /// Cameras with Sobol' points, and with other points.
+    sobol_camera: usize,
+    other_camera: usize,
     camera_invisible: usize,
     /// Scenes with hits on each kind of material (rows) and surface.
     kinds: [[usize; 3]; MaterialKind::ALL.len()],
@@ -223,7 +225,8 @@ impl LaneCoverage {
         let s = &packed.specialization;
         // SIMD lanes compute only the rays of these cameras.
         let has_pinhole = s.lens == 0 && s.panoramic == 0;
-        let has_lane_camera = has_pinhole && s.pixel_pattern == SOBOL && s.filter_bins == 0;
+        let has_lane_camera = has_pinhole && s.filter_bins == 0;
+        let has_sobol = s.pixel_pattern == SOBOL;
         if hits == LaneHits::default() {
             return;
         }
@@ -236,7 +239,8 @@ impl LaneCoverage {
             }
         }
         for (count, has_feature) in [
-            (&mut self.camera, has_lane_camera),
+            (&mut self.sobol_camera, has_lane_camera && has_sobol),
+            (&mut self.other_camera, has_lane_camera && !has_sobol),
             (&mut self.camera_invisible, has_lane_camera && s.camera_invisible != 0),
             (&mut self.coat, is_principled && s.lobes & LOBE_COAT != 0),
             (&mut self.sheen, is_principled && s.lobes & LOBE_SHEEN != 0),
@@ -264,7 +268,8 @@ impl LaneCoverage {
 
     fn assert_all_covered(&self) {
         let LaneCoverage {
-            camera,
+            sobol_camera,
+            other_camera,
             camera_invisible,
             kinds,
             coat,
@@ -285,7 +290,8 @@ impl LaneCoverage {
             layers,
         } = *self;
         let features = [
-            camera,
+            sobol_camera,
+            other_camera,
             camera_invisible,
             coat,
             sheen,

@@ -5,13 +5,18 @@ use fearless_simd::{Level, dispatch};
 
 use super::mesh::{HitPrimitive, face_direction_allowed};
 use super::phong::{is_lit, phong_lobes};
-use super::samples::{LANES, directions_at};
+use super::samples::{LANES, LEVEL, directions_at};
 use super::surface::Surface;
 use super::traversal::{Directions, MAX_SEGMENTS};
 use crate::records::Material;
 
+/// Returns a mask in which bit i is set if the surface reflects no light from direction i.
+pub fn unlit_bits(prim: &HitPrimitive, surface: &Surface, directions: &Directions) -> u32 {
+    directions.all() & !allowed_bits(*LEVEL, prim, surface, directions)
+}
+
 /// Returns a mask in which bit i is set if the surface may reflect light from direction i.
-pub fn allowed_bits(level: Level, prim: &HitPrimitive, surface: &Surface, directions: &Directions) -> u32 {
+fn allowed_bits(level: Level, prim: &HitPrimitive, surface: &Surface, directions: &Directions) -> u32 {
     let is_flat = surface.smooth_normal == surface.normal;
     dispatch!(level, simd => {
         let mut bits = 0;

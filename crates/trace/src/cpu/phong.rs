@@ -2,12 +2,13 @@
 
 use super::lanes::{Real, Vector3, constant, select};
 use super::light::LightSegments;
-use super::lobes::{allowed_bits, lobes_of_all};
+use super::lobes::{lobes_of_all, unlit_bits};
 use super::math::{dot, max, power, power_whole};
 use super::mesh::HitPrimitive;
 use super::samples::{LEVEL, Samples};
 use super::shadow::SampleBlock;
 use super::surface::Surface;
+use super::traversal::Directions;
 use crate::records::Material;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -44,8 +45,7 @@ pub fn is_lit<V: Vector3>(surface: &Surface, direction: V) -> <V::Real as Real>:
 }
 
 pub fn unlit_mask(prim: &HitPrimitive, surface: &Surface, segments: LightSegments, block: SampleBlock) -> u32 {
-    let directions = Samples::of(block).segments(*LEVEL, segments);
-    directions.all() & !allowed_bits(*LEVEL, prim, surface, &directions)
+    unlit_bits(prim, surface, &Samples::of(block).segments(*LEVEL, segments))
 }
 
 #[inline(always)]
@@ -65,14 +65,26 @@ pub fn phong_block(
     exponent_bits: u32,
     sum: Lobes,
 ) -> Lobes {
-    if occluded == u32::MAX >> (32 - block.count) {
+    let directions = Samples::of(block).segments(*LEVEL, segments);
+    add_visible(surface, material, &directions, occluded, exponent_bits, sum)
+}
+
+/// [`phong_block`] for known directions.
+pub fn add_visible(
+    surface: &Surface,
+    material: &Material,
+    directions: &Directions,
+    occluded: u32,
+    exponent_bits: u32,
+    sum: Lobes,
+) -> Lobes {
+    if occluded == directions.all() {
         return Lobes {
             diffuse: sum.diffuse + 0.0, // -0 becomes 0
             specular: sum.specular + 0.0,
         };
     }
-    let directions = Samples::of(block).segments(*LEVEL, segments);
-    let values = lobes_of_all(*LEVEL, surface, material, &directions, exponent_bits);
+    let values = lobes_of_all(*LEVEL, surface, material, directions, exponent_bits);
     let mut lobes = sum;
     for (i, (diffuse, specular)) in values[0].iter().zip(&values[1]).enumerate().take(directions.count) {
         let visible = (occluded >> i) & 1 == 0;

@@ -8,18 +8,20 @@ use crate::cpu::geometry::{
     surface_of,
 };
 use crate::cpu::light::{segments_to_light, spot_falloff};
+use crate::cpu::lobes::unlit_bits;
 use crate::cpu::mesh::HitPrimitive;
 use crate::cpu::path::{Path, SpecularSplit, glass_path, is_specular, mirrored_path, usable_normal};
-use crate::cpu::phong::{Lobes, phong_block, unlit_mask};
+use crate::cpu::phong::{Lobes, add_visible};
 use crate::cpu::ray::{Hit, Ray};
 use crate::cpu::rng::unit_float;
+use crate::cpu::samples::{LEVEL, Samples};
 use crate::cpu::sampling::{decision_bits, sample_key};
 use crate::cpu::shadow::SampleBlock;
 use crate::cpu::surface::Surface;
 use crate::cpu::texture::evaluate_material;
 use crate::records::{
     EMITTER, GRID, Light, MAX_PATH_LEAVES, MAX_SPLIT_DEPTH, MIRROR, Material, NO_INDEX, NO_PRIMITIVE, Packed,
-    SAMPLE_BLOCK, SPOT,
+    ROTATED_GRID, SAMPLE_BLOCK, SPOT,
 };
 
 pub fn radiance(scene: &Packed, ray: Ray, differential: Differential, pixel: UVec2, sample: u32) -> Vec3 {
@@ -149,7 +151,10 @@ pub fn lobes_of_light(
     sample: u32,
 ) -> Lobes {
     let segments = segments_to_light(light, surface.position);
-    let key = sample_key(pixel, scene.camera.seed, 1 + light.number);
+    let key = match pattern {
+        GRID | ROTATED_GRID => UVec2::ZERO, // without effect
+        _ => sample_key(pixel, scene.camera.seed, 1 + light.number),
+    };
     let mut lobes = Lobes {
         diffuse: 0.0,
         specular: 0.0,
@@ -164,16 +169,16 @@ pub fn lobes_of_light(
             group: sample,
             key,
         };
+        let directions = Samples::of(block).segments(*LEVEL, segments);
         let mut unlit = 0;
         if scene.specialization.tlas_kinds != 0 {
-            unlit = unlit_mask(prim, surface, segments, block);
+            unlit = unlit_bits(prim, surface, &directions);
         }
         let occluded = occluded_samples(scene, surface, light, block, unlit);
-        lobes = phong_block(
+        lobes = add_visible(
             surface,
             material,
-            segments,
-            block,
+            &directions,
             occluded,
             scene.specialization.exponent_bits,
             lobes,

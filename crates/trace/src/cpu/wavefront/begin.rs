@@ -1,5 +1,5 @@
 //! The stage that begins paths with their camera rays. SIMD lanes compute the rays of perspective and orthographic
-//! cameras without a lens, if the samples of a pixel are Sobol' points.
+//! cameras without a lens and a filter table, and Sobol' points.
 
 use fearless_simd::prelude::*;
 use fearless_simd::{dispatch, u32x8};
@@ -13,9 +13,10 @@ use super::super::pixel::{Layers, differential_at};
 use super::super::ray::Ray;
 use super::super::rng::hash4;
 use super::super::samples::LEVEL;
+use super::super::sampling::{sample_key, sample_square};
 use super::super::sequence::sobol_sample;
 use super::rows::{LANES, Row, get3, store3};
-use crate::records::{NO_PRIMITIVE, Packed, SOBOL};
+use crate::records::{GRID, NO_PRIMITIVE, Packed, ROTATED_GRID, SOBOL};
 
 /// Begins a path for each camera sample, like `begin_path`. A camera sample is a pixel and a sample number. Returns true if
 /// the rays have yet to pass surfaces that are invisible to the camera.
@@ -38,10 +39,10 @@ pub fn begin_paths(
     scene.specialization.camera_invisible != 0
 }
 
-/// Returns true if `begin_in_lanes` can compute the camera rays: each depends only on its pixel and a Sobol' point.
+/// Returns true if `begin_in_lanes` can compute the camera rays: each depends only on its pixel and a point in it.
 fn has_lane_camera(scene: &Packed) -> bool {
     let s = &scene.specialization;
-    s.pixel_pattern == SOBOL && s.filter_bins == 0 && s.lens == 0 && s.panoramic == 0
+    s.filter_bins == 0 && s.lens == 0 && s.panoramic == 0
 }
 
 /// Begins paths in SIMD lanes, with the results of `camera_sample` and of `begin_path` without invisible surfaces.
@@ -56,11 +57,22 @@ fn begin_in_lanes<S: Simd>(
     let s = &scene.specialization;
     loop {
         let (mut x, mut y, mut index, mut sample) = ([0; LANES], [0; LANES], [0; LANES], [0; LANES]);
+        let (mut u_x, mut u_y): (Row, Row) = ([0.0; LANES], [0.0; LANES]);
         let mut count = 0;
         for (pixel, number) in samples.by_ref().take(LANES) {
             (x[count], y[count], sample[count]) = (pixel.x, pixel.y, number);
             let (round, round_index) = (number / s.pixel_samples, number % s.pixel_samples);
-            index[count] = round.wrapping_mul(s.pixel_side).wrapping_add(round_index);
+            match s.pixel_pattern {
+                SOBOL => index[count] = round.wrapping_mul(s.pixel_side).wrapping_add(round_index),
+                pattern => {
+                    let key = match pattern {
+                        GRID | ROTATED_GRID => UVec2::ZERO, // without effect
+                        _ => sample_key(pixel, scene.camera.seed, 0),
+                    };
+                    let u = sample_square(pattern, s.pixel_side, round_index, round, key);
+                    (u_x[count], u_y[count]) = (u.x, u.y);
+                }
+            }
             pixels.push(pixel);
             count += 1;
         }
@@ -69,8 +81,16 @@ fn begin_in_lanes<S: Simd>(
         }
         let words = |words: [u32; LANES]| u32x8::simd_from(simd, words);
         let (pixel_x, pixel_y) = (words(x), words(y));
-        let key = hash4([pixel_x, pixel_y, words([scene.camera.seed; LANES]), words([0; LANES])]);
-        let u = sobol_sample(words(index), Lanes2 { x: key[0], y: key[1] });
+        let u = match s.pixel_pattern {
+            SOBOL => {
+                let key = hash4([pixel_x, pixel_y, words([scene.camera.seed; LANES]), words([0; LANES])]);
+                sobol_sample(words(index), Lanes2 { x: key[0], y: key[1] })
+            }
+            _ => Lanes2 {
+                x: SimdFrom::simd_from(simd, u_x),
+                y: SimdFrom::simd_from(simd, u_y),
+            },
+        };
         let raster = Lanes2 {
             x: pixel_x.to_real() + u.x,
             y: pixel_y.to_real() + u.y,
