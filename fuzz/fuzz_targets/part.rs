@@ -91,7 +91,7 @@ fuzz_target!(|bytes: &[u8]| {
             return;
         };
         let options = SaveOptions {
-            metadata: parts.told(),
+            metadata: parts.metadata(),
             ..SaveOptions::default()
         };
         let _ = save(vec![Target { format, files }], &layout, &options, &mut |sink| {
