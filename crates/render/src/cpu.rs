@@ -54,6 +54,11 @@ impl<P: Deref<Target = Packed>> Cpu<P> {
         self.film.map(|(film, _)| film)
     }
 
+    /// Decodes the BVHs for fast traversal, which the first dispatch does otherwise.
+    pub fn prepare(&self) {
+        decode_bvhs(&self.scene);
+    }
+
     fn check_idle(&self) -> Result<(), RenderError> {
         match self.pending {
             Some(_) => Err(RenderError::Pending),

@@ -4,6 +4,8 @@
 use std::ops::Range;
 use std::sync::OnceLock;
 
+use rayon::prelude::*;
+
 use super::huge_pages::vec_in_huge_pages;
 use super::{Aabb, Node};
 
@@ -49,14 +51,26 @@ impl DecodedMesh {
     /// Decodes a BVH over triangles. `vertices` are positions, each followed by an unused word; `triangles` are three
     /// vertex indices and the triangle's index, in leaf order.
     pub fn new(nodes: &[Node], vertices: &[[f32; 4]], triangles: &[[u32; 4]]) -> DecodedMesh {
-        let leaf_count = |node: &Node| node.leaves.iter().filter(|leaf| **leaf != 0).count();
-        let mut leaves = vec_in_huge_pages(nodes.iter().map(leaf_count).sum());
-        let mut leaf = |items: Range<usize>, bounds: Aabb| {
-            leaves.push(DecodedLeaf::new(vertices, triangles, items.start, items.len()));
-            ((leaves.len() - 1) as u32, bounds)
-        };
+        let mut items_of_leaves = Vec::new();
+        let mut first_leaves = Vec::with_capacity(nodes.len());
+        for node in nodes {
+            first_leaves.push(items_of_leaves.len() as u32);
+            items_of_leaves.extend((0..8).map(|child| node.items(child)).filter(|items| !items.is_empty()));
+        }
+        let mut leaves = vec_in_huge_pages(items_of_leaves.len());
+        items_of_leaves
+            .into_par_iter()
+            .map(|items| DecodedLeaf::new(vertices, triangles, items.start, items.len()))
+            .collect_into_vec(&mut leaves);
         let mut decoded_nodes = vec_in_huge_pages(nodes.len());
-        decoded_nodes.extend(nodes.iter().map(|node| DecodedNode::new(node, &mut leaf)));
+        nodes
+            .par_iter()
+            .zip(first_leaves)
+            .map(|(node, first_leaf)| {
+                let mut leaves = first_leaf..;
+                DecodedNode::new(node, |_, bounds| (leaves.next().unwrap_or_default(), bounds))
+            })
+            .collect_into_vec(&mut decoded_nodes);
         DecodedMesh {
             nodes: decoded_nodes,
             leaves,
@@ -78,7 +92,7 @@ pub fn decode_items(nodes: &[Node], boxes: impl Fn(usize) -> Aabb) -> Vec<Decode
 
 impl DecodedNode {
     /// `leaf` returns the index and the box of a leaf, given its items and its decoded box.
-    fn new(node: &Node, leaf: &mut impl FnMut(Range<usize>, Aabb) -> (u32, Aabb)) -> DecodedNode {
+    fn new(node: &Node, mut leaf: impl FnMut(Range<usize>, Aabb) -> (u32, Aabb)) -> DecodedNode {
         let mut decoded = DecodedNode {
             planes: [[[f32::INFINITY; 8]; 3], [[f32::NEG_INFINITY; 8]; 3]],
             children: [LEAF; 8],
@@ -140,9 +154,12 @@ impl<T> DecodedOnce<T> {
         self.0.get()
     }
 
-    /// Returns the decoded form, after decoding the BVH if necessary.
-    pub fn get_or_init(&self, decode: impl FnOnce() -> T) -> &T {
-        self.0.get_or_init(decode)
+    /// Decodes the BVH unless it has been decoded. Several threads may do so at once: a lock would be held while rayon
+    /// runs other tasks, which may need it.
+    pub fn init(&self, decode: impl FnOnce() -> T) {
+        if self.get().is_none() {
+            _ = self.0.set(decode());
+        }
     }
 }
 

@@ -18,7 +18,7 @@ use super::samples::{LEVEL, Samples, box_hits};
 use super::shadow::{SampleBlock, occlusion_mask};
 use super::slab::{Slabs, box_interval, interval_hits, slabs};
 use super::surface::{Surface, largest};
-use super::traversal::{self, Line, MeshRay, Nearest};
+use super::traversal::{self, Directions, Line, MeshRay, Nearest};
 use crate::bvh::{Aabb, Node};
 use crate::records::{
     BvhItem, CASTS_SHADOW, INFINITE_T, INSTANCE, Instance, Light, NO_INDEX, Packed, PackedMesh, SOME_SHADOWS,
@@ -224,7 +224,9 @@ pub fn occluded_by_bvh(
         light_segments: segments_to_light(light, surface.ray_origin),
         samples: Samples::of(block),
     };
-    let directions = rays.samples.segments(*LEVEL, rays.light_segments);
+    let mut directions = Directions::EMPTY;
+    rays.samples
+        .write_segments(*LEVEL, rays.light_segments, &mut directions);
     let pad = item_pad(scene, surface.ray_origin);
     let mut occluded = already_occluded & all_samples;
     if scene.bvh.items.len() <= FEW_ITEMS {
@@ -280,10 +282,12 @@ fn occluded_by_mesh(scene: &Packed, instance_index: u32, candidates: u32, rays: 
         u: vector_to_mesh(i, rays.light_segments.u),
         v: vector_to_mesh(i, rays.light_segments.v),
     };
+    let mut directions = Directions::EMPTY;
+    rays.samples.write_segments(*LEVEL, mesh_segments, &mut directions);
     let segments = traversal::Segments {
         o: origin,
         pad: mesh_pad(i, origin),
-        directions: &rays.samples.segments(*LEVEL, mesh_segments),
+        directions: &directions,
         t_max: rays.light.t_max,
         skip: excluded_triangle(rays.surface.exclude_front, instance_index),
     };

@@ -21,10 +21,10 @@ pub fn decode_bvhs_up_to(scene: &Packed, max_leaves: usize) {
     if bvh.items.len() + triangles > max_leaves {
         return;
     }
-    bvh.meshes.par_iter().for_each(|mesh| {
-        mesh.decoded.get_or_init(|| decoded(mesh));
-    });
-    bvh.decoded.get_or_init(|| {
+    bvh.meshes
+        .par_iter()
+        .for_each(|mesh| mesh.decoded.init(|| decoded(mesh)));
+    bvh.decoded.init(|| {
         decode_items(cast_slice(&bvh.nodes), |i| Aabb {
             low: bvh.items[i].low,
             high: bvh.items[i].high,

@@ -32,15 +32,16 @@ fn allowed_bits(level: Level, prim: &HitPrimitive, surface: &Surface, directions
     })
 }
 
-/// Returns the values of [`phong_lobes`] for all directions: diffuse lobes, then specular lobes.
-pub fn lobes_of_all(
+/// Writes the values of [`phong_lobes`] for all directions: diffuse lobes, then specular lobes. Returned values would be
+/// copied.
+pub fn write_lobes(
     level: Level,
     surface: &Surface,
     material: &Material,
     directions: &Directions,
     exponent_bits: u32,
-) -> [[f32; MAX_SEGMENTS]; 2] {
-    let mut values = [[0.0; MAX_SEGMENTS]; 2];
+    values: &mut [[f32; MAX_SEGMENTS]; 2],
+) {
     dispatch!(level, simd => {
         for i in (0..directions.count).step_by(LANES) {
             let lobes = phong_lobes(surface, material, directions_at(simd, directions, i), exponent_bits);
@@ -48,7 +49,6 @@ pub fn lobes_of_all(
             lobes.specular.store_slice(&mut values[1][i..i + LANES]);
         }
     });
-    values
 }
 
 #[cfg(test)]
@@ -123,8 +123,10 @@ mod tests {
             };
             let exponent_bits = if i % 2 == 0 { 4 } else { 0 };
             for level in levels() {
-                let directions = Samples::of(block).segments(level, segments);
-                let lobes = lobes_of_all(level, &surface, &material, &directions, exponent_bits);
+                let mut directions = Directions::EMPTY;
+                Samples::of(block).write_segments(level, segments, &mut directions);
+                let mut lobes = [[0.0; MAX_SEGMENTS]; 2];
+                write_lobes(level, &surface, &material, &directions, exponent_bits, &mut lobes);
                 let bits = allowed_bits(level, &prim, &surface, &directions);
                 assert_eq!(directions.count, count as usize);
                 for k in 0..count {

@@ -2,13 +2,13 @@
 
 use super::lanes::{Real, Vector3, constant, select};
 use super::light::LightSegments;
-use super::lobes::{lobes_of_all, unlit_bits};
+use super::lobes::{unlit_bits, write_lobes};
 use super::math::{dot, max, power, power_whole};
 use super::mesh::HitPrimitive;
 use super::samples::{LEVEL, Samples};
 use super::shadow::SampleBlock;
 use super::surface::Surface;
-use super::traversal::Directions;
+use super::traversal::{Directions, MAX_SEGMENTS};
 use crate::records::Material;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -45,7 +45,9 @@ pub fn is_lit<V: Vector3>(surface: &Surface, direction: V) -> <V::Real as Real>:
 }
 
 pub fn unlit_mask(prim: &HitPrimitive, surface: &Surface, segments: LightSegments, block: SampleBlock) -> u32 {
-    unlit_bits(prim, surface, &Samples::of(block).segments(*LEVEL, segments))
+    let mut directions = Directions::EMPTY;
+    Samples::of(block).write_segments(*LEVEL, segments, &mut directions);
+    unlit_bits(prim, surface, &directions)
 }
 
 #[inline(always)]
@@ -65,7 +67,8 @@ pub fn phong_block(
     exponent_bits: u32,
     sum: Lobes,
 ) -> Lobes {
-    let directions = Samples::of(block).segments(*LEVEL, segments);
+    let mut directions = Directions::EMPTY;
+    Samples::of(block).write_segments(*LEVEL, segments, &mut directions);
     add_visible(surface, material, &directions, occluded, exponent_bits, sum)
 }
 
@@ -84,7 +87,8 @@ pub fn add_visible(
             specular: sum.specular + 0.0,
         };
     }
-    let values = lobes_of_all(*LEVEL, surface, material, directions, exponent_bits);
+    let mut values = [[0.0; MAX_SEGMENTS]; 2];
+    write_lobes(*LEVEL, surface, material, directions, exponent_bits, &mut values);
     let mut lobes = sum;
     for (i, (diffuse, specular)) in values[0].iter().zip(&values[1]).enumerate().take(directions.count) {
         let visible = (occluded >> i) & 1 == 0;

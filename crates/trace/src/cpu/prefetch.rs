@@ -1,4 +1,4 @@
-//! Prefetches of data that a batch of paths will read.
+//! Prefetches of data.
 
 use super::geometry::instance_of;
 use super::ray::Hit;
@@ -17,9 +17,13 @@ pub fn prefetch_line(address: *const u8) {
     let _ = address;
 }
 
+/// Starts to load all cache lines of an item, whose index may be any.
 #[inline(always)]
-fn prefetch_item<T>(items: &[T], index: u32) {
-    prefetch_line(items.as_ptr().wrapping_add(index as usize).cast());
+pub fn prefetch_item<T>(items: &[T], index: u32) {
+    let address = items.as_ptr().wrapping_add(index as usize).cast::<u8>();
+    for offset in (0..size_of::<T>()).step_by(64) {
+        prefetch_line(address.wrapping_add(offset));
+    }
 }
 
 /// Starts to load the vertex indices of a triangle, given its position in leaf order.

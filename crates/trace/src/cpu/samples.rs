@@ -76,18 +76,9 @@ impl Samples {
         samples
     }
 
-    /// Returns the vectors to the samples on a light.
-    #[inline(always)] // which avoids a copy of the result
-    pub fn segments(&self, level: Level, segments: LightSegments) -> Directions {
-        let mut directions = Directions {
-            count: self.count,
-            components: [[0.0; MAX_SEGMENTS]; 3],
-        };
-        self.write_segments(level, segments, &mut directions);
-        directions
-    }
-
-    fn write_segments(&self, level: Level, segments: LightSegments, directions: &mut Directions) {
+    /// Writes the vectors to the samples on a light. Returned values would be copied.
+    pub fn write_segments(&self, level: Level, segments: LightSegments, directions: &mut Directions) {
+        directions.count = self.count;
         dispatch!(level, simd => {
             for i in (0..self.count.next_multiple_of(WIDEST)).step_by(LANES) {
                 let row = |row: &[f32; MAX_SEGMENTS]| f32x8::from_slice(simd, &row[i..i + LANES]);

@@ -9,6 +9,7 @@ use super::primitive::{occludes, solid_levels};
 use super::ray::vector_to_local;
 use super::samples::{LEVEL, Samples, occluded_directions};
 use super::sampling::sample_square;
+use super::traversal::Directions;
 use crate::records::{Light, Primitive, Sphere};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -26,7 +27,9 @@ pub fn occlusion_mask(kind: u32, q: &Primitive, p: Vec3, from_inside: bool, ligh
     let from_anchor = vector_to_local(q, p - q.anchor);
     let o = from_anchor - q.middle;
     let levels = solid_levels(kind, q, from_anchor, from_inside);
-    let directions = Samples::of(block).segments(*LEVEL, segments_to_local(q, segments_to_light(light, p)));
+    let segments = segments_to_local(q, segments_to_light(light, p));
+    let mut directions = Directions::EMPTY;
+    Samples::of(block).write_segments(*LEVEL, segments, &mut directions);
     occluded_directions(kind, o, &directions, levels, light.t_max)
 }
 

@@ -19,6 +19,7 @@ use crate::cpu::sampling::{decision_bits, sample_key};
 use crate::cpu::shadow::SampleBlock;
 use crate::cpu::surface::Surface;
 use crate::cpu::texture::evaluate_material;
+use crate::cpu::traversal::Directions;
 use crate::records::{
     EMITTER, GRID, Light, MAX_PATH_LEAVES, MAX_SPLIT_DEPTH, MIRROR, Material, NO_INDEX, NO_PRIMITIVE, Packed,
     ROTATED_GRID, SAMPLE_BLOCK, SPOT,
@@ -169,7 +170,8 @@ pub fn lobes_of_light(
             group: sample,
             key,
         };
-        let directions = Samples::of(block).segments(*LEVEL, segments);
+        let mut directions = Directions::EMPTY;
+        Samples::of(block).write_segments(*LEVEL, segments, &mut directions);
         let mut unlit = 0;
         if scene.specialization.tlas_kinds != 0 {
             unlit = unlit_bits(prim, surface, &directions);

@@ -96,6 +96,12 @@ pub struct Directions {
 }
 
 impl Directions {
+    /// No vectors.
+    pub const EMPTY: Directions = Directions {
+        count: 0,
+        components: [[0.0; MAX_SEGMENTS]; 3],
+    };
+
     /// Creates the structure from the first [`MAX_SEGMENTS`] vectors.
     pub fn new(vectors: &[Vec3]) -> Directions {
         let first = vectors.first().copied().unwrap_or(Vec3::Z);

@@ -5,6 +5,7 @@ use std::ops::Range;
 use fearless_simd::prelude::*;
 use fearless_simd::{f32x4, f32x8};
 
+use super::super::prefetch::prefetch_item;
 use super::four::{Four, intersect};
 use super::{Line, Mesh};
 use crate::bvh::{DecodedLeaf, DecodedMesh, DecodedNode, LEAF, Node};
@@ -177,6 +178,10 @@ pub trait TriangleBvh {
 
     /// Returns the triangles of a leaf. An empty leaf has none.
     fn triangles(&self, leaf: <Self::Node as WideNode>::Leaf) -> Option<impl Triangles>;
+
+    /// Starts to load a leaf.
+    #[inline(always)]
+    fn prefetch_leaf(&self, _leaf: <Self::Node as WideNode>::Leaf) {}
 }
 
 impl TriangleBvh for Mesh<'_> {
@@ -209,5 +214,10 @@ impl TriangleBvh for DecodedMesh {
     #[inline(always)]
     fn triangles(&self, leaf: u32) -> Option<impl Triangles> {
         self.leaves.get(leaf as usize)
+    }
+
+    #[inline(always)]
+    fn prefetch_leaf(&self, leaf: u32) {
+        prefetch_item(&self.leaves, leaf);
     }
 }

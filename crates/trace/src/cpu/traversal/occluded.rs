@@ -5,6 +5,7 @@ use fearless_simd::f32x8;
 use fearless_simd::prelude::*;
 
 use super::super::bits::bits_of;
+use super::super::prefetch::prefetch_item;
 use super::closest::STACK;
 use super::line::{MIN_COMPONENT, axes_from, in_order, maximum, minimum};
 use super::node::{TriangleBvh, Triangles as _, WideNode};
@@ -54,6 +55,8 @@ pub fn occluded<S: Simd>(simd: S, mesh: &impl TriangleBvh, segments: &Segments, 
         segments,
         mask,
         #[inline(always)]
+        |leaf| mesh.prefetch_leaf(leaf),
+        #[inline(always)]
         |lanes, leaf, leaf_mask| {
             let Some(triangles) = mesh.triangles(leaf) else {
                 return 0;
@@ -98,6 +101,7 @@ pub fn items<S: Simd>(
         nodes,
         segments,
         mask,
+        |_| {},
         #[inline(always)]
         |lanes, items, leaf_mask| {
             let mut occluded = 0;
@@ -149,13 +153,14 @@ fn in_lanes<S: Simd>(lanes: &[Lanes<S>], mut test: impl FnMut(&Lanes<S>) -> u64)
 }
 
 /// Visits each leaf with the mask of the segments that hit the leaf. `visit` returns the mask of the segments that the
-/// leaf occludes. Returns the mask of all occluded segments.
+/// leaf occludes. `prefetch_leaf` starts to load a leaf. Returns the mask of all occluded segments.
 #[inline(always)]
 fn traverse<S: Simd, N: WideNode>(
     simd: S,
     nodes: &[N],
     segments: &Segments,
     mask: u32,
+    prefetch_leaf: impl Fn(N::Leaf),
     mut visit: impl FnMut(&[Lanes<S>], N::Leaf, u32) -> u32,
 ) -> u32 {
     let mut pending = mask & segments.directions.all();
@@ -233,8 +238,13 @@ fn traverse<S: Simd, N: WideNode>(
             }
         }
         let inner = node.inner();
+        for slot in bits_of(hit_children & !inner) {
+            prefetch_leaf(node.leaf(slot));
+        }
         for slot in far_to_near(hit_children & inner, octant) {
-            stack.push((node.node(slot), children[slot]));
+            let child = node.node(slot);
+            prefetch_item(nodes, child);
+            stack.push((child, children[slot]));
         }
         for slot in bits_of(hit_children & !inner) {
             let mask = children[slot] & pending;
