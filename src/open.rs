@@ -43,6 +43,15 @@ impl Engine {
         }
     }
 
+    /// Does what the first dispatch would do otherwise.
+    pub(crate) fn prepare(&self) {
+        match self {
+            Engine::Cpu(cpu) => cpu.prepare(),
+            #[cfg(feature = "gpu")]
+            Engine::Gpu(..) => {}
+        }
+    }
+
     /// Denoises a finished film with noise estimates.
     pub(crate) fn denoise(&self, film: &mut Film) -> Result<(), RenderError> {
         film.denoised = match self {

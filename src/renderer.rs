@@ -131,9 +131,7 @@ impl OpenScene {
                 Err(error) => return Err(error),
             }
         }
-        if let Engine::Cpu(cpu) = &open.engine {
-            cpu.prepare();
-        }
+        open.engine.prepare();
         open.largest_film = open.engine.backend().largest_film();
         let reason = match (&open.selection, &options.device) {
             (Some(selection), _) => &selection.reason,
