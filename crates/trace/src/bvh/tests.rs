@@ -1,9 +1,11 @@
 //! Tests of the BVH builder: node invariants for random, degenerate and extreme boxes.
 
+use std::sync::atomic::{AtomicU32, Ordering};
+
 use glam::Vec3;
 
 use super::binary::{Binary, Inner};
-use super::{Aabb, BUILD_MAX_DEPTH, MAX_LEAF_SIZE, Node, Tree, build};
+use super::{Aabb, BUILD_MAX_DEPTH, DecodedOnce, MAX_LEAF_SIZE, Node, Tree, build};
 use crate::cases;
 
 /// Numbers from 0 to 1.
@@ -275,4 +277,23 @@ fn children_are_in_the_slots_of_their_octants() {
     let tree = build(&boxes, 1);
     let items: Vec<u32> = (0..8).map(|c| tree.order[tree.nodes[0].items(c)][0]).collect();
     assert_eq!(items, [7, 6, 5, 4, 3, 2, 1, 0]);
+}
+
+/// A thread that decodes a BVH may run another task that decodes the same BVH, while rayon waits for a part. With a lock,
+/// this test would not end.
+#[test]
+fn a_task_may_decode_a_bvh_during_its_decoding() {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    let (decoded, calls) = (DecodedOnce::default(), AtomicU32::new(0));
+    let decode = || {
+        rayon::yield_now(); // runs the other task
+        calls.fetch_add(1, Ordering::Relaxed)
+    };
+    pool.scope(|scope| {
+        for _ in 0..2 {
+            scope.spawn(|_| decoded.init(decode));
+        }
+    });
+    decoded.init(|| unreachable!());
+    assert_eq!((calls.into_inner(), decoded.get()), (2, Some(&0)));
 }
