@@ -66,9 +66,12 @@ impl DecodedMesh {
         nodes
             .par_iter()
             .zip(first_leaves)
-            .map(|(node, first_leaf)| {
-                let mut leaves = first_leaf..;
-                DecodedNode::new(node, |_, bounds| (leaves.next().unwrap_or_default(), bounds))
+            .map(|(node, mut next_leaf)| {
+                DecodedNode::new(node, |_, bounds| {
+                    let leaf = next_leaf;
+                    next_leaf += 1;
+                    (leaf, bounds)
+                })
             })
             .collect_into_vec(&mut decoded_nodes);
         DecodedMesh {
