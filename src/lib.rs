@@ -100,8 +100,7 @@
 //! - `gpu`: rendering on GPUs and software Vulkan. Without it, [`Device::Auto`] is the CPU, and wgpu is not linked.
 //! - `formats`: OpenEXR, WebP and KTX 2 files, and metadata of JPEG files. Without it, such files are errors, JPEG files
 //!   have no metadata, and textures of glTF files use the PNG or JPEG image if there is one.
-//! - `schema`: the JSON Schema of scene files, [`scene::schema`].
-//! - `cli`: the program `wgray`. Enables `formats` and `schema`.
+//! - `cli`: the program `wgray`. Enables `formats`.
 //! - `dev`: the program's development mode, a page that updates when a shader or scene is saved. Enables `cli` and `gpu`.
 //!
 //! Without optimization, the CPU renders far more slowly. To optimize the renderer in your debug builds:

@@ -10,7 +10,6 @@ use crate::color::{linear_to_srgb, srgb_to_linear};
 
 /// Transform from linear light to display values. [`ViewTransform::name`] is the name in files.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[non_exhaustive]
 pub enum ViewTransform {
     /// Clamps to 0 ... 1, then applies gamma 1/2.2.

@@ -1,4 +1,4 @@
-//! The derive macro `JsonSchema` of builds without the cargo feature `schema`. It replaces the macro of the crate
+//! The derive macro `JsonSchema` of builds that do not generate the JSON Schema. It replaces the macro of the crate
 //! schemars, so that the attributes of types are the same in all builds.
 
 use proc_macro::TokenStream;

@@ -36,7 +36,6 @@ mod presentation;
 mod problem;
 mod read;
 mod scene;
-#[cfg(feature = "schema")]
 mod schema;
 mod sky;
 mod spline;
@@ -71,7 +70,6 @@ pub use parse::{Pieces, Places, is_json_scene};
 pub use presentation::{Presentation, UpAxis};
 pub use problem::{ErrorPlace, Problem, UnreadableFile};
 pub use scene::*;
-#[cfg(feature = "schema")]
 pub use schema::{
     fields::{Field, Kind as FieldKind, Names, fields},
     schema,

@@ -31,7 +31,7 @@ pub enum Value {
 
 /// A channel of a texture. In a file, the names are in lower case: `"g"`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum Channel {
     /// Red.
@@ -103,7 +103,7 @@ pub enum TextureKind {
 
 /// Texture addressing outside of the image. In a file, the names are in snake case: `"repeat"`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum Wrap {
     /// Repeats the image.
@@ -117,7 +117,7 @@ pub enum Wrap {
 
 /// Texture filter. In a file, the names are in snake case: `"ewa"`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum TextureFilter {
     /// Nearest texel.
@@ -140,7 +140,7 @@ impl TextureFilter {
 
 /// Encoding of 8-bit and 16-bit values. In a file, the names are in snake case: `"srgb"`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Deserialize, Serialize)]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum Encoding {
     /// The sRGB transfer function of IEC 61966-2-1.

@@ -1,6 +1,6 @@
 //! Kinds of values of scene files: JSON schemas independent of the Rust types. Fields of descriptions refer to kinds,
-//! as in `#[schemars(with = "Length")]`, and import this module with `*`: `no_kinds.rs` replaces it without the cargo
-//! feature `schema`.
+//! as in `#[schemars(with = "Length")]`, and import this module with `*`. Only the test that generates the schema needs
+//! it; `no_kinds.rs` replaces it in other builds.
 
 use std::borrow::Cow;
 
@@ -9,10 +9,8 @@ use schemars::{Schema, SchemaGenerator};
 use serde_json::{Value, json};
 
 use crate::limits::*;
+use crate::schema::TITLE_SEPARATOR;
 use crate::{MetalIndex, ViewSettings};
-
-/// Separator of a kind's label and its range, in schema titles.
-pub(crate) const TITLE_SEPARATOR: &str = "|";
 
 const COORDINATES: (f64, f64) = (-MAX_COORDINATE, MAX_COORDINATE);
 
@@ -95,6 +93,25 @@ kinds! {
     Factor3, "three numbers", list(3, scale());
     Matrix, "three rows of four numbers", matrix();
     ListIndex, "a number", integer(0, u32::MAX);
+}
+
+/// The names of [`ViewTransform`](crate::ViewTransform), with their descriptions.
+#[derive(JsonSchema)]
+#[schemars(inline)]
+#[expect(dead_code, reason = "only the schema of the type is used")]
+pub(crate) enum ViewTransformName {
+    /// Clamps to 0 ... 1, then applies gamma 1/2.2.
+    #[schemars(rename = "gamma22")]
+    Gamma22,
+    /// Clamps to 0 ... 1, then applies the sRGB curve.
+    #[schemars(rename = "srgb")]
+    Srgb,
+    /// AgX without a look: desaturates bright colors gradually, like film.
+    #[schemars(rename = "agx")]
+    Agx,
+    /// Khronos PBR Neutral: keeps colors up to a brightness, and compresses brighter colors.
+    #[schemars(rename = "khronos-pbr-neutral")]
+    KhronosPbrNeutral,
 }
 
 /// A plain color with components from 0 to 1, or a texture.

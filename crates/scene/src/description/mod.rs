@@ -9,7 +9,7 @@ mod camera_path;
 mod environment;
 mod gltf;
 mod integrator;
-#[cfg_attr(not(feature = "schema"), path = "no_kinds.rs")]
+#[cfg_attr(not(test), path = "no_kinds.rs")]
 pub(crate) mod kinds;
 mod light;
 mod material;
@@ -18,7 +18,7 @@ mod principled;
 mod render;
 mod shape;
 pub(super) mod tagged;
-#[cfg(feature = "schema")]
+#[cfg(test)]
 pub(crate) mod tagged_schema;
 mod texture;
 
@@ -183,6 +183,7 @@ pub struct ImageDescription {
     pub height: u32,
     /// View transform, from linear radiance to display values.
     #[serde(default)]
+    #[schemars(with = "ViewTransformName")]
     pub view_transform: ViewTransform,
     /// Exposure in stops: radiance is multiplied by 2 to this power before the view transform.
     #[serde(default)]

@@ -1,3 +1,3 @@
-//! The module `kinds` without the cargo feature `schema`.
+//! The module `kinds` of builds that do not generate the schema.
 
 pub(crate) use wgray_no_schema::JsonSchema;

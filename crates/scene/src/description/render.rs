@@ -158,7 +158,7 @@ impl<'de> Deserialize<'de> for SamplesDescription {
     }
 }
 
-#[cfg(feature = "schema")]
+#[cfg(test)]
 impl JsonSchema for SamplesDescription {
     fn schema_name() -> std::borrow::Cow<'static, str> {
         "SamplesDescription".into()

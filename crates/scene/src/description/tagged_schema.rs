@@ -3,6 +3,8 @@
 use schemars::{Schema, SchemaGenerator};
 use serde_json::{Map, Value, json};
 
+use crate::schema::definition;
+
 /// Returns the schema of a table whose key `type` selects one of several types. Each type has a tag, a description and
 /// a schema, which becomes a definition named after `section`.
 pub(crate) fn tagged(generator: &mut SchemaGenerator, section: &str, types: Vec<(&str, &str, Schema)>) -> Schema {
@@ -41,10 +43,4 @@ pub(crate) fn tagged(generator: &mut SchemaGenerator, section: &str, types: Vec<
         "anyOf": alternatives,
     });
     schema.try_into().unwrap_or_default()
-}
-
-/// Returns the name of the definition of a type, such as `camera-perspective`. `section` is the name of a section or of
-/// its Rust type.
-pub(crate) fn definition(section: &str, tag: &str) -> String {
-    format!("{}-{tag}", section.trim_end_matches("Description").to_lowercase())
 }

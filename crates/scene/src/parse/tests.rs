@@ -238,9 +238,9 @@ fn invalid_text_is_reported_with_its_line() {
             "shapes[0].radius is missing",
         ),
         (
-            "[[shapes]]\n[[shapes]]",
+            "[[lights]]\n[[lights]]",
             1,
-            "shapes[0].type is missing; it must be one of \"rectangle\", \"disk\", \"ellipsoid\", \"sphere\", \"cylinder\", \"triangle\", \"tetrahedron\", \"plane\", \"mesh\", \"gltf\"",
+            "lights[0].type is missing; it must be one of \"rectangle\", \"point\", \"directional\", \"spot\"",
         ),
         (
             "[[lights]]\ntype = 'directional'\ndirection = [0, 0, 1]\ncolor = [1, 1, 1]\n[[lights]]\ntype = 'point'\nvertex = 3",

@@ -5,7 +5,8 @@ use std::path::Path;
 
 use serde_json::{Value as Json, json};
 
-use super::{TITLE_SEPARATOR, file_schema, to_toml};
+use super::generate::to_toml;
+use super::{TITLE_SEPARATOR, file_schema};
 
 const PAGE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/scene-format.md");
 
