@@ -21,8 +21,8 @@ fn transferred(derivative: Derivative, ray: Ray, t: f32, normal: vec3f) -> Deriv
 
 // Returns the derivative of the outward unit normal for the derivative `dp` of the position (section 3.2). With the
 // matrix M of the rows q.x, q.y and q.z, a point p of a solid with the center c has the local position l = M (p - c).
-// The gradient of |l|^2 / 2 is g = M^T l, on a cylinder's side without the third row of M. The normal is n = g / |g|,
-// with the derivative (dg - n (n . dg)) / |g|.
+// With the gradient s of the solid's function at l (`solid_gradient`), the gradient in world space is g = M^T s. The
+// normal is n = g / |g|, with the derivative (dg - n (n . dg)) / |g|.
 fn normal_derivative(q: Primitive, local: vec3f, dp: vec3f) -> vec3f {
     let dl = vector_to_local(q, dp);
     let s = solid_gradient(q.kind, local);

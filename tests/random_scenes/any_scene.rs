@@ -84,7 +84,7 @@ fn path_settings() -> BoxedStrategy<PathSettings> {
         .boxed()
 }
 
-fn light() -> impl Strategy<Value = LightDescription> {
+fn light() -> BoxedStrategy<LightDescription> {
     let rectangle = (
         point(),
         frame(),
@@ -118,11 +118,11 @@ fn light() -> impl Strategy<Value = LightDescription> {
                 inner_angle: fraction * cone_angle,
             })
         });
-    prop_oneof![4 => rectangle, 2 => point_light, 2 => directional, 1 => spot]
+    prop_oneof![4 => rectangle, 2 => point_light, 2 => directional, 1 => spot].boxed()
 }
 
 /// Generates cameras on surfaces, inside shapes, or outside.
-fn camera() -> impl Strategy<Value = CameraDescription> {
+fn camera() -> BoxedStrategy<CameraDescription> {
     let position = prop_oneof![2 => point().prop_map(|p| p * 3.0 + DVec3::new(0.01, -0.02, 0.03)), 1 => point()];
     let look_at = point().prop_map(|p| p * 0.5);
     // A pinhole, a thin lens, or a panorama if the number of blades exceeds the maximum.
@@ -132,8 +132,8 @@ fn camera() -> impl Strategy<Value = CameraDescription> {
         0u32..18,
     );
     let sizes = (20.0..120.0, 0.5..6.0);
-    (position, look_at, sizes, any::<bool>(), lens).prop_map(
-        |(position, look_at, (fov, height), is_orthographic, lens)| {
+    (position, look_at, sizes, any::<bool>(), lens)
+        .prop_map(|(position, look_at, (fov, height), is_orthographic, lens)| {
             let (aperture, focus_distance, blades) = lens;
             let up = if (look_at - position).cross(DVec3::Z).length() > 0.1 {
                 DVec3::Z
@@ -165,11 +165,11 @@ fn camera() -> impl Strategy<Value = CameraDescription> {
                     ..PerspectiveDescription::new(position, look_at, fov)
                 })
             }
-        },
-    )
+        })
+        .boxed()
 }
 
-fn render() -> impl Strategy<Value = RenderDescription> {
+fn render() -> BoxedStrategy<RenderDescription> {
     let pattern = || {
         select(
             patterns::all()
@@ -188,51 +188,54 @@ fn render() -> impl Strategy<Value = RenderDescription> {
         PixelFilterKind::BlackmanHarris,
     ];
     let options = (any::<bool>(), 1u32..6, any::<bool>(), select(kinds), any::<bool>());
-    (color(1.0), color(1.0), epsilon, any::<u32>(), samples, options).prop_map(
-        |(
-            ambient,
-            background,
-            shadow_epsilon,
-            seed,
-            (pixel_pattern, pixel_samples, light_pattern, light_samples),
-            (opaque, max_depth, filtered, kind, adaptive),
-        )| {
-            RenderDescription {
+    (color(1.0), color(1.0), epsilon, any::<u32>(), samples, options)
+        .prop_map(
+            |(
                 ambient,
                 background,
                 shadow_epsilon,
-                shadows: if opaque { Shadows::Opaque } else { Shadows::Transparent },
-                max_depth,
-                ray_differentials: filtered,
                 seed,
-                pixel_samples: patterns::samples(pixel_pattern, pixel_samples),
-                light_samples: patterns::samples(light_pattern, light_samples),
-                filter: PixelFilterDescription { kind, radius: None },
-                adaptive: (adaptive && pixel_pattern.is_extensible()).then_some(AdaptiveDescription {
-                    error: 0.02,
-                    max_samples: Some(16),
-                }),
-                ..RenderDescription::default()
-            }
-        },
-    )
+                (pixel_pattern, pixel_samples, light_pattern, light_samples),
+                (opaque, max_depth, filtered, kind, adaptive),
+            )| {
+                RenderDescription {
+                    ambient,
+                    background,
+                    shadow_epsilon,
+                    shadows: if opaque { Shadows::Opaque } else { Shadows::Transparent },
+                    max_depth,
+                    ray_differentials: filtered,
+                    seed,
+                    pixel_samples: patterns::samples(pixel_pattern, pixel_samples),
+                    light_samples: patterns::samples(light_pattern, light_samples),
+                    filter: PixelFilterDescription { kind, radius: None },
+                    adaptive: (adaptive && pixel_pattern.is_extensible()).then_some(AdaptiveDescription {
+                        error: 0.02,
+                        max_samples: Some(16),
+                    }),
+                    ..RenderDescription::default()
+                }
+            },
+        )
+        .boxed()
 }
 
 /// Generates scenes of both integrators.
-pub fn description() -> impl Strategy<Value = Description> {
-    description_with((shapes(), meshes()), prop::option::of(path_settings()))
+pub fn description() -> BoxedStrategy<Description> {
+    description_with((shapes(), meshes()), prop::option::of(path_settings())).boxed()
 }
 
-pub fn direct_light_description() -> impl Strategy<Value = Description> {
-    description_with((shapes(), meshes()), Just(None))
+pub fn direct_light_description() -> BoxedStrategy<Description> {
+    description_with((shapes(), meshes()), Just(None)).boxed()
 }
 
 /// Generates scenes with too few primitives for a BVH.
-pub fn without_trees() -> impl Strategy<Value = Description> {
+pub fn without_trees() -> BoxedStrategy<Description> {
     description_with(
         (prop::collection::vec(shape(), 0..7), Just(Default::default())),
         Just(None),
     )
+    .boxed()
 }
 
 type Shapes = (
@@ -241,9 +244,9 @@ type Shapes = (
 );
 
 fn description_with(
-    shapes: impl Strategy<Value = Shapes>,
+    shapes: impl Strategy<Value = Shapes> + 'static,
     paths: impl Strategy<Value = Option<PathSettings>> + 'static,
-) -> impl Strategy<Value = Description> {
+) -> BoxedStrategy<Description> {
     // Sometimes, the lights are enough for a light tree.
     let few = prop::collection::vec(light(), 0..4);
     let lights = prop_oneof![9 => few, 1 => prop::collection::vec(light(), 17..40)];
@@ -305,4 +308,5 @@ fn description_with(
         .prop_filter("a valid scene", |description| {
             description.validate_with(&Assets::beside(folder())).is_ok()
         })
+        .boxed()
 }

@@ -9,46 +9,49 @@ use wgray::scene::*;
 
 use super::values::*;
 
-pub fn color_or_texture() -> impl Strategy<Value = ColorDescription> {
+pub fn color_or_texture() -> BoxedStrategy<ColorDescription> {
     let texture = select(&["checker", "lines", "constant"][..]).prop_map(str::to_string);
     prop_oneof![
         4 => color(1.0).prop_map(ColorDescription::Plain),
         1 => texture.prop_map(|texture| ColorDescription::Texture(TextureReference { texture })),
     ]
+    .boxed()
 }
 
-pub fn textures() -> impl Strategy<Value = BTreeMap<String, TextureDescription>> {
+pub fn textures() -> BoxedStrategy<BTreeMap<String, TextureDescription>> {
     let placement = (
         select(&[1.0, 4.0, 0.3, -2.0][..]),
         select(&[0.0, 30.0, 90.0][..]),
         0.0..1.0,
     );
-    (color(1.0), color(1.0), placement, 0.05..0.5).prop_map(|(even, odd, (scale, rotate, offset), line_width)| {
-        let (scale, offset) = ([scale, scale * 2.0], [offset, 0.0]);
-        let checker = CheckerDescription {
-            even,
-            odd,
-            scale,
-            rotate,
-            offset,
-        };
-        let lines = LinesDescription {
-            cell: even,
-            line: odd,
-            line_width,
-            scale,
-            rotate,
-            offset,
-        };
-        BTreeMap::from([
-            ("checker".to_string(), TextureDescription::Checker(checker)),
-            ("lines".to_string(), TextureDescription::Lines(lines)),
-            (
-                "constant".to_string(),
-                TextureDescription::Constant(ConstantDescription { color: even }),
-            ),
-        ])
-    })
+    (color(1.0), color(1.0), placement, 0.05..0.5)
+        .prop_map(|(even, odd, (scale, rotate, offset), line_width)| {
+            let (scale, offset) = ([scale, scale * 2.0], [offset, 0.0]);
+            let checker = CheckerDescription {
+                even,
+                odd,
+                scale,
+                rotate,
+                offset,
+            };
+            let lines = LinesDescription {
+                cell: even,
+                line: odd,
+                line_width,
+                scale,
+                rotate,
+                offset,
+            };
+            BTreeMap::from([
+                ("checker".to_string(), TextureDescription::Checker(checker)),
+                ("lines".to_string(), TextureDescription::Lines(lines)),
+                (
+                    "constant".to_string(),
+                    TextureDescription::Constant(ConstantDescription { color: even }),
+                ),
+            ])
+        })
+        .boxed()
 }
 
 pub fn material() -> BoxedStrategy<MaterialDescription> {
@@ -97,17 +100,18 @@ pub fn material() -> BoxedStrategy<MaterialDescription> {
 }
 
 /// Generates emission, or `None` in two of three cases.
-pub fn emission() -> impl Strategy<Value = Option<ColorDescription>> {
+pub fn emission() -> BoxedStrategy<Option<ColorDescription>> {
     let texture = select(&["checker", "lines", "constant"][..]).prop_map(str::to_string);
     prop_oneof![
         6 => Just(None),
         2 => color(5.0).prop_map(|color| Some(ColorDescription::Plain(color))),
         1 => texture.prop_map(|texture| Some(ColorDescription::Texture(TextureReference { texture }))),
     ]
+    .boxed()
 }
 
 /// Generates a number from 0 to 1, often 0 or 1, or a texture channel.
-pub fn fraction_or_texture() -> impl Strategy<Value = ValueDescription> {
+pub fn fraction_or_texture() -> BoxedStrategy<ValueDescription> {
     let texture = (
         select(&["checker", "lines"][..]).prop_map(str::to_string),
         select(&[Channel::R, Channel::G, Channel::B][..]),
@@ -118,10 +122,11 @@ pub fn fraction_or_texture() -> impl Strategy<Value = ValueDescription> {
         3 => (0.0..=1.0).prop_map(ValueDescription::Plain),
         1 => texture.prop_map(|(texture, channel)| ValueDescription::channel(texture, channel)),
     ]
+    .boxed()
 }
 
 /// Generates principled materials with any combination of lobes.
-pub fn principled() -> impl Strategy<Value = MaterialDescription> {
+pub fn principled() -> BoxedStrategy<MaterialDescription> {
     let fractions = proptest::collection::vec(fraction_or_texture(), 8);
     let volume = (select(&[0.0, 1.0][..]), color(1.0), select(&[1.0, 1.3, 1.5, 2.4][..]));
     let alpha = (
@@ -163,6 +168,7 @@ pub fn principled() -> impl Strategy<Value = MaterialDescription> {
                 MaterialDescription::Principled(m)
             },
         )
+        .boxed()
 }
 
 /// Generates any material that `path` supports.

@@ -3,6 +3,8 @@
 use glam::DVec3;
 use wgray::scene::*;
 
+use super::shapes::{move_placement, scale_and_translate_shape};
+
 /// Scales the cameras, lights and shapes of a scene about the origin, then translates them by `offset`.
 pub fn scale_and_translate(description: &mut Description, scale: f64, offset: DVec3) {
     let move_point = |p: &mut DVec3| *p = *p * scale + offset;
@@ -31,59 +33,9 @@ pub fn scale_and_translate(description: &mut Description, scale: f64, offset: DV
         }
     }
     for shape in &mut description.shapes {
-        match shape {
-            ShapeDescription::Rectangle(s) => {
-                move_point(&mut s.center);
-                s.size = s.size.map(|side| side * scale);
-            }
-            ShapeDescription::Sphere(s) => {
-                move_point(&mut s.center);
-                s.radius *= scale;
-            }
-            ShapeDescription::Disk(s) => {
-                move_point(&mut s.center);
-                s.radius *= scale;
-            }
-            ShapeDescription::Ellipsoid(s) => {
-                move_point(&mut s.center);
-                [&mut s.a, &mut s.b, &mut s.c]
-                    .into_iter()
-                    .for_each(|axis| *axis *= scale);
-            }
-            ShapeDescription::Cylinder(s) => {
-                [&mut s.start, &mut s.end].into_iter().for_each(move_point);
-                s.radius *= scale;
-            }
-            ShapeDescription::Triangle(s) => s.vertices.iter_mut().for_each(move_point),
-            ShapeDescription::Tetrahedron(s) => s.vertices.iter_mut().for_each(move_point),
-            ShapeDescription::Plane(s) => move_point(&mut s.point),
-            ShapeDescription::Mesh(s) => move_placement(&mut s.translate, &mut s.scale, &mut s.matrix, scale, offset),
-            other => panic!("no random scene has the shape {other:?}"),
-        }
+        scale_and_translate_shape(shape, scale, offset);
     }
     for i in &mut description.instances {
         move_placement(&mut i.translate, &mut i.scale, &mut i.matrix, scale, offset);
     }
-}
-
-fn move_placement(
-    translate: &mut Option<DVec3>,
-    factors: &mut Option<Scale>,
-    matrix: &mut Option<Vec<[f64; 4]>>,
-    scale: f64,
-    offset: DVec3,
-) {
-    if let Some(rows) = matrix {
-        for (row, offset) in rows.iter_mut().zip(offset.to_array()) {
-            *row = row.map(|x| x * scale);
-            row[3] += offset;
-        }
-        return;
-    }
-    *translate = Some(translate.unwrap_or_default() * scale + offset);
-    *factors = Some(match factors {
-        None => Scale::All(scale),
-        Some(Scale::All(s)) => Scale::All(*s * scale),
-        Some(Scale::Each(s)) => Scale::Each(*s * scale),
-    });
 }

@@ -12,7 +12,7 @@ use wgray_render::pack::MAX_LINEAR_PRIMITIVES;
 use super::files::MESHES;
 use super::values::*;
 
-pub fn shape() -> impl Strategy<Value = ShapeDescription> {
+pub fn shape() -> BoxedStrategy<ShapeDescription> {
     let material = select(&["a", "b", "c"][..]).prop_map(str::to_string);
     let rectangle = (material.clone(), point(), frame(), [length(), length()]).prop_map(
         |(material, center, [normal, tangent], size)| {
@@ -93,12 +93,13 @@ pub fn shape() -> impl Strategy<Value = ShapeDescription> {
         1 => tetrahedron,
         1 => plane,
     ]
+    .boxed()
 }
 
 /// Translation, rotation and scale, or a matrix.
 pub type Placement = (Option<DVec3>, Option<Rotation>, Option<Scale>, Option<Vec<[f64; 4]>>);
 
-pub fn placement() -> impl Strategy<Value = Placement> {
+pub fn placement() -> BoxedStrategy<Placement> {
     let angle = || prop_oneof![2 => select(&[0.0, 90.0, -180.0, 30.0][..]), 1 => -360.0..360.0];
     let angles = [angle(), angle(), angle()].prop_map(|a| Rotation::Angles(DVec3::from_array(a)));
     let about = (direction(), angle()).prop_map(|(axis, degrees)| Rotation::About(RotationAbout { axis, degrees }));
@@ -110,62 +111,68 @@ pub fn placement() -> impl Strategy<Value = Placement> {
     let components = (prop::option::of(point()), rotation, scale).prop_map(|(t, r, s)| (t, r, s, None));
     let row = || [coordinate(), coordinate(), coordinate(), coordinate()];
     let matrix = [row(), row(), row()].prop_map(|rows| (None, None, None, Some(rows.to_vec())));
-    prop_oneof![5 => components, 1 => matrix]
+    prop_oneof![5 => components, 1 => matrix].boxed()
 }
 
-pub fn normals() -> impl Strategy<Value = Option<Normals>> {
-    select(vec![None, Some(Normals::Smooth), Some(Normals::Flat)])
+pub fn normals() -> BoxedStrategy<Option<Normals>> {
+    select(vec![None, Some(Normals::Smooth), Some(Normals::Flat)]).boxed()
 }
 
-pub fn up() -> impl Strategy<Value = Up> {
-    select(vec![Up::Z, Up::Y, Up::X])
+pub fn up() -> BoxedStrategy<Up> {
+    select(vec![Up::Z, Up::Y, Up::X]).boxed()
 }
 
 /// Generates materials of mesh groups.
-pub fn group_materials() -> impl Strategy<Value = BTreeMap<String, String>> {
-    prop::option::of(select(&["a", "b", "c"][..])).prop_map(|material| {
-        let group_material = material.map(|material| ("second".to_string(), material.to_string()));
-        group_material.into_iter().collect()
-    })
+pub fn group_materials() -> BoxedStrategy<BTreeMap<String, String>> {
+    prop::option::of(select(&["a", "b", "c"][..]))
+        .prop_map(|material| {
+            let group_material = material.map(|material| ("second".to_string(), material.to_string()));
+            group_material.into_iter().collect()
+        })
+        .boxed()
 }
 
-pub fn mesh() -> impl Strategy<Value = ShapeDescription> {
+pub fn mesh() -> BoxedStrategy<ShapeDescription> {
     let material = select(&["a", "b", "c"][..]).prop_map(str::to_string);
     let file = select(MESHES).prop_map(|(name, ..)| name.to_string());
-    (file, normals(), up(), material, group_materials(), placement()).prop_map(
-        |(file, normals, up, material, materials, (translate, rotate, scale, matrix))| {
-            ShapeDescription::Mesh(MeshDescription {
-                file,
-                normals,
-                up,
+    (file, normals(), up(), material, group_materials(), placement())
+        .prop_map(
+            |(file, normals, up, material, materials, (translate, rotate, scale, matrix))| {
+                ShapeDescription::Mesh(MeshDescription {
+                    file,
+                    normals,
+                    up,
+                    material: Some(material),
+                    materials,
+                    translate,
+                    rotate,
+                    scale,
+                    matrix,
+                })
+            },
+        )
+        .boxed()
+}
+
+pub fn instance() -> BoxedStrategy<InstanceDescription> {
+    let name = || select(&["a", "b", "c"][..]).prop_map(str::to_string);
+    (name(), name(), group_materials(), placement())
+        .prop_map(
+            |(mesh, material, materials, (translate, rotate, scale, matrix))| InstanceDescription {
+                mesh,
                 material: Some(material),
                 materials,
                 translate,
                 rotate,
                 scale,
                 matrix,
-            })
-        },
-    )
-}
-
-pub fn instance() -> impl Strategy<Value = InstanceDescription> {
-    let name = || select(&["a", "b", "c"][..]).prop_map(str::to_string);
-    (name(), name(), group_materials(), placement()).prop_map(
-        |(mesh, material, materials, (translate, rotate, scale, matrix))| InstanceDescription {
-            mesh,
-            material: Some(material),
-            materials,
-            translate,
-            rotate,
-            scale,
-            matrix,
-        },
-    )
+            },
+        )
+        .boxed()
 }
 
 /// Generates mesh files and instances, often none.
-pub fn meshes() -> impl Strategy<Value = (BTreeMap<String, MeshFileDescription>, Vec<InstanceDescription>)> {
+pub fn meshes() -> BoxedStrategy<(BTreeMap<String, MeshFileDescription>, Vec<InstanceDescription>)> {
     let file = || {
         (select(MESHES), normals(), up()).prop_map(|((name, ..), normals, up)| {
             let mut mesh = MeshFileDescription::new(name.to_string());
@@ -178,13 +185,70 @@ pub fn meshes() -> impl Strategy<Value = (BTreeMap<String, MeshFileDescription>,
         names.into_iter().zip(files).collect()
     });
     let with_instances = (files, prop::collection::vec(instance(), 1..5));
-    prop_oneof![3 => Just(Default::default()), 1 => with_instances]
+    prop_oneof![3 => Just(Default::default()), 1 => with_instances].boxed()
 }
 
 /// Generates a few shapes, or enough for a BVH. Meshes are rare, because kernels with mesh traversal take seconds to
 /// compile.
-pub fn shapes() -> impl Strategy<Value = Vec<ShapeDescription>> {
+pub fn shapes() -> BoxedStrategy<Vec<ShapeDescription>> {
     let shape = || prop_oneof![9 => shape(), 1 => mesh()];
     let many = MAX_LINEAR_PRIMITIVES + 1..MAX_LINEAR_PRIMITIVES + 20;
-    prop_oneof![11 => prop::collection::vec(shape(), 0..7), 1 => prop::collection::vec(shape(), many)]
+    prop_oneof![11 => prop::collection::vec(shape(), 0..7), 1 => prop::collection::vec(shape(), many)].boxed()
+}
+
+/// Scales a shape about the origin, then translates it by `offset`.
+pub fn scale_and_translate_shape(shape: &mut ShapeDescription, scale: f64, offset: DVec3) {
+    let move_point = |p: &mut DVec3| *p = *p * scale + offset;
+    match shape {
+        ShapeDescription::Rectangle(s) => {
+            move_point(&mut s.center);
+            s.size = s.size.map(|side| side * scale);
+        }
+        ShapeDescription::Sphere(s) => {
+            move_point(&mut s.center);
+            s.radius *= scale;
+        }
+        ShapeDescription::Disk(s) => {
+            move_point(&mut s.center);
+            s.radius *= scale;
+        }
+        ShapeDescription::Ellipsoid(s) => {
+            move_point(&mut s.center);
+            [&mut s.a, &mut s.b, &mut s.c]
+                .into_iter()
+                .for_each(|axis| *axis *= scale);
+        }
+        ShapeDescription::Cylinder(s) => {
+            [&mut s.start, &mut s.end].into_iter().for_each(move_point);
+            s.radius *= scale;
+        }
+        ShapeDescription::Triangle(s) => s.vertices.iter_mut().for_each(move_point),
+        ShapeDescription::Tetrahedron(s) => s.vertices.iter_mut().for_each(move_point),
+        ShapeDescription::Plane(s) => move_point(&mut s.point),
+        ShapeDescription::Mesh(s) => move_placement(&mut s.translate, &mut s.scale, &mut s.matrix, scale, offset),
+        other => panic!("no random scene has the shape {other:?}"),
+    }
+}
+
+/// Scales and translates a mesh or an instance.
+pub fn move_placement(
+    translate: &mut Option<DVec3>,
+    factors: &mut Option<Scale>,
+    matrix: &mut Option<Vec<[f64; 4]>>,
+    scale: f64,
+    offset: DVec3,
+) {
+    if let Some(rows) = matrix {
+        for (row, offset) in rows.iter_mut().zip(offset.to_array()) {
+            *row = row.map(|x| x * scale);
+            row[3] += offset;
+        }
+        return;
+    }
+    *translate = Some(translate.unwrap_or_default() * scale + offset);
+    *factors = Some(match factors {
+        None => Scale::All(scale),
+        Some(Scale::All(s)) => Scale::All(*s * scale),
+        Some(Scale::Each(s)) => Scale::Each(*s * scale),
+    });
 }

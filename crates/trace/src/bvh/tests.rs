@@ -108,7 +108,7 @@ fn few_items_give_valid_bvhs() {
 
 #[test]
 fn many_items_give_valid_shallow_bvhs() {
-    let boxes = random_boxes(100_000);
+    let boxes = random_boxes(cases(100_000));
     assert!(check_builds(&boxes) <= 9);
 }
 
@@ -133,7 +133,10 @@ fn invalid_bvhs_are_detected() {
 
 #[test]
 fn the_bvh_does_not_depend_on_the_number_of_threads() {
-    for boxes in [random_boxes(200_000), vec![box_around(Vec3::ONE, Vec3::ONE); 100_000]] {
+    for boxes in [
+        random_boxes(cases(200_000)),
+        vec![box_around(Vec3::ONE, Vec3::ONE); cases(100_000)],
+    ] {
         let [one, two, five] = [1, 2, 5].map(|threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             let tree = pool.install(|| build(&boxes, 4));

@@ -99,7 +99,7 @@ records! {
         pub determinant: f32,
         /// Solids: object-space vector from the anchor to the center. Else 0.
         pub middle: Vec3,
-        /// Solids: constant term of the implicit equation, `|middle|² - 1`; cylinders ignore z of `middle`.
+        /// Solids: constant term of the implicit equation, such as `|middle|² - 1`.
         pub level: f32,
     }
 
