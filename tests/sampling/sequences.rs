@@ -201,22 +201,24 @@ fn star_discrepancy(points: &[Vec2]) -> f64 {
         coordinates
     };
     let ys = coordinates(points.iter().map(|p| p.y).collect());
+    // Numbers of points by y, among those with x < a and with x <= a.
+    let (mut open, mut closed) = (vec![0.0; ys.len()], vec![0.0; ys.len()]);
+    let count_while = |counts: &mut [f64], first: &mut usize, keep: &dyn Fn(f64) -> bool| {
+        while let Some(p) = by_x.get(*first).filter(|p| keep(f64::from(p.x))) {
+            counts[ys.partition_point(|y| *y < f64::from(p.y))] += 1.0;
+            *first += 1;
+        }
+    };
+    let (mut first_open, mut first_closed) = (0, 0);
     let mut max_deviation = 0.0f64;
     for a in coordinates(points.iter().map(|p| p.x).collect()) {
-        let sorted_ys_where = |keep: &dyn Fn(f64) -> bool| {
-            let mut selected_ys: Vec<f64> = by_x
-                .iter()
-                .filter(|p| keep(f64::from(p.x)))
-                .map(|p| f64::from(p.y))
-                .collect();
-            selected_ys.sort_by(f64::total_cmp);
-            selected_ys
-        };
-        let (open, closed) = (sorted_ys_where(&|x| x < a), sorted_ys_where(&|x| x <= a));
-        for &b in &ys {
-            let below = open.partition_point(|y| *y < b) as f64 / n;
-            let covered = closed.partition_point(|y| *y <= b) as f64 / n;
-            max_deviation = max_deviation.max(a * b - below).max(covered - a * b);
+        count_while(&mut open, &mut first_open, &|x| x < a);
+        count_while(&mut closed, &mut first_closed, &|x| x <= a);
+        let (mut below, mut covered) = (0.0, 0.0);
+        for (j, b) in ys.iter().enumerate() {
+            covered += closed[j];
+            max_deviation = max_deviation.max(a * b - below / n).max(covered / n - a * b);
+            below += open[j];
         }
     }
     max_deviation

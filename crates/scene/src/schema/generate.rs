@@ -12,7 +12,7 @@ use crate::{CameraDescription, Description};
 const FILE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/src/schema/scene.json");
 
 /// Returns the schema of the types, with titles that contain the kinds of values.
-fn generated() -> Value {
+pub(super) fn generated() -> Value {
     // Subschemas are inlined, because editors ignore descriptions next to a reference.
     let settings = SchemaSettings::draft2020_12().with(|settings| settings.inline_subschemas = true);
     let mut schema = settings

@@ -5,8 +5,8 @@ use std::path::Path;
 
 use serde_json::{Value as Json, json};
 
-use super::generate::to_toml;
-use super::{TITLE_SEPARATOR, file_schema};
+use super::TITLE_SEPARATOR;
+use super::generate::{generated, to_toml};
 
 const PAGE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/scene-format.md");
 
@@ -308,7 +308,7 @@ fn with_tables(page: &str, root: &Json) -> String {
 fn the_page_has_the_tables_of_the_schema() {
     let path = Path::new(PAGE);
     let found = fs::read_to_string(path).unwrap();
-    let expected = with_tables(&found, &file_schema());
+    let expected = with_tables(&found, &generated());
     if std::env::var_os("WGRAY_TEST_RECORD").is_some_and(|value| value == "1") {
         return fs::write(path, expected).unwrap();
     }
@@ -325,7 +325,7 @@ fn the_page_has_the_tables_of_the_schema() {
 #[test]
 fn every_table_of_the_schema_has_a_marker() {
     let page = fs::read_to_string(PAGE).unwrap();
-    let root = file_schema();
+    let root = generated();
     let types = root["$defs"].as_object().unwrap().keys().map(String::as_str);
     // A type whose rows are all in the shared table has no table.
     let types = types.filter(|name| !key_rows(&root, name).is_empty());
@@ -341,7 +341,7 @@ fn every_table_of_the_schema_has_a_marker() {
 
 #[test]
 fn a_changed_schema_changes_the_table() {
-    let mut root = file_schema();
+    let mut root = generated();
     let page = "<!--keys:image-->\n<!--end-->\n";
     let row = "| `width` | pixels, 1 to 65536 | required | Width |\n";
     assert!(!with_tables(page, &root).contains(row));
