@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 
 use super::{TITLE_SEPARATOR, definition, file_schema};
 use crate::description::tagged::Tagged as _;
-use crate::{CameraDescription, Description};
+use crate::{CameraDescription, Description, ViewTransform};
 
 const FILE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/src/schema/scene.json");
 
@@ -205,4 +205,10 @@ fn the_file_has_the_schema_of_the_types() {
         return fs::write(FILE, format!("{expected:#}\n")).unwrap();
     }
     assert!(file_schema() == expected, "WGRAY_TEST_RECORD=1 writes {FILE}");
+}
+
+#[test]
+fn the_schema_has_all_view_transforms() {
+    let names = &generated()["properties"]["image"]["properties"]["view_transform"]["enum"];
+    assert_eq!(*names, json!(ViewTransform::ALL.map(ViewTransform::name)));
 }
